@@ -36,10 +36,9 @@ DOORS = {
     "petsc4py": {"fem/petsc.py"},
     "(computed)": {"study/cli/__init__.py"},
     "h5py": {
-        "study/result/grow.py",
         "study/result/skeleton.py",
         "study/result/write.py",
-        "study/result/guarded.py",
+        "study/result/hdf5.py",
         "study/accuracy/cost_study.py",
     },
     "pyvista": PICTURES | {"study/patch/vtk_faces.py"},

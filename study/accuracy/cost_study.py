@@ -28,7 +28,7 @@ from softjaw.study.accuracy.parameters import (
 )
 from softjaw.study.messages import OTHER_FILE, StudyError, beside
 from softjaw.study.result import provenance
-from softjaw.study.result.guarded import GuardedFile, opened
+from softjaw.study.result.hdf5 import StoredFile, opened
 from softjaw.study.scene import Scene
 
 FloatArray = NDArray[np.float64]
@@ -270,17 +270,17 @@ def save(path: Path, study: CostStudy) -> None:
 def load(path: Path) -> CostStudy:
     """Read a study; raise `StudyError` if the file is none."""
 
-    def make(file: GuardedFile) -> CostStudy:
+    def make(file: StoredFile) -> CostStudy:
         try:
             return _read(path, file)
         finally:
             file.close()
 
     # Nothing to walk through: reading the study has read all of the file.
-    return opened(path, "cost study", make, lambda study: None)
+    return opened(path, "cost study", make)
 
 
-def _read(path: Path, file: GuardedFile) -> CostStudy:
+def _read(path: Path, file: StoredFile) -> CostStudy:
     found = file.attributes()
     if (found.get("kind"), found.get("version")) != (KIND, str(VERSION)):
         raise StudyError(OTHER_FILE, f"{path}: not a cost study of this version; choose another file with -o")
@@ -305,7 +305,7 @@ def _read(path: Path, file: GuardedFile) -> CostStudy:
     return study
 
 
-def _column(file: GuardedFile, path: str, texts: bool) -> Any:
+def _column(file: StoredFile, path: str, texts: bool) -> Any:
     """Texts, or numbers ``(rows,)``."""
     if texts:
         return file.texts(path)

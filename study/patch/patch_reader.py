@@ -75,8 +75,8 @@ def read_patch(file: str, reading: Reading) -> ReadPatch:
     if ending == ".csv":
         return checked(_read_table(path, reading), reading.flip_normals)
     # slow to import (VTK, HDF5), and not needed for tables
+    from softjaw.study.patch.trial import trouble
     from softjaw.study.patch.vtk_faces import read_vtk
-    from softjaw.study.result.guarded import trouble
 
     if why := trouble(lambda: read_vtk(path, reading)):  # VTK may not survive the file
         raise StudyError(OTHER_FILE, f"{path}: damaged ({why}); write it again")

@@ -1,9 +1,9 @@
 """Checksums (CRC-32) of a result file: what each covers, how it is made, and what does not match.
 
 HDF5 has checksums of its own (fletcher32), but ranks cannot write to such datasets independently of each other ("Can't
-perform independent write with filters in pipeline"). So the rows carry these, and readers compare them before they
-believe a value. One covers one *part* of a row (its maps, its fingers, its patch, ...): who wants little reads little.
-A state has one of its own: a case whose state was lost is not taken for one that was never solved.
+perform independent write with filters in pipeline"). So every row has one checksum for each dataset that it has a value
+in, and readers compare it before they believe a value. The last one of a row is that of its state: a case whose state
+was lost is not taken for one that was never solved.
 """
 
 from __future__ import annotations
@@ -13,14 +13,17 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from softjaw.study.quantities import MISSING, STATES
-from softjaw.study.result.datasets import CLOSING, STATE, SUMS, Column
-from softjaw.study.result.guarded import GuardedFile
+from softjaw.study.result.datasets import CLOSING_SUMS, SUMS, Column
+from softjaw.study.result.hdf5 import StoredFile
 from softjaw.study.result.layout import ROOT, Layout
 
-BLOCK = 2**24  # bytes of rows that are put side by side at a time
+NARROW_BYTES = 64  # up to this width, rows are summed side by side
 OF_STATE = {state: zlib.crc32(bytes([state])) for state in range(len(STATES))}
+# What a byte does to a running CRC-32, by the byte and the last eight bits of the sum.
+STEP = ~np.array([zlib.crc32(bytes([i ^ 0xFF])) for i in range(256)], np.uint32) ^ np.uint32(0x00FFFFFF)
 ABOUT = {"axes": ("units", "long_name", "scene_key"), "scene": ("digest", "file", "overrides", "petsc_options")}
 PLACED = ("object_rotation", "object_origin")
 
@@ -30,46 +33,55 @@ def of_array(values: Any) -> int:
     return zlib.crc32(np.ascontiguousarray(values).tobytes())
 
 
-def of_parts(layout: Layout, row: int, values: Sequence[Any]) -> dict[str, int]:
-    """Checksum of every part of a row; ``values`` as from ``study.result.write.record``."""
-    places = layout.places(row)
+def of_lines(lines: NDArray[np.uint8]) -> NDArray[np.uint32]:
+    """Checksum of every line of bytes ``(n, k)``.
 
-    def data(i: int) -> bytes:
-        return b"" if places[i] is None else np.asarray(values[i], layout.columns[i].dtype).tobytes()
-
-    return {part: zlib.crc32(b"".join(map(data, columns))) for part, columns in layout.parts.items()}
-
-
-def sums_of(file: GuardedFile, layout: Layout, part: str, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Those of the ``rows`` that have a part, and the checksums of the values that stand there."""
-    columns = [layout.columns[i] for i in layout.parts[part]]
-    # Some parts are stored for few candidates only: other rows have nothing to compare.
-    if columns[0].among:
-        rows = rows[_lines(layout, columns[0], rows) >= 0]
-    if not rows.size:
-        return rows, np.empty(0, np.uint32)
-    views = [(_bytes(file, layout, c), c) for c in columns]
-    # In blocks, because all rows of a wide part side by side may not fit into memory.
-    step = max(BLOCK // max(sum(view.shape[1] for view, _ in views), 1), 1)
-    found: list[int] = []
-    for some in (rows[start : start + step] for start in range(0, len(rows), step)):
-        block = np.concatenate([view[_lines(layout, c, some)] for view, c in views], axis=1)
-        found += [zlib.crc32(line) for line in block]
-    return rows, np.array(found, np.uint32)
+    >>> of_lines(np.frombuffer(b"123456789", np.uint8)[None]) == zlib.crc32(b"123456789")
+    array([ True])
+    """
+    if lines.shape[1] > NARROW_BYTES:
+        return np.array([zlib.crc32(line) for line in lines], np.uint32)
+    crc = np.full(len(lines), 0xFFFFFFFF, np.uint32)
+    for byte in lines.T:
+        crc = STEP[(crc ^ byte) & 0xFF] ^ (crc >> 8)
+    return ~crc
 
 
-def broken_rows(file: GuardedFile, layout: Layout, part: str, rows: np.ndarray) -> np.ndarray:
-    """Those of the ``rows`` whose values of a part do not match their checksum."""
-    rows, found = sums_of(file, layout, part, rows)
-    return rows[found != _sums(file, layout, part)[rows]]
+def of_row(layout: Layout, values: Sequence[Any], state: int) -> NDArray[np.uint32]:
+    """Checksums of a row and of its state; ``values`` as from `study.result.write.record`."""
+    columns = zip(layout.columns, values, strict=True)
+    return np.array([*(of_array(np.asarray(v, c.dtype)) for c, v in columns), OF_STATE[state]], "<u4")
 
 
-def broken_states(file: GuardedFile, layout: Layout, codes: np.ndarray, under_way: bool) -> np.ndarray:
+def of_column(layout: Layout, column: Column, values: NDArray[Any], rows: NDArray[Any]) -> tuple[Any, Any]:
+    """Those of the ``rows`` that have a place in a column's dataset ``values``, and their checksums."""
+    lines = layout.lines(column, rows)
+    rows, lines = rows[lines >= 0], lines[lines >= 0]
+    if not values.size:
+        return rows, np.zeros(len(rows), np.uint32)
+    size = int(np.prod(column.shape, dtype=int)) * column.dtype.itemsize
+    return rows, of_lines(np.ascontiguousarray(values).reshape(-1).view(np.uint8).reshape(-1, size)[lines])
+
+
+def broken_rows(file: StoredFile, layout: Layout, column: Column, values: Any, rows: NDArray[Any]) -> NDArray[Any]:
+    """Those of the ``rows`` whose values in a column's dataset do not match their checksum."""
+    rows, sums = of_column(layout, column, values, rows)
+    return rows[sums != stored_sums(file, layout, column.path)[rows]]
+
+
+def stored_sums(file: StoredFile, layout: Layout, path: str) -> NDArray[np.uint32]:
+    """Checksums of all rows for the dataset at a path, or of the states."""
+    dataset = file.checked(SUMS, (*layout.shape, len(layout.summed)), np.dtype("<u4"))
+    sums: NDArray[np.uint32] = file.values(dataset, (..., layout.summed.index(path)))
+    return sums.ravel()
+
+
+def broken_states(file: StoredFile, layout: Layout, codes: np.ndarray, under_way: bool) -> np.ndarray:
     """Rows whose state is not the one that was stored.
 
     Where a run is ``under_way``, or was killed, a row may be stored and not yet marked; nowhere else.
     """
-    stored = _sums(file, layout, STATE)
+    stored = stored_sums(file, layout, layout.summed[-1])
     # A damaged state may be any byte: those that mean nothing get 0 and count as wrong.
     wrong = np.array([OF_STATE.get(state, 0) for state in range(256)], np.uint32)[codes] != stored
     if under_way and wrong.any():
@@ -85,17 +97,17 @@ def of_session(session: np.void) -> int:
     return zlib.crc32(b"".join(session[name].tobytes() for name in session.dtype.names or () if name != "crc"))
 
 
-def of_header(file: GuardedFile, layout: Layout) -> int:
+def of_header(file: StoredFile, layout: Layout) -> int:
     """Checksum of what is written once, when the file is made: axes, options, scene, definitions, labels."""
     axes = [f"axes/{name}" for name in layout.names]
     study = file.attributes(ROOT)
     # Lists of texts: the repr of an array is shortened and depends on the version of numpy.
     parts = [study.get("options"), study.get("title"), [str(name) for name in study.get("axes", ())]]
     for name in ("scene", *axes):
-        found = file.attributes(f"{ROOT}/{name}")
-        parts.append([found.get(key) for key in ABOUT[name.partition("/")[0]]])
-        parts += [np.asarray(found[key]).tolist() for key in PLACED if key in found]
-        parts += [[str(text) for text in found["options"]]] if "options" in found else []
+        attributes = file.attributes(f"{ROOT}/{name}")
+        parts.append([attributes.get(key) for key in ABOUT[name.partition("/")[0]]])
+        parts += [np.asarray(attributes[key]).tolist() for key in PLACED if key in attributes]
+        parts += [[str(text) for text in attributes["options"]]] if "options" in attributes else []
     crc = zlib.crc32(repr(parts).encode())
     arrays = ["scene", "definitions", "candidates/label", *axes]
     arrays += ["wrenches/motion", "wrenches/candidate"] * bool(layout.sampled)
@@ -104,34 +116,7 @@ def of_header(file: GuardedFile, layout: Layout) -> int:
     return crc
 
 
-def closing_sum(file: GuardedFile, layout: Layout, name: str) -> int:
+def closing_sum(file: StoredFile, layout: Layout, name: str) -> int:
     """The stored checksum of something that is filled after all rows, by its name in ``layout.closing``."""
-    found = file.checked(f"{SUMS}/{CLOSING}", (len(layout.closing),), np.dtype("<u4"))
-    return int(file.values(found)[layout.closing.index(name)])
-
-
-def _sums(file: GuardedFile, layout: Layout, part: str) -> np.ndarray:
-    return file.values(file.checked(f"{SUMS}/{part}", layout.shape, np.dtype("<u4"))).ravel()
-
-
-def _bytes(file: GuardedFile, layout: Layout, column: Column) -> np.ndarray:
-    """A column's dataset as bytes, one line for every row that has a value in it."""
-    found = layout.dataset(column.path)
-    values = np.ascontiguousarray(file.values(file.checked(found.path, found.shape, found.dtype)))
-    size = int(np.prod(column.shape, dtype=int)) * column.dtype.itemsize
-    return values.reshape(-1).view(np.uint8).reshape(-1, size) if size else np.empty((layout.rows, 0), np.uint8)
-
-
-def _lines(layout: Layout, column: Column, rows: np.ndarray) -> np.ndarray:
-    """Lines of `_bytes` in which rows stand; -1 where they have none."""
-    if not column.among:
-        return rows
-    index = np.unravel_index(rows, layout.shape)
-    chosen = layout.chosen[column.among]
-    slots = np.full(int(np.prod(layout.shape[-3:-1])), -1)
-    slots[list(chosen)] = np.arange(len(chosen))
-    slot = slots[index[-3] * layout.shape[-2] + index[-2]]
-    lead = (*layout.shape[:-3], len(chosen), layout.shape[-1])
-    # -1 cannot be ravelled; such rows are marked again below.
-    lines = np.ravel_multi_index((*index[:-3], np.maximum(slot, 0), index[-1]), lead)
-    return np.where(slot < 0, -1, lines)
+    dataset = file.checked(CLOSING_SUMS, (len(layout.closing),), np.dtype("<u4"))
+    return int(file.values(dataset)[layout.closing.index(name)])

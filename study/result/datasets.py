@@ -9,14 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from softjaw.study.quantities import BY_KEY, FIRST, MISSING, MODELS, Quantity, map_row
+from softjaw.study.quantities import BY_KEY, MISSING, MODELS, Quantity
 
 MESSAGE = 2000  # bytes of a message: all flags of a case have room
 ROOT = "/study"
-SUMS = f"{ROOT}/checksums"  # a dataset for each part of a row, and these two:
-STATE, CLOSING = "code", "closing"  # of the states; of what is filled after all rows
-APART = ("cor_wrench",)  # columns so large that they are a part of a row by themselves
-TIMES = "times"  # a part that differs from run to run
+CODE = f"{ROOT}/status/code"
+SUMS, CLOSING_SUMS = f"{ROOT}/checksums/rows", f"{ROOT}/checksums/closing"  # of rows; of what is filled after all rows
 
 
 @dataclass(frozen=True)
@@ -38,30 +36,20 @@ class Dataset:
 
 @dataclass(frozen=True)
 class Column:
-    """One case's share of a dataset.
-
-    ``flat`` ones stand in the order of the rows, those ``among`` some candidates are stored for these only.
-    """
+    """One case's share of a dataset; those ``among`` some candidates are stored for these only."""
 
     key: str
     path: str
     shape: tuple[int, ...]
     dtype: np.dtype
     fill: Any
-    flat: bool = False
     among: str = ""
-
-    @property
-    def part(self) -> str:
-        """The part of the row whose checksum covers it."""
-        group, _, name = self.key.partition("/")
-        return TIMES if name.startswith("seconds_") else name if name in APART else group
 
 
 def columns_of(layout: Any) -> Iterator[Column]:
-    """All columns of a row of a layout."""
-    for q in layout.quantities:
-        shape = tuple(layout.counters[dim] for dim in q.dims)
+    """All columns that a row has in a new file."""
+    for q in layout.asked:
+        shape = tuple(layout.lengths[dim] for dim in q.dims)
         # Integers have no NaN: codes use -1 for none.
         dtype, fill = ("i1", -1) if q.meanings else ("<f8", np.nan)
         if q.group == "maps" and q.by_model:
@@ -70,7 +58,7 @@ def columns_of(layout: Any) -> Iterator[Column]:
         elif q.group == "maps":
             yield Column(q.key, f"{ROOT}/{q.name}/{q.name}", shape, np.dtype(dtype), fill)
         elif q.group != "status":
-            yield Column(q.key, f"{ROOT}/{q.key}", shape, np.dtype(dtype), fill, q.group == "patch", q.among)
+            yield Column(q.key, f"{ROOT}/{q.key}", shape, np.dtype(dtype), fill, q.among)
     # The message stays last: `blank` and `record` address it as the last column.
     yield Column("status/message", f"{ROOT}/status/message", (), np.dtype(f"S{MESSAGE}"), b"")
 
@@ -79,22 +67,16 @@ def datasets_of(layout: Any) -> Iterator[Dataset]:
     """All datasets of a layout but axes, texts and sessions."""
     for c in layout.columns:
         q = BY_KEY.get(c.key) or BY_KEY[c.key.rpartition("/")[0]]
-        lead, scales = ((layout.rows,), ("row",)) if c.flat else (layout.shape, layout.names)
+        lead, scales = layout.shape, layout.names
         if c.among:
             lead = (*lead[:-3], len(layout.chosen[c.among]), lead[-1])
             scales = (*scales[:-3], c.among, scales[-1])
-        yield Dataset(c.path, lead + c.shape, c.dtype, c.fill, _describe(q, c.key), scales + q.dims * bool(c.shape))
+        yield Dataset(c.path, lead + c.shape, c.dtype, c.fill, described(q, c.key), scales + q.dims * bool(c.shape))
     for name in ("code", "attempts"):
-        about = _describe(BY_KEY[f"status/{name}"], f"status/{name}")
+        about = described(BY_KEY[f"status/{name}"], f"status/{name}")
         # The fill value means not computed, so a new file needs no state written.
         yield Dataset(f"{ROOT}/status/{name}", layout.shape, np.dtype("u1"), MISSING, about, layout.names)
     yield from _checksums(layout)
-    for name in FIRST:
-        q, order = map_row(name), layout.seen
-        shape, scales = (tuple(given[i] for i in order) for given in (layout.shape, layout.names))
-        shown = {"interpretation": ("spectrum", "image")[len(layout.shown) - 1]}
-        attributes = _describe(q, f"{q.key}/{MODELS[0]}") | shown
-        yield Dataset(f"{ROOT}/map/{name}", shape, np.dtype("<f8"), np.nan, attributes, scales)
     if layout.sampled:
         yield from _sample_datasets(layout)
     lengths = dict(zip(layout.names, layout.shape, strict=True))
@@ -107,16 +89,14 @@ def datasets_of(layout: Any) -> Iterator[Dataset]:
 
 
 def _checksums(layout: Any) -> Iterator[Dataset]:
-    """Checksums of the parts of every row, of its state, and of what is filled after all rows."""
+    """Checksums of every row for each dataset and of its state, and of what is filled after all rows."""
     u4 = np.dtype("<u4")
-    for part in layout.parts:
-        about = {"long_name": f"crc32 of the case's {part}", "units": ""}
-        yield Dataset(f"{SUMS}/{part}", layout.shape, u4, 0, about, layout.names)
-    about = {"long_name": "crc32 of the state of the case", "units": ""}
+    text = "crc32 of the case in each dataset, in the order of the columns in the options, and of its state"
+    shape, scales = (*layout.shape, len(layout.summed)), (*layout.names, "column")
     # Filled with the sum of "not computed": a lost state then differs from a case that was never solved.
-    yield Dataset(f"{SUMS}/{STATE}", layout.shape, u4, zlib.crc32(bytes([MISSING])), about, layout.names)
+    yield Dataset(SUMS, shape, u4, zlib.crc32(bytes([MISSING])), {"long_name": text, "units": ""}, scales)
     about = {"long_name": f"crc32 of {', '.join(layout.closing)}", "units": ""}
-    yield Dataset(f"{SUMS}/{CLOSING}", (len(layout.closing),), u4, 0, about, (CLOSING,))
+    yield Dataset(CLOSING_SUMS, (len(layout.closing),), u4, 0, about, ("closing",))
 
 
 def _sample_datasets(layout: Any) -> Iterator[Dataset]:
@@ -135,7 +115,8 @@ def _numbers(path: str, what: str, count: int, scale: str) -> Dataset:
     return Dataset(path, (count,), np.dtype("<i4"), 0, about, (scale,))
 
 
-def _describe(q: Quantity, key: str) -> dict[str, str]:
+def described(q: Quantity, key: str) -> dict[str, str]:
+    """Attributes of the dataset of a quantity, or of one of its models."""
     model = key.rpartition("/")[2] if key != q.key else ""
     label = f"{q.label}, {model}" if model else q.label
     long_name = f"{label} [{q.unit}]" if q.unit else label

@@ -13,6 +13,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from softjaw.study.quantities import (
     ALONG,
@@ -29,10 +30,10 @@ from softjaw.study.quantities import (
 from softjaw.study.quantities import DONE as DONE
 from softjaw.study.quantities import FAILED as FAILED
 from softjaw.study.quantities import MISSING as MISSING
-from softjaw.study.result.datasets import CLOSING, Column, Dataset, columns_of, datasets_of
+from softjaw.study.result.datasets import CODE, Column, Dataset, columns_of, datasets_of
 from softjaw.study.result.datasets import ROOT as ROOT
 
-PROGRAM, VERSION = "softjaw", 7
+PROGRAM, VERSION = "softjaw", 8
 LABEL, SESSIONS, REPORT = 80, 256, 8192
 # Fixed lengths: a run writes to space that is there already, and text of any length would need more.
 SESSION = np.dtype(
@@ -78,7 +79,8 @@ class Layout:
 
     ``has`` names what of `NEEDS` the scene asks for besides two meshes; the wrenches of ``samples`` motions are stored
     for the candidates ``sampled``, counted over stations and angles. ``added`` is what each round of a refinement added
-    to the scene: stations [mm], or poses as `study.run.pattern.Place`.
+    to the scene: stations [mm], or poses as `study.run.pattern.Place`. ``stored`` are the paths of the columns in an
+    existing file, which may be others than those of this version; empty for a new one.
     """
 
     axes: tuple[Any, ...]
@@ -92,12 +94,12 @@ class Layout:
     samples: int = 0
     sampled: tuple[int, ...] = ()
     added: tuple[tuple[Any, ...], ...] = ()
+    stored: tuple[str, ...] = ()
 
     @cached_property
-    def parts(self) -> dict[str, tuple[int, ...]]:
-        """Parts of a row that have a checksum, and the positions of their columns."""
-        names = dict.fromkeys(column.part for column in self.columns)
-        return {name: tuple(i for i, c in enumerate(self.columns) if c.part == name) for name in names}
+    def summed(self) -> tuple[str, ...]:
+        """Paths of the datasets that a row has a checksum for, the state last."""
+        return (*(self.stored or (c.path for c in self.columns)), CODE)
 
     @property
     def closing(self) -> tuple[str, ...]:
@@ -111,7 +113,13 @@ class Layout:
 
     @cached_property
     def quantities(self) -> tuple[Quantity, ...]:
-        """All quantities of the cases of this file."""
+        """All quantities of the cases of this file that this version knows."""
+        keys = {key for c in self.columns for key in (c.key, c.key.rpartition("/")[0])}
+        return tuple(q for q in self.asked if q.key in keys or q.group == "status")
+
+    @cached_property
+    def asked(self) -> tuple[Quantity, ...]:
+        """All quantities that this version stores for such a scene."""
         held = zip(HELD, (self.cor_grid, self.sampled, self.patches), strict=True)
         return quantities((*self.has, *[NEEDS[0]] * (self.meshes > 1), *(name for name, size in held if size)))
 
@@ -137,14 +145,13 @@ class Layout:
         return tuple([i for i in order if self.shape[i] > 1][:2]) or (len(self.shape) - 1,)
 
     @property
-    def seen(self) -> tuple[int, ...]:
-        """Order of the axes in ``/study/map``: many viewers show the last two and let the others be chosen."""
-        others = [i for i in reversed(range(len(self.shape))) if i not in self.shown]
-        return (*others, *reversed(self.shown))
-
-    @property
     def counters(self) -> dict[str, int]:
         """The other dimensions and their lengths: each is a dimension scale 0, 1, 2, ..."""
+        return {**self.lengths, "column": len(self.summed), "closing": len(self.closing)}
+
+    @cached_property
+    def lengths(self) -> dict[str, int]:
+        """Dimensions of the quantities besides the axes, and their lengths."""
         parts = {"finger": FINGERS, "model": len(MODELS), "component": 3, "monomial": len(MONOMIALS)}
         parts |= {"session": SESSIONS, "component_2": 3}
         parts |= {"wrench": 6, "wrench_2": 6} if "six components" in self.has else {}
@@ -154,13 +161,13 @@ class Layout:
             parts["wall_place"] = AROUND * ALONG
         if self.sampled:
             parts |= {"sampled": len(self.sampled), "sample": self.samples}
-        parts[CLOSING] = len(self.closing)
-        return {**parts, **({"row": self.rows, "face": self.faces} if self.patches else {})}
+        return {**parts, **({"face": self.faces} if self.patches else {})}
 
     @cached_property
     def columns(self) -> tuple[Column, ...]:
-        """All columns of a row, in the order of the checksums."""
-        return tuple(columns_of(self))
+        """All columns of a row that this version knows."""
+        known = {c.path: c for c in columns_of(self)}
+        return tuple(known[path] for path in self.stored or known if path in known)
 
     @cached_property
     def datasets(self) -> tuple[Dataset, ...]:
@@ -196,7 +203,20 @@ class Layout:
         number = index[-3] * self.shape[-2] + index[-2]
         slots = {name: own.get(number) for name, own in self._slots.items()}
         among = {name: None if slot is None else (*index[:-3], slot, index[-1]) for name, slot in slots.items()}
-        return [(row,) if c.flat else among[c.among] if c.among else index for c in self.columns]
+        return [among[c.among] if c.among else index for c in self.columns]
+
+    def lines(self, column: Column, rows: NDArray[Any]) -> NDArray[Any]:
+        """Where rows stand in a column's dataset, counted over the axes of the rows in it; -1 where they have none."""
+        if not column.among:
+            return rows
+        index = np.unravel_index(rows, self.shape)
+        chosen = self.chosen[column.among]
+        slots = np.full(int(np.prod(self.shape[-3:-1])), -1)
+        slots[list(chosen)] = np.arange(len(chosen))
+        slot = slots[index[-3] * self.shape[-2] + index[-2]]
+        lead = (*self.shape[:-3], len(chosen), self.shape[-1])
+        lines = np.ravel_multi_index((*index[:-3], np.maximum(slot, 0), index[-1]), lead)  # -1 cannot be ravelled
+        return np.where(slot < 0, -1, lines)
 
     def definitions(self) -> str:
         """The definitions of all quantities of this layout, derived ones included."""
@@ -208,7 +228,9 @@ class Layout:
         derived = [asdict(d) for d in self.derived]
         names = ("faces", "meshes", "patches", "cor_grid", "planar", "has", "samples", "sampled",
                  *["added"] * bool(self.added))  # fmt: skip
-        return json.dumps({**{name: getattr(self, name) for name in names}, "derived": derived})
+        return json.dumps(
+            {**{name: getattr(self, name) for name in names}, "derived": derived, "columns": self.summed[:-1]}
+        )
 
 
 def layout_from_options(axes: Sequence[Any], text: str) -> Layout:
@@ -230,7 +252,9 @@ def layout_from_options(axes: Sequence[Any], text: str) -> Layout:
             raise ValueError(f"has {has}, {samples} samples of candidates {sampled[:5]}")
         patches = bool(options["patches"])
         added = tuple(tuple(map(_place, some)) for some in options.get("added", ()))
-        return Layout(tuple(axes), faces, meshes, patches, derived, cor_grid, planar, has, samples, sampled, added)
+        stored = tuple(map(str, options["columns"]))
+        return Layout(tuple(axes), faces, meshes, patches, derived, cor_grid, planar, has, samples, sampled, added,
+                      stored)  # fmt: skip
     except (KeyError, TypeError, AttributeError) as error:
         raise ValueError(f"its layout attribute is damaged ({error})") from error
 

@@ -1,8 +1,9 @@
 """A new result file: everything but the values, with all its space; one process makes it before any solve.
 
+A finished file with more stations is a new one into which what is solved is copied.
+
 NeXus viewers find a plot by the attributes of the groups: signals, axes and the slice that is shown first. ``map`` is
-where they open. It repeats two maps with the axes turned so that stations run to the right and angles up, which viewers
-that always draw the last two axes show at once.
+where they open: two maps at the largest force, which viewers that always draw the last two axes show at once.
 """
 
 from __future__ import annotations
@@ -18,10 +19,10 @@ import numpy as np
 
 from softjaw.friction.motion import fibonacci_twists
 from softjaw.study.messages import CANNOT_WRITE, StudyError, remove
-from softjaw.study.quantities import FIRST, MODELS
+from softjaw.study.quantities import BY_KEY, FIRST, MODELS
 from softjaw.study.result import checksums
-from softjaw.study.result.datasets import CLOSING, SUMS
-from softjaw.study.result.guarded import GuardedFile, reason
+from softjaw.study.result.datasets import CLOSING_SUMS, described
+from softjaw.study.result.hdf5 import StoredFile, reason
 from softjaw.study.result.layout import (
     LABEL,
     PROGRAM,
@@ -35,10 +36,15 @@ from softjaw.study.result.layout import (
     Layout,
 )
 from softjaw.study.result.provenance import SAMPLING
+from softjaw.study.result.store import open_result
+from softjaw.study.units import shown_text
 
 LIBVER = ("earliest", "v110")  # programs that bring an older HDF5 of their own can read it
 TEXT = h5py.string_dtype("utf-8")
 EVEN = 1e-6  # relative difference of steps that makes an axis uneven
+SESSION_ROWS = f"{ROOT}/provenance/sessions"
+# What a grown file has of its own, or what is filled again once nothing is missing.
+NOT_COPIED = (f"{ROOT}/derived/", CLOSING_SUMS, f"{ROOT}/wrenches/motion", f"{ROOT}/wrenches/candidate")
 TEXTS = {
     "title": "name of the object or of the scene",
     "scene": "the scene with all settings, as TOML",
@@ -59,7 +65,7 @@ def create(path: Path, layout: Layout, header: Header) -> None:
             _write_skeleton(file, layout, header)
         # Opened anew: the sums are of what a reader will find in the file.
         with h5py.File(part, "r+", libver=LIBVER) as file:
-            _write_checksums(file, GuardedFile(part, file), layout)
+            _write_checksums(file, StoredFile(part, file), layout)
         with part.open("r+b") as handle:
             # Blocks that exist now cannot be missing when a rank writes.
             os.posix_fallocate(handle.fileno(), 0, part.stat().st_size)
@@ -72,6 +78,56 @@ def create(path: Path, layout: Layout, header: Header) -> None:
             raise
         raise StudyError(CANNOT_WRITE, f"{path}: cannot be created: {reason(error)}") from error
     put_in_place(part, path)
+
+
+def grow(path: Path, layout: Layout, header: Header) -> None:
+    """Replace a file by one with the stations of ``layout``, among which are all of its own; by one process.
+
+    The old file has its name until the new one is whole and on disk, so that a kill at any time leaves one of them.
+    Rows are copied with their checksums: a torn one stays torn, and is solved again.
+    """
+    grown = path.with_name(path.name + ".grown")
+    create(grown, layout, header)
+    try:
+        with open_result(path, unchecked=True) as old, h5py.File(grown, "r+", libver=LIBVER) as file:
+            places = _places(old.layout, layout)
+            known = {d.path for d in old.layout.datasets}
+            for dataset in (d for d in layout.datasets if d.path in known and not d.path.startswith(NOT_COPIED)):
+                values = old.file.values(old.file.plain(dataset.path))
+                target = file[dataset.path]
+                target[...] = _spread(values, dataset, places).astype(target.dtype)  # texts with their encoding
+            file[SESSION_ROWS][...] = old.file.values(old.file.plain(SESSION_ROWS))
+        with grown.open("r+b") as handle:
+            os.fsync(handle.fileno())
+    except (OSError, RuntimeError) as error:
+        remove(grown)
+        raise StudyError(CANNOT_WRITE, f"{path}: cannot be given more stations: {reason(error)}") from error
+    put_in_place(grown, path)
+
+
+def _places(old: Layout, new: Layout) -> dict[str, Any]:
+    """Where the entries of the dimensions that grow stand in the new file."""
+    before, now = (np.asarray(layout.axes[-3].values) for layout in (old, new))
+    stations = np.searchsorted(now, before)
+    if not np.array_equal(now[np.minimum(stations, len(now) - 1)], before):
+        raise ValueError("a station of the file is not among those of its scene")
+    found = {"station": stations}
+    angles = new.shape[-2]
+    for name, numbers in old.chosen.items():
+        moved = [int(stations[n // angles]) * angles + n % angles for n in numbers]
+        found[name] = np.array([new.chosen[name].index(n) for n in moved], int)
+    return found
+
+
+def _spread(values: np.ndarray, dataset: Dataset, places: dict[str, Any]) -> np.ndarray:
+    """The values at their places in the new shape, and the dataset's fill value elsewhere."""
+    found = np.full(dataset.shape, dataset.fill, dataset.dtype)
+    index: list[Any] = [slice(None)] * found.ndim
+    for axis, name in enumerate(dataset.scales[: found.ndim]):
+        if name in places:
+            index[axis] = places[name]
+    found[tuple(index)] = values
+    return found
 
 
 def put_in_place(part: Path, path: Path) -> None:
@@ -122,14 +178,15 @@ def _write_skeleton(file: h5py.File, layout: Layout, header: Header) -> None:
         count.make_scale(name)
     for dataset in layout.datasets:
         _create_dataset(file, dataset)
+    _link_maps(study, layout)
     _write_texts(study, layout, header)
 
 
-def _write_checksums(file: h5py.File, guarded: GuardedFile, layout: Layout) -> None:
+def _write_checksums(file: h5py.File, stored: StoredFile, layout: Layout) -> None:
     """Checksums of what stands in the new file already."""
-    file[ROOT].attrs.modify("checksum", np.uint32(checksums.of_header(guarded, layout)))
+    file[ROOT].attrs.modify("checksum", np.uint32(checksums.of_header(stored, layout)))
     for i, name in enumerate(layout.closing):
-        file[f"{SUMS}/{CLOSING}"][i] = checksums.of_array(file[f"{ROOT}/{name}"][()])
+        file[CLOSING_SUMS][i] = checksums.of_array(file[f"{ROOT}/{name}"][()])
 
 
 def _write_texts(study: h5py.Group, layout: Layout, header: Header) -> None:
@@ -198,6 +255,20 @@ def _create_dataset(file: h5py.File, dataset: Dataset) -> None:
     _attach_scales(made, dataset.scales)
 
 
+def _link_maps(study: h5py.Group, layout: Layout) -> None:
+    """``map``: what viewers open at, as views of the maps themselves; no value stands in the file twice."""
+    at = [int(i) if i != "." else slice(None) for i in view_slice(layout)]
+    names = [layout.names[i] for i in layout.shown]
+    for name in FIRST:
+        values = study[f"{name}/{MODELS[0]}"]
+        view = h5py.VirtualLayout(tuple(layout.shape[i] for i in layout.shown), values.dtype)
+        view[...] = h5py.VirtualSource(".", values.name, values.shape)[tuple(at)]
+        made = study["map"].create_virtual_dataset(name, view, fillvalue=np.nan)
+        made.attrs["interpretation"] = ("spectrum", "image")[len(names) - 1]
+        made.attrs.update(described(BY_KEY[f"maps/{name}"], f"maps/{name}/{MODELS[0]}"))
+        _attach_scales(made, names)
+
+
 def _attach_scales(dataset: h5py.Dataset, names: Sequence[str]) -> None:
     # xarray and NeXus viewers look for the scales beside the data: a second hard link puts them there.
     for i, name in enumerate(names):
@@ -215,33 +286,32 @@ def _write_attribute(node: Any, key: str, value: Any) -> None:
         node.attrs[key] = value
 
 
-def view_slice(layout: Layout, order: Sequence[int]) -> list[str]:
+def view_slice(layout: Layout) -> list[str]:
     """Which axes a viewer shows first (``.``) and where it stands on the others: the highest force, else 0."""
     last = len(layout.shape) - 1
-    return ["." if i in layout.shown else str(layout.shape[i] - 1 if i == last else 0) for i in order]
+    return ["." if i in layout.shown else str(n - 1 if i == last else 0) for i, n in enumerate(layout.shape)]
 
 
-def axes_of(layout: Layout, order: Sequence[int]) -> dict[str, Any]:
-    """Names of the axes in an order, as NeXus wants them.
+def axes_of(layout: Layout, chosen: Sequence[int]) -> dict[str, Any]:
+    """Names of some axes, as NeXus wants them.
 
     silx takes an axis of exactly two values for a linear calibration and draws nothing: no axis (``.``) is better
     there. Beside an uneven axis it draws dots instead, and then needs both.
     """
-    values = [np.asarray(layout.axes[i].values, float) for i in order]
+    values = [np.asarray(layout.axes[i].values, float) for i in chosen]
     even = all(np.ptp(np.diff(v)) <= EVEN * np.ptp(v) for v in values[-2:] if len(v) > 2)
-    names = ["." if len(v) == 2 and even else layout.names[i] for v, i in zip(values, order, strict=True)]
+    names = ["." if len(v) == 2 and even else layout.names[i] for v, i in zip(values, chosen, strict=True)]
     return {"axes": names, **{f"{name}_indices": i for i, name in enumerate(names) if name != "."}}
-
-
-def _plot(layout: Layout, order: Sequence[int]) -> dict[str, Any]:
-    return {"NX_class": "NXdata", **axes_of(layout, order), "default_slice": view_slice(layout, order)}
 
 
 def groups(layout: Layout) -> dict[str, dict[str, Any]]:
     """Every group below ``/study`` with its attributes; NXdata groups draw themselves in NeXus viewers."""
-    plot = _plot(layout, range(len(layout.shape)))
-    first = {"signal": FIRST[0], "auxiliary_signals": list(FIRST[1:]), "title": "grasp map, curved contact model"}
-    found: dict[str, dict[str, Any]] = {"map": {**_plot(layout, layout.seen), **first}}
+    plot = {"NX_class": "NXdata", **axes_of(layout, range(len(layout.shape))), "default_slice": view_slice(layout)}
+    others = [(axis, int(i)) for axis, i in zip(layout.axes, view_slice(layout), strict=True) if i != "."]
+    at = [f"{axis.name} {shown_text(axis.values[i], axis.units, 5)}" for axis, i in others]
+    title = ", ".join(["grasp map, curved contact model", *at])
+    first = {"signal": FIRST[0], "auxiliary_signals": list(FIRST[1:]), "title": title}
+    found: dict[str, dict[str, Any]] = {"map": {"NX_class": "NXdata", **axes_of(layout, layout.shown), **first}}
     for q in layout.quantities:
         if q.group != "maps":
             continue

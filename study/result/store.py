@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -20,7 +19,7 @@ import numpy as np
 from softjaw.study.messages import OTHER_FILE, StudyError
 from softjaw.study.quantities import STATES
 from softjaw.study.result import checksums
-from softjaw.study.result.guarded import opened, text_of
+from softjaw.study.result.hdf5 import opened, text_of
 from softjaw.study.result.layout import (
     LABEL,
     MISSING,
@@ -73,8 +72,7 @@ class Result:
         self.title = str(study.get("title", ""))
         self.digest = file.attributes(f"{ROOT}/scene").get("digest", "")
         self._known = {d.path: d for d in self.layout.datasets}
-        self._part = {column.path: column.part for column in self.layout.columns}
-        self._trusted: set[str] = set(self.layout.parts) if unchecked else set()
+        self._columns = {column.path: column for column in self.layout.columns}
         self._unchecked = unchecked
         # With a wrong header, the sums of the rows would be looked for in the wrong places.
         if not unchecked and str(checksums.of_header(file, self.layout)) != study.get("checksum"):
@@ -97,21 +95,26 @@ class Result:
 
     def read(self, path: str) -> np.ndarray:
         """A dataset of the layout below ``/study``, for example ``checks/adhesion`` or ``e_n/pcm``."""
-        dataset = self._checked(path)
-        self._compare(self._part.get(f"{ROOT}/{path}", ""))
-        return self._believable(path, self.file.values(dataset))
+        column = None if self._unchecked else self._columns.get(f"{ROOT}/{path}")
+        # States before values: a row that is marked has all its values.
+        rows = np.flatnonzero(self.status != MISSING) if column else np.empty(0, int)
+        values = self.file.values(self._checked(path))
+        if column:
+            wrong = checksums.broken_rows(self.file, self.layout, column, values, rows)
+            self._refuse(self._still(wrong, self.status), path)
+        return self._believable(path, values)
 
     def patch(self, row: int) -> dict[str, np.ndarray]:
         """Faces of both fingers at one case: ``pressure (2, faces)``, ``centroid (2, faces, 3)``, ..."""
-        names = [path.rpartition("/")[2] for path in self._known if path.startswith(f"{ROOT}/patch/")]
-        found = {name: self.file.values(self._checked(f"patch/{name}"), row) for name in names}
+        names = [path.rpartition("/")[2] for path in self._columns if path.startswith(f"{ROOT}/patch/")]
+        index = tuple(map(int, np.unravel_index(row, self.layout.shape)))
+        faces = {name: self.file.values(self._checked(f"patch/{name}"), index) for name in names}
         if not self._unchecked and self.status.flat[row] != MISSING:
-            index = np.unravel_index(row, self.layout.shape)
-            stored = self.file.values(self._checked("checksums/patch"), index)
-            # Joined in the order of the columns, as the writer summed them.
-            if checksums.of_array(b"".join(values.tobytes() for values in found.values())) != stored:
-                raise self._damaged(f"the patch of case {row} does not match its checksum")
-        return found
+            sums = self.file.values(self._checked("checksums/rows"), index)
+            for name, values in faces.items():
+                if checksums.of_array(values) != sums[self.layout.summed.index(f"{ROOT}/patch/{name}")]:
+                    self._refuse(np.array([row]), f"patch/{name}")
+        return faces
 
     def derived(self, name: str) -> np.ndarray:
         """A dataset that was filled after all rows."""
@@ -189,15 +192,6 @@ class Result:
         """Whether the last session has no end: it is running, or was killed."""
         sessions = self.sessions
         return bool(sessions and not sessions[-1]["stop"])
-
-    def _compare(self, part: str) -> None:
-        """Refuse the file if a part of its rows does not match its checksums; once for each part."""
-        if self._unchecked or not part or part in self._trusted:
-            return
-        rows = np.flatnonzero(self.status != MISSING)
-        wrong = checksums.broken_rows(self.file, self.layout, part, rows)
-        self._trusted.add(part)
-        self._refuse(self._still(wrong, self.status), f"'{part}'")
 
     def _still(self, wrong: np.ndarray, codes: np.ndarray) -> np.ndarray:
         """Those of some rows that a run has not begun anew since their states were read; of the others, now missing."""
@@ -294,20 +288,7 @@ def open_result(path: str | Path, unchecked: bool = False) -> Result:
     ``unchecked`` reads what is there, whether it matches its checksums or not.
     """
     path = Path(path)
-    return opened(path, "result file", lambda file: Result(path, file, unchecked), _go_through)
-
-
-def _go_through(result: Result) -> None:
-    """Touch whatever readers of a result may read, however much of it is broken."""
-    for dataset in result.layout.datasets:
-        # One broken dataset must not hide the next one from the trial.
-        with suppress(StudyError):
-            found = result.file.plain(dataset.path)
-            if found.chunks:  # data that have to be unpacked
-                result.file.values(found)
-    for name in ("scene", "definitions", "report"):
-        with suppress(StudyError):
-            getattr(result, name)
+    return opened(path, "result file", lambda file: Result(path, file, unchecked))
 
 
 def torn_rows(path: Path, layout: Layout) -> list[int]:
@@ -316,7 +297,10 @@ def torn_rows(path: Path, layout: Layout) -> list[int]:
     with open_result(path, unchecked=True) as result:
         codes = result.codes.ravel()
         marked = np.flatnonzero(codes != MISSING)
-        torn = [checksums.broken_rows(result.file, layout, part, marked) for part in layout.parts]
+        torn = [
+            checksums.broken_rows(result.file, layout, c, result.read(c.path.removeprefix(f"{ROOT}/")), marked)
+            for c in layout.columns
+        ]
         # The caller holds the lock, so no run is under way.
         states = checksums.broken_states(result.file, layout, codes, under_way=False)
     # What is not marked is solved anyway.

@@ -13,10 +13,10 @@ import numpy as np
 
 from softjaw.study.case.result import CaseResult
 from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, StudyError
-from softjaw.study.quantities import EFFECT_TABLE, EFFECTS, FIRST, MEASURED, MODELS
+from softjaw.study.quantities import EFFECT_TABLE, EFFECTS, MEASURED, MODELS
 from softjaw.study.result import checksums
-from softjaw.study.result.datasets import CLOSING, MESSAGE, STATE, SUMS
-from softjaw.study.result.guarded import GuardedFile
+from softjaw.study.result.datasets import CLOSING_SUMS, MESSAGE, SUMS
+from softjaw.study.result.hdf5 import StoredFile
 from softjaw.study.result.layout import DONE, FAILED, MISSING, ROOT, SESSION, Header, Layout
 from softjaw.study.result.skeleton import LIBVER, report_bytes, text_bytes
 from softjaw.study.result.store import Result, open_result
@@ -40,10 +40,8 @@ class ResultWriter:
         self._file = h5py.File(path, "r+", libver=LIBVER, **shared)
         # Opened once: finding an object by its path takes longer than a small write.
         self._columns = [self._file[c.path] for c in layout.columns]
-        keys = [c.key for c in layout.columns]
-        self._maps = {keys.index(f"maps/{name}/{MODELS[0]}"): self._file[f"{ROOT}/map/{name}"] for name in FIRST}
         self._code, self._attempts = (self._file[f"{ROOT}/status/{name}"] for name in ("code", "attempts"))
-        self._sums = {part: self._file[f"{SUMS}/{part}"] for part in (*layout.parts, STATE, CLOSING)}
+        self._sums, self._closing_sums = self._file[SUMS], self._file[CLOSING_SUMS]
         self._sessions = self._file[f"{ROOT}/provenance/sessions"]
         self.session = 0
 
@@ -65,12 +63,12 @@ class ResultWriter:
         """Make a failed or torn row a missing one that was never tried."""
         # State first, attempts last: a kill in between leaves a begun row, which the next run tidies.
         self._code[self._index(row)] = MISSING
-        self._sums[STATE][self._index(row)] = checksums.OF_STATE[MISSING]
+        self.tidy(row)
         self._attempts[self._index(row)] = 0
 
     def tidy(self, row: int) -> None:
         """Make a missing row that a killed process had stored, but not marked, like any other missing one."""
-        self._sums[STATE][self._index(row)] = checksums.OF_STATE[MISSING]
+        self._sums[(*self._index(row), -1)] = checksums.OF_STATE[MISSING]
 
     def write(self, row: int, values: Sequence[np.ndarray]) -> None:
         """Store a solved case; ``values`` as from ``record``."""
@@ -96,12 +94,7 @@ class ResultWriter:
                 dataset[index] = value.astype(dataset.dtype)  # with its encoding
             elif value.size:
                 _write_block(dataset, place, value)
-        # Turned copies for viewers; they have no checksum.
-        for position, dataset in self._maps.items():
-            dataset[tuple(index[i] for i in self.layout.seen)] = values[position]
-        sums = {**checksums.of_parts(self.layout, row, values), STATE: checksums.OF_STATE[state]}
-        for part, crc in sums.items():
-            _write_block(self._sums[part], index, np.array(crc, "<u4"))
+        _write_block(self._sums, index, checksums.of_row(self.layout, values, state))
         self._code[index] = state
 
     def _index(self, row: int) -> tuple[int, ...]:
@@ -113,7 +106,7 @@ class ResultWriter:
 
     def result(self) -> Result:
         """The same file for reading; not to be closed by itself."""
-        return Result(self.path, GuardedFile(self.path, self._file))
+        return Result(self.path, StoredFile(self.path, self._file))
 
     def write_report(self, text: str) -> None:
         """Write the report, cut where it is too long; by one rank, after all rows."""
@@ -128,7 +121,7 @@ class ResultWriter:
         self._close(f"derived/{name}", found)
 
     def _close(self, name: str, values: np.ndarray) -> None:
-        self._sums[CLOSING][self.layout.closing.index(name)] = checksums.of_array(values)
+        self._closing_sums[self.layout.closing.index(name)] = checksums.of_array(values)
 
     def begin_session(self, **fields: Any) -> None:
         """Add a row to the provenance; by one rank."""

@@ -20,7 +20,7 @@ from softjaw.study.run.plan import Plan, measured_seconds
 from softjaw.study.run.progress import duration
 from softjaw.study.run.shares import by_cost
 
-STATE_WRITES = 5  # of a case besides its values: begun, state, its checksum, and the maps that are seen first
+STATE_WRITES = 3  # of a case besides its values: begun, checksums, state
 NOTHING = 0.05  # share of the time below which something does not count as the limit
 GOOD = 0.8
 # Measured on one machine with a local disk: a look at a node's counter [s], and one write of a rank [s].
@@ -138,7 +138,7 @@ def scaling_text(plan: Plan, path: Path, ranks: Sequence[int], repeat: int = 1) 
         raise StudyError(OTHER_FILE, f"{path}: no case was timed yet; run the study first, or give -n one number")
     columns = plan.layout.columns
     row = sum(int(np.prod(c.shape)) * c.dtype.itemsize for c in columns)
-    writes = len(columns) + len(plan.layout.parts) + STATE_WRITES
+    writes = len(columns) + STATE_WRITES
     machine = Machine(PER_NODE, CLAIM, WRITE * writes, max(writes / WRITES_PER_S, row / BYTES_PER_S))
     replays = [replay(paths, n, machine) for n in ranks]
     times = [sum(own.seconds) for own in paths]

@@ -21,10 +21,9 @@ from mpi4py import MPI
 from softjaw.study.messages import CANNOT_WRITE, DONE, SOME_FAILED, STOPPED, StudyError, make_folders
 from softjaw.study.quantities import DONE as CASE_DONE
 from softjaw.study.result import provenance
-from softjaw.study.result.grow import grow
 from softjaw.study.result.layout import FAILED, MISSING
 from softjaw.study.result.lock import Lock, OpenedFile
-from softjaw.study.result.skeleton import create
+from softjaw.study.result.skeleton import create, grow
 from softjaw.study.result.store import Result, open_result, torn_rows
 from softjaw.study.result.write import ResultWriter, verify
 from softjaw.study.run.limits import GRACE, Stopper, limited_memory

@@ -21,7 +21,7 @@ from softjaw.study.cli import main
 from softjaw.study.export.csv_yaml import csv_text
 from softjaw.study.messages import OTHER_FILE, UNPRINTABLE, USAGE, StudyError
 from softjaw.study.patch.patch_reader import Reading, read_patch
-from softjaw.study.result.guarded import trouble
+from softjaw.study.patch.trial import trouble
 from softjaw.study.result.store import open_result
 from softjaw.study.scene import SceneError, load_scene, parse_scene
 from tests.fuzz.lies import LIES

@@ -7,8 +7,8 @@ import numpy as np
 
 from softjaw.study.quantities import MISSING
 from softjaw.study.result import checksums
-from softjaw.study.result.datasets import CLOSING, STATE, SUMS
-from softjaw.study.result.guarded import GuardedFile
+from softjaw.study.result.datasets import CLOSING_SUMS, SUMS
+from softjaw.study.result.hdf5 import StoredFile
 from softjaw.study.result.layout import ROOT
 from softjaw.study.result.store import Result
 
@@ -16,20 +16,21 @@ from softjaw.study.result.store import Result
 def sealed(path):
     """Give a file the checksums of its values, as somebody would who wants to deceive; its path."""
     with h5py.File(path, "r+") as file:
-        guarded = GuardedFile(path, file)
-        result = Result(path, guarded, unchecked=True)
+        stored = StoredFile(path, file)
+        result = Result(path, stored, unchecked=True)
         layout, codes = result.layout, result.codes.ravel()
-        for part in layout.parts:
-            rows, sums = checksums.sums_of(guarded, layout, part, np.flatnonzero(codes != MISSING))
-            stored = file[f"{SUMS}/{part}"][()]
-            stored[np.unravel_index(rows, layout.shape)] = sums
-            file[f"{SUMS}/{part}"][...] = stored
-        file[f"{SUMS}/{STATE}"][...] = np.vectorize(lambda code: checksums.OF_STATE.get(code, 0))(result.codes)
+        sums = file[SUMS][()].reshape(layout.rows, -1)
+        for column in layout.columns:
+            values = file[column.path][()]
+            rows, found = checksums.of_column(layout, column, values, np.flatnonzero(codes != MISSING))
+            sums[rows, layout.summed.index(column.path)] = found
+        sums[:, -1] = [checksums.OF_STATE.get(code, 0) for code in codes]
+        file[SUMS][...] = sums.reshape(file[SUMS].shape)
         for i, name in enumerate(layout.closing):
-            file[f"{SUMS}/{CLOSING}"][i] = checksums.of_array(file[f"{ROOT}/{name}"][()])
+            file[CLOSING_SUMS][i] = checksums.of_array(file[f"{ROOT}/{name}"][()])
         sessions = file[f"{ROOT}/provenance/sessions"][()]
         for i in np.flatnonzero(sessions["start"] != b""):
             sessions[i]["crc"] = checksums.of_session(sessions[i])
         file[f"{ROOT}/provenance/sessions"][...] = sessions
-        file[ROOT].attrs.modify("checksum", np.uint32(checksums.of_header(guarded, layout)))
+        file[ROOT].attrs.modify("checksum", np.uint32(checksums.of_header(stored, layout)))
     return path

@@ -12,8 +12,8 @@ import trimesh
 
 from softjaw.study.doctor import launch_environment
 from softjaw.study.quantities import DONE, WIDE
-from softjaw.study.result.grow import grow
 from softjaw.study.result.layout import MISSING, layout_from_options
+from softjaw.study.result.skeleton import grow
 from softjaw.study.result.store import open_result
 from softjaw.study.run.pattern import FINEST, SAME, apart, gained, next_poses, with_places
 from softjaw.study.run.plan import make_plan

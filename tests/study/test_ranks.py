@@ -145,7 +145,7 @@ def test_any_number_of_ranks_writes_the_same_bits(once, shared_path, scene, alon
     expected = once(contents, alone)
     # all that is compared: maps of every model, both fingers, the checks and every face
     for name in ("e_n/ccm", "quality/pcm", "fingers/cor_wrench", "checks/ellipticity", "patch/pressure",
-                 "checksums/patch", "quality_fitted/pcm", "limit_surface/coefficients",
+                 "checksums/rows/study/patch/pressure", "quality_fitted/pcm", "limit_surface/coefficients",
                  "wrenches/wrench"):  # fmt: skip
         assert f"study/{name}" in expected
     with open_result(path) as result:

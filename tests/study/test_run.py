@@ -309,7 +309,7 @@ def test_a_torn_row_is_solved_again(once, shared_path, whole, uninterrupted, ran
         shutil.copy(whole, path)
         with h5py.File(path, "r+") as file:
             file["study/fingers/f_x_max"][2, 1, 0, 1, 2] += 1e-12
-            file["study/patch/normal"][30, 0, 3, 1] = 0.0
+            file["study/patch/normal"][5, 0, 0, 0, 3, 1] = 0.0
         return study(ranks, path)
 
     code, output, _ = once(tear)

@@ -12,6 +12,8 @@ import h5py
 import numpy as np
 import pytest
 
+import softjaw
+from softjaw.study import quantities
 from softjaw.study.case.result import CaseResult
 from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, StudyError
 from softjaw.study.quantities import BY_KEY, MODELS, NEEDS, TABLE
@@ -95,19 +97,51 @@ def test_viewers_find_a_plot_from_the_root_down(path):
         signals = [plot.attrs["signal"], *plot.attrs["auxiliary_signals"]]
         assert signals == ["quality", "e_n"]
         # silx draws nothing over an axis of two values: that one is named '.' and keeps its dimension scale.
-        assert list(plot.attrs["axes"]) == ["normal_force", ".", "station"]
-        assert list(plot.attrs["default_slice"]) == ["2", ".", "."]
+        assert list(plot.attrs["axes"]) == ["station", "."]
         for name in signals:
-            assert plot[name].shape == (3, 2, 5)
+            assert plot[name].shape == (5, 2)
             assert plot[name].attrs["interpretation"] == "image"
-            assert [d[0].name.rpartition("/")[2] for d in plot[name].dims] == ["normal_force", "angle", "station"]
+            assert [d[0].name.rpartition("/")[2] for d in plot[name].dims] == ["station", "angle"]
         assert plot["quality"].attrs["long_name"] == "grasp quality, ccm"
         whole = entry["quality"]
         assert [whole.attrs["signal"], *whole.attrs["auxiliary_signals"]] == ["ccm", "pcm", "pcm_projected"]
         assert list(whole.attrs["axes"]) == ["station", ".", "normal_force"]
         assert list(whole.attrs["default_slice"]) == [".", ".", "2"]
         assert entry["e_n/ccm"].attrs["units"] == "m"
-        assert entry["patch/normal"].dims[3][0].shape == (3,)
+        assert entry["patch/normal"].dims[5][0].shape == (3,)
+
+
+def test_the_map_that_viewers_open_at_is_the_one_at_the_largest_force(path):
+    layout = small()
+    for row in (16, 17):  # the second and third force at station 2, angle 1
+        put(path, layout, row, record(layout, CaseResult({"maps/quality": [row, 0.0, 0.0]})))
+    with h5py.File(path) as file:
+        shown = file["study/map/quality"][()]
+        assert shown[2, 1] == 17.0
+        assert np.isnan(np.delete(shown.ravel(), 5)).all()
+    assert torn_rows(path, layout) == []
+
+
+@pytest.mark.parametrize("older", [True, False])
+def test_a_file_that_has_not_the_quantities_of_this_version_opens(tmp_path, monkeypatch, older):
+    """One that was written before epsilon was added, and one that has it where this version does not."""
+    path, layout = tmp_path / "other.hdf", small()
+    if older:
+        layout = small(stored=tuple(c.path for c in layout.columns if "/epsilon" not in c.path))
+    create(path, layout, HEADER)
+    put(path, layout, 10, record(layout, CaseResult({"maps/quality": [1.0, 2.0, 3.0], "maps/flags": 0.0})))
+    if not older:
+        monkeypatch.setattr(quantities, "TABLE", tuple(q for q in TABLE if "epsilon" not in q.name))
+    ds = softjaw.open(path)
+    assert "epsilon" not in ds
+    assert ds.quality.values[1, 1, 1].tolist() == [1.0, 2.0, 3.0]
+    with pytest.raises(StudyError) as refused:
+        verify(path, small(), HEADER)
+    assert refused.value.code == OTHER_FILE
+    with h5py.File(path, "r+") as file:
+        file["study/quality/pcm"][1, 1, 1] = 7.0
+    with pytest.raises(StudyError, match=r"quality/pcm of case 10"):
+        softjaw.open(path)
 
 
 def test_every_dimension_has_a_scale_beside_the_data(path):
@@ -160,8 +194,7 @@ def test_every_dataset_says_what_it_is(tmp_path):
 )
 def test_viewers_open_at_stations_and_angles_at_the_highest_force(sizes, expected):
     layout = small(sizes=sizes)
-    assert view_slice(layout, range(3)) == expected
-    assert [expected[i] for i in layout.seen] == view_slice(layout, layout.seen)
+    assert view_slice(layout) == expected
 
 
 def test_an_axis_of_two_values_has_a_name_only_beside_an_uneven_one():
@@ -169,7 +202,7 @@ def test_an_axis_of_two_values_has_a_name_only_beside_an_uneven_one():
     uneven = Layout((*even.axes[:-1], even.axes[-1]._replace(values=np.array([1.0, 2.0, 5.0]))), 4)
     assert axes_of(even, range(3))["axes"] == ["station", ".", "normal_force"]
     assert axes_of(uneven, range(3))["axes"] == ["station", "angle", "normal_force"]
-    assert axes_of(uneven, (2, 1, 0))["axes"] == ["normal_force", ".", "station"]
+    assert axes_of(uneven, (0, 1))["axes"] == ["station", "."]
     assert axes_of(uneven, range(3))["angle_indices"] == 1
 
 
@@ -183,9 +216,9 @@ def test_a_sweep_comes_first_and_needs_no_dot_in_its_name(tmp_path):
         assert read.read("e_n_error/e_n_error").shape == read.layout.shape
         assert read.patch(0) == {}
         assert read.derived("slope").shape == (3,)
-    assert view_slice(layout, range(4)) == ["0", ".", ".", "2"]
+    assert view_slice(layout) == ["0", ".", ".", "2"]
     assert "patch" not in groups(layout)
-    assert layout_from_options(axes, layout.options()) == layout
+    assert layout_from_options(axes, layout.options()).options() == layout.options()
     verify(tmp_path / "s.hdf", layout, HEADER)
 
 
@@ -200,7 +233,7 @@ def test_damage_in_a_done_row_is_found(path):
         file["study/e_n/pcm"][0, 0, 1] = 7.0  # not a done row
         file["study/status/message"][1, 0, 1] = b"other"
         file["study/status/code"][0, 1, 0] = 2
-        file["study/patch/area"][29, 1, 3] = 0.0
+        file["study/patch/area"][4, 1, 2, 1, 3] = 0.0
     assert torn_rows(path, layout) == [0, 3, 7, 29]
 
 
@@ -224,7 +257,7 @@ def test_wrenches_are_stored_for_the_candidates_that_were_named(tmp_path):
     with h5py.File(path, "r+") as file:
         file["study/wrenches/wrench"][0, 1, 0, 0, 0, 0] += 1
     assert torn_rows(path, layout) == [10]
-    assert layout_from_options(layout.axes, layout.options()) == layout
+    assert layout_from_options(layout.axes, layout.options()).options() == layout.options()
     assert "wrenches" not in {d.path.split("/")[2] for d in small(samples=7).datasets}
 
 
