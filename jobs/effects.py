@@ -60,12 +60,12 @@ PADS = (
 PLATES = ((2.0, 200.0), (1.0, 5.0), (0.53, 200.0), (2.0, 3.0), (1.0, 70.0))  # mm, GPa
 CUP, BOTTLE = "jobs/cup.toml", "jobs/bottle.toml"
 WALLS = {  # file, wall, modulus [GPa], stations, forces
-    **{f"cup {t} mm, {E} GPa": (CUP, f"wall_profile_mm=[[0, {t}], [110, {t}]]", E, "[50]", "[0.5, 2, 4]")
+    **{f"cup {t} mm, {E} GPa": (CUP, f"wall_mm=[[0, {t}], [110, {t}]]", E, "[50]", "[0.5, 2, 4]")
        for t, E in ((0.45, 1.3), (1.0, 1.3), (1.0, 10), (1.0, 70))},
     **{f"bottle {t} mm, {E} GPa": (BOTTLE, f"wall_mm={t}", E, "[50, 70, 150]", "[1, 3, 7, 13]")
        for t, E in ((0.4, 2.0), (0.8, 2.0), (0.8, 20), (1.5, 20), (1.5, 70))},
 }  # fmt: skip
-COARSE = ("accuracy.wall_around_mm=4", "accuracy.wall_along_mm=6", "accuracy.wall_coarse_mm=12",
+COARSE = ("accuracy.wall_element_mm=4",
           "gripper.elements=[10, 6, 4]", 'accuracy.contact="weighted"')  # fmt: skip
 SHELL, SHELLS, COUPLING = "object: rigid or shell", "object: linear or nonlinear shell", "friction acting back"
 PANELS = {  # of an effect: indicator up to which it is skipped without a measurement, and what the axis says

@@ -21,7 +21,7 @@ from softjaw.study.flags import flag_words
 from softjaw.study.scene import load_scene
 
 COARSE = (
-    "accuracy.meshes=1", "accuracy.wall_around_mm=2.5", "accuracy.wall_along_mm=4", "accuracy.wall_coarse_mm=8",
+    "accuracy.meshes=1", "accuracy.wall_element_mm=2.5",
     "gripper.elements=[12, 6, 4]", 'effects.object="nonlinear_shell"', 'object.wall_material="custom"',
     "object.wall_poisson_ratio=0.38",
 )  # fmt: skip
@@ -31,8 +31,8 @@ def row(scene: str, station: float, angle: float, thickness: float, modulus: flo
     """Thickness [mm], modulus [GPa], for each force the closing displacement [mm] and flags, and CPU seconds."""
     held = f"candidates.stations_mm=[{station}]", f"candidates.angles_deg=[{angle}]", f"load.normal_force_n={forces}"
     # a wall of a varying thickness becomes one of the same thickness everywhere
-    even = "wall_profile_mm" not in Path(scene).read_text(encoding="utf-8")
-    wall = f"wall_mm={thickness}" if even else f"wall_profile_mm=[[0, {thickness}], [100, {thickness}]]"
+    even = "wall_mm" not in Path(scene).read_text(encoding="utf-8")
+    wall = f"wall_mm={thickness}" if even else f"wall_mm=[[0, {thickness}], [100, {thickness}]]"
     point = load_scene(scene, [*COARSE, *held, f"object.{wall}", f"object.young_modulus_gpa={modulus}"])
     unit = next(iter(units(point, lambda p: build_object(p.object).axis_symmetry)))
     start, cells = time.process_time(), []

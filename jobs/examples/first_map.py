@@ -21,7 +21,7 @@ scene = sj.Scene.from_dict({
     "gripper": {"elements": [12, 6, 4], "max_opening_mm": 85},  # a coarse mesh, good to a few per cent
     "candidates": {"stations": 6, "station_range_mm": [20, 95], "angles_deg": [0]},
     "load": {"normal_force_n": [2, 5]},
-    "output": {"patches": "none"},
+    "run": {"patches": "none"},
 })  # fmt: skip
 
 # %% The study

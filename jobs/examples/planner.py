@@ -21,7 +21,7 @@ scene = sj.Scene.from_file(Path(__file__).parents[1] / "bottle-rigid.toml").with
     "candidates.angles_deg": [0, 45, 90, 135],  # the bottle is round, so all of them are solved as one
     "candidates.refine": None,
     "load.normal_force_n": [2, 5, 10],
-    "output.patches": "none",
+    "run.patches": "none",
 })  # fmt: skip
 if not FILE.exists():
     sj.run(scene, FILE)

@@ -185,14 +185,11 @@ def _object_mesh(scene: Scene) -> Iterable[Parameter]:
     """The wall's mesh, or the grid on which a mesh's distance is sampled; other objects are exact."""
     if has_wall(scene.object) and scene.effects.object != "rigid":
         least, most = (getattr(limit, name) for limit, name in zip(LIMITS, ("ge", "le"), strict=True))
-        keys = ("wall_around_mm", "wall_along_mm", "wall_coarse_mm")
-        sizes = [[min(max(round(f * getattr(scene.accuracy, k), 3), least), most) for k in keys] for f in WALL]
+        sizes = [min(max(round(f * scene.accuracy.wall_element_mm, 3), least), most) for f in WALL]
         levels = [
-            Level(", ".join(f"{s:g}" for s in size) + " mm",
-                  tuple((f"accuracy.{k}", s) for k, s in zip(keys, size, strict=True)), f)
-            for f, size in zip(WALL, sizes, strict=True)
-        ]  # fmt: skip
-        yield Parameter("wall mesh", "elements of the wall, around, along and coarse", tuple(levels), formal=2.0)
+            Level(f"{size:g} mm", (("accuracy.wall_element_mm", size),), f) for f, size in zip(WALL, sizes, strict=True)
+        ]
+        yield Parameter("wall mesh", "elements of the wall, round the object", tuple(levels), formal=2.0)
     elif scene.object.shape == "mesh":
         own = scene.object.grid_step_mm
         sides = zip(scene.gripper.pad_size[:2], scene.gripper.elements, strict=False)

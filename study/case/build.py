@@ -223,7 +223,7 @@ def with_sampled_grasps(scene: Scene) -> Scene:
     StudyError
         For geometry that cannot be, or that leaves no grasp between the pads.
     """
-    if scene.candidates.sampler is None:
+    if scene.candidates.sampled is None:
         return scene
     check_object(scene)
     from softjaw.study.case import sampler  # compiled loops, which most scenes are checked without

@@ -182,12 +182,12 @@ def _fingers(case: Simulated) -> Level:
     """One finger where a plane of symmetry lies between two that press on one wall."""
     if case.fingers_solved == 1:
         return Level("one", reason=SYMMETRY)
-    return Level("two", reason=_forced(case, "fingers", ONLY))
+    return Level("two", reason=ONLY)
 
 
 def _friction(case: Simulated) -> Level:
     S, F_N = (sum(getattr(c.limits["ccm"], name) for c in case.contacts) for name in ("S", "F_N"))
-    return Level("ccm", 1.0 - F_N / S, _forced(case, "friction", CHEAP))
+    return Level("ccm", 1.0 - F_N / S, CHEAP)
 
 
 def _wrench(case: Simulated) -> Level:
@@ -200,7 +200,7 @@ def _limit_surface(case: Simulated) -> Level:
     """An ellipsoid, whose quality is 5 to 10 % off, only where the scene asks for it."""
     model = case.scene.limit_surface.model
     error = float(np.max([own["ccm"].fit_error.Erad for own in case.fits]))
-    return Level(SURFACES[model], error, _forced(case, "limit_surface", CHEAP) if model == "quartic" else FORCED)
+    return Level(SURFACES[model], error, CHEAP if model == "quartic" else FORCED)
 
 
 # --- the table, in the order of choosing ------------------------------------------------------------------------------

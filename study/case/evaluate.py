@@ -14,8 +14,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softjaw.friction.motion import cor_grid
-from softjaw.friction.wrench import friction_wrench
 from softjaw.lsfit.quartic import Quartic
 from softjaw.lsfit.surface import LimitSurface
 from softjaw.scoring.closed_form import volume_linf
@@ -30,6 +28,7 @@ from softjaw.study.flags import raised
 from softjaw.study.quantities import MODELS, TABLE
 from softjaw.study.scene import Scene
 from softjaw.study.scene.sections import LimitSurfaceKeys as Choice
+from softjaw.study.units import in_si
 
 FloatArray = NDArray[np.float64]
 FACING = math.radians(0.5)  # misalignment up to which the closed form is off by less than 1e-4
@@ -60,8 +59,6 @@ class EvaluationSettings:
         Section ``[limit_surface]`` of a scene.
     task : Task, optional
         What is to be held; with it the payload is computed.
-    cor_grid : tuple
-        Grid of centres of rotation whose wrenches are computed; none where it is empty.
     epsilon_everywhere, six, sampled : bool
         Whether to find epsilon in any pose, 6-D ellipsoids, and to keep the sampled wrenches.
     """
@@ -70,7 +67,6 @@ class EvaluationSettings:
     torques: float
     surface: Choice = field(default_factory=Choice)
     task: Task | None = None
-    cor_grid: Any = ()
     epsilon_everywhere: bool = False
     six: bool = False
     sampled: bool = False
@@ -85,18 +81,19 @@ def lengths(scene: Scene, obj: Any) -> tuple[FloatArray, float]:
     extents = np.ptp(np.asarray(obj.bounds, float), axis=0)
     if scene.object.axis_symmetry in (0, 4):
         extents[:2] = extents[:2].max()  # alike but for rounding, so that images by that symmetry are
-    longest = scene.score.object_length or float(extents.max())
-    uniform = scene.score.object_length is not None or scene.score.length_scale == "longest"
-    arms = np.full(3, longest) if uniform else extents
-    if scene.score.torque_scale == "object":
-        return arms, longest
-    return arms, scene.score.contact_length or scene.gripper.pad_length
+    arms_by, torques_by = scene.score.object_length_mm, scene.score.contact_length_mm
+    longest = float(extents.max()) if isinstance(arms_by, str) else in_si("arms_mm", arms_by)
+    torques = {"pad": scene.gripper.pad_length, "object": longest}
+    return (
+        extents if arms_by == "per_axis" else np.full(3, longest),
+        torques[torques_by] if isinstance(torques_by, str) else in_si("torques_mm", torques_by),
+    )
 
 
 def settings_of(scene: Scene, obj: Any) -> EvaluationSettings:
     """What a scene asks for."""
     return EvaluationSettings(
-        *lengths(scene, obj), scene.limit_surface, task_of(scene, obj), scene.friction.cor_grid,
+        *lengths(scene, obj), scene.limit_surface, task_of(scene, obj),
         epsilon_everywhere=scene.score.epsilon == "everywhere",
         six=scene.effects.wrench == "6-D", sampled=bool(scene.sampled),
     )  # fmt: skip
@@ -130,8 +127,6 @@ def evaluate(
         held, flag = payload_values(contacts, fits, settings.task)
         values |= held
         values["maps/flags"] |= flag
-    if settings.cor_grid:
-        values["fingers/cor_wrench"] = _per_patch(contacts, lambda c: _cor_wrenches(c, settings.cor_grid))
     return values, fits
 
 
@@ -177,11 +172,6 @@ def _friction_values(contacts: Sequence[Contact]) -> dict[str, Any]:
     values |= {f"maps/{key}": limits[key].min(axis=0) for key in ECCENTRICITIES}
     values["fingers/e_n_ratio"] = limits["e_n_ratio"]
     return values | {f"maps/{key}": value for key, value in _overestimates(contacts).items()}
-
-
-def _cor_wrenches(contact: Contact, grid: Any) -> FloatArray:
-    """Friction wrenches ``(f_x, f_y, tau_z)`` for the paper's grid of centres of rotation."""
-    return friction_wrench(contact.local, cor_grid(grid, contact.rho), contact.mu)[:, [0, 1, 5]]
 
 
 def _overestimates(contacts: Sequence[Contact]) -> dict[str, float]:

@@ -86,11 +86,10 @@ def check_wall(shape: Any, surface: OuterSurface) -> None:
     try:
         body_mesh(
             surface, shape.wall, size,
-            open_top=shape.open_top, open_bottom=shape.base == "none", base_thickness=shape.base_wall,
+            open_top=shape.open_top, open_bottom=shape.open_bottom, base_thickness=shape.base_wall,
         )  # fmt: skip
     except ValueError as error:
-        key = "wall_mm" if shape.wall_mm is not None else "wall_profile_mm"
-        raise StudyError(USAGE, f"object.{key}: {error}") from error
+        raise StudyError(USAGE, f"object.wall_mm: {error}") from error
 
 
 def wall_lines(
@@ -100,6 +99,5 @@ def wall_lines(
 
     ``scene`` is a `Scene` whose object has a wall, ``turned`` its outer surface as the fingers see it.
     """
-    accuracy = scene.accuracy
-    size = MeshSize((0.0, math.pi), heights, half, accuracy.wall_around, accuracy.wall_along, accuracy.wall_coarse)
-    return around(turned, size, mirrors), along(turned, size, scene.object.base == "none", scene.object.open_top)
+    size = MeshSize((0.0, math.pi), heights, half, *scene.accuracy.wall_sizes)
+    return around(turned, size, mirrors), along(turned, size, scene.object.open_bottom, scene.object.open_top)

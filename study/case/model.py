@@ -30,17 +30,18 @@ MOST_TRIED, MOST_NAMED = 1000, 5  # pads brought to the object beforehand (the o
 BACK = (0.1, 0.4, 1.6)  # of the pad's thickness: where it stands before it is brought to the smooth surface
 OFF = 1e-9  # gap at first touch [m]
 GLUE = 1e4  # stiffness of the glue on a tilting mount over that of the pad: rigid to that share
+PLATE_POISSON = 0.3  # of the backing plate; the modulus is what a scene gives
 DEEP = 0.9  # of the pad's thickness: how far round the undeformed contact face the object must be known
 
 
 def pad_material(gripper: Gripper) -> Material:
     """Foam of the pads."""
-    return material(gripper.material, gripper.shear_modulus, gripper.foam_ratio, gripper.shear_moduli, gripper.alpha)
+    return material(gripper.material, gripper.shear_modulus, gripper.foam_ratio, *reversed(gripper.hyperfoam_terms))
 
 
 def backing_plate(gripper: Gripper) -> BackingPlate:
     """Plate behind each pad."""
-    return BackingPlate(gripper.sheet_thickness, gripper.sheet_modulus, gripper.sheet_poisson, gripper.sheet_support)
+    return BackingPlate(gripper.sheet_thickness, gripper.sheet_modulus, PLATE_POISSON, gripper.sheet_support)
 
 
 def tilting_mount(gripper: Gripper) -> TiltingMount | None:

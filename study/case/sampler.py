@@ -263,14 +263,14 @@ def with_sampled_grasps(scene: Scene) -> Scene:
         Where no grasp fits between the pads.
     """
     given, surface, lids = scene.candidates, surface_triangles(scene.object), lids_of(build_object(scene.object))
-    found = antipodal_grasps(surface, jaws_of(scene), given.count, given.seed, lids=lids)
+    found = antipodal_grasps(surface, jaws_of(scene), given.sampled or 1, lids=lids)
     placed = own_frame(scene.object)
     poses = tuple(_as_pose(grasp, placed) for grasp in found if not grasp.state)
     if not poses:
         states = [STATES[state] for state in sorted({grasp.state for grasp in found})] or ["the pads miss the object"]
         raise StudyError(
             USAGE,
-            f"candidates.sampler: found no grasp between the pads ({', '.join(states)}); expected at least one: give"
+            f"candidates.sampled: found no grasp between the pads ({', '.join(states)}); expected at least one: give"
             " poses, another pad, or a larger gripper.max_opening_mm",
         )
     kept = {key: getattr(given, key) for key in OF_EVERY_KIND}

@@ -454,7 +454,7 @@ def grasp_of(scene: Scene, fingers: list[Finger], coarser: bool) -> Grasp:
 
 def _grip(scene: Scene, fingers: list[Finger], held: Grasp, coarser: bool) -> Grip:
     """Both fingers on the wall."""
-    size = WallMesh(scene.accuracy.wall_around, scene.accuracy.wall_along, scene.accuracy.wall_coarse)
+    size = WallMesh(*scene.accuracy.wall_sizes)
     mesh = size.halved() if coarser else size
     body, linear = thin_body(scene.object), scene.effects.object == "linear_shell"
     coupled = scene.effects.friction_pressure_coupling == "tangential"

@@ -39,8 +39,7 @@ def thin_body(shape: Walled) -> ThinWalled:
         shape.support,
         shape.open_top,
         shape.base_wall,
-        shape.springs,
-        shape.base == "none",
+        open_bottom=shape.open_bottom,
     )
 
 

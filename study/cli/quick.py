@@ -59,7 +59,7 @@ def check(options: Namespace) -> str:
 def plan(options: Namespace) -> str:
     """Say what a run will take."""
     scene = with_sampled_grasps(scene_of(options))
-    path = target(options, scene)
+    path = target(options)
     made = make_plan(scene, options.scene, options.overrides)
     lines = [plan_text(made, scene, path, options.ranks[0]), *told(scene)]
     if len(options.ranks) > 1 or options.repeat > 1:
@@ -80,13 +80,13 @@ def scene_of(options: Namespace) -> Scene:
         raise StudyError(USAGE, str(error)) from error
 
 
-def target(options: Namespace, scene: Scene) -> Path:
+def target(options: Namespace) -> Path:
     """The result file of a run; refuse names that no viewer of results would open."""
     if options.output is None:
-        return Path(scene.output.file)
+        return Path("results") / f"{Path(options.scene).stem}.hdf"
     path = Path(options.output)
     if path.suffix != ".hdf":
-        better = path / Path(scene.output.file).name if path.is_dir() else path.with_name(path.name + ".hdf")
+        better = path / f"{Path(options.scene).stem}.hdf" if path.is_dir() else path.with_name(path.name + ".hdf")
         text = f"-o: found '{path}', expected a file ending in .hdf, which all viewers open; write -o {better}"
         raise StudyError(USAGE, text)
     return path

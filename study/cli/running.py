@@ -18,7 +18,7 @@ def run(options: Namespace) -> int:
     # A run in a pipe whose reader leaves must go on solving.
     sys.stdout = Unbreakable(sys.stdout)
     given = [*options.overrides, *petsc_overrides(options.petsc)]
-    path = target(options, options.scene_read)
+    path = target(options)
     return solve_scene(
         options.scene_read, path, MPI.COMM_WORLD, scene_file=options.scene, overrides=given,
         retry_failed=options.retry_failed,

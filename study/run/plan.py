@@ -76,7 +76,7 @@ def make_plan(
     digest, text = scene.digest, scene.effective_toml()
     if rounds:
         scene = refined(scene, rounds)
-    patches = scene.output.patches != "none"
+    patches = scene.run.patches != "none"
     faces = math.prod(pad_shape(scene.gripper).patch_faces) if patches else 0
     axes = tuple(grasps.axes(scene))
     placed = own_frame(scene.object)
@@ -101,8 +101,8 @@ def make_plan(
         scene.accuracy.meshes,
         patches,
         tuple(derived(scene)),
-        scene.friction.cor_grid,
-        scene.friction.model,
+        0,
+        "pcm",
         has(scene),
         scene.limit_surface.samples,
         scene.sampled,

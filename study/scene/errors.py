@@ -20,6 +20,31 @@ Tables = Mapping[str, Mapping[str, FieldInfo]]  # keys of every section, by its 
 MOST_LISTED = 50  # problems in one message
 MOVED = {  # keys of the last version, and what stands for them
     "accuracy.e_n": "write `accuracy.target`, with `accuracy.target_of = \"e_n\"`",
+    "effects.fingers": "leave it out: symmetry decides it, and effects.model_size = \"full\" solves both",
+    "effects.friction": "leave it out: every friction model is computed",
+    "effects.limit_surface": "write `limit_surface.model`",
+    "friction.model": "leave it out: every friction model is shown",
+    "friction.cor_grid": "leave it out: `softjaw.read_patch` gives the patch, `softjaw.friction_wrench` its wrenches",
+    "gripper.grading_x": "write `gripper.grading = [x, y, z]`",
+    "gripper.grading_y": "write `gripper.grading = [x, y, z]`",
+    "gripper.grading_z": "write `gripper.grading = [x, y, z]`",
+    "gripper.sheet_poisson": "leave it out: it is 0.3",
+    "gripper.alpha": "write `gripper.terms_kpa = [[exponent, modulus], ...]`",
+    "gripper.shear_moduli_kpa": "write `gripper.terms_kpa = [[exponent, modulus], ...]`",
+    "score.torque_scale": "write `score.contact_length_mm = \"pad\"` or `\"object\"`",
+    "score.length_scale": "write `score.object_length_mm = \"per_axis\"` or `\"longest\"`",
+    "score.graspit": "leave it out: jobs/graspit.py compares with it",
+    "object.wall_profile_mm": "write `object.wall_mm = [[z, thickness], ...]`",
+    "object.open_top": "write `object.open_ends`: \"top\", \"both\" or \"none\"",
+    "object.base": "write `object.open_ends = \"both\"` for a tube",
+    "object.springs_n_per_mm": "leave it out: it is 1 N/mm",
+    "candidates.sampler": "write `candidates.sampled`, the number of grasps",
+    "candidates.count": "write `candidates.sampled`, the number of grasps",
+    "candidates.seed": "leave it out",
+    "accuracy.wall_around_mm": "write `accuracy.wall_element_mm`",
+    "accuracy.wall_along_mm": "write `accuracy.wall_element_mm`: along the axis it is 5/3 of it",
+    "accuracy.wall_coarse_mm": "write `accuracy.wall_element_mm`: elsewhere it is 4 times as large",
+    "output": "write `patches` in [run], and name the file with -o",
     "accuracy.cost_file": "write `accuracy.target`: no file of costs is needed",
     "uncertainty.probes": "remove it: all candidates are solved with every sample",
     "uncertainty.mesh": "write `accuracy.meshes = 2`",
@@ -122,7 +147,7 @@ def _expectation(entry: ErrorDetails, path: KeyPath) -> str:
 def _right_key(path: KeyPath, tables: Tables) -> str:
     """What to write instead of an unknown key or section."""
     key, (stem, _) = str(path[-1]), split_unit(str(path[-1]))
-    if moved := MOVED.get(key_text(path)) or MOVED.get(key_text(path[:1])):
+    if moved := MOVED.get(key_text(path)):
         return moved
     if len(path) == 1 and (near := closest(key, list(tables))):
         return f"did you mean [{near}]?"

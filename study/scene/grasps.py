@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar
 
 from pydantic import AfterValidator, BeforeValidator, Field
 
@@ -117,11 +117,10 @@ class Candidates(SceneSection):
     poses: tuple[GraspPose, ...] = Field(
         (), strict=False, max_length=100_000, description="explicit grasps", examples=[POSE]
     )
-    sampler: Literal["antipodal"] | None = Field(
-        None, description="looks for grasps itself: pairs of places of the surface that face each other"
+    sampled: int | None = Field(
+        None, ge=1, le=1000, description="looks for so many distinct grasps itself: pairs of places of the surface that"
+        " face each other"
     )
-    count: int = Field(12, ge=1, le=1000, description="distinct grasps that the sampler gives at most")
-    seed: int = Field(0, ge=0, le=2**31, description="of the places where the sampler looks")
     refine: Annotated[Refinement | None, BeforeValidator(_switched)] = Field(
         None,
         description="solves further stations between the given ones, or further poses around the best given ones",
@@ -153,15 +152,15 @@ class Candidates(SceneSection):
     @property
     def total(self) -> int:
         """Number of candidates; of a sampler as many as it may give."""
-        if self.sampler:
-            return self.count
+        if self.sampled:
+            return self.sampled
         return len(self.poses) or len(self.station_values_mm) * len(self.angles_deg)
 
     @property
     def refined_until(self) -> str:
         """What ends a refinement, in words."""
         share = self.refine.best_within if self.refine else 0.0
-        if self.poses or self.sampler:
+        if self.poses or self.sampled:
             return f"until a finer step between poses gains less than {share:.2g} of the best"
         return f"until the best is known to {share:.2g} of itself"
 
@@ -173,19 +172,16 @@ class Candidates(SceneSection):
         """Exactly one way of giving the candidates."""
         spread = self.stations is not None or self.station_range_mm is not None
         given = {"stations": spread, "stations_mm": self.stations_mm is not None, "poses": bool(self.poses)}
-        given["sampler"] = self.sampler is not None
+        given["sampled"] = self.sampled is not None
         ways = [way for way in given if given[way]]
         if len(ways) != 1:
-            expected = "one of stations_mm, stations with station_range_mm, sampler, or [[candidates.poses]]"
+            expected = "one of stations_mm, stations with station_range_mm, sampled, or [[candidates.poses]]"
             yield wrong(ways, f"{expected}, {EXAMPLE}", *ways[-1:])
         if spread and (self.stations is None or self.station_range_mm is None):
             key, missing = ("stations", "station_range_mm") if self.stations else ("station_range_mm", "stations")
             yield wrong(getattr(self, key), f"{missing} beside it, {EXAMPLE}", key)
-        needs = {"count": self.sampler, "seed": self.sampler, "angles_deg": not (self.poses or self.sampler)}
-        for key, met in needs.items():
-            if not met and (value := getattr(self, key)) != Candidates.model_fields[key].default:
-                way = "stations" if key.endswith("deg") else 'sampler = "antipodal"'
-                yield wrong(value, f"{way} beside it", key)
+        if (self.poses or self.sampled) and self.angles_deg != Candidates.model_fields["angles_deg"].default:
+            yield wrong(self.angles_deg, "stations beside it", "angles_deg")
 
     def rules_on(self, shape: Shape) -> Errors:
         """Stations beside the object, or along its faces, cannot touch it."""

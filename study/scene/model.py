@@ -21,7 +21,6 @@ from softjaw.study.scene.grasps import OF_EVERY_KIND, Candidates, GraspPose, Ref
 from softjaw.study.scene.objects import SHAPES, Mesh, Object, SectionTable
 from softjaw.study.scene.section import SceneSection
 from softjaw.study.scene.sections import (
-    LEVELS,
     UNCERTAIN,
     Accuracy,
     Effects,
@@ -29,7 +28,6 @@ from softjaw.study.scene.sections import (
     Gripper,
     LimitSurfaceKeys,
     Load,
-    Output,
     Run,
     ScoreKeys,
     TaskKeys,
@@ -46,7 +44,6 @@ NOT_SWEPT = {
     "object.mesh": "write one scene per mesh",
     "object.name": "a name changes no result",
     "candidates.stations": "stations are an axis of the maps already",
-    "friction.cor_grid": "it changes the size of the results",
     "accuracy.meshes": "it changes which maps there are",
     "accuracy.target": "it changes which maps there are",
     "effects.wrench": "it changes what is stored",
@@ -54,7 +51,7 @@ NOT_SWEPT = {
     "limit_surface.samples": "it changes the size of the results",
     "limit_surface.wrench_samples": "it changes the size of the results",
 }
-NO_RESULT = ("output", "run", "uncertainty")  # sections that change no result of a case
+NO_RESULT = ("run", "uncertainty")  # sections that change no result of a case
 MOST_GRID_POINTS, MOST_CASES = 10_000, 1_000_000
 OVERRIDE = "section.key=value with a value as in TOML, as in gripper.pad_width_mm=20 or object.name='\"cup\"'"
 Rule = Callable[..., Errors]
@@ -65,7 +62,6 @@ JOINT: dict[str, tuple[tuple[Rule, tuple[str, ...]], ...]] = {
     "friction": ((Friction.used_rules, ("effects",)),),
     "candidates": ((Candidates.rules_on, ("object",)), (Candidates.pose_rules, ("object", "gripper"))),
     "limit_surface": (
-        (lambda surface, effects: effects.surface_rules(surface), ("effects",)),
         (lambda surface, c: c.name_rules("wrench_samples", surface.wrench_samples), ("candidates",)),
     ),
     "petsc": ((petsc_rules, ()),),
@@ -88,7 +84,6 @@ class Scene(SceneSection):
     limit_surface: LimitSurfaceKeys = Field(default_factory=LimitSurfaceKeys)
     score: ScoreKeys = Field(default_factory=ScoreKeys)
     task: TaskKeys = Field(default_factory=TaskKeys)
-    output: Output = Field(default_factory=Output)
     run: Run = Field(default_factory=Run)
     petsc: dict[str, Option] = Field(default_factory=dict, description="options of the contact solver, contact_...")
     sweep: dict[str, Annotated[tuple[str | int | float, ...], Field(strict=False, min_length=1)]] = Field(
@@ -208,12 +203,11 @@ class Scene(SceneSection):
         """Every value in effect, defaults filled in, as the tables of a scene file."""
         data = self.model_dump(exclude_none=True)
         # Only the way that was chosen: a scene that gives both would be refused.
-        if self.candidates.poses or self.candidates.sampler:
-            way = ("poses",) if self.candidates.poses else ("sampler", "count", "seed")
+        if self.candidates.poses or self.candidates.sampled:
+            way = ("poses",) if self.candidates.poses else ("sampled",)
             data["candidates"] = {key: v for key, v in data["candidates"].items() if key in (*way, *OF_EVERY_KIND)}
         else:
-            for key in ("poses", "count", "seed"):
-                del data["candidates"][key]
+            del data["candidates"]["poses"]
         return data
 
     def effective_toml(self) -> str:
@@ -222,9 +216,9 @@ class Scene(SceneSection):
 
     @property
     def digest(self) -> str:
-        """SHA-256 of what changes results, the mesh's bytes included; not names, paths, ``[output]``, ``[run]``."""
+        """SHA-256 of what changes results, the mesh's bytes included; not names, paths, ``[run]``."""
         data = self.effective()
-        del data["output"], data["run"], data["object"]["name"]
+        del data["run"], data["object"]["name"]
         if not self.uncertainty.spread:  # files of scenes without it keep their digest
             del data["uncertainty"]
         if isinstance(self.object, Mesh):
@@ -406,14 +400,8 @@ def _scene(
 
 
 def _fill_in(data: dict[str, Any], path: Path) -> None:
-    """Fill in what depends on the scene file or on the sweep: result file, place of the mesh, values that are swept."""
-    output, shape, sweep = data.setdefault("output", {}), data.get("object"), data.get("sweep")
-    effects, surface = data.get("effects"), data.setdefault("limit_surface", {})
-    # A level of the effect and the model name the same choice; what the scene gives itself stays.
-    if isinstance(effects, dict) and isinstance(surface, dict) and (level := effects.get("limit_surface")) in LEVELS:
-        surface.setdefault("model", LEVELS[level][0])
-    if isinstance(output, dict):
-        output.setdefault("file", f"results/{path.stem}.hdf")
+    """Fill in what depends on the scene file or on the sweep: place of the mesh, values that are swept."""
+    shape, sweep = data.get("object"), data.get("sweep")
     if isinstance(shape, dict) and isinstance(shape.get("mesh"), str) and shape["mesh"]:
         # Relative to the scene, so that a run from any folder finds the mesh.
         shape["mesh"] = str((path.parent / shape["mesh"]).resolve())
@@ -481,8 +469,8 @@ def axis_rules(sweep: Mapping[str, Sequence[Any]], sections: Mapping[str, Any]) 
             yield wrong(key, f"a key with a single value, as `{near or 'gripper.pad_width_mm'}`", key)
         elif key in NOT_SWEPT or section in NO_RESULT:
             yield wrong(values, f"a key that can be swept; {NOT_SWEPT.get(key, 'it changes no result')}", key)
-        elif key == "gripper.element" and "output" in sections and sections["output"].patches == "all":
-            yield wrong(values, 'output.patches = "none" beside it, for faces that differ from case to case', key)
+        elif key == "gripper.element" and "run" in sections and sections["run"].patches == "all":
+            yield wrong(values, 'run.patches = "none" beside it, for faces that differ from case to case', key)
         elif len(set(values)) < len(values) or len({isinstance(v, str) for v in values}) > 1:
             yield wrong(values, "a list of numbers or a list of texts, each once", key)
 

@@ -72,9 +72,8 @@ class Shape(SceneSection):
 class Walled(Shape):
     """Shapes that can have a thin wall: ``wall_mm`` makes them hollow, and the wall gives way under the pads."""
 
-    wall_mm: Length | None = Field(None, description="wall thickness; without it the object is rigid")
-    wall_profile_mm: Annotated[tuple[Point, ...], Field(strict=False, min_length=2, max_length=500)] | None = Field(
-        None, description="wall thickness by height, as pairs [z, thickness] with rising z, instead of wall_mm"
+    wall_mm: Length | Annotated[tuple[Point, ...], Field(strict=False, min_length=2, max_length=500)] | None = Field(
+        None, description="wall thickness, or pairs [z, thickness] with rising z; without it the object is rigid"
     )
     base_wall_mm: Length | None = Field(None, description="thickness of a flat bottom; that of the wall if left out")
     wall_material: Literal["PET", "PP", "HDPE", "custom"] = Field("PET", description="material of the wall")
@@ -82,27 +81,38 @@ class Walled(Shape):
     wall_poisson_ratio: Ratio | None = Field(None, description="Poisson's ratio of the wall instead of the material's")
     yield_strength_mpa: Strength | None = Field(None, description="yield strength instead of the material's")
     allowed_dent_mm: Length | None = Field(None, description="largest allowed indentation, for the safe force range")
-    open_top: bool = Field(True, description="whether the last section is open, as a cup's and a bottle's without cap")
-    base: Literal["closed", "none"] = Field("closed", description='the bottom: "none" makes a tube, open at both ends')
+    open_ends: Literal["top", "both", "none"] = Field(
+        "top", description="top: open as a cup and a bottle without its cap are; both: a tube"
+    )
     support: Literal["standing", "clamped", "free"] = Field(
         "standing", description="standing on its bottom, clamped there (a tube at both ends), or held by the fingers"
     )
-    springs_n_per_mm: float = Field(1.0, gt=0, le=1e4, description="total stiffness of springs in place of friction")
     base_wall, young_modulus = si("base_wall_mm"), si("young_modulus_gpa")
     yield_strength, allowed_dent = si("yield_strength_mpa"), si("allowed_dent_mm")
-    springs: ClassVar[Any] = si("springs_n_per_mm")
 
     @property
     def wall(self) -> float | tuple[Span, ...] | None:
         """Wall thickness, or pairs of height and thickness [m]; None for a rigid object."""
-        profile = self.wall_profile_mm
-        return in_si("wall_mm", self.wall_mm) if profile is None else in_si("wall_profile_mm", profile)
+        return in_si("wall_mm", self.wall_mm)
+
+    @property
+    def thicknesses_mm(self) -> tuple[float, ...]:
+        """Thickness at every point where one is given [mm]."""
+        return tuple(t for _, t in self.wall_mm) if isinstance(self.wall_mm, tuple) else (self.wall_mm or 0.0,)
+
+    @property
+    def open_top(self) -> bool:
+        """Whether nothing closes the top."""
+        return self.open_ends != "none"
+
+    @property
+    def open_bottom(self) -> bool:
+        """Whether nothing closes the bottom."""
+        return self.open_ends == "both"
 
     def rules(self) -> Errors:
-        """Exactly one thickness, thin beside the object, and a complete material."""
+        """A thickness that is thin beside the object, and a complete material."""
         yield from super().rules()
-        if self.wall_mm is not None and self.wall_profile_mm is not None:
-            yield wrong(self.wall_profile_mm, "either wall_mm or wall_profile_mm", "wall_profile_mm")
         if self.wall is not None:
             yield from self._wall_rules()
             return
@@ -111,19 +121,16 @@ class Walled(Shape):
                 yield wrong(value, "a wall beside it, as in `wall_mm = 0.4`", key)
 
     def _wall_rules(self) -> Errors:
-        if self.base == "none" and self.base_wall_mm is not None:
-            yield wrong(self.base_wall_mm, 'either base_wall_mm or base = "none"', "base_wall_mm")
-        pairs = self.wall_profile_mm or ()
-        for i, (low, high) in enumerate(pairwise(pairs), 1):
+        if self.open_bottom and self.base_wall_mm is not None:
+            yield wrong(self.base_wall_mm, 'either base_wall_mm or open_ends = "both"', "base_wall_mm")
+        for i, (low, high) in enumerate(pairwise(self.wall_mm if isinstance(self.wall_mm, tuple) else ()), 1):
             if high[0] <= low[0]:
-                yield wrong(high, f"pairs [z, thickness] with z rising from {low[0]:g} mm", "wall_profile_mm", i)
+                yield wrong(high, f"pairs [z, thickness] with z rising from {low[0]:g} mm", "wall_mm", i)
         most = THICKEST * min((high - low for low, high in self.spans_mm.values()), default=math.inf)
-        for thickness in [t for _, t in pairs] or [self.wall_mm or 0.0]:
-            if not 0 < thickness <= most:
-                key = "wall_profile_mm" if pairs else "wall_mm"
-                expected = f"a thickness above 0 and up to {most:g} mm, a tenth of the object's smallest extent"
-                yield wrong(thickness, f"{expected}; a thicker wall is as good as rigid: leave it out", key)
-                break
+        thick = [t for t in self.thicknesses_mm if not 0 < t <= most]
+        if thick:
+            expected = f"a thickness above 0 and up to {most:g} mm, a tenth of the object's smallest extent"
+            yield wrong(thick[0], f"{expected}; a thicker wall is as good as rigid: leave it out", "wall_mm")
         missing = [k for k in ("young_modulus_gpa", "wall_poisson_ratio") if getattr(self, k) is None]
         if self.wall_material == "custom" and missing:
             expected = f"{' and '.join(missing)} beside it, as in `wall_poisson_ratio = 0.38`"

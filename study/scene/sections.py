@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import string
 from collections.abc import Mapping
-from pathlib import PurePosixPath, PureWindowsPath
+from contextlib import suppress
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import AfterValidator, Field, model_validator
@@ -14,9 +14,9 @@ from softjaw.fem.pad.halving import halved
 from softjaw.study.messages import shown
 from softjaw.study.scene.errors import Errors, wrong
 from softjaw.study.scene.objects import Shape, Walled
-from softjaw.study.scene.section import Direction, SceneSection, Text, Vector, once_and_rising
+from softjaw.study.scene.section import Direction, Point, SceneSection, Vector, once_and_rising
 from softjaw.study.scene.text import flat
-from softjaw.study.units import si
+from softjaw.study.units import in_si, si
 
 Count = Annotated[int, Field(ge=2, le=400)]
 Counts = Annotated[tuple[Count, Count, Count], Field(strict=False)]
@@ -25,17 +25,14 @@ Extents = Annotated[tuple[Extent, Extent], Field(strict=False)]
 FingerSide = Annotated[float, Field(ge=1, le=1000)]
 FingerSize = Annotated[tuple[FingerSide, FingerSide], Field(strict=False)]
 Force = Annotated[float, Field(gt=0, le=1000)]
-Terms = Annotated[tuple[float, ...], Field(strict=False, max_length=6)]
 Grading = Annotated[float, Field(ge=0.05, le=20)]
+Gradings = Annotated[tuple[Grading, Grading, Grading], Field(strict=False)]
 WallSize = Annotated[float, Field(ge=0.2, le=50)]
 Names = Annotated[tuple[int | str, ...], Field(strict=False, min_length=1)]
 MOST_ELEMENTS, LARGEST_ASPECT = 1_000_000, 20.0
 UNCERTAIN = ("object", "gripper", "friction", "candidates", "task")  # sections whose numbers may be
 MOST_MESHES = 4  # of a case, each 1.4 times as fine in every direction as the one before; each costs 3 times as much
 ROUNDING = 1e-9  # of a length: the plate's solver finds nodes this close to the rim of the support on it, too
-LEVELS = {  # level of the effect: models of [limit_surface]
-    "three_motions": ("three_motions",), "fitted_ellipsoid": ("full", "axis_aligned"), "quartic": ("quartic",),
-}  # fmt: skip
 CONVEX_FITS = ("full", "quartic")  # models that a convex program can fit, too
 OPTION_CHARACTERS = {*string.ascii_lowercase, *string.digits, "_"}
 VALUE_CHARACTERS = {*string.ascii_letters, *string.digits, *"_,.+-"}
@@ -51,13 +48,15 @@ class Gripper(SceneSection):
     material: Literal["blatz_ko", "hyperfoam", "neo_hookean", "linear"] = Field("blatz_ko", description="material law")
     shear_modulus_kpa: float = Field(40.0, ge=0.01, le=1e6, description="initial shear modulus of the pad")
     poisson_ratio: float = Field(0.25, ge=0, le=0.4999, description="Poisson's ratio of the pad; Blatz-Ko foam: 0.25")
-    alpha: Terms = Field((), description="exponents of hyperfoam's terms", examples=[[-2]])
-    shear_moduli_kpa: Terms = Field((), description="moduli of hyperfoam's terms", examples=[[40]])
+    terms_kpa: Annotated[tuple[Point, ...], Field(strict=False, max_length=6)] = Field(
+        (), description="terms of hyperfoam, pairs of exponent and shear modulus", examples=[[[-2, 40]]]
+    )
     elements: Counts = Field((20, 10, 6), description="elements of the whole pad along its length, width and thickness")
     element: Literal["hex8", "hex27"] = Field("hex8", description="trilinear or triquadratic elements")
-    grading_x: Grading = Field(1.0, description="size of the elements at the pad's ends over that at its centre")
-    grading_y: Grading = Field(1.0, description="size of the elements at the pad's sides over that at its centre")
-    grading_z: Grading = Field(1.0, description="size of the elements at the pad's back over that at its contact face")
+    grading: Gradings = Field(
+        (1.0, 1.0, 1.0), description="size of the elements at the pad's ends, sides and back over that at the middle of"
+        " its contact face"
+    )
     max_opening_mm: float | None = Field(
         None, gt=0, le=1000, description="largest distance of the pads' faces; wider grasps are not solved"
     )
@@ -68,13 +67,12 @@ class Gripper(SceneSection):
     )
     sheet_thickness_mm: float = Field(2.0, ge=0.05, le=100, description="thickness of the backing plate")
     sheet_modulus_gpa: float = Field(200.0, ge=1e-3, le=2000, description="Young's modulus of the plate; steel: 200")
-    sheet_poisson: float = Field(0.3, ge=0, le=0.4999, description="Poisson's ratio of the backing plate")
     sheet_support_mm: Extents = Field((20.0, 10.0), description="length and width of the plate's middle that is held")
     tilt_stiffness_nm_per_rad: float | None = Field(
         None, ge=1e-3, le=1e5, description="moment per angle of a mount that lets the pad tilt; left out: it does not"
     )
     pad_length, pad_width, pad_thickness = si("pad_length_mm"), si("pad_width_mm"), si("pad_thickness_mm")
-    shear_modulus, shear_moduli = si("shear_modulus_kpa"), si("shear_moduli_kpa")
+    shear_modulus: ClassVar[Any] = si("shear_modulus_kpa")
     max_opening: ClassVar[Any] = si("max_opening_mm")
     finger_size: ClassVar[Any] = si("finger_size_mm")
     sheet_thickness, sheet_modulus = si("sheet_thickness_mm"), si("sheet_modulus_gpa")
@@ -86,9 +84,16 @@ class Gripper(SceneSection):
         """Fill in hyperfoam's terms from the modulus (one term, which is Blatz-Ko foam), or the modulus from them."""
         if not isinstance(data, dict) or data.get("material") != "hyperfoam":
             return data
-        terms = data.get("shear_moduli_kpa", [data.get("shear_modulus_kpa", 40.0)])
-        plain = isinstance(terms, list | tuple) and all(isinstance(t, int | float) for t in terms)
-        return {"alpha": [-2.0], "shear_modulus_kpa": sum(terms) if plain else 40.0, **data, "shear_moduli_kpa": terms}
+        if "terms_kpa" not in data:
+            return {**data, "terms_kpa": [[-2.0, data.get("shear_modulus_kpa", 40.0)]]}
+        with suppress(TypeError, ValueError):  # of terms that are refused
+            return {"shear_modulus_kpa": sum(modulus for _, modulus in data["terms_kpa"]), **data}
+        return data
+
+    @property
+    def hyperfoam_terms(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Exponents [-] and shear moduli [Pa] of hyperfoam's terms."""
+        return tuple(e for e, _ in self.terms_kpa), tuple(in_si("modulus_kpa", m) for _, m in self.terms_kpa)
 
     @property
     def pad_size(self) -> tuple[float, float, float]:
@@ -100,11 +105,6 @@ class Gripper(SceneSection):
         """Poisson's ratio of the foam; the Blatz-Ko law has its own by its form, whatever the scene says."""
         return 0.25 if self.material == "blatz_ko" else self.poisson_ratio
 
-    @property
-    def grading(self) -> tuple[float, float, float]:
-        """Ratio of the element sizes at the rim (x, y) and back (z) to those at the centre and contact face [-]."""
-        return (self.grading_x, self.grading_y, self.grading_z)
-
     def rules(self) -> Errors:
         """Constants that the material cannot have, slivers, and meshes beyond any memory."""
         yield from self._hyperfoam_rules() if self.material == "hyperfoam" else self._material_rules()
@@ -114,7 +114,7 @@ class Gripper(SceneSection):
         n = self.elements
         for i in (0, 1):
             if n[i] % 2 and self.grading[i] != 1:
-                yield wrong(self.grading[i], f"1.0, or an even number of elements, not {n[i]}", f"grading_{'xy'[i]}")
+                yield wrong(self.grading[i], f"1.0, or an even number of elements, not {n[i]}", "grading", i)
         if math.prod(n) > MOST_ELEMENTS:
             expected = f"at most {MOST_ELEMENTS:,} elements, not {math.prod(n):,}; start with [20, 10, 6]"
             yield wrong(n, expected, "elements")
@@ -138,18 +138,15 @@ class Gripper(SceneSection):
         if self.material == "blatz_ko" and self.poisson_ratio != 0.25:
             expected = '0.25, which Blatz-Ko foam always has, or material = "hyperfoam"'
             yield wrong(self.poisson_ratio, expected, "poisson_ratio")
-        for key in ("alpha", "shear_moduli_kpa"):
-            if terms := getattr(self, key):
-                yield wrong(terms, f'material = "hyperfoam", not {shown(self.material)}, beside it', key)
+        if self.terms_kpa:
+            yield wrong(self.terms_kpa, f'material = "hyperfoam", not {shown(self.material)}, beside it', "terms_kpa")
 
     def _hyperfoam_rules(self) -> Errors:
-        if len(self.alpha) != len(self.shear_moduli_kpa):
-            yield wrong(self.alpha, f"as many exponents as moduli, {len(self.shear_moduli_kpa)}", "alpha")
-        if 0 in self.alpha:
-            yield wrong(self.alpha, "exponents other than 0, such as 0.01", "alpha")
-        total = sum(self.shear_moduli_kpa)
-        if total <= 0 or not math.isclose(total, self.shear_modulus_kpa, rel_tol=1e-9):
-            expected = f"the sum of shear_moduli_kpa, {total:g} kPa, and > 0; leave it out"
+        if any(exponent == 0 for exponent, _ in self.terms_kpa):
+            yield wrong(self.terms_kpa, "exponents other than 0, such as 0.01", "terms_kpa")
+        total = sum(modulus for _, modulus in self.terms_kpa)
+        if total <= 0 or not math.isclose(total, self.shear_modulus_kpa, rel_tol=ROUNDING):
+            expected = f"the sum of the moduli of terms_kpa, {total:g} kPa, and > 0; leave it out"
             yield wrong(self.shear_modulus_kpa, expected, "shear_modulus_kpa")
 
     def symmetry_rules(self, effects: Effects) -> Errors:
@@ -178,11 +175,9 @@ class Gripper(SceneSection):
 
 
 class Friction(SceneSection):
-    """Friction between pad and object. Every model is computed; ``model`` is the planar one shown first."""
+    """Friction between pad and object. Every friction model is computed."""
 
     mu: float = Field(0.8, ge=0, le=10, description="Coulomb friction coefficient")
-    model: Literal["pcm", "pcm_projected"] = Field("pcm", description="planar variant that is shown first")
-    cor_grid: int = Field(0, ge=0, le=1000, description="n of an n x n grid of centres of rotation; 0 is off")
     used_by_pressing: bool = Field(
         False, description="whether the friction that pressing has used is missing for holding (CCM)"
     )
@@ -206,24 +201,17 @@ class Load(SceneSection):
 class ScoreKeys(SceneSection):
     """How torques are made comparable with forces in the grasp quality."""
 
-    torque_scale: Literal["contact", "object"] = Field(
-        "contact", description="length that scales soft torques: of the contact, as in the paper, or of the object"
-    )
-    object_length_mm: Annotated[float, Field(gt=0, le=2000)] | Literal["auto"] = Field(
-        "auto", description="length that scales torque arms along all axes; auto: those of length_scale"
-    )
-    length_scale: Literal["per_axis", "longest"] = Field(
+    object_length_mm: Annotated[float, Field(gt=0, le=2000)] | Literal["per_axis", "longest"] = Field(
         "per_axis",
-        description="extents of the object that scale torque arms: its own along each of x, y and z, as in the paper,"
-        " or the longest along all",
+        description="what scales torque arms: the object's own extents along x, y and z, as in the paper, the longest"
+        " of them, or a length",
     )
-    contact_length_mm: Annotated[float, Field(gt=0, le=500)] | Literal["auto"] = Field(
-        "auto", description="length that scales soft torques; auto is the pad's length"
+    contact_length_mm: Annotated[float, Field(gt=0, le=500)] | Literal["pad", "object"] = Field(
+        "pad", description="what scales soft torques: the pad's length, as in the paper, the object's, or a length"
     )
     epsilon: Literal["facing", "everywhere"] = Field(
         "facing", description="where epsilon is computed: for antipodal contacts, or in any pose (some 0.1 s each)"
     )
-    object_length, contact_length = si("object_length_mm"), si("contact_length_mm")
 
 
 class LimitSurfaceKeys(SceneSection):
@@ -275,11 +263,6 @@ class Effects(SceneSection):
     )
     sheet: Literal["auto", "rigid", "elastic"] = Field("auto", description="the pad's backing plate")
     model_size: Literal["auto", "full", "half", "quarter"] = Field("auto", description="part of the pad that is meshed")
-    fingers: Literal["auto", "two"] = Field("auto", description="fingers that are solved")
-    friction: Literal["auto", "ccm"] = Field("auto", description="friction model behind the score")
-    limit_surface: Literal["auto", "three_motions", "fitted_ellipsoid", "quartic"] = Field(
-        "auto", description="form of the limit surface; auto is that of [limit_surface]"
-    )
     friction_pressure_coupling: Literal["auto", "none", "tangential"] = Field(
         "auto", description="whether friction acts back on the contact pressure; auto: where it moves e_n"
     )
@@ -292,13 +275,6 @@ class Effects(SceneSection):
         hollow = isinstance(shape, Walled) and shape.wall is not None
         if self.object.endswith("shell") and not hollow:
             yield wrong(self.object, 'an object with a wall, as `wall_mm = 0.4` in [object], or "auto"', "object")
-
-    def surface_rules(self, surface: LimitSurfaceKeys) -> Errors:
-        """A forced level is that of the model."""
-        models = LEVELS.get(self.limit_surface, ())
-        if models and surface.model not in models:
-            expected = f'"auto", or the level of limit_surface.model, which is {shown(surface.model)}'
-            yield wrong(self.limit_surface, expected, "limit_surface")
 
 
 class Accuracy(SceneSection):
@@ -319,15 +295,22 @@ class Accuracy(SceneSection):
     min_step_fraction: float = Field(
         1 / 8, gt=0, le=1, description="shortest part of a load step that is tried before displacement control"
     )
-    wall_around_mm: WallSize = Field(1.5, description="size of a thin wall's elements round the object, under the pads")
-    wall_along_mm: WallSize = Field(2.5, description="size of a thin wall's elements along the axis, under the pads")
-    wall_coarse_mm: WallSize = Field(6.0, description="largest size of a thin wall's elements elsewhere")
-    wall_around, wall_along, wall_coarse = si("wall_around_mm"), si("wall_along_mm"), si("wall_coarse_mm")
+    wall_element_mm: WallSize = Field(
+        1.5, description="size of a thin wall's elements round the object, under the pads; along it 5/3, elsewhere 4"
+        " times as large"
+    )
 
     def rules(self) -> Errors:
         """A target needs errors."""
         if self.target is not None and self.meshes < 2:
             yield wrong(self.target, "accuracy.meshes = 2 beside it, whose difference tells the error", "target")
+
+    @property
+    def wall_sizes(self) -> tuple[float, float, float]:
+        """Sizes of a thin wall's elements round the object and along it under the pads, and elsewhere at most [m]."""
+        around = self.wall_element_mm
+        sizes: tuple[float, float, float] = in_si("sizes_mm", (around, 5 * around / 3, 4 * around))
+        return sizes
 
     @property
     def most_meshes(self) -> int:
@@ -367,26 +350,10 @@ class Uncertainty(SceneSection):
                 yield wrong(value, expected, "spread", key)
 
 
-class Output(SceneSection):
-    """Where results go and what they hold."""
-
-    file: Text = Field(
-        "results/scene.hdf", min_length=1, max_length=1000, description="result file, below the working directory"
-    )
-    patches: Literal["all", "none"] = Field("all", description="whether the pressure on every face is kept")
-
-    def rules(self) -> Errors:
-        """Results end in .hdf, the one ending that every viewer takes, and stay below the working directory."""
-        path = PurePosixPath(self.file)
-        if not self.file.endswith(".hdf"):
-            yield wrong(self.file, "a file ending in .hdf, which all viewers open", "file")
-        if path.is_absolute() or PureWindowsPath(self.file).drive or ".." in path.parts:
-            yield wrong(self.file, "a path below the working directory; `-o` takes any other", "file")
-
-
 class Run(SceneSection):
-    """Limits for single cases. Results do not depend on them: they may differ from run to run."""
+    """Limits for single cases, and what of them is kept. Results do not depend on it."""
 
+    patches: Literal["all", "none"] = Field("all", description="whether the pressure on every face is kept")
     time_limit_s: float = Field(
         600.0, ge=0.1, le=1e6, description="time after which a case fails; the other cases continue"
     )

@@ -142,7 +142,7 @@ def _values(text: str) -> dict[str, Any]:
         tables = tomllib.loads(text)
     except RecursionError as error:
         raise ValueError("nested too deeply") from error
-    values = flat({name: table for name, table in tables.items() if name not in ("output", "run")})
+    values = flat({name: table for name, table in tables.items() if name != "run"})
     for pose in values.get("candidates.poses", ()):
         # Labels name candidates and change no result.
         pose.pop("label", None)

@@ -113,12 +113,6 @@ def test_a_mesh_elsewhere_is_read_and_its_place_is_shown_and_kept(tmp_path, told
 # --- scenes ---
 
 
-@pytest.mark.parametrize("file", ["/tmp/x.hdf", "../x.hdf", "a/../../x.hdf", "C:/x.hdf"])
-def test_results_do_not_leave_the_working_directory_unless_asked_on_the_command_line(file):
-    with pytest.raises(SceneError, match="below the working directory"):
-        parse_scene(BALL + f'[output]\nfile = "{file}"\n')
-
-
 @pytest.mark.parametrize("name", ["\\u001b[2J", "\\u009b2J", "a\\nb", "\\u202e", "\\u2028"])
 def test_names_hold_no_orders_for_a_terminal(name):
     with pytest.raises(SceneError, match="without control characters"):

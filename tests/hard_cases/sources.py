@@ -74,7 +74,7 @@ def scaled(scene: Scene, length: float = 1.0, force: float = 1.0) -> Scene:
 def _with_moduli(shape: Mapping[str, Any]) -> dict[str, Any]:
     """An object's table with the constants of its wall's material written out."""
     named = MATERIALS.get(shape.get("wall_material", "").lower())
-    if named is None or not (shape.get("wall_mm") or shape.get("wall_profile_mm")):
+    if named is None or not shape.get("wall_mm"):
         return dict(shape)
     own = {"young_modulus_gpa": named.young_modulus / 1e9, "wall_poisson_ratio": named.poisson_ratio,
            "yield_strength_mpa": named.yield_strength / 1e6}  # fmt: skip

@@ -48,7 +48,7 @@ def test_a_scaled_scene_has_scaled_sizes_forces_and_moduli():
     assert two.load.normal_force_n == tuple(8 * f for f in one.load.normal_force_n)
     assert (two.gripper.shear_modulus_kpa, two.object.young_modulus_gpa) == (80.0, pytest.approx(4.0))
     assert two.object.wall_poisson_ratio == 0.38
-    assert (two.accuracy.wall_around_mm, two.gripper.elements) == (6.0, one.gripper.elements)
+    assert (two.accuracy.wall_element_mm, two.gripper.elements) == (6.0, one.gripper.elements)
 
 
 def test_a_pressed_column_is_in_balance_and_its_mean_arm_is_that_of_a_rectangle():

@@ -126,7 +126,7 @@ def test_images_lose_their_empty_margins_and_keep_a_little():
 # --- the scenes themselves, on coarse meshes ---------------------------------------------------------------------
 
 PAD = ("gripper.elements=[12, 6, 4]", "accuracy.meshes=1")
-WALL = ("accuracy.wall_around_mm=3", "accuracy.wall_along_mm=5", "accuracy.wall_coarse_mm=12")
+WALL = ("accuracy.wall_element_mm=3")
 PLACES = ("candidates.stations_mm=[33.8, 68.9, 104, 150]", "load.normal_force_n=[3, 13]")
 COARSE = {  # file: scene and overrides
     "fig4-curvature": ("fig4-curvature", ("gripper.elements=[8, 12, 4]",)),

@@ -138,5 +138,5 @@ def random_scene(seed: int, k: int) -> tuple[str, Table]:
     return kind, {
         "object": {"name": f"{kind} {k}", **body}, "gripper": pads,
         "friction": {"mu": number(rng.uniform(0.3, 1.2))}, "load": {"normal_force_n": forces(rng, pads)},
-        "candidates": places(rng, body, pads), "accuracy": {"meshes": 1}, "output": {"patches": "none"},
+        "candidates": places(rng, body, pads), "accuracy": {"meshes": 1}, "run": {"patches": "none"},
     }  # fmt: skip

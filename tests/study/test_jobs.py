@@ -20,9 +20,7 @@ ONE = {
     "flask-mesh": ("candidates.stations_mm=[30]", "candidates.angles_deg=[0]"),
 }
 COARSE_WALL = (
-    "accuracy.wall_around_mm=4",
-    "accuracy.wall_along_mm=6",
-    "accuracy.wall_coarse_mm=12",
+    "accuracy.wall_element_mm=4",
     "accuracy.meshes=1",
 )
 # The same of the scenes with thin walls, and the dents that their largest force may leave [mm].

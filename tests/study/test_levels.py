@@ -32,9 +32,8 @@ meshes = 2
 [effects]
 friction_pressure_coupling = "none"
 """
-WALL = ("object.wall_mm=0.8", "effects.object='nonlinear_shell'", "accuracy.wall_around_mm=5",
-        "accuracy.wall_along_mm=8", "accuracy.wall_coarse_mm=16", "load.normal_force_n=[1, 2, 3]",
-        "gripper.elements=[6, 4, 2]")  # fmt: skip
+WALL = ("object.wall_mm=0.8", "effects.object='nonlinear_shell'", "accuracy.wall_element_mm=5",
+        "load.normal_force_n=[1, 2, 3]", "gripper.elements=[6, 4, 2]")  # fmt: skip
 BOTH = pytest.mark.parametrize("overrides", [(), WALL], ids=["rigid", "wall"])
 ROUGH = ("effects.friction_pressure_coupling='tangential'",)
 

@@ -150,8 +150,8 @@ def test_fitted_quartics_in_any_pose_have_the_volume_of_their_surfaces():
 
 
 def test_epsilon_in_any_pose_is_computed_on_demand():
-    [facing] = cases(OVAL, "score.length_scale=longest", forces="[5]")
-    [askew] = cases(OVAL, "score.length_scale=longest", "score.epsilon=everywhere", angles="[30]", forces="[5]")
+    [facing] = cases(OVAL, "score.object_length_mm=longest", forces="[5]")
+    [askew] = cases(OVAL, "score.object_length_mm=longest", "score.epsilon=everywhere", angles="[30]", forces="[5]")
     assert (np.array(facing["maps/epsilon"]) > 0).all()
     assert (np.array(askew["maps/epsilon"]) > 0).all()
     assert (np.array(askew["maps/epsilon"]) < facing["maps/epsilon"]).all()

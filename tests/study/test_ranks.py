@@ -29,9 +29,6 @@ edge_radius_mm = 8
 [gripper]
 elements = [8, 4, 2]
 
-[friction]
-cor_grid = 3
-
 [limit_surface]
 samples = 80
 wrench_samples = [2, 5]
@@ -124,7 +121,7 @@ def test_one_candidate_of_many_forces_is_divided_to_the_same_bits(once, shared_p
     changes = ("candidates.stations_mm=[30]", "candidates.angles_deg=[5]", "load.normal_force_n=[0.5, 1, 2, 3, 4, 6]",
                "limit_surface.wrench_samples='none'", "effects.friction_pressure_coupling='auto'")  # fmt: skip
     if name == "cup":
-        changes += ("accuracy.wall_around_mm=4", "accuracy.wall_along_mm=6", "accuracy.wall_coarse_mm=12",
+        changes += ("accuracy.wall_element_mm=4",
                     "gripper.pad_length_mm=30")  # fmt: skip
     place = [word for change in changes for word in ("--set", change)]
     whole, path = shared_path / "whole.hdf", shared_path / "divided.hdf"
@@ -144,7 +141,7 @@ def test_any_number_of_ranks_writes_the_same_bits(once, shared_path, scene, alon
     assert not list(shared_path.glob("*.part"))
     expected = once(contents, alone)
     # all that is compared: maps of every model, both fingers, the checks and every face
-    for name in ("e_n/ccm", "quality/pcm", "fingers/cor_wrench", "checks/ellipticity", "patch/pressure",
+    for name in ("e_n/ccm", "quality/pcm", "checks/ellipticity", "patch/pressure",
                  "checksums/rows/study/patch/pressure", "quality_fitted/pcm", "limit_surface/coefficients",
                  "wrenches/wrench"):  # fmt: skip
         assert f"study/{name}" in expected

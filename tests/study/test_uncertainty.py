@@ -66,13 +66,13 @@ def test_every_input_takes_the_middles_of_intervals_of_equal_probability_once():
 
 
 def test_a_scene_is_solved_as_given_and_with_every_sample():
-    swept = scene("sweep.friction.model=['pcm', 'pcm_projected']")
+    swept = scene("sweep.score.object_length_mm=['longest', 'per_axis']")
     assert [len(axis.values) for axis in axes(swept)] == [2, 9, 2, 1, 1]
     assert len(axes(swept)[1].options) == 9
     points = swept.points
     assert (len(points), swept.cases) == (18, 36)
-    assert points[0] == {"friction.model": "pcm"}
-    assert points[9] == {"friction.model": "pcm_projected"}
+    assert points[0] == {"score.object_length_mm": "longest"}
+    assert points[9] == {"score.object_length_mm": "per_axis"}
     assert [p["friction.mu"] for p in points[1:9]] == [p["friction.mu"] for p in points[10:]]
     units = make_plan(scene()).units
     assert [u.scene.friction.mu for u in units[::2]] == [0.8, *(p["friction.mu"] for p in scene().points[1:])]

@@ -43,9 +43,7 @@ a_mm = 24
 b_mm = 20
 """
 COARSE = """[accuracy]
-wall_around_mm = 4
-wall_along_mm = 6
-wall_coarse_mm = 12
+wall_element_mm = 4
 meshes = 1
 [effects]
 friction_pressure_coupling = "none"
@@ -182,14 +180,14 @@ def test_a_tube_gives_way_more_than_a_cup_and_less_where_its_rims_are_held():
     straight = CUP.replace("[0, 24], [4, 28]", "[0, 30]").replace("[60, 32], [80, 34]", "[60, 30], [80, 30]")
     found = [
         solved(straight, *own, forces="[1]")[0].values["maps/indentation"]
-        for own in (("object.support='clamped'", "object.base='none'"), (), ("object.base='none'",))
+        for own in (("object.support='clamped'", "object.open_ends='both'"), (), ("object.open_ends='both'",))
     ]
     assert 1.3 * found[0] < found[1] < 0.8 * found[2]
-    values = solved(straight, "object.base='none'", "object.wall_mm=0.25", forces="[0.1, 3]")[1].values
+    values = solved(straight, "object.open_ends='both'", "object.wall_mm=0.25", forces="[0.1, 3]")[1].values
     assert values["maps/indentation"] > wall.DEEP * 0.030
     assert values["maps/flags"] & Flag.DENTED
     with pytest.raises(Exception, match="base_wall_mm"):
-        solved(straight, "object.base='none'", "object.base_wall_mm=0.8")
+        solved(straight, "object.open_ends='both'", "object.base_wall_mm=0.8")
 
 
 def test_a_collapse_fails_the_case_and_those_above_with_the_reason(monkeypatch):

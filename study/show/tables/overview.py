@@ -40,7 +40,6 @@ def scene_text(scene: Any, file: str) -> str:
         "compliance": compliance_text(scene) if has_wall(o) else "",
         "petsc": " ".join(f"-{key} {value}" for key, value in scene.petsc.items()),
         "each case": limits_text(scene.run),
-        "results": scene.output.file,
     }
     return "\n".join([f"{file}: no errors", *aligned(rows), *told(scene)])
 
@@ -82,7 +81,7 @@ def wall_text(shape: Any) -> str:
 
     name = None if shape.wall_material == "custom" else shape.wall_material
     found = wall_material(name, shape.young_modulus, shape.wall_poisson_ratio, shape.yield_strength)
-    given = [t for _, t in shape.wall_profile_mm or ()] or [shape.wall_mm]
+    given = shape.thicknesses_mm
     thickness = f"{min(given):g}" if min(given) == max(given) else f"{min(given):g} to {max(given):g}"
     strength = shown_text(found.yield_strength, "Pa", 6) if found.yield_strength else ""
     strength = f", yields at {strength}" if strength else ", yield strength unknown"

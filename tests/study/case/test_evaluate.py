@@ -103,9 +103,9 @@ def test_extents_scale_arms_each_along_its_axis_or_the_longest_along_all():
     text += "[candidates]\nstations_mm = [0]\nangles_deg = [0]\n[load]\nnormal_force_n = [2]"
     for overrides, arms, torques in (
         ([], [0.05, 0.04, 0.12], 0.05),
-        (['score.length_scale="longest"'], [0.12] * 3, 0.05),
+        (['score.object_length_mm="longest"'], [0.12] * 3, 0.05),
         (["score.object_length_mm=80"], [0.08] * 3, 0.05),
-        (['score.torque_scale="object"'], [0.05, 0.04, 0.12], 0.12),
+        (['score.contact_length_mm="object"'], [0.05, 0.04, 0.12], 0.12),
     ):
         scene = parse_scene(text, overrides=overrides)
         found = lengths(scene, build_object(scene.object))

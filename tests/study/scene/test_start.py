@@ -31,7 +31,7 @@ SMALL = {  # what makes a run of a second or two of each kind
     "cup": ["candidates.stations=2", "load.normal_force_n=[0.5]",
             "effects.object='rigid'"],
     "cylinder": ["load.normal_force_n=[3]", "accuracy.meshes=1"],
-    "mesh": ["candidates.count=2", "load.normal_force_n=[2]"],
+    "mesh": ["candidates.sampled=2", "load.normal_force_n=[2]"],
 }  # fmt: skip
 
 
@@ -92,7 +92,7 @@ def test_a_mesh_gets_a_sampler_and_keeps_the_pads(tmp_path):
     """The flask is 120 mm high and 49.7 mm wide along y; stations that fit it stand in comments."""
     assert started("mesh", "-o", "sub/flask") == 0
     scene = load_scene(tmp_path / "sub" / "flask.toml")
-    assert (scene.candidates.sampler, scene.candidates.count) == ("antipodal", 12)
+    assert scene.candidates.sampled == 12
     proposed = "# stations_mm = [25.0, 35.0, 45.0, 55.0, 65.0, 75.0, 85.0, 95.0]"
     assert proposed in (tmp_path / "sub" / "flask.toml").read_text()
     assert (scene.gripper.pad_length_mm, scene.gripper.pad_width_mm) == (50, 22)
@@ -107,7 +107,7 @@ def with_stations(path):
     """A scene with its commented stations in place of the sampler, if it proposes any."""
     text = path.read_text()
     if "# stations_mm" in text:
-        for key, new in (("sampler", "# sampler"), ("count", "# count"), ("# stations_mm", "stations_mm"),
+        for key, new in (("sampled", "# sampled"), ("# stations_mm", "stations_mm"),
                          ("# angles_deg", "angles_deg")):  # fmt: skip
             text = text.replace(f"\n{key} =", f"\n{new} =")
     path.write_text(text)

@@ -48,9 +48,7 @@ safety = 1
 [gripper]
 elements = [6, 4, 3]
 [accuracy]
-wall_around_mm = 4
-wall_along_mm = 6
-wall_coarse_mm = 12
+wall_element_mm = 4
 [candidates]
 stations_mm = [30, 50]
 angles_deg = [0]
@@ -134,7 +132,7 @@ def test_the_size_of_a_shell_is_that_of_the_mesh_that_is_solved(solved):
     made = Candidate(scene, fingers, unit.candidate.poses)
     assert size.shell == pytest.approx(6 * made.solver.shell.nodes, rel=0.1)  # the axis is one node
     made.destroy()
-    fine = wall_size(scene.with_values({"accuracy.wall_around_mm": 1.0, "accuracy.wall_along_mm": 1.5}))
+    fine = wall_size(scene.with_values({"accuracy.wall_element_mm": 1.0}))
     assert fine.shell > 4 * size.shell
     assert fine.memory > 4 * size.memory
 
