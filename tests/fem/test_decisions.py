@@ -174,6 +174,7 @@ def test_a_mesh_as_large_as_is_allowed_is_allowed(size, beyond, seed):
         cleaned(moved(factor * beyond * points, seed), CUBE[1], unit)
 
 
+@pytest.mark.long
 @tries
 @given(seeds)
 def test_a_box_of_whole_steps_has_as_many_cells(seed):
@@ -613,6 +614,7 @@ def cylinder(ends, seed=None):
 SURFACE = cylinder((0.0, 2.0))
 
 
+@pytest.mark.long
 @tries
 @given(seeds)
 def test_a_point_at_the_end_of_a_wall_faces_it(seed):

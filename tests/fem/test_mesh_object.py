@@ -58,7 +58,8 @@ def spheroid(x, a=0.025, c=0.04):
     return g, np.stack([n[:, 0] * x[:, 0] / r, n[:, 0] * x[:, 1] / r, n[:, 1]], axis=1)
 
 
-@pytest.mark.parametrize("levels", [2, pytest.param(3, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("levels", [2, 3])
 def test_region_of_flat_facets_converges_to_the_sphere_and_the_spheroid_when_mesh_and_grid_are_refined(levels):
     """Halving triangles and grid: the facets' sagitta, edge^2 / (8 R), bounds the distance, and falls to a quarter.
 

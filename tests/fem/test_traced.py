@@ -201,6 +201,7 @@ def traced_can(facet=0.0015):
     return ThinWalled(surface, surface.round, 4e-4, PET, "standing")
 
 
+@pytest.mark.long
 def test_a_traced_can_between_two_fingers_is_the_can():
     """Force 1 N and 3 N; the facets' sagitta is 8 um, the travels are about 1 mm."""
     exact, found = (list(grip(body).load_path((1.0, 3.0))) for body in (thin(), traced_can()))

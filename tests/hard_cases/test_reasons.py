@@ -53,4 +53,4 @@ def test_only_nearly_incompressible_pads_start_unsqueezed():
         u = pad.displacement(SpringBed(pad, gap).guess(1e-3))[:, 2]
         found.append(np.ptp(u))
     assert found[0] > 5e-4
-    assert found[1] == 0.0
+    assert found[1] < 1e-12  # of strokes of 1 mm; the guess is the same everywhere

@@ -82,7 +82,8 @@ def test_a_coarse_variant_of_every_scene_is_solved(once, shared_path, name):
         assert result.read("checks/min_det_f").min() > 0
 
 
-@pytest.mark.parametrize("name", quick(WALLED, "bottle"))
+@pytest.mark.long  # tests/study/test_walls.py presses thin walls in the fast stage
+@pytest.mark.parametrize("name", WALLED)
 def test_a_coarse_variant_of_every_scene_with_a_thin_wall_is_solved(once, shared_path, name):
     path, (overrides, indentations) = shared_path / f"{name}.hdf", WALLED[name]
     words = [word for value in (*COARSE_WALL, *overrides) for word in ("--set", value)]
@@ -102,6 +103,7 @@ def test_a_coarse_variant_of_every_scene_with_a_thin_wall_is_solved(once, shared
             assert np.isfinite(wrenches).all()
 
 
+@pytest.mark.long
 def test_the_curvature_study_shows_that_curvature_costs_and_against_what_to_draw_it(once, shared_path):
     path = shared_path / "fig4.hdf"
     words = "--set", "gripper.elements=[8, 20, 4]", "--set", 'effects.friction_pressure_coupling="none"'

@@ -36,6 +36,7 @@ def along_the_neck(stations, forces=FORCES):
     return *np.moveaxis(np.array(rows), 2, 0), known
 
 
+@pytest.mark.long
 def test_a_station_that_moves_by_two_micrometres_changes_nothing():
     """5.43 mm at 4 N with nodal gaps; weighted ones wander to 8.1 mm there, and fail."""
     closing, e_n, iterations, known = along_the_neck([170.588, 170.59], FORCES[:4])

@@ -77,6 +77,7 @@ def test_coulombs_law_and_balance_hold(level):
         np.testing.assert_allclose(rubbed, state.wall.load.sum(axis=0), atol=1e-9 * state.force)
 
 
+@pytest.mark.long
 def test_quarter_half_and_full_give_the_same():
     for allowed in ((True, False), (False, False)):
         for a, b in zip(states(), states(allowed=allowed), strict=True):
@@ -85,6 +86,7 @@ def test_quarter_half_and_full_give_the_same():
                 assert e_n(finger) == pytest.approx(e_n(a.fingers[0]), rel=1e-6)
 
 
+@pytest.mark.long
 def test_a_wall_that_hardly_gives_way_is_a_rigid_object():
     problem = grip(thin(), mu=MU).problem
     gap = gap_at(pose(0.0, 0.075))
@@ -100,6 +102,7 @@ def test_a_wall_that_hardly_gives_way_is_a_rigid_object():
         assert e_n(one.fingers[0]) == pytest.approx(e_n(other), rel=5e-4)
 
 
+@pytest.mark.long
 def test_a_level_from_the_coarse_load_path_is_that_of_the_fine_one():
     coarse = tuple(grip(thin(), elements=(6, 4, 2), mu=MU).load_path((0.5, 2.0)))
     fine = {"elements": (12, 8, 4), "mesh": WallMesh(0.0015, 0.0025, 0.010)}

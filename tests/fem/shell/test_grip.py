@@ -53,6 +53,7 @@ def test_the_tangent_is_the_derivative_of_the_residual(allowed, level, control):
             assert np.abs(found - expected)[rows].max() <= 1e-8 * np.abs(found).max() + 1e-3
 
 
+@pytest.mark.long
 def test_quarter_half_and_full_give_the_same():
     reference = states()
     for allowed in ((True, False), (False, True), (False, False)):

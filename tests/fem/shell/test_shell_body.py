@@ -154,6 +154,7 @@ def reaction(body, q, load=0.0):
     return np.where([*mesh.symmetry, False], 0.0, force[:, :3].sum(axis=0)) / mesh.share
 
 
+@pytest.mark.long
 def test_quarter_half_and_whole_are_the_same():
     found = []
     for symmetry in (WHOLE, HALF_Y, HALF_X, QUARTER):

@@ -195,6 +195,7 @@ def sampled_scene(opening=50, more=""):
     return with_sampled_grasps(parse_scene(SCENE.format(opening=opening, more=more)))
 
 
+@pytest.mark.long
 def test_a_scene_gets_the_grasps_as_poses_once_and_for_all():
     scene = sampled_scene()
     poses = scene.candidates.poses
