@@ -153,7 +153,7 @@ def smooth_triangles(
     alike = pairs[halves[:, 0], 0] != pairs[halves[:, 1], 0]
     # an edge at the very angle is a crease, whatever rounding makes of it
     crease = ~paired | ~alike | (cosine < np.cos(np.radians(crease_angle)) + AT_ANGLE)
-    turn = np.where(paired, np.arccos(np.clip(np.where(alike, cosine, -cosine), -1.0, 1.0)), 0.0)
+    turn = np.where(paired, np.arccos(np.clip(np.where(alike, cosine, -cosine), -1.0, 1.0)), np.pi)
     corner_normals = _corner_normals(points, triangles, area, normal, halves[~crease])
     inner = np.empty((len(ends), 2, 3))
     for end in (0, 1):
