@@ -15,7 +15,6 @@ TOLERANCE = 1e-9  # of a face's size: a line through an edge belongs to both fac
 SAME = 1e-6  # of a usual face's size: corners no farther apart are one
 STEEP = 1e-9  # cosine between a line and a face's normal, below which the line runs along the face
 UNLOADED = 0.01  # weight of a face's own normal, in mean loads of all faces: the object's counts where there is load
-NEWTON = 20  # iterations, of which bilinear faces take three or four
 
 
 class Foot(NamedTuple):
@@ -174,7 +173,7 @@ def _bilinear(u: FloatArray, v: FloatArray) -> FloatArray:
 def _reference(q: FloatArray) -> FloatArray:
     """Coordinates ``u, v`` ``(n, 2)`` of the point 0 in plane quadrilaterals ``(n, 4, 2)``, by Newton's method."""
     uv = np.zeros((len(q), 2))
-    for _ in range(NEWTON):
+    for _ in range(20):  # bilinear faces take three or four
         u, v = uv.T
         r = np.einsum("nk,nkc->nc", _bilinear(u, v), q)
         du = ((q[:, 1] - q[:, 0]) * (1 - v)[:, None] + (q[:, 2] - q[:, 3]) * (1 + v)[:, None]) / 4

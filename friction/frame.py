@@ -186,16 +186,16 @@ def _on_faces(faces: ContactPatch, cop: FloatArray, N: FloatArray) -> tuple[Floa
 
 def _on_the_whole(face: ContactFace, cop: FloatArray, N: FloatArray) -> tuple[FloatArray, FloatArray, int, FrameFlag]:
     """Origin, normal, passes and flag on one surface; steps are halved where they lead to and fro."""
-    flag, seen = FrameFlag.CLEAN, []
+    flag, normals = FrameFlag.CLEAN, []
     for iterations in range(1, MAX_ITERATIONS + 1):
         origin, new, missed = face.foot(cop, N)
         step = new - N
         if np.linalg.norm(step) < STILL:
             break
-        seen.append(new)
+        normals.append(new)
         N = _direction(N + 0.5 ** (iterations // HALVED) * step)
     if np.linalg.norm(step) > NEARLY:  # still to and fro: the mean of the last normals
-        N = _direction(np.mean(seen[-HALVED:], axis=0))
+        N = _direction(np.mean(normals[-HALVED:], axis=0))
         origin, _, missed = face.foot(cop, N)
         flag |= FrameFlag.CYCLE
     return origin, N, iterations, flag | FrameFlag.HOLE * missed
@@ -214,7 +214,6 @@ def _axes(N: FloatArray, x_hint: ArrayLike) -> FloatArray:
 
 ANGLE = 1e-6  # of a cosine: files in single precision know their directions to some 1e-7
 OPPOSED = -0.5  # cosine between the normals of neighbours: a real overhang turns by less from face to face
-NEIGHBOURS = 4
 TIED = 1e-6  # of a distance: faces as far away as the last neighbour are neighbours too
 
 
@@ -241,8 +240,8 @@ def firm(faces: ContactPatch) -> NDArray[np.bool_]:
     """Which faces are no slivers ``(n,)``: all without corners, and all where every one is a sliver."""
     if faces.corners is None:
         return np.ones(len(faces.area), dtype=bool)
-    whole = ~slivers(faces.corners)
-    return whole | ~whole.any()
+    plane = ~slivers(faces.corners)
+    return plane | ~plane.any()
 
 
 def opposing(faces: ContactPatch, turned: NDArray[np.bool_]) -> bool:
@@ -252,7 +251,7 @@ def opposing(faces: ContactPatch, turned: NDArray[np.bool_]) -> bool:
     """
     if not turned.any() or len(turned) == 1:
         return False
-    tree, count = cKDTree(faces.centroid), min(NEIGHBOURS + 1, len(turned))
+    tree, count = cKDTree(faces.centroid), min(5, len(turned))
     # all faces as far away as the last neighbour count, or which one does would hang on rounding
     reach = tree.query(faces.centroid[turned], k=[count])[0][:, 0] * (1 + TIED)
     near = tree.query_ball_point(faces.centroid[turned], reach)

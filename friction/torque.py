@@ -7,8 +7,6 @@ import numpy as np
 from softjaw.friction.patch import CANCEL, ContactPatch, FloatArray, NoContactError
 from softjaw.friction.wrench import checked_mu, friction_sums, model_faces
 
-MAX_CUTS = 2000
-
 
 def pure_torque(patch: ContactPatch, mu: float, model: str = "ccm", tolerance: float = 1e-9) -> float:
     """Torque limit at zero net force: the least ``H(v_x, v_y, 1)`` over all sliding velocities.
@@ -41,7 +39,7 @@ def pure_torque(patch: ContactPatch, mu: float, model: str = "ccm", tolerance: f
     twist, sums = np.array([[0.0, 0.0, 0.0, 0.0, 0.0, 1.0]]), np.empty((1, 7))
     # the first ellipse is a circle that must hold the minimiser
     v, P, best, limit = np.zeros(2), np.eye(2) * radius**2, np.inf, 0.0
-    for cut in range(MAX_CUTS):
+    for cut in range(2000):
         twist[0, :2] = v
         friction_sums(arm, normal, load, twist, sums)
         T, g = sums[0, 6], sums[0, :2]
@@ -51,7 +49,7 @@ def pure_torque(patch: ContactPatch, mu: float, model: str = "ccm", tolerance: f
         if T - width >= best - limit:
             return float(mu * size * best)
         v, P = _smaller_ellipse(v, P, g / width, (T - best) / width)
-    raise ArithmeticError(f"pure torque not found to {tolerance:g} after {MAX_CUTS} cuts: ask for a larger tolerance")
+    raise ArithmeticError(f"pure torque not found to {tolerance:g} after {cut + 1} cuts: ask for a larger tolerance")
 
 
 def _radius(patch: ContactPatch) -> float:

@@ -32,7 +32,7 @@ from softjaw.friction.motion import SLIDE_X, SLIDE_Y, TURN_Z
 from softjaw.friction.patch import CANCEL, ContactPatch, FloatArray
 
 MODELS = ("ccm", "pcm", "pcm_projected", "unrolled")
-DIRECTIONS, NARROWED = 6, 1e-3  # on each side of the best one so far; width at which the search for it ends [rad]
+SEARCH_WIDTH = 1e-3  # at which the search for the direction of the largest force ends [rad]
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class FrictionLimits:
         reaches as far as before less ``|used|`` to the one side. What ``t`` balances among faces returns as all slip.
         """
         axes = (self.f_x, self.f_y, self.tau_z)
-        f_x, f_y, tau_z = (max(0.0, own - abs(float(u))) for own, u in zip(axes, np.asarray(used), strict=True))
+        f_x, f_y, tau_z = (max(0.0, limit - abs(float(u))) for limit, u in zip(axes, np.asarray(used), strict=True))
         share = tau_z / self.tau_z if self.tau_z > 0.0 else 1.0
         return replace(self, f_x=f_x, f_y=f_y, tau_z=tau_z, e_n=share * self.e_n)
 
@@ -152,15 +152,15 @@ def _largest_force(patch: ContactPatch) -> float:
     """Largest force ``max f_t`` in the contact plane over all motions, for ``mu = 1`` [N].
 
     It is the largest value of the support function over translations, whose direction is found on a grid that narrows
-    round the best one, to `NARROWED`; the maximum is flat there, so that it is known to 1e-9 of itself.
+    round the best one, to `SEARCH_WIDTH`; the maximum is flat there, so that it is known to 1e-9 of itself.
     A planar contact carries the same in all directions and needs no search.
     """
     best, width, largest = 0.5 * math.pi, 0.5 * math.pi, 0.0
-    while width > NARROWED:
-        angles = best + width * np.linspace(-1.0, 1.0, 2 * DIRECTIONS + 1)
+    while width > SEARCH_WIDTH:
+        angles = best + width * np.linspace(-1.0, 1.0, 13)
         forces = friction_support(patch, np.column_stack([np.cos(angles), np.sin(angles), np.zeros(angles.size)]), 1.0)
         k = int(forces.argmax())
-        best, width, largest = float(angles[k]), width / DIRECTIONS, max(largest, float(forces[k]))
+        best, width, largest = float(angles[k]), width / 6, max(largest, float(forces[k]))
     return largest
 
 

@@ -12,12 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import ConvexHull, QhullError
 
 FloatArray = NDArray[np.float64]
-FLAT = 1e-12  # of the longest extent: points that are thinner have no volume
-STEP = 1e-5  # of differences of a support function of size 1: rounding and bending both leave some 1e-10
-ALONG = 1e-14  # of the product of two axes: what is left of a form whose axes are parallel to the components
-ROUND = 1e-9  # of the squared support: how far it may be from a quadratic form
-DIRECTIONS = 6000
-SPACING = 2.8 / np.sqrt(DIRECTIONS)  # no direction is farther than this from the nearest of the Fibonacci points
+ROUNDING_SHARE = 1e-12  # of the largest number of its kind: an extent, a load or an arm below it is the rounding of 0
+SUPPORT_STEP = 1e-5  # of differences of a support function of size 1: rounding and bending both leave some 1e-10
 
 
 class Body(Protocol):
@@ -96,7 +92,7 @@ def quadratic_form(body: Body) -> tuple[FloatArray, FloatArray, FloatArray]:
     for (i, j), h in zip(pairs, body.support(np.array([e[i] + e[j] for i, j in pairs])), strict=True):
         # polarisation: the squared support of a sum holds the mixed term twice
         product = (h**2 - Q[i, i] - Q[j, j]) / 2
-        Q[i, j] = Q[j, i] = product if abs(product) > ALONG else 0.0
+        Q[i, j] = Q[j, i] = product if abs(product) > 1e-14 else 0.0  # rounding of axes along the components
     return reach, scale, Q
 
 
@@ -106,7 +102,7 @@ def is_ellipsoid(body: Body) -> bool:
     # six supports always fit some form: others have to confirm it
     t = fibonacci_vertices(np.ones(3), 60)
     h2 = body.support(t / scale) ** 2
-    return bool(np.abs(h2 - np.einsum("ka,ab,kb->k", t, Q, t)).max() <= ROUND * h2.max())
+    return bool(np.abs(h2 - np.einsum("ka,ab,kb->k", t, Q, t)).max() <= 1e-9 * h2.max())
 
 
 def ellipsoid_matrix(body: Body) -> FloatArray | None:
@@ -136,8 +132,9 @@ def ellipsoid_inside(body: Body) -> FloatArray:
     if (axes <= 0).any():
         return np.zeros((3, 3))
     # between samples a support of the even body falls by no more than the distance times its largest value
-    h = body.support(fibonacci_vertices(np.ones(3), DIRECTIONS) / axes)
-    return np.diag(axes * max(h.min() - SPACING * h.max() / (1 - SPACING), 0))
+    h = body.support(fibonacci_vertices(np.ones(3), 6000) / axes)
+    spacing = 2.8 / np.sqrt(len(h))  # no direction is farther than this from the nearest of the Fibonacci points
+    return np.diag(axes * max(h.min() - spacing * h.max() / (1 - spacing), 0))
 
 
 def _root(B: FloatArray) -> FloatArray:
@@ -165,10 +162,10 @@ def touching_points(body: Body, t: ArrayLike) -> FloatArray:
     S = T / scale
     length = np.linalg.norm(S, axis=1, keepdims=True)
     S /= np.where(length > 0, length, 1.0)
-    steps = STEP * np.vstack([np.eye(3), -np.eye(3), np.zeros((1, 3))])
+    steps = SUPPORT_STEP * np.vstack([np.eye(3), -np.eye(3), np.zeros((1, 3))])
     h = body.support(((S[None] + steps[:, None]) * scale).reshape(-1, 3)).reshape(7, len(S))
     # the gradient of a support function is the point that touches
-    p = (h[:3] - h[3:6]).T / (2 * STEP)
+    p = (h[:3] - h[3:6]).T / (2 * SUPPORT_STEP)
     # along the direction itself the support is known better than its differences are
     along = (p * S).sum(axis=1)
     return p * np.where(along > 0, h[6] / np.where(along > 0, along, 1.0), 1.0)[:, None] / scale
@@ -208,11 +205,11 @@ def polytope_volume(vertices: ArrayLike) -> tuple[float, float]:
 
 
 def hull_volume(points: FloatArray) -> float:
-    """Volume of the hull of points ``(m, d)``; 0 where they are flat, thinner than `FLAT` of their longest extent."""
+    """Volume of the hull of points ``(m, d)``; 0 where they are thinner than `ROUNDING_SHARE` of their extent."""
     centred = points - points.mean(axis=0)
     _, extent, axes = np.linalg.svd(centred, full_matrices=False)
     # Qhull fails on flat points, and joggled ones would have a volume of rounding
-    if len(points) <= points.shape[1] or extent[-1] <= FLAT * extent[0]:
+    if len(points) <= points.shape[1] or extent[-1] <= ROUNDING_SHARE * extent[0]:
         return 0.0
     even = centred @ axes.T / extent  # Qhull loses facets of points that are much longer than wide
     try:

@@ -33,15 +33,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from softjaw.scoring.bodies import Body, ellipsoid_inside, is_ellipsoid, joined
 from softjaw.scoring.contact import SoftContact
-from softjaw.scoring.gauge import cone_programme, contact_support, gauge
+from softjaw.scoring.gauge import LORENTZ, cone_programme, contact_support, gauge
 from softjaw.scoring.reach import reach
 
 FloatArray = NDArray[np.float64]
 
 
-_SMALLEST = 1e-9  # relative to the largest wrench of a contact: what counts as no wrench
-_ABSOLUTE = 1e-6
-_ROUNDS, _STARTS, _SPLITS = 12, 40, 16
+NO_WRENCH = 1e-9  # relative to the largest wrench of a contact: what counts as none
+_ROUNDS = 12  # of following a ray to its facet
 
 
 class EpsilonBound(NamedTuple):
@@ -114,7 +113,7 @@ def separating_wrench(c: FloatArray, D: FloatArray) -> FloatArray | None:
     n, size = len(c), np.abs(c).max()
     _, spread, V = np.linalg.svd(np.vstack([c, D.reshape(-1, 6)]))
     # if the wrenches span less than six dimensions, this direction is felt by no contact
-    if len(spread) < 6 or spread[-1] <= _SMALLEST * spread[0]:
+    if len(spread) < 6 or spread[-1] <= NO_WRENCH * spread[0]:
         return V[-1]
     # least t with c_i u + |D_i u| <= t, force and torque of u of at most one
     G = np.zeros((1, n + 2, 4, 7))
@@ -125,21 +124,21 @@ def separating_wrench(c: FloatArray, D: FloatArray) -> FloatArray | None:
     h[0, :n, 0], h[0, n:, 0] = size, 1
     x, _ = cone_programme(np.eye(7)[6], G, h, np.array([1e-9 * size]))
     u = x[:, :6] / max(float(np.linalg.norm(x[:, :6])), 1e-300)
-    return u[0] if contact_support(c, D, u).max() < -_SMALLEST * size else None
+    return u[0] if contact_support(c, D, u).max() < -NO_WRENCH * size else None
 
 
 def _between(c: FloatArray, D: FloatArray, kind: str, tolerance: float) -> tuple[float, float, FloatArray]:
     """Bounds of epsilon, closer than the tolerance unless that takes too many proofs."""
     proofs = [certified_radius(c, D, kind)]
     upper, u = _weakest(c, D, proofs[0].directions, kind, proofs[0].radius * (1 + tolerance / 10))
-    for _ in range(_SPLITS):
+    for _ in range(16):
         # the bound is the smallest radius of all sides, so only a split of that one can raise it
         first = min(proofs, key=lambda proof: proof.radius)
-        if upper <= first.radius * (1 + tolerance) + _ABSOLUTE:
+        if upper <= first.radius * (1 + tolerance) + 1e-6:
             break
         # random starts are for the case of a gap, where the directions of the proof may have missed the weakest
         if len(proofs) == 1:
-            many = np.random.default_rng(0).normal(size=(_STARTS, 6))
+            many = np.random.default_rng(0).normal(size=(40, 6))
             upper, u = min((upper, u), _weakest(c, D, many, kind, first.radius), key=lambda pair: pair[0])
         proofs.remove(first)
         for side in (first.split, -first.split):
@@ -178,12 +177,10 @@ def _weakest_of_bodies(C: FloatArray, bodies: Sequence[Body], u: FloatArray, kin
     return best, at
 
 
-_LORENTZ = np.array([1.0, -1.0, -1.0, -1.0])
 # in Pauli matrices Lorentz vectors are Hermitian ones without negative eigenvalues
 _SIGMA = np.array([[[1, 0], [0, 1]], [[0, 1], [1, 0]], [[0, -1j], [1j, 0]], [[1, 0], [0, -1]]])
 _PAIRS = np.einsum("apq,brs->abprqs", _SIGMA, _SIGMA).reshape(16, 4, 4)
 _TRANSPOSED = np.array([1.0, 1.0, -1.0, 1.0])  # transposing a Hermitian matrix turns its second Pauli coordinate
-_NEWTON_STEPS = 300
 
 
 class Proof(NamedTuple):
@@ -214,7 +211,7 @@ def certified_radius(
     programme = _Programme(c, D, kind, planes)
     x = before = programme.start()
     mu = 1.0
-    for _ in range(_NEWTON_STEPS):
+    for _ in range(300):
         try:
             step, decrement = programme.newton_step(x, mu)
         except np.linalg.LinAlgError:
@@ -250,7 +247,7 @@ class _Programme:
         L[:, 0] += s[np.arange(n) % k]
         self.planes = np.zeros((0, d)) if planes is None else planes
         lines = np.vstack([s, self.planes])
-        squares = np.einsum("a,iad,iae->ide", _LORENTZ, L, L)
+        squares = np.einsum("a,iad,iae->ide", LORENTZ, L, L)
         pairs = [np.outer(g, s_) for i, g in enumerate(lines) for s_ in lines[:i]]
         groups = [
             np.diag([1.0] * 6 + [0.0] * k)[None],
@@ -291,7 +288,7 @@ class _Programme:
         """Whether the form and all multipliers are inside their cones."""
         a = x[self.lorentz]
         # signs are cheap; factors are tried only of what passes them
-        if (x[self.single] <= 0).any() or (a[:, 0] <= 0).any() or ((a * a) @ _LORENTZ <= 0).any():
+        if (x[self.single] <= 0).any() or (a[:, 0] <= 0).any() or ((a * a) @ LORENTZ <= 0).any():
             return False
         try:
             np.linalg.cholesky(self._form(x))
@@ -310,10 +307,10 @@ class _Programme:
         g[self.single] -= 1 / x[self.single]
         H[self.single, self.single] += 1 / x[self.single] ** 2
         a = x[self.lorentz]
-        q = ((a * a) @ _LORENTZ)[:, None]
-        slope = -2 * a * _LORENTZ / q
+        q = ((a * a) @ LORENTZ)[:, None]
+        slope = -2 * a * LORENTZ / q
         g[self.lorentz] += slope
-        _add(H, self.lorentz, slope[:, :, None] * slope[:, None, :] - 2 * np.diag(_LORENTZ) / q[:, None])
+        _add(H, self.lorentz, slope[:, :, None] * slope[:, None, :] - 2 * np.diag(LORENTZ) / q[:, None])
         P = np.linalg.inv(np.tensordot(x[self.matrices], _PAIRS, 1))[:, None] @ _PAIRS
         g[self.matrices] -= np.einsum("pkii->pk", P).real
         flat = P.reshape(-1, 16, 16), P.swapaxes(2, 3).reshape(-1, 16, 16)

@@ -31,8 +31,7 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
 
 
-TINY = 1e-200  # instead of a singular value 0
-SHADOW = 512  # directions in which a body without closed form is asked for its shadow
+MIN_SINGULAR_VALUE = 1e-200  # instead of a singular value 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +110,7 @@ class EllipsoidFibre:
     @cached_property
     def rim(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """The disc for `ridge`: the rim of a flat body has normals only as the limit of thin ones."""
-        return _disc(np.maximum(self.axes, THIN * self.axes[2]), self.vectors, self.facet_map)
+        return _disc(np.maximum(self.axes, MIN_THICKNESS * self.axes[2]), self.vectors, self.facet_map)
 
     def measures(self, level: int) -> tuple[float, float]:
         """Volume of the cone and area of the hull of an ellipse and 0."""
@@ -188,7 +187,7 @@ def _disc(
     # pairs of axes instead of determinant times inverse, which a flat ellipsoid does not have
     cofactor = (vectors * [axes[1] * axes[2], axes[0] * axes[2], axes[0] * axes[1]]) @ vectors.T
     W, s, sphere = np.linalg.svd(F[:, 1:] @ cofactor)
-    s = np.maximum(s, TINY)
+    s = np.maximum(s, MIN_SINGULAR_VALUE)
     c = float(axes.prod()) * F[:, 0]
     return W * s, c, (W.T @ c) / s, sphere
 
@@ -227,10 +226,10 @@ class MeshFibre:
     @cached_property
     def _shadow(self) -> float:
         """Area of the hull of the body's shadow and 0, measured where the shadow is about as wide as long."""
-        M, phi = self.span.M, 2 * math.pi * np.arange(SHADOW) / SHADOW
+        M, phi = self.span.M, 2 * math.pi * np.arange(512) / 512
         W, s, _ = np.linalg.svd(M[:, 1:] * self.body.support(np.eye(3)))
         # a shadow that is thin or far from 0 is stretched: equal steps of angle must see its round parts
-        s = np.maximum(s, [TINY, max(abs(W[:, 1] @ M[:, 0]) / 10, 1e-12 * s[0], TINY)])
+        s = np.maximum(s, [MIN_SINGULAR_VALUE, max(abs(W[:, 1] @ M[:, 0]) / 10, 1e-12 * s[0], MIN_SINGULAR_VALUE)])
         u = np.column_stack([np.cos(phi), np.sin(phi)]) @ (W / s).T @ M
         return float(s.prod()) * fan_area(u[:, 0] + self.body.support(u[:, 1:]))
 
@@ -250,8 +249,8 @@ class MeshFibre:
         edges = np.sort(np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
         # an edge of a closed mesh has two triangles, which follow each other once sorted
         order = np.lexsort((edges[:, 1], edges[:, 0]))
-        one, two = order[0::2] % len(triangles), order[1::2] % len(triangles)
-        between = ((y[one] < 0) != (y[two] < 0)) & ((x[one] * y[two] - x[two] * y[one]) * (y[two] - y[one]) > 0)
+        i, j = order[0::2] % len(triangles), order[1::2] % len(triangles)
+        between = ((y[i] < 0) != (y[j] < 0)) & ((x[i] * y[j] - x[j] * y[i]) * (y[j] - y[i]) > 0)
         v = points @ self.span.M[:, 1:].T + self.span.M[:, 0]
         a, b = v[edges[order[0::2]][between, 0]], v[edges[order[0::2]][between, 1]]
         return 0.5 * float(np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum())
@@ -261,7 +260,7 @@ def _cross(a: FloatArray, b: FloatArray) -> float:
     return float(a[0] * b[1] - a[1] * b[0])
 
 
-THIN = 1e-9  # of the longest extent; what is thinner counts as flat
+MIN_THICKNESS = 1e-9  # of the longest extent, which flat bodies are given so that their rims have normals
 
 
 def surface_mesh(body: Body, level: int) -> tuple[FloatArray, IntArray]:
@@ -299,8 +298,8 @@ def _hull_mesh(vertices: FloatArray) -> tuple[FloatArray, IntArray]:
     extent = np.append(extent, np.zeros(3 - len(extent)))
     if extent[0] == 0:
         return vertices, np.zeros((0, 3), dtype=np.intp)
-    flat = extent <= THIN * extent[0]
-    axes = axes * np.where(flat, THIN * extent[0], extent)[:, None]
+    flat = extent <= MIN_THICKNESS * extent[0]
+    axes = axes * np.where(flat, MIN_THICKNESS * extent[0], extent)[:, None]
     points = np.vstack([vertices, centre + axes[flat], centre - axes[flat]])
     # Hulls turn with linear maps: made as thick as wide, the points cost Qhull no digits.
     round_points = np.linalg.solve(axes.T, (points - centre).T).T

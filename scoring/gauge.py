@@ -24,7 +24,6 @@ from numpy.typing import NDArray
 from softjaw.scoring.bodies import joined
 
 FloatArray = NDArray[np.float64]
-_ROUNDING = 1e-10  # what loads may miss of a wrench, and of their cones, relative to what they carry
 
 
 class Gauge(NamedTuple):
@@ -105,7 +104,7 @@ def _reach(c: FloatArray, D: FloatArray, w: FloatArray, x: FloatArray, kind: str
     # forces beyond their limit shrink together, which keeps their wrench along w
     total = {"linf": lam.max(axis=(1, 2)), "l1": lam.sum(axis=(1, 2))}[kind]
     # loads off the line of w prove only s = 0, where none are needed
-    return np.where(missing <= _ROUNDING * size, s / np.maximum(total, 1), 0.0)
+    return np.where(missing <= 1e-10 * size, s / np.maximum(total, 1), 0.0)
 
 
 def _across(w: FloatArray) -> FloatArray:
@@ -117,9 +116,7 @@ def _across(w: FloatArray) -> FloatArray:
     return reflection[:, :, 1:]
 
 
-_J = np.array([1.0, -1.0, -1.0, -1.0])
-_STEPS = 60
-_FAR = 1e5  # a programme whose minimisers lie far away, or reach to infinity, ends there
+LORENTZ = np.array([1.0, -1.0, -1.0, -1.0])
 
 
 def cone_programme(
@@ -147,10 +144,10 @@ def cone_programme(
     # multipliers start on the axes of their cones, far from the boundary
     z[..., 0] = np.abs(cost).sum() / n
     active = np.arange(m)
-    for _ in range(_STEPS):
+    for _ in range(60):
         gap = (y[active] * z[active]).sum(axis=(1, 2))
         off = np.abs(cost + np.einsum("miad,mia->md", G[active], z[active])).max(axis=1)
-        far = np.abs(x[active]).max(axis=1) > _FAR
+        far = np.abs(x[active]).max(axis=1) > 1e5  # minimisers at infinity
         # programmes that are done drop out, or all would go on with the slowest
         active = active[((gap > tolerance[active]) | (off > 1e-10)) & ~far]
         if not len(active):
@@ -211,20 +208,20 @@ def _step(
 
 def _scaling(y: FloatArray, z: FloatArray) -> tuple[FloatArray, FloatArray]:
     """``v`` and ``beta`` of the scaling ``W = beta (2 v v^T - J)`` with ``W z = W^-1 y``."""
-    sizes = [np.sqrt((a * a) @ _J) for a in (y, z)]
+    sizes = [np.sqrt((a * a) @ LORENTZ) for a in (y, z)]
     y, z = (a / size[..., None] for a, size in zip((y, z), sizes, strict=True))
-    w = (y + _J * z) / np.sqrt(2 * (1 + (y * z).sum(axis=2)))[..., None]
+    w = (y + LORENTZ * z) / np.sqrt(2 * (1 + (y * z).sum(axis=2)))[..., None]
     w[..., 0] += 1
     return w / np.sqrt(2 * w[..., :1]), np.sqrt(sizes[0] / sizes[1])[..., None]
 
 
 def _apply(v: FloatArray, beta: FloatArray, a: FloatArray) -> FloatArray:
-    return beta * (2 * (v * a).sum(axis=-1, keepdims=True) * v - _J * a)
+    return beta * (2 * (v * a).sum(axis=-1, keepdims=True) * v - LORENTZ * a)
 
 
 def _apply_inverse(v: FloatArray, beta: FloatArray, a: FloatArray) -> FloatArray:
-    v = _J * v
-    return (2 * (v * a).sum(axis=-1, keepdims=True) * v - _J * a) / beta
+    v = LORENTZ * v
+    return (2 * (v * a).sum(axis=-1, keepdims=True) * v - LORENTZ * a) / beta
 
 
 def _product(a: FloatArray, b: FloatArray) -> FloatArray:
@@ -236,7 +233,7 @@ def _product(a: FloatArray, b: FloatArray) -> FloatArray:
 
 def _quotient(a: FloatArray, b: FloatArray) -> FloatArray:
     """The ``x`` whose product with ``a`` is ``b``."""
-    first = (b * _J * a).sum(axis=-1, keepdims=True) / ((a * a) @ _J)[..., None]
+    first = (b * LORENTZ * a).sum(axis=-1, keepdims=True) / ((a * a) @ LORENTZ)[..., None]
     x = (b - first * a) / a[..., :1]
     x[..., :1] = first
     return x
@@ -244,12 +241,12 @@ def _quotient(a: FloatArray, b: FloatArray) -> FloatArray:
 
 def _longest(lam: FloatArray, *steps: FloatArray) -> FloatArray:
     """Longest step from ``lam`` that stays in all cones, ``(m,)``."""
-    size = np.sqrt((lam * lam) @ _J)[..., None]
+    size = np.sqrt((lam * lam) @ LORENTZ)[..., None]
     unit = lam / size
     outward = []
     for d in steps:
         # a Lorentz boost takes lam to the axis of the cone, where the way to the boundary is plain
-        along = (unit * _J * d).sum(axis=2, keepdims=True)
+        along = (unit * LORENTZ * d).sum(axis=2, keepdims=True)
         across = d[..., 1:] - (along + d[..., :1]) / (unit[..., :1] + 1) * unit[..., 1:]
         outward.append((np.linalg.norm(across, axis=2) - along[..., 0]) / size[..., 0])
     # a step that never leaves the cones has no longest length
@@ -257,4 +254,4 @@ def _longest(lam: FloatArray, *steps: FloatArray) -> FloatArray:
 
 
 def _inside(y: FloatArray) -> NDArray[np.bool_]:
-    return ((y[..., 0] > 0) & ((y * y) @ _J > 0)).all(axis=1)
+    return ((y[..., 0] > 0) & ((y * y) @ LORENTZ > 0)).all(axis=1)

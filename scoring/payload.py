@@ -34,12 +34,10 @@ from softjaw.scoring.contact import SoftContact
 FloatArray = NDArray[np.float64]
 GRAVITY = 9.80665
 KINDS = ("shared", "up_to", "fixed")
-GAP = 5e-4  # of the bounds, relative, at which the search ends
-NOTHING = 1e-7  # of the forces of the grasp, below which a force is rounding
-OFF = 1e-11  # torque at which K is taken, so that no two bases of the programme are alike
+BOUND_GAP = 5e-4  # of the bounds, relative, at which the search ends
+ROUNDING_FORCE = 1e-7  # of the forces of the grasp, below which a force is rounding
+TORQUE_OFFSET = 1e-11  # torque at which K is taken, so that no two bases of the programme are alike
 PENALTY = 1e5  # of torques that no point takes, against forces
-PIVOTS = 400  # of one programme; ten are usual
-ROUNDS = 40  # of looking along facets; eight are usual
 
 
 @dataclass(frozen=True)
@@ -98,8 +96,8 @@ def payload(
     V1, V2 = (np.ascontiguousarray(getattr(c.body, "vertices").T) / size for c in contacts)  # noqa: B009
     C[:, :, 0] /= size
     grasp = _Grasp(C, V1, V2, KINDS.index(kind))
-    found = _along(grasp, _unit(direction)) if direction is not None else _worst(grasp)
-    return Payload(size * found.force, size * found.upper, found.direction, found.borne)
+    answer = _along(grasp, _unit(direction)) if direction is not None else _worst(grasp)
+    return Payload(size * answer.force, size * answer.upper, answer.direction, answer.borne)
 
 
 @dataclass(frozen=True)
@@ -119,7 +117,7 @@ class _Grasp:
         basis[:, 7] = np.arange(1, m + 1)
         first, _ = _farthest(self.C, self.V1, self.V2, self.kind, np.ones(6))
         basis[-1, :6], basis[-1, 6:] = first, (1.0, 0.0)
-        off = OFF * np.sqrt(np.arange(2.0, m + 1)) - rows @ first
+        off = TORQUE_OFFSET * np.sqrt(np.arange(2.0, m + 1)) - rows @ first
         basis[:-1, 6] = np.where(off < 0, -1.0, 1.0)
         return basis
 
@@ -129,7 +127,7 @@ class _Grasp:
         upper, point, missing = _programme(
             self.C, self.V1, self.V2, self.kind, np.append(along, np.zeros(3)), rows, new
         )
-        return (upper if missing < NOTHING else -np.inf), point, new
+        return (upper if missing < ROUNDING_FORCE else -np.inf), point, new
 
 
 def _along(grasp: _Grasp, d: FloatArray) -> Payload:
@@ -140,7 +138,7 @@ def _along(grasp: _Grasp, d: FloatArray) -> Payload:
     rows[:3, 3:], rows[3:, :3] = np.eye(3), across
     most, point, basis = grasp.farthest(-d, rows, grasp.begin(rows))
     least = -grasp.farthest(d, rows, basis)[0]  # from which load on: 0 or less where none is needed
-    if most < -NOTHING or least > NOTHING:
+    if most < -ROUNDING_FORCE or least > ROUNDING_FORCE:
         return Payload(0.0, 0.0, d, False)
     return Payload(max(float(-d @ point[:3]), 0.0), max(most, 0.0), d, True)
 
@@ -152,16 +150,16 @@ def _worst(grasp: _Grasp) -> Payload:
     search = _Search(grasp, rows)
     for u in np.vstack([np.eye(3), -np.eye(3)]):
         begin = search.look(u, begin)
-        if search.upper < -NOTHING:
+        if search.upper < -ROUNDING_FORCE:
             return Payload(0.0, 0.0, -search.u, False)
     # a set that is flat has no hull, and no ball round 0
-    thin = np.linalg.svd(search.found - search.found.mean(axis=0))[2][-1]
+    thin = np.linalg.svd(search.forces - search.forces.mean(axis=0))[2][-1]
     for u in (thin, -thin):
         search.look(u, begin)
-    flat = np.linalg.svd(search.found - search.found.mean(axis=0))[1][-1] <= NOTHING
-    lower = 0.0 if flat or search.upper <= NOTHING else search.refine()
-    force = min(lower, search.upper) if lower > NOTHING else 0.0
-    return Payload(force, max(search.upper, 0.0), -search.u, search.upper >= -NOTHING)
+    flat = np.linalg.svd(search.forces - search.forces.mean(axis=0))[1][-1] <= ROUNDING_FORCE
+    lower = 0.0 if flat or search.upper <= ROUNDING_FORCE else search.refine()
+    force = min(lower, search.upper) if lower > ROUNDING_FORCE else 0.0
+    return Payload(force, max(search.upper, 0.0), -search.u, search.upper >= -ROUNDING_FORCE)
 
 
 class _Search:
@@ -174,7 +172,7 @@ class _Search:
         self.upper, self.u = np.inf, np.zeros(3)
 
     @property
-    def found(self) -> FloatArray:
+    def forces(self) -> FloatArray:
         """Forces ``(n, 3)`` of the points."""
         return np.array(self.points)
 
@@ -190,17 +188,17 @@ class _Search:
     def refine(self) -> float:
         """Distance of the nearest facet of the hull, after looking along all that are nearer than the least support."""
         lower = -np.inf
-        for _ in range(ROUNDS):
-            hull = ConvexHull(self.found)
+        for _ in range(40):
+            hull = ConvexHull(self.forces)
             # several triangles may share one facet
             planes, which = np.unique(np.round(hull.equations, 12), axis=0, return_index=True)
             distance = -planes[:, 3]
             lower = float(distance.min())
-            near = np.flatnonzero(distance < self.upper * (1.0 - GAP))
-            if self.upper < NOTHING or not len(near):
+            near = np.flatnonzero(distance < self.upper * (1.0 - BOUND_GAP))
+            if self.upper < ROUNDING_FORCE or not len(near):
                 break
             for k in near[np.argsort(distance[near], kind="stable")]:
-                if distance[k] < self.upper * (1.0 - GAP):
+                if distance[k] < self.upper * (1.0 - BOUND_GAP):
                     self.look(planes[k, :3], self.bases[hull.simplices[which[k], 0]])
         return lower
 
@@ -227,13 +225,13 @@ def _touching(C, V, q, out):
 @njit(cache=True)
 def _farthest(C, V1, V2, kind, q):
     """Point ``(6,)`` of W that is farthest along ``q``, and how far."""
-    one, two = np.empty(6), np.empty(6)
-    h1, h2 = _touching(C[0], V1, q, one), _touching(C[1], V2, q, two)
+    w1, w2 = np.empty(6), np.empty(6)
+    h1, h2 = _touching(C[0], V1, q, w1), _touching(C[1], V2, q, w2)
     if kind == 0:
-        return (2.0 * one, 2.0 * h1) if h1 >= h2 else (2.0 * two, 2.0 * h2)
+        return (2.0 * w1, 2.0 * h1) if h1 >= h2 else (2.0 * w2, 2.0 * h2)
     if kind == 1:
-        return one * (h1 > 0.0) + two * (h2 > 0.0), max(h1, 0.0) + max(h2, 0.0)
-    return one + two, h1 + h2
+        return w1 * (h1 > 0.0) + w2 * (h2 > 0.0), max(h1, 0.0) + max(h2, 0.0)
+    return w1 + w2, h1 + h2
 
 
 @njit(cache=True)
@@ -246,7 +244,7 @@ def _programme(C, V1, V2, kind, along, rows, basis):
     m = len(basis)
     B, cost, right = np.zeros((m, m)), np.zeros(m), np.ones(m)
     for i in range(m - 1):
-        right[i] = OFF * np.sqrt(i + 2.0)
+        right[i] = TORQUE_OFFSET * np.sqrt(i + 2.0)
     for k in range(m):
         if basis[k, 7] > 0:
             B[int(basis[k, 7]) - 1, k], cost[k] = basis[k, 6], -PENALTY
@@ -256,7 +254,7 @@ def _programme(C, V1, V2, kind, along, rows, basis):
     inverse = np.linalg.inv(B)
     x = inverse @ right
     upper, column = np.inf, np.ones(m)
-    for _ in range(PIVOTS):
+    for _ in range(400):
         y = cost @ inverse
         point, support = _farthest(C, V1, V2, kind, along - y[: m - 1] @ rows)
         bound = support + y[: m - 1] @ right[: m - 1]

@@ -36,8 +36,8 @@ from softjaw.scoring.fibre import Fibre, Span, fibre_of
 FloatArray = NDArray[np.float64]
 
 
-ROUNDING = 1e-13
-TURN = 1e-9  # keeps a direction off sides that are parallel to it, where the share of least force is not unique
+MIN_RELATIVE_ERROR = 1e-13  # of a volume: what rounding leaves
+DELTA_TURN = 1e-9  # [rad] keeps a direction off sides parallel to it, where the share of least force is not unique
 
 
 class _Ellipsoid:
@@ -126,10 +126,10 @@ def cone_volume(
     # where no division of a wrench costs less than another, any direction will do
     if math.hypot(*delta) <= 1e-9 * (math.hypot(*a1) + math.hypot(*a2)):
         delta = np.array([1.0, 0.0])
-    delta = delta + TURN * np.array([-delta[1], delta[0]])
+    delta = delta + DELTA_TURN * np.array([-delta[1], delta[0]])
     coarse = _volumes(fibres, delta, 0, with_l1)
     if all(fibre.exact for fibre in fibres):
-        return PoseVolume(float(J * coarse[0]), float(J * coarse[1]), TURN)
+        return PoseVolume(float(J * coarse[0]), float(J * coarse[1]), DELTA_TURN)
     before = coarse
     for level in range(1, min(fibre.finest for fibre in fibres) + 1):
         fine = _volumes(fibres, delta, level, with_l1)
@@ -142,19 +142,19 @@ def cone_volume(
         coarse, before = fine, better
     # an extrapolation may undershoot a volume near 0
     linf, l1 = J * np.maximum(better, 0)
-    return PoseVolume(float(linf), float(l1), max(error, ROUNDING))
+    return PoseVolume(float(linf), float(l1), max(error, MIN_RELATIVE_ERROR))
 
 
 def _volumes(fibres: tuple[Fibre, Fibre], delta: FloatArray, level: int, with_l1: bool) -> FloatArray:
     """Both volumes over J, ``(2,)``."""
-    one, two = fibres
-    (K1, A1), (K2, A2) = one.measures(level), two.measures(level)
-    n1, n2 = one.sides(level, delta), two.sides(level, delta)
-    V = mixed_area(np.vstack([n1, one.base(level)]), np.vstack([n2, two.base(level)]))
+    first, second = fibres
+    (K1, A1), (K2, A2) = first.measures(level), second.measures(level)
+    n1, n2 = first.sides(level, delta), second.sides(level, delta)
+    V = mixed_area(np.vstack([n1, first.base(level)]), np.vstack([n2, second.base(level)]))
     linf = K1 * A2 + A1 * K2 + 2 * V
     if not with_l1:
         return np.array([linf, math.nan])
-    edges = K1 * two.ridge(level, delta) + one.ridge(level, -delta) * K2
+    edges = K1 * second.ridge(level, delta) + first.ridge(level, -delta) * K2
     return np.array([linf, edges / 15 + joint_pairs(n1, n2, delta) / 20])
 
 

@@ -10,18 +10,13 @@ from enum import IntFlag
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softjaw.scoring.bodies import Body, ellipsoid_matrix
+from softjaw.scoring.bodies import ROUNDING_SHARE, Body, ellipsoid_matrix
 from softjaw.scoring.closed_form import epsilon_l1, epsilon_linf, volume_l1, volume_linf
 from softjaw.scoring.contact import SoftContact
 from softjaw.scoring.epsilon import epsilon
 from softjaw.scoring.pose import pose_volume
 
 FloatArray = NDArray[np.float64]
-
-
-ON_LINE = 1e-12  # of arms, angles and axes: contacts that face each other up to this have closed forms
-NOTHING = 1e-12
-"""Share of the largest load, torques divided by their length, up to which a load is the rounding of none."""
 
 
 class ScoreFlag(IntFlag):
@@ -104,14 +99,14 @@ def score(
 
 
 def contact_flag(bodies: Sequence[Body], contact_length: float) -> ScoreFlag:
-    """What some contact does not carry at all, up to `NOTHING`; torques are divided by the length [m]."""
+    """What some contact does not carry at all, up to `ROUNDING_SHARE`; torques are divided by the length [m]."""
     return _lacking(*((body.support(np.eye(3)) / [1.0, 1.0, contact_length]).tolist() for body in bodies))
 
 
 def _lacking(*contacts: Sequence[float]) -> ScoreFlag:
     flag = ScoreFlag.CLEAN
     for f_x, f_y, tau in contacts:
-        least = NOTHING * max(f_x, f_y, tau)
+        least = ROUNDING_SHARE * max(f_x, f_y, tau)
         if tau <= least:
             flag |= ScoreFlag.NO_TORQUE
         if f_x <= least or f_y <= least:
@@ -179,8 +174,8 @@ def grasp_score(
     >>> from softjaw.scoring.contact import contact_axes
     >>> body = Ellipsoid([1, 1, 0.2])
     >>> pads = [SoftContact([x, 0, 0], contact_axes([-x, 0, 0], [0, 0, 1]), body) for x in (-0.5, 0.5)]
-    >>> found = grasp_score(pads, object_length=1.0, contact_length=1.0)
-    >>> found.method, abs(found.quality / (14 / 9 * math.pi**2 * 0.2) - 1) < 1e-12
+    >>> grasp = grasp_score(pads, object_length=1.0, contact_length=1.0)
+    >>> grasp.method, abs(grasp.quality / (14 / 9 * math.pi**2 * 0.2) - 1) < 1e-12
     ('antipodal', True)
     """
     if len(contacts) != 2:
@@ -215,12 +210,12 @@ def _epsilons(
 ) -> tuple[float, float]:
     """L-infinity and L1, in closed form where there is one."""
     arms = np.array([contact.position for contact in contacts]) - np.asarray(centre_of_mass, float)
-    if faces(contacts, ON_LINE):
-        one, two = (_line_axes(contacts[0], contact) for contact in contacts)
+    if faces(contacts, ROUNDING_SHARE):
+        first, second = (_line_axes(contacts[0], contact) for contact in contacts)
         along = arms @ contacts[0].axes[2]
-        on_line = np.abs(arms - np.outer(along, contacts[0].axes[2])).max() <= ON_LINE * np.abs(arms).max()
-        if on_line and one is not None and two is not None:
-            a, b = (axes / [1, 1, contact_length] for axes in (one, two))
+        on_line = np.abs(arms - np.outer(along, contacts[0].axes[2])).max() <= ROUNDING_SHARE * np.abs(arms).max()
+        if on_line and first is not None and second is not None:
+            a, b = (axes / [1, 1, contact_length] for axes in (first, second))
             arm1, arm2 = (along / object_length).tolist()
             return epsilon_linf(a, b, arm1, arm2), epsilon_l1(a, b, arm1, arm2)
     bounds = (epsilon(contacts, object_length, contact_length, centre_of_mass, kind) for kind in ("linf", "l1"))
@@ -236,4 +231,4 @@ def _line_axes(first: SoftContact, contact: SoftContact) -> FloatArray | None:
     turn = first.axes @ contact.axes.T
     B = turn @ A @ turn.T
     axes = B.diagonal().copy()
-    return axes if np.abs(B - np.diag(axes)).max() <= ON_LINE * np.abs(axes).max() else None
+    return axes if np.abs(B - np.diag(axes)).max() <= ROUNDING_SHARE * np.abs(axes).max() else None

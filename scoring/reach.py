@@ -28,10 +28,6 @@ from softjaw.scoring.gauge import gauge
 FloatArray = NDArray[np.float64]
 
 
-_CUTS = 80
-_FAR = 1e4  # the programmes look for directions u of at most this, relative to 1 / |w|
-
-
 class Reach(NamedTuple):
     """Bounds of the reach, and the direction ``(r,)`` that gives the upper one."""
 
@@ -63,7 +59,7 @@ def reach(C: FloatArray, bodies: Sequence[Body], w: FloatArray, kind: str, toler
     programme = _CuttingPlanes(C, bodies, w, kind)
     best = Reach(0.0, np.inf, w / (w @ w))
     programme.cut(best.u)
-    for _ in range(_CUTS):
+    for _ in range(80):
         lower, u = programme.solve()
         upper = programme.support(u)
         if upper < best.upper:
@@ -84,7 +80,7 @@ class _CuttingPlanes:
     def __init__(self, C: FloatArray, bodies: Sequence[Body], w: FloatArray, kind: str) -> None:
         self.C, self.bodies, self.w, self.kind = C, bodies, w, kind
         self.r, self.k = len(w), 1 if kind == "l1" else len(C)
-        self.far = _FAR / np.linalg.norm(w)
+        self.far = 1e4 / np.linalg.norm(w)  # of the directions u that the programmes look for
         self.rows = np.zeros((0, self.r + self.k))
         for i, body in enumerate(bodies):
             axes = body.support(np.eye(3))

@@ -2,4 +2,4 @@
 
 import os
 
-TURNS = int(os.environ.get("TURNS", 50))
+TURNS = int(os.environ.get("TURNS", 20))

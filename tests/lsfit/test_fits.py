@@ -126,8 +126,9 @@ def test_only_two_points_need_the_programme(name):
         assert objective(fit.surface, W) > objective(least_squares_quartic(W, T, gamma=0), W)
     else:
         assert fit.certificate == "least squares"
-        # the same equations, solved in the same order
-        np.testing.assert_array_equal(fit.surface.coefficients, least_squares_quartic(W, T, gamma=0).coefficients)
+        free = least_squares_quartic(W, T, gamma=0)
+        # the condition of the equations, some 1e3, times rounding
+        np.testing.assert_allclose(fit.surface.coefficients, free.coefficients, rtol=1e-10, atol=1e-10)
 
 
 def test_twenty_noisy_samples_need_the_programme():

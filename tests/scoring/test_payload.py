@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from softjaw.scoring.bodies import PolytopeBody, fibonacci_vertices
 from softjaw.scoring.contact import SoftContact, contact_axes
-from softjaw.scoring.payload import GAP, payload
+from softjaw.scoring.payload import BOUND_GAP, payload
 
 F, MU, E, D = 5.0, 0.8, 0.006, 0.06
 AXES = F * np.array([MU, MU, MU * E])
@@ -55,7 +55,7 @@ def test_in_the_worst_direction_the_load_also_takes_force_from_a_finger():
     assert np.abs(found.direction) == pytest.approx(np.array([1, 1 / MU, 1 / MU]) / np.hypot(1, np.sqrt(2) / MU), 1e-3)
     round_one = held(pair(body=SMOOTH))
     assert round_one.force == pytest.approx(2 * MU * F / np.hypot(1, MU), rel=3e-3)
-    assert round_one.force <= round_one.upper <= round_one.force * (1 + 1.01 * GAP)
+    assert round_one.force <= round_one.upper <= round_one.force * (1 + 1.01 * BOUND_GAP)
 
 
 @pytest.mark.parametrize("arm", [0.003, 0.02])
@@ -106,7 +106,7 @@ def test_payload_grows_with_the_forces_and_does_not_depend_on_the_frame():
     contacts, com = pair(0.01, SMOOTH), np.array([0.004, 0.01, -0.02])
     moved = [SoftContact(turn @ c.position + shift, c.axes @ turn.T, c.body) for c in contacts]
     force = held(contacts, com).force
-    assert held(moved, turn @ com + shift).force == pytest.approx(force, rel=2 * GAP)
+    assert held(moved, turn @ com + shift).force == pytest.approx(force, rel=2 * BOUND_GAP)
     more = [SoftContact(c.position, c.axes, PolytopeBody(2 * SMOOTH.vertices)) for c in contacts]
     assert payload(more, pushes(contacts, 2 * F), com).force == pytest.approx(2 * force, rel=1e-9)
 
