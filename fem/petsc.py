@@ -47,9 +47,9 @@ def take_buffers(*others: Callable[[], object]) -> None:
     MemoryError
         Where addresses are too few for one of them.
     """
-    one = np.eye(2)
+    small = np.eye(2)
     # the addresses are only reserved, not touched: the look costs no memory
-    for operation in (lambda: np.linalg.solve(one, one), lambda: scipy.linalg.lu_factor(one), *others):
+    for operation in (lambda: np.linalg.solve(small, small), lambda: scipy.linalg.lu_factor(small), *others):
         try:
             mmap.mmap(-1, ROOM, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS, prot=mmap.PROT_READ).close()
         except OSError as error:
@@ -92,7 +92,7 @@ take_buffers(_dense_factors)
 PETSc.Log.begin()
 REASONS = {value: name for name, value in vars(PETSc.SNES.ConvergedReason).items() if isinstance(value, int)}
 OUT_OF_MEMORY = (-5, -7, -13)  # INFOG(1) of MUMPS
-NEAR, FAST = 1e5, 0.05  # see NonlinearSolver
+WITHIN, FAST = 1e5, 0.05  # see NonlinearSolver
 STALLED = 5  # iterations without a fall to less than a part `FAST`: good ones need fewer
 DISSECTED = 2500  # unknowns from which on the analysis of a better ordering pays
 RESERVED = 5  # of the iterations that a solve may take: the last ones are always made with new factors
@@ -157,7 +157,7 @@ class NonlinearSolver:
     """Newton solver of one problem; the matrix pattern and its symbolic factorisation live as long as it does.
 
     Where the problem allows it, two kinds of steps take the factors of the tangent before: the first one from the
-    solution of the solve before, where they are nearly exact; and the last ones, once the residual is within `NEAR`
+    solution of the solve before, where they are nearly exact; and the last ones, once the residual is within `WITHIN`
     tolerances of its goal and falls to less than a part `FAST` in every step. What comes of them is judged by the same
     residual, so they cost steps but no accuracy. They do end just below the tolerance, where a Newton step would go far
     beyond; so a caller whose tolerance is loose sets ``thrifty`` to False, which rules out the latter kind.
@@ -404,7 +404,7 @@ class NonlinearSolver:
         # near the limit of iterations Newton's quadratic end is worth its factorisation
         if not self.thrifty or len(norms) > self._limit - RESERVED:
             return False
-        return norms[-1] <= min(FAST * norms[-2], NEAR * self._goal) and keep(x, False)
+        return norms[-1] <= min(FAST * norms[-2], WITHIN * self._goal) and keep(x, False)
 
     def _grow(self) -> None:
         """Give the matrix the pattern's new rows; its factors are analysed anew."""

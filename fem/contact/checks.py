@@ -13,10 +13,10 @@ from softjaw.fem.pad.foam import FloatArray, Foam
 BALANCE = 1e-8  # of the normal force
 # of an element's size, of the largest pressure, of their product: a hundred times what the tolerance of the solve
 # leaves at the smallest contacts of practice, and far below what a result can show
-PENETRATION = ADHESION = COMPLEMENTARITY = 1e-6
-NEAR = 1e-4  # the same four where the nodes in contact alternate for ever: still far below the error of any mesh
+CONTACT_LAWS = 1e-6
+ALTERNATING = 1e-4  # the same where the nodes in contact alternate for ever: still far below the error of any mesh
 BARELY_ELLIPTIC = 0.1  # eigenvalue of the acoustic tensor over the shear modulus at which foam gives way somewhere
-TOO_MUCH = 0.7  # strain beyond which not the contact is what fails
+MOST_STRAIN = 0.7  # strain beyond which not the contact is what fails
 MOST_FALL = 0.05  # of the closing displacement from one force to the next: weighted and nodal gaps differ by less
 
 
@@ -42,7 +42,7 @@ class Checks:
 
 
 def check(
-    foam: Foam, x: FloatArray, state: tuple[FloatArray, FloatArray, ContactPoints], left_over: float, force: float,
+    foam: Foam, x: FloatArray, state: tuple[FloatArray, FloatArray, ContactPoints], imbalance: float, force: float,
     residual: float, slack: float = 0.0,
 ) -> Checks:  # fmt: skip
     """Measures of a pad's state ``x`` at a normal force [N] on the whole pad.
@@ -54,12 +54,12 @@ def check(
         Unknowns of the pad.
     state : tuple
         Nodal pressures, mean gaps and points of the contact face, as ``contact_state`` gives them.
-    left_over : float
+    imbalance : float
         Largest force out of balance at a node, of the whole pad [N].
     force, residual : float
         The normal force [N], and the part of it that a node may be out of balance.
     slack : float
-        What every law of the contact may be off by at least, `NEAR` or nothing.
+        What every law of the contact may be off by at least, `ALTERNATING` or nothing.
 
     Raises
     ------
@@ -83,22 +83,17 @@ def check(
         max_strain=strain,
         ellipticity=ellipticity,
     )
-    for kept, broken in (
-        (
-            checks.force_balance <= max(BALANCE, slack),
-            f"force balance is off by {checks.force_balance:.1e} of the force",
-        ),
-        (checks.adhesion <= max(ADHESION, slack), f"tension in the contact: lowest pressure {pressure.min():.3g} Pa"),
-        (checks.penetration <= max(PENETRATION, slack), f"the pad penetrates the object by {-gap.min():.3g} m"),
-        (checks.complementarity <= max(COMPLEMENTARITY, slack), "pressure and gap are both positive at a node"),
+    bound = max(CONTACT_LAWS, slack)
+    for holds, broken in (
+        (checks.force_balance <= max(BALANCE, slack), f"the force balance is off by {checks.force_balance:.1e}"),
+        (checks.adhesion <= bound, f"tension in the contact: lowest pressure {pressure.min():.3g} Pa"),
+        (checks.penetration <= bound, f"the pad penetrates the object by {-gap.min():.3g} m"),
+        (checks.complementarity <= bound, "pressure and gap are both positive at a node"),
         (det > 0.0, f"an element is inverted: det F = {det:.3g}"),
         # a caller that loosens the tolerance of the solve loosens this check with it, and no other
-        (
-            left_over <= max(BALANCE, residual, slack) * force,
-            f"a node of the foam is out of balance by {left_over:.3g} N",
-        ),
+        (imbalance <= max(BALANCE, residual, slack) * force, f"a node is out of balance by {imbalance:.3g} N"),
     ):
-        if not kept:
+        if not holds:
             raise CheckError(f"the state at {force:.4g} N converged but is wrong: {broken}")
     return checks
 
@@ -128,7 +123,7 @@ def explained(error: ConvergenceError, foam: Foam, x: FloatArray, force: float) 
     """
     det, strain, ellipticity = foam.strains(x, DIRECTIONS)
     # the reason is looked for in the last state in equilibrium: what failed beyond it has no state to look at
-    if isinstance(error, NotReachedError) or (ellipticity > BARELY_ELLIPTIC and strain < TOO_MUCH):
+    if isinstance(error, NotReachedError) or (ellipticity > BARELY_ELLIPTIC and strain < MOST_STRAIN):
         return error
     # still elliptic, so it is the strain that is too much
     if ellipticity > BARELY_ELLIPTIC:

@@ -14,8 +14,6 @@ stretch from a rim of the pad, where pressure need not vanish, to a free edge at
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -26,17 +24,6 @@ LOADED = 1e-9  # of the largest load of a face, below which it carries none
 RESOLVED = 0.24  # node spacing over half length at which half of the fourth moment counts (Hertz's cylinder)
 FLATTEST, STEEPEST = 1.8, 2.4  # of <y^4> / <y^2>^2: an even pressure, and more than any contact has that ends smoothly
 EVEN, POINTED = 7.0 / 6.0, 14.0 / 9.0  # bounds of <s^2> / <s>^2 from a rim on: c_0 = 0, and c_1 = -c_0 / b
-WINDOW = 2  # elements to each side of the largest pressure that its fit takes
-INDEPENDENT = 1e-6  # singular values of the fit, over the largest, below which loads do not tell a coefficient
-
-
-@dataclass(frozen=True)
-class _Stretches:
-    """Loaded faces in a row along the lines of a grid ``(stretches,)``."""
-
-    length: FloatArray  # with the edges inside the faces [m]
-    width: FloatArray  # across the line, mean by load [m]
-    free: FloatArray  # ends that are no rim of the pad: 0, 1 or 2
 
 
 def contact_area(patch: ContactPatch, faces: tuple[int, int]) -> float:
@@ -62,8 +49,8 @@ def contact_area(patch: ContactPatch, faces: tuple[int, int]) -> float:
     rims_x = _rims(corners[[0, -1]].swapaxes(0, 1), ((0, 3), (1, 2)))
     across = _stretches(load, place, along_y, along_x, rims_y)
     along = _stretches(load.T, place.swapaxes(0, 1), along_x.T, along_y.T, rims_x)
-    weights = [float(s.free @ s.width) for s in (across, along)]
-    areas = [float(s.length @ s.width) for s in (across, along)]
+    weights = [float(free @ width) for _, width, free in (across, along)]
+    areas = [float(length @ width) for length, width, _ in (across, along)]
     # a face that bears up to all rims has no edge to reconstruct
     return float(np.dot(areas, weights) / sum(weights)) if sum(weights) > 0 else areas[0]
 
@@ -80,12 +67,13 @@ def largest_pressure(patch: ContactPatch, faces: tuple[int, int], per_side: int)
     # four faces together hold the whole load of a node, and of Gauss points the mean of an element or between two
     mean = _four(load) / _four(area)
     i, j = divmod(int(mean.argmax()), mean.shape[1])
-    near, inner = (_about(i, j, reach * per_side) for reach in (WINDOW, WINDOW // 2))
+    near, inner = (_about(i, j, reach * per_side) for reach in (2, 1))
     on = load[near] > LOADED * load.max()
     middle, size = place[i : i + 2, j : j + 2].mean(axis=(0, 1)), np.ptp(place[near], axis=(0, 1))
     root = np.sqrt(area[near][on])
     terms = _terms((place[near][on] - middle) / size)
-    fit, *_ = np.linalg.lstsq(terms * root[:, None], (load / area)[near][on] * root, rcond=INDEPENDENT)
+    # loads tell no coefficient below this part of the largest singular value
+    fit, *_ = np.linalg.lstsq(terms * root[:, None], (load / area)[near][on] * root, rcond=1e-6)
     # far from the largest load, and where nothing bears, a quadratic says nothing
     at = place[inner][load[inner] > LOADED * load.max()]
     return float((_terms((at - middle) / size) @ fit).max())
@@ -119,10 +107,12 @@ def _rims(ends: FloatArray, sides: tuple[tuple[int, int], ...]) -> FloatArray:
 
 def _stretches(
     load: FloatArray, place: FloatArray, side: FloatArray, width: FloatArray, rims: FloatArray
-) -> _Stretches:
-    """Loaded stretches of the lines along the second axis of a grid.
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Loaded stretches of the lines along the second axis of a grid, each ``(stretches,)``.
 
-    ``place (lines, faces, 3)``, ``side`` of the faces along the lines and ``width`` across them [m].
+    ``place (lines, faces, 3)``, ``side`` of the faces along the lines and ``width`` across them [m]. Returned are the
+    length with the edges inside the faces [m], the mean width by load [m], and the number of ends that are no rim of
+    the pad.
     """
     steps = np.diff(place, axis=1, prepend=rims[:, :1], append=rims[:, 1:])
     from_rim = np.cumsum(np.linalg.norm(steps, axis=2), axis=1)
@@ -146,7 +136,7 @@ def _stretches(
     # the first idle node is not in contact; beside a rim, where pressure may be singular, all but the last ones are
     inner = np.where(low, s[np.maximum(ends - 1, starts)], s[np.minimum(starts + 1, ends)]) * (low | high)
     length = np.where(low & high, full, np.clip(length, inner - 0.5 * spacing, full + spacing))
-    return _Stretches(length, np.add.reduceat(load[on] * width[on], starts) / force, 2.0 - low - high)
+    return length, np.add.reduceat(load[on] * width[on], starts) / force, 2.0 - low - high
 
 
 def _between_edges(variance: FloatArray, fourth: FloatArray, spacing: FloatArray) -> FloatArray:

@@ -74,8 +74,8 @@ def _points(pad: Pad, points: ContactPoints, rule: str) -> tuple[FloatArray, Flo
     # position and pressure are polynomials in each face, and the rule has as many points as these have coefficients
     to_rule = N @ np.linalg.inv(pad.face_N)
     position, normal = (np.einsum("pq,fqi->fpi", to_rule, field) for field in (points.position, points.normal))
-    own = np.outer(pad.side_weights, pad.side_weights).ravel()
-    load = np.outer(weights, weights).ravel() * (points.load / own @ to_rule.T)
+    solved = np.outer(pad.side_weights, pad.side_weights).ravel()
+    load = np.outer(weights, weights).ravel() * (points.load / solved @ to_rule.T)
     return position, normal / np.linalg.norm(normal, axis=2, keepdims=True), load, weights
 
 

@@ -80,13 +80,13 @@ def stick_or_slip(
     share = np.where(slips[..., 0], most / np.where(size > 0.0, size, 1.0), 1.0)[..., None, None]
     eye = np.eye(3)
 
-    def kept(D: FloatArray) -> FloatArray:
+    def across_slip(D: FloatArray) -> FloatArray:
         # the length of a slipping point's traction is given, so only the change across it counts
         return share * np.where(slips[..., None], D - along[..., :, None] * (along[..., None, :] @ D), D)
 
-    by_d = kept(eye - normal[..., :, None] * normal[..., None, :])
+    by_d = across_slip(eye - normal[..., :, None] * normal[..., None, :])
     # the tangent plane turns as the point slides, wherever the surface is curved
-    by_normal = kept(-across[..., None] * eye - normal[..., :, None] * d[..., None, :])
+    by_normal = across_slip(-across[..., None] * eye - normal[..., :, None] * d[..., None, :])
     return t, by_d, by_normal, np.where(slips & (most > 0.0)[..., None], mu * along, 0.0)
 
 

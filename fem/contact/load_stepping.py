@@ -26,7 +26,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from softjaw.fem.contact.checks import BALANCE, NEAR
+from softjaw.fem.contact.checks import ALTERNATING, BALANCE
 from softjaw.fem.contact.problem import ContactProblem, Control
 from softjaw.fem.contact.rigid import RigidProblem
 from softjaw.fem.errors import ConvergenceError, NotReachedError, SpentError
@@ -36,20 +36,14 @@ FloatArray = NDArray[np.float64]
 State = tuple[FloatArray, float]  # unknowns and force [N]
 MOST_STEPS = 60  # under displacement control, for one force
 SHORTEST = 1.0 / 64.0  # of the longest step under displacement control, where that is bounded
-MOST_FAILURES = 20  # under displacement control, for one force
-FIRST_TRIES = 12
-DROP = 0.5  # of the force: what is left of it less than that after a step of closing has jumped
-FALL = 1e-6  # of the force: less is the rounding of a plateau, see `falls`
 FIRMLY, BARELY = 1e-3, 1e-6  # part of the wanted force that a first state should have, and that it must have
 LONGEST = 0.2  # foretold closing displacement of one step
 STRAY = 0.1  # distance of a node or the backing plate from where it was foretold; good steps of practice keep to 0.06
 SHORTEST_FORETOLD = 0.025  # foretold closing displacement of a step that is not halved again
-LEAST = 0.01  # foretold closing displacement of a step that is given up where Newton's method does not converge
-FEWEST = 1.0 / 1024.0  # part of a step that is not halved again where nothing is foretold
+GIVEN_UP = 0.01  # foretold closing displacement of a step that is given up where Newton's method does not converge
 FOLD = 0.25  # growth of the largest strain in one step; good steps of practice keep to 0.15
 FOLDING, FOLDS = 0.1, 3.0  # the same, and over the growth of the force's logarithm, where 0.2 is usual
-FIRST = 0.25  # closing displacement at which the first contact is looked for, at most
-MOST_NEAR = 12  # Newton iterations from the state of a coarser mesh; good starts take 4 to 7
+MOST_FROM_COARSE = 12  # Newton iterations from the state of a coarser mesh; good starts take 4 to 7
 ASTRAY = "the state at {force:.4g} N differs from the state on the coarser mesh"
 STRAINED = 0.5  # largest strain from which on a state is checked for stability
 
@@ -61,7 +55,8 @@ def falls(forces: Sequence[float]) -> bool:
     (True, False)
     """
     f = np.asarray(forces, dtype=float)
-    return bool((np.diff(f) < -FALL * np.abs(f[1:])).any())
+    # less than this part of the force is the rounding of a plateau
+    return bool((np.diff(f) < -1e-6 * np.abs(f[1:])).any())
 
 
 @dataclass(frozen=True)
@@ -99,7 +94,7 @@ class Stepping:
     watch : callable
         Called with every new state and its force [N]; what it raises ends the load path.
     near : callable
-        Whether the iterate that a failed solve ended at keeps the laws of contact to `NEAR` and may pass as a state.
+        Whether the iterate that a failed solve ended at keeps the laws of contact to `ALTERNATING` and may pass.
     deepest : float
         Closing displacement at which the backing plate would be in a rigid object [m].
     """
@@ -131,7 +126,7 @@ class Stepping:
             x, self.off = error.end or (x, np.inf)
             self.off /= scale
             # `not <=`: a residual that is not a number is not near
-            if not self.off <= NEAR or not self.near(x):
+            if not self.off <= ALTERNATING or not self.near(x):
                 work.halvings += 1
                 raise
         closing = self.problem.closing(x)
@@ -199,7 +194,7 @@ class Stepping:
                 # bracketed: from here on the state is looked for between two that lie on the path
                 if high[1] >= force:
                     return self._land(low, high, force, work)
-                if high[1] < DROP * low[1]:
+                if high[1] < 0.5 * low[1]:
                     raise ConvergenceError(f"the pad jumps to a state of {high[1]:.4g} N")
                 self.watch(*high)
                 if forces is not None:
@@ -211,7 +206,7 @@ class Stepping:
                 raise
             except ConvergenceError as error:
                 step, failures = 0.5 * step, failures + 1
-                if step < least or failures > MOST_FAILURES:
+                if step < least or failures > 20:
                     if falls([peak[0], low[1]]):
                         raise self._limit(peak, low, force) from error
                     raise ConvergenceError(f"stuck at {low[1]:.4g} N of {force:.4g} N: {error}") from error
@@ -243,7 +238,7 @@ class Stepping:
         """First state in contact and its force, by displacement control near ``closing``; force has no start."""
         failure, best = "no force yet", None
         # too deep a start does not converge, too shallow a one has no force: look in between
-        for _ in range(FIRST_TRIES):
+        for _ in range(12):
             try:
                 x = self.solve(self.problem.guess(closing), Control(closing=closing), work)
             except ConvergenceError as error:
@@ -289,7 +284,7 @@ class Following(Stepping):
 
     def first(self, closing: float, force: float, work: Work) -> State:
         """As `Stepping.first`, not further in than where a first contact is certain to be on the path."""
-        return super().first(min(closing, FIRST * self.problem.thickness), force, work)
+        return super().first(min(closing, 0.25 * self.problem.thickness), force, work)
 
     def step_to(
         self, x: FloatArray, reached: float, force: float, work: Work, *, by_displacement: bool = True
@@ -308,7 +303,7 @@ class Following(Stepping):
             except ConvergenceError:
                 cut *= 0.5
                 # `not >` instead of `<=`: NaN, where nothing is foretold, has to end the halving
-                if cut < self.settings.min_step and not self._foretold(here, 0.5 * (target - here.force)) > LEAST:
+                if cut < self.settings.min_step and not self._foretold(here, 0.5 * (target - here.force)) > GIVEN_UP:
                     if not by_displacement:
                         raise
                     return self._past_limit(here, force, work)
@@ -317,8 +312,8 @@ class Following(Stepping):
             leaves, forks = self._leaves(here, ahead), here.stable and not ahead.stable
             # a state may have converged and still belong to another branch: it is judged before it is passed on
             if leaves or forks or ahead.strain - here.strain > FOLD:
-                # here NaN has to go on with the halving, down to the fewest
-                if cut > FEWEST and not self._foretold(here, target - here.force) <= SHORTEST_FORETOLD:
+                # here NaN has to go on with the halving, down to a part of 1/1024
+                if cut > 1.0 / 1024.0 and not self._foretold(here, target - here.force) <= SHORTEST_FORETOLD:
                     cut, work.halvings = 0.5 * cut, work.halvings + 1
                     continue
                 if leaves:
@@ -333,7 +328,7 @@ class Following(Stepping):
 
     def from_near(self, start: FloatArray, force: float, work: Work) -> FloatArray:
         """As `Stepping.from_near`; refused where a path from first contact need not lead to the state."""
-        x = self.solve(start, Control(force=force), work, self.most or MOST_NEAR)
+        x = self.solve(start, Control(force=force), work, self.most or MOST_FROM_COARSE)
         folds = self.problem.largest_strain(x) - self.problem.largest_strain(start) > FOLD
         # with a part of the tangent alone nothing tells whether the state is stable
         here = None if self.problem.complementarity else self._place(x, force, None)

@@ -27,11 +27,9 @@ from softjaw.fem.objects.measured_face import MeasuredFace
 from softjaw.fem.pad.mesh import Pad
 
 MARGIN = 2.0  # standard errors of the face that a contact has to stand
-TAKEN_AWAY = 3.0  # of them, by which the face is lifted where nothing surely bears
 DOUBTFUL = 0.5  # of the closing displacement: with a larger margin nothing tells contact from noise
-RAMP = 2.0  # elements over which it is lifted
-SAMPLES = 60  # of the lift along a side of the pad
-LEAST_DEPTH = 1e-6  # of the pad's thickness: less is no contact
+LIFT, RAMP = 3.0, 2.0  # standard errors by which the face is lifted where nothing surely bears; elements of the ramp
+LIFT_SAMPLES = 60  # of the lift along a side of the pad
 
 
 @dataclass(frozen=True)
@@ -103,7 +101,7 @@ class MeasuredPress:
             If there is no acceptable state.
         """
         depth = self._depth(face)
-        if not depth > LEAST_DEPTH * self.pad.shape.size[2]:
+        if not depth > 1e-6 * self.pad.shape.size[2]:
             raise NoContactError("the face lies nowhere below the undeformed one, so it touches nothing")
         touching, margin = face.lifted(depth), MARGIN * face.doubt
         if margin >= DOUBTFUL * depth:
@@ -121,7 +119,7 @@ class MeasuredPress:
     def _depth(self, face: MeasuredFace) -> float:
         """How far the deepest point of the face lies below the undeformed one [m]."""
         nodes = self.pad.nodes[self.pad.contact_nodes]
-        x, y = (np.linspace(nodes[:, k].min(), nodes[:, k].max(), 4 * SAMPLES + 1) for k in (0, 1))
+        x, y = (np.linspace(nodes[:, k].min(), nodes[:, k].max(), 4 * LIFT_SAMPLES + 1) for k in (0, 1))
         X, Y = np.meshgrid(x, y, indexing="ij")
         return float(-face.height(X.ravel(), Y.ravel())[0].min())
 
@@ -133,8 +131,8 @@ class MeasuredPress:
         widths = [side / n for side, n in zip(self.pad.shape.size[:2], self.pad.shape.elements, strict=False)]
         growth = math.sqrt(depth / sure.closing) - 1.0
         reach = 0.5 * float(np.ptp(bearing, axis=0).max()) * growth + max(widths)
-        x, y = (np.linspace(-0.7, 0.7, SAMPLES) * side for side in self.pad.shape.size[:2])
+        x, y = (np.linspace(-0.7, 0.7, LIFT_SAMPLES) * side for side in self.pad.shape.size[:2])
         places = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
         t = np.clip((cKDTree(bearing).query(places)[0] - reach) / (RAMP * max(widths)), 0.0, 1.0)
-        lift = TAKEN_AWAY * face.doubt * t**3 * (10.0 - 15.0 * t + 6.0 * t**2)
+        lift = LIFT * face.doubt * t**3 * (10.0 - 15.0 * t + 6.0 * t**2)
         return LiftedFace(face, RectBivariateSpline(x, y, lift))

@@ -16,7 +16,7 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-from softjaw.fem.contact.checks import NEAR, Checks, check
+from softjaw.fem.contact.checks import ALTERNATING, Checks, check
 from softjaw.fem.contact.friction import load_steps
 from softjaw.fem.contact.load_stepping import ASTRAY, STRAY, FloatArray, Settings, Stepping, Work
 from softjaw.fem.contact.problem import ContactPoints, ContactProblem
@@ -252,7 +252,7 @@ class LoadPath(ABC, Generic[ProblemT]):
         """The state, checked."""
         problem, x, steps = self.problem, here.x, self._stepping
         residual = np.abs(problem.residual(x))
-        instead, slack, path = problem.rule != self._wanted.rule, NEAR if steps.off else 0.0, problem.history(x)
+        instead, slack, path = problem.rule != self._wanted.rule, ALTERNATING if steps.off else 0.0, problem.history(x)
         pads = []
         for k, f in enumerate(problem.fingers):
             state, unknowns = problem.contact_state(x, k), x[f.unknowns].copy()

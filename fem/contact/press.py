@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from softjaw.fem.contact.checks import NEAR, check, explained, refuse_fall
+from softjaw.fem.contact.checks import ALTERNATING, check, explained, refuse_fall
 from softjaw.fem.contact.load_stepping import FloatArray, Following, Settings, State, Stepping, Work
 from softjaw.fem.contact.path import LoadPath, OnPath, Pressed
 from softjaw.fem.contact.problem import Control, Gap
@@ -79,7 +79,7 @@ class Press(LoadPath[RigidProblem]):
         )  # fmt: skip
 
     def _keeps_laws(self, x: FloatArray) -> bool:
-        """Whether an iterate that no solve has ended at keeps all laws of contact to `NEAR`."""
+        """Whether an iterate that no solve has ended at keeps all laws of contact to `ALTERNATING`."""
         # vinewtonrsls has another residual, which says nothing of pressures at their bounds
         if self.problem.complementarity:
             return False
@@ -91,7 +91,7 @@ class Press(LoadPath[RigidProblem]):
             return False
         try:
             imbalance = float(np.abs(residual).max()) / self.pad.share
-            check(self.problem.foam, x, state, imbalance, force, self.settings.residual, NEAR)
+            check(self.problem.foam, x, state, imbalance, force, self.settings.residual, ALTERNATING)
         except CheckError:
             return False
         return True

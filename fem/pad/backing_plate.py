@@ -55,7 +55,7 @@ def back_stiffness(
         return BackStiffness(free, np.zeros((1, 1)))
     nodes = np.flatnonzero(free.any(axis=-1).ravel())
     linear = LinearShell(shell, fixed)
-    C, _ = linear.compliance(nodes)
+    C = linear.compliance(nodes)
     linear.destroy()
     moving = free.reshape(-1, 3)[nodes].ravel()
     C = C[np.ix_(moving, moving)]

@@ -21,25 +21,25 @@ def interpolated(coarse: Pad, x: FloatArray, fine: Pad, turn: FloatArray = UPRIG
     """
     places = turn * fine.nodes
     u = turn * _mirrored(coarse, places, coarse.nodes, coarse.displacement(x))
-    face, own = coarse.nodes[coarse.contact_nodes, :2], places[fine.contact_nodes, :2]
-    pressure = _mirrored(coarse, own, face, x[coarse.closing_dof + 1 :, None])
-    found = np.zeros(fine.size)
-    found[fine.dofs[fine.dofs >= 0]] = u[fine.dofs >= 0]
-    found[fine.closing_dof] = x[coarse.closing_dof]
-    found[fine.closing_dof + 1 :] = np.maximum(0.0, pressure[:, 0])
-    return found
+    face, contact = coarse.nodes[coarse.contact_nodes, :2], places[fine.contact_nodes, :2]
+    pressure = _mirrored(coarse, contact, face, x[coarse.closing_dof + 1 :, None])
+    state = np.zeros(fine.size)
+    state[fine.dofs[fine.dofs >= 0]] = u[fine.dofs >= 0]
+    state[fine.closing_dof] = x[coarse.closing_dof]
+    state[fine.closing_dof + 1 :] = np.maximum(0.0, pressure[:, 0])
+    return state
 
 
 def _mirrored(coarse: Pad, points: FloatArray, nodes: FloatArray, values: FloatArray) -> FloatArray:
     """Values ``(n, c)`` at points ``(n, d)`` of a field given at nodes; where those end, of its mirror image."""
-    inside, found = points.copy(), np.ones((len(points), values.shape[1]))
+    inside, signs = points.copy(), np.ones((len(points), values.shape[1]))
     for axis in range(2):
         if coarse.symmetry[axis]:
             inside[:, axis] = np.abs(points[:, axis])
             if values.shape[1] == 3:
                 # the displacement across the plane of symmetry changes its sign
-                found[:, axis] = np.where(points[:, axis] < 0.0, -1.0, 1.0)
-    return found * _tensor(coarse, inside, nodes, values)
+                signs[:, axis] = np.where(points[:, axis] < 0.0, -1.0, 1.0)
+    return signs * _tensor(coarse, inside, nodes, values)
 
 
 def _tensor(coarse: Pad, points: FloatArray, nodes: FloatArray, values: FloatArray) -> FloatArray:
@@ -50,12 +50,12 @@ def _tensor(coarse: Pad, points: FloatArray, nodes: FloatArray, values: FloatArr
     grid = np.empty((*map(len, lines), values.shape[1]))
     grid[place] = values
     places = [_places(points[:, axis], line, coarse.shape.per_side) for axis, line in enumerate(lines)]
-    found = np.zeros((len(points), values.shape[1]))
+    total = np.zeros((len(points), values.shape[1]))
     for corner in np.ndindex(*(coarse.shape.per_side,) * len(lines)):
         index = tuple(numbers[:, i] for (numbers, _), i in zip(places, corner, strict=True))
         weight = np.prod([N[:, i] for (_, N), i in zip(places, corner, strict=True)], axis=0)
-        found += weight[:, None] * grid[index]
-    return found
+        total += weight[:, None] * grid[index]
+    return total
 
 
 def _places(s: FloatArray, line: FloatArray, per_side: int) -> Places:

@@ -211,8 +211,8 @@ def face_rule(per_side: int, contact: str) -> tuple[FloatArray, FloatArray]:
     points = np.linspace(0.5 - 0.5 * a, 0.5 + 0.5 * a, per_side)
     outer = 0.5 if per_side == 2 else 1.0 / (6.0 * a * a)
     weights = np.array([outer, outer]) if per_side == 2 else np.array([outer, 1.0 - 2.0 * outer, outer])
-    one = along_side(per_side, points)
-    N = np.einsum("pi,qj->pqij", one, one).reshape(per_side**2, per_side**2)
+    side = along_side(per_side, points)
+    N = np.einsum("pi,qj->pqij", side, side).reshape(per_side**2, per_side**2)
     return N, weights
 
 

@@ -28,7 +28,6 @@ from softjaw.fem.objects.spline_surface import SplineSurface, evaluate
 
 IntArray = NDArray[np.int32]
 FAR = 1.0  # gap of a point that faces no wall [m]
-MAX_ITERATIONS = 50
 SHARP = 1e-13  # how well the place is found [m]
 LONGEST_TURN, LONGEST_SLIDE = 0.1, 0.004  # of one iteration [rad], [m]
 
@@ -118,46 +117,40 @@ def face(wall: Wall, points: FloatArray, places: FloatArray, v: FloatArray, w: F
     ArithmeticError
         If a point close to the wall finds no place.
     """
-    found = _search(wall, points, places, v, w)
+    facing = _search(wall, points, places, v, w)
     # a second search for the few that failed is cheaper than a safe start for all of them
-    again = np.flatnonzero(np.isnan(found.gap) | (found.gap == FAR))
+    again = np.flatnonzero(np.isnan(facing.gap) | (facing.gap == FAR))
     if len(again):
         # where a point was last may lie beyond a fold by now: begin once more from the nearest place of the whole wall
         fresh = wall.places(points[again])
-        pick = (fresh[:, 1] > wall.ends[0]) & (fresh[:, 1] < wall.ends[1]) | np.isnan(found.gap[again])
+        pick = (fresh[:, 1] > wall.ends[0]) & (fresh[:, 1] < wall.ends[1]) | np.isnan(facing.gap[again])
         again, fresh = again[pick], fresh[pick]
-        once_more = _search(wall, points[again], fresh, v, w)
+        second = _search(wall, points[again], fresh, v, w)
         # NaN compares as false: what is lost again keeps its first answer
-        good = once_more.gap < FAR
-        for one, other in zip(vars(found).values(), vars(once_more).values(), strict=True):
-            one[again[good]] = other[good]
+        good = second.gap < FAR
+        for values, better in zip(vars(facing).values(), vars(second).values(), strict=True):
+            values[again[good]] = better[good]
         places[again[good]] = fresh[good]
-    lost = np.flatnonzero(np.isnan(found.gap))
+    lost = np.flatnonzero(np.isnan(facing.gap))
     if len(lost):
         raise ArithmeticError(f"a point of the pad at {points[lost[0]].tolist()} m has no closest point on the wall")
-    return found
+    return facing
 
 
 def _search(wall: Wall, points: FloatArray, places: FloatArray, v: FloatArray, w: FloatArray) -> Facing:
     """`face` from given places; the gap of a point that got lost is NaN."""
     n = len(points)
-    found = Facing(
-        np.empty(n),
-        np.zeros((n, 3)),
-        np.zeros((n, 3)),
-        np.zeros((n, 4), np.int32),
-        np.zeros((n, 4)),
-        np.zeros((n, 3, 3)),
-        np.zeros((n, 3, 3)),
-        np.zeros((n, 4, 3, 3)),
-    )
+    facing = Facing(
+        np.empty(n), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 4), np.int32), np.zeros((n, 4)),
+        np.zeros((n, 3, 3)), np.zeros((n, 3, 3)), np.zeros((n, 4, 3, 3)),
+    )  # fmt: skip
     surface = wall.surface
     _face(
         np.ascontiguousarray(points), places, surface.theta, surface.s, surface.coefficients, surface.closed,
-        wall.closed, *wall.ends, wall.theta, wall.s, wall.nodes, wall.half, v, w, found.gap, found.normal, found.e,
-        found.nodes, found.N, found.H, found.G, found.A,
+        wall.closed, *wall.ends, wall.theta, wall.s, wall.nodes, wall.half, v, w, facing.gap, facing.normal, facing.e,
+        facing.nodes, facing.N, facing.H, facing.G, facing.A,
     )  # fmt: skip
-    return found
+    return facing
 
 
 @njit(cache=True)
@@ -175,7 +168,7 @@ def _face(points, places, lines_t, lines_s, coefficients, periodic, closed, low,
         if closed:
             t0 = theta[0] + (t0 - theta[0]) % (theta[-1] - theta[0])
         ok, length, size = False, 1.0, 1.0
-        for iteration in range(MAX_ITERATIONS):
+        for iteration in range(50):
             evaluate(lines_t, lines_s, coefficients, periodic, t0, s0, X)
             _element(theta, s, table, t0, s0, at, shape, shape_1, shape_2)
             length = _director(X, half, w, at, shape, shape_1, shape_2, n, n_1, n_2)

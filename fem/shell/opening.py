@@ -22,13 +22,10 @@ from softjaw.fem.petsc import NonlinearSolver
 from softjaw.fem.shell.wall_mesh import BodyMesh
 from softjaw.fem.shell.wall_problem import WallProblem
 
-SIDES = 0.3  # of the largest distance from the plane between the fingers on a ring: nodes nearer to it are left out
 FIRST_STEP, SHORTEST_STEP = 0.25, 1e-5  # step of time, in units of D over the pad's modulus per thickness and area
 MOVE, FARTHEST = 4e-4, 1.2e-3  # of a node in one step: wanted, and the most that is taken [m]
 SLOWLY, ALTERNATES, STAYS = 0.25, 1e-2, 0.05  # part of the wanted move, residual over the force and over the one before
-ITERATIONS = 2  # of a step
-NEAR, LOOSE = 1e-6, 30.0  # residual over the force at which a step ends early, and up to which it is taken
-SHORTER = 0.4  # part of a step that is tried after one that was not taken
+SETTLED, LOOSE = 1e-6, 30.0  # residual over the force at which a step ends early, and up to which it is taken
 
 
 class Opening:
@@ -52,18 +49,19 @@ class Opening:
         # inner faces meet before the middle surfaces do
         self._inner = mesh.X - mesh.D
         x = self._inner[mesh.number, 0]
-        bound = np.maximum(SIDES * np.abs(x).max(axis=0), 1e-6)
+        # nodes near the plane between the fingers are left out
+        bound = np.maximum(0.3 * np.abs(x).max(axis=0), 1e-6)
         self._near = np.unique(mesh.number[x > bound])
         back = np.unique(mesh.number[x < -bound])
         self._across = None if mesh.symmetry[0] else back
         if self._across is not None:
             self._across = back[cKDTree(self._inner[back, 1:]).query(self._inner[self._near, 1:])[1]]
-        self._whole = self._apart(np.zeros(mesh.X.size * 2))
+        self._undeformed = self._apart(np.zeros(mesh.X.size * 2))
         self.last = 1.0, 0.0
 
     def __call__(self, q: FloatArray) -> float:
         """Opening at the state ``q (6 k,)`` of the shell, where it is smallest: 1 undeformed, 0 where walls meet."""
-        return float((self._apart(q) / self._whole).min())
+        return float((self._apart(q) / self._undeformed).min())
 
     def _apart(self, q: FloatArray) -> FloatArray:
         parts = q.reshape(-1, 6)
@@ -106,19 +104,19 @@ def creep(
     while time > SHORTEST_STEP:
         problem.control, problem.damping = Control(force=force), (resistance / time, x.copy())
         try:
-            ahead, norm, fall = solver.approach(x, NEAR * force, ITERATIONS)
+            ahead, norm, fall = solver.approach(x, SETTLED * force, 2)
         finally:
             problem.damping = None
         move = float(np.abs((ahead - x)[wall]).max())
         # `not <=`: NaN is not taken
         if not (norm <= LOOSE * force and move <= FARTHEST):
-            time *= SHORTER
+            time *= 0.4
             continue
         x = ahead
         yield x, move / time
         # little moves, little is out of balance, but it stays so: the active set alternates, which resistance settles
-        if move < SLOWLY * MOVE and NEAR < norm / force < ALTERNATES and fall > STAYS:
-            time *= SHORTER
+        if move < SLOWLY * MOVE and SETTLED < norm / force < ALTERNATES and fall > STAYS:
+            time *= 0.4
         else:
             time *= float(np.clip(MOVE / max(move, 1e-12), 0.5, 2.0))
     raise ConvergenceError(f"the wall does not creep on at {force:.4g} N")

@@ -20,25 +20,17 @@ from softjaw.fem.objects.stacked import wall_surface
 from softjaw.fem.shell.element import FloatArray, Shell
 from softjaw.fem.shell.facing import Wall
 from softjaw.fem.shell.wall_material import WallMaterial
-from softjaw.fem.shell.wall_mesh import BodyMesh, MeshSize, body_mesh
+from softjaw.fem.shell.wall_mesh import ON_LINE, BodyMesh, MeshSize, body_mesh
 from softjaw.fem.shell.wall_model import LinearShell, LinearWall, NonlinearWall
 
-ON_LINE = 1e-9  # grid lines this close to the edge of the flat bottom are on it [m]
-WEAK = 1.0  # N/m: stiffness of all weak springs of a whole body together, per direction
-ALIKE = 1e-9  # how exactly poses must be images of each other, in units of their size
+SAME_POSE = 1e-9  # how exactly poses must be images of each other, in units of their size
 HALF_TURN = np.diag([-1.0, -1.0, 1.0])
 
 
-@dataclass(frozen=True)
-class Supported:
-    """Shell with weak springs ``shell.springs``, and which of its numbers ``fixed (6 k,)`` are zero by its support."""
-
-    shell: Shell[BodyMesh]
-    fixed: FloatArray
-
-
-def supported(mesh: BodyMesh, material: WallMaterial, support: str = "free", stiffness: float = WEAK) -> Supported:
-    """Shell of a body that is held in one of the ways of ``SUPPORTS``.
+def supported(
+    mesh: BodyMesh, material: WallMaterial, support: str = "free", stiffness: float = 1.0
+) -> tuple[Shell[BodyMesh], FloatArray]:
+    """Shell of a body with weak springs, and which of its numbers ``(6 k,)`` a support of ``SUPPORTS`` fixes.
 
     Parameters
     ----------
@@ -64,7 +56,7 @@ def supported(mesh: BodyMesh, material: WallMaterial, support: str = "free", sti
     shell.springs.reshape(-1, 6)[:, :3] = (stiffness * mesh.share * shell.node_area / shell.node_area.sum())[:, None]
     held = np.zeros((shell.nodes, 6), dtype=bool)
     SUPPORTS[support](mesh, held)
-    return Supported(shell, held.ravel() | mesh.symmetric)
+    return shell, held.ravel() | mesh.symmetric
 
 
 def _clamped(mesh: BodyMesh, held: FloatArray) -> None:
@@ -166,20 +158,20 @@ def grasp(body: ThinWalled, poses: tuple[Pose, Pose], allowed: tuple[bool, bool]
     # an approach along the axis has no angle about it, and any will do
     angle = float(np.arctan2(-approach[1], -approach[0])) if np.hypot(*approach[:2]) > 1e-6 else 0.0
     turned = Turned(body.surface, angle, body.round)
-    one, two = (_turned(pose, angle) for pose in poses)
-    size = max(np.abs(one.origin).max(), np.abs(two.origin).max())
+    turned_poses = tuple(_turned(pose, angle) for pose in poses)
+    size = max(np.abs(pose.origin).max() for pose in turned_poses)
 
     def alike(p: Pose, q: Pose) -> bool:
-        same = np.abs(p.rotation - q.rotation).max() <= ALIKE
-        return same and np.abs(p.origin - q.origin).max() <= ALIKE * size
+        same = np.abs(p.rotation - q.rotation).max() <= SAME_POSE
+        return same and np.abs(p.origin - q.origin).max() <= SAME_POSE * size
 
     # the plane y = 0 halves both pads, the plane x = 0 makes one finger the other's image
-    across = allowed[1] and turned.symmetric[1] and all(_is_own_image(pose, ALIKE * size) for pose in (one, two))
-    between = allowed[0] and turned.symmetric[0] and alike(_image(one), two)
-    flipped = tuple(across and pose.rotation[1, 1] < 0 for pose in (one, two))
-    kept = tuple(_half_turned(p) if flip else p for p, flip in zip((one, two), flipped, strict=True))
+    across = allowed[1] and turned.symmetric[1] and all(_is_own_image(pose, SAME_POSE * size) for pose in turned_poses)
+    between = allowed[0] and turned.symmetric[0] and alike(_image(turned_poses[0]), turned_poses[1])
+    flipped = tuple(across and pose.rotation[1, 1] < 0 for pose in turned_poses)
+    solved = tuple(_half_turned(p) if flip else p for p, flip in zip(turned_poses, flipped, strict=True))
     n = 1 if between else 2
-    return Grasp(angle, kept[:n], flipped[:n], (between, across))
+    return Grasp(angle, solved[:n], flipped[:n], (between, across))
 
 
 def wall_between(body: ThinWalled, held: Grasp, pad_size: Sequence[float], mesh: WallMesh, *, linear: bool = False):
@@ -187,10 +179,10 @@ def wall_between(body: ThinWalled, held: Grasp, pad_size: Sequence[float], mesh:
     low, high, half = _footprint(held, pad_size)
     size = MeshSize((0.0, np.pi), (low, high), half, mesh.around, mesh.along, mesh.coarse)
     # a pad may reach beyond the wall, where the outline has no station
-    one = _supported(body, held, _within(body, size))
-    found = one.shell.mesh
-    wall = Wall(_surface(found), found.theta, found.s, found.number, 0.5 * found.thickness)
-    return (LinearWall if linear else NonlinearWall)(one.shell, one.fixed), [wall] * len(held.poses)
+    shell, fixed = _supported(body, held, _within(body, size))
+    meshed = shell.mesh
+    wall = Wall(_surface(meshed), meshed.theta, meshed.s, meshed.number, 0.5 * meshed.thickness)
+    return (LinearWall if linear else NonlinearWall)(shell, fixed), [wall] * len(held.poses)
 
 
 # the indicator of every candidate asks for the same factors
@@ -201,11 +193,10 @@ def object_factors(
     """First stiffness of the object, meshed alike along its whole wall; made once per rank."""
     z = body.surface.curve.derivative(np.linspace(*body.surface.wall, 257))[:, 0]
     size = MeshSize((0.0, np.pi), (z.min(), z.max()), half, mesh.around, mesh.along, mesh.coarse)
-    one = _supported(body, Grasp(angle, (), (), mirrors), _within(body, size))
-    return LinearShell(one.shell, one.fixed)
+    return LinearShell(*_supported(body, Grasp(angle, (), (), mirrors), _within(body, size)))
 
 
-def _supported(body: ThinWalled, held: Grasp, size: MeshSize) -> Supported:
+def _supported(body: ThinWalled, held: Grasp, size: MeshSize) -> tuple[Shell[BodyMesh], FloatArray]:
     surface = Turned(body.surface, held.angle, body.round)
     mesh = body_mesh(
         surface, body.thickness, size, held.mirrors,
@@ -257,4 +248,4 @@ def _image(pose: Pose) -> Pose:
 def _is_own_image(pose: Pose, tolerance: float) -> bool:
     """Whether y = 0 of the grasp frame is the pad's own plane y = 0."""
     # either sign: half a turn about the approach leaves the pad in the same plane
-    return abs(abs(pose.rotation[1, 1]) - 1.0) <= ALIKE and abs(pose.origin[1]) <= tolerance
+    return abs(abs(pose.rotation[1, 1]) - 1.0) <= SAME_POSE and abs(pose.origin[1]) <= tolerance

@@ -231,9 +231,9 @@ def friction_tangent(N, area, held, traction, by_motion, by_normal, by_pressure,
         w = area[f, q]
         for j in range(t + 48 + k):
             for c in range(3):
-                own = R[0, c] * change[0, j] + R[1, c] * change[1, j] + R[2, c] * change[2, j]
+                pull = R[0, c] * change[0, j] + R[1, c] * change[1, j] + R[2, c] * change[2, j]
                 for b in range(k):
-                    M[c * k + b, j] = -w * N[q, b] * own
+                    M[c * k + b, j] = -w * N[q, b] * pull
             for a in range(4):
                 share = 0.0
                 if j < t + 24:

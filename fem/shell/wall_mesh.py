@@ -16,11 +16,10 @@ from softjaw.fem.shell.element import FloatArray, IntArray, ShellMesh, grid_elem
 
 Outer = OuterSurface | Turned
 Thickness = float | Sequence[tuple[float, float]]  # of a wall [m], or pairs (z, thickness)
-SAMPLES = 4000  # of the wanted element size along a line
+LINE_SAMPLES = 4000  # of the wanted element size along a line
 TURN = np.radians(25.0)  # largest turn of the outline within one element
 SQUARE = ElementQuad1()
-AT_END = 1e-9  # heights this close to the wall's ends are at them [m]
-THICKEST = 1.0 - 1e-6  # of the outline's radius: a wall that reaches its centre of curvature has no inner face
+ON_LINE = 1e-9  # places this close to an end or an edge of the wall are on it [m]
 
 
 @dataclass(frozen=True)
@@ -73,7 +72,7 @@ def divided(start: float, end: float, x: FloatArray, h: FloatArray, multiple: in
 
     The number of intervals is a multiple of ``multiple``.
     """
-    fine = np.linspace(start, end, SAMPLES)
+    fine = np.linspace(start, end, LINE_SAMPLES)
     density = 1.0 / np.interp(fine, x, h)
     count = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(fine))])
     # rounding just above a whole number of intervals must not add one
@@ -89,13 +88,13 @@ def along(surface: Outer, size: MeshSize, open_bottom: bool, open_top: bool, mar
     begin = surface.wall[0] if open_bottom else 0.0
     end = surface.wall[1] if open_top else surface.end
     low, high = (surface.station(z) for z in size.heights)
-    x = np.linspace(begin, end, SAMPLES)
+    x = np.linspace(begin, end, LINE_SAMPLES)
     off = np.maximum(np.maximum(low - x, x - high), 0.0)
     bend = np.abs(surface.curve.curvature(x))
     # fine where pads touch, and wherever the outline bends: facets must follow a rounded edge
     h = np.minimum(np.minimum(size.along + size.growth * off, size.coarse), TURN / np.maximum(bend, 1e-9))
     h = limited(x, h, size.growth)
-    edges = sorted({edge for edge in (*surface.flat, *marks) if begin + 1e-9 < edge < end - 1e-9})
+    edges = sorted({edge for edge in (*surface.flat, *marks) if begin + ON_LINE < edge < end - ON_LINE})
     runs = [divided(a, b, x, h) for a, b in pairwise([begin, *edges, end])]
     return np.concatenate([*(run[:-1] for run in runs), runs[-1][-1:]])
 
@@ -116,7 +115,7 @@ def around(surface: Outer, size: MeshSize, symmetry: tuple[bool, bool]) -> Float
     middles = np.interp(np.mod(size.angles, 2 * np.pi), fine, arc)
 
     first, last = (float(place) for place in np.interp([begin, end], fine, arc))
-    x = np.linspace(first, last, SAMPLES)
+    x = np.linspace(first, last, LINE_SAMPLES)
     # the short way round the body
     off = np.abs((x[:, None] - middles + 0.5 * turn) % turn - 0.5 * turn).min(axis=1)
     h = np.minimum(size.around + size.growth * np.maximum(off - size.half_width, 0.0), size.coarse)
@@ -217,8 +216,8 @@ def body_mesh(
     ValueError
         For a symmetry that the surface does not have, or a wall that is not positive or too thick for its curvature.
     """
-    for plane, wanted, found in zip("xy", symmetry, surface.symmetric, strict=True):
-        if wanted and not found:
+    for plane, wanted, given in zip("xy", symmetry, surface.symmetric, strict=True):
+        if wanted and not given:
             raise ValueError(f"the body is shifted along {plane}, so {plane} = 0 is no symmetry; mesh it whole")
     s = along(surface, size, open_bottom, open_top, _steps(surface, thickness))
     theta = around(surface, size, symmetry)
@@ -235,7 +234,7 @@ def _steps(surface: Outer, thickness: Thickness) -> list[float]:
     if isinstance(thickness, float):
         return []
     z = surface.curve.derivative(np.linspace(*surface.wall, 257))[:, 0]
-    low, high = z.min() + AT_END, z.max() - AT_END
+    low, high = z.min() + ON_LINE, z.max() - ON_LINE
     return [surface.station(height) for height, _ in thickness if low < height < high]
 
 
@@ -268,7 +267,8 @@ def _wall(surface: Outer, thickness: Thickness, base: float | None, s: FloatArra
     if not (np.isfinite(t) & (t > 0)).all():
         raise ValueError(f"the wall thickness must be positive everywhere, found {t.min():g} m")
     bend = surface.curve.curvature(s)
-    if (bend * t > THICKEST).any():
+    # a wall that reaches its centre of curvature has no inner face
+    if (bend * t > 1.0 - 1e-6).any():
         k = int(np.argmax(bend * t))
         raise ValueError(
             f"the wall is {t[k]:g} m thick at z = {z[k]:g} m, where the outline's radius is only "
@@ -295,13 +295,13 @@ def interpolated(coarse: BodyMesh, q: FloatArray, fine: BodyMesh) -> FloatArray:
     lines, values = _all_round(coarse, q.reshape(-1, 6)[coarse.number])
     # splines, for a kink between two nodes would be a bend that the thin wall resists with all its stiffness
     around = CubicSpline(lines, values, bc_type="periodic")(fine.theta)
-    found = np.empty((len(fine.X), 6))
-    found[fine.number] = CubicSpline(coarse.s, around, axis=1)(fine.s)
+    state = np.empty((len(fine.X), 6))
+    state[fine.number] = CubicSpline(coarse.s, around, axis=1)(fine.s)
     # directors keep their length: a thickness that splines have changed would be a large stress
-    director = fine.D + found[:, 3:]
+    director = fine.D + state[:, 3:]
     length = np.linalg.norm(fine.D, axis=1) / np.linalg.norm(director, axis=1)
-    found[:, 3:] = length[:, None] * director - fine.D
-    return found.ravel()
+    state[:, 3:] = length[:, None] * director - fine.D
+    return state.ravel()
 
 
 def _all_round(mesh: BodyMesh, values: FloatArray) -> tuple[FloatArray, FloatArray]:

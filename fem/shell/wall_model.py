@@ -61,17 +61,13 @@ class LinearShell:
         q[self.free] = self._factors.solve(load[self.free])
         return q
 
-    def compliance(self, nodes: IntArray) -> tuple[FloatArray, FloatArray]:
-        """Answer of the outer face's nodes ``(n,)`` to forces on them.
+    def compliance(self, nodes: IntArray) -> FloatArray:
+        """Displacement of the outer face's nodes ``(n,)`` by forces on them: symmetric, ``(3 n, 3 n)`` [m/N].
 
-        Returns
-        -------
-        C, W : (3 n, 3 n) arrays
-            Displacement ``u + w`` and change of the director ``w`` of every node and component (rows, node by node) per
-            force on every node and component [m/N]. ``C`` is symmetric; ``W`` turns the outer face's normals.
+        Rows and columns are node by node.
         """
         u = (6 * np.asarray(nodes, dtype=np.int64)[:, None] + np.arange(3)).ravel()
-        C, W = np.empty((len(u), len(u))), np.empty((len(u), len(u)))
+        C = np.empty((len(u), len(u)))
         # the whole load matrix of a fine wall would not fit into memory
         for k in range(0, len(u), AT_ONCE):
             part = u[k : k + AT_ONCE]
@@ -79,8 +75,8 @@ class LinearShell:
             columns = np.arange(len(part))
             load[part, columns] = load[part + 3, columns] = 1.0  # a force on the outer face works on u + w
             q = self.solve(load)
-            C[:, k : k + AT_ONCE], W[:, k : k + AT_ONCE] = q[u] + q[u + 3], q[u + 3]
-        return C, W
+            C[:, k : k + AT_ONCE] = q[u] + q[u + 3]
+        return C
 
     def destroy(self) -> None:
         """Give the factors' memory back."""

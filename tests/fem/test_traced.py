@@ -217,9 +217,9 @@ def test_a_traced_tube_under_pressure():
     mesh = body_mesh(surface, 5e-4, MeshSize(heights=(0.02, 0.04), half_width=1.0), (True, True), open_bottom=True)
     body, p, R = supported(mesh, PET), 10.0, 0.03 - 2.5e-4
     load = np.zeros((len(mesh.X), 6))
-    load[:, :3] = p * body.shell.node_area[:, None] * mesh.D / 2.5e-4
+    load[:, :3] = p * body[0].node_area[:, None] * mesh.D / 2.5e-4
     load = np.where(mesh.symmetric.reshape(-1, 6), 0, load).ravel()
-    q = LinearShell(body.shell, body.fixed).solve(load).reshape(-1, 6)
+    q = LinearShell(*body).solve(load).reshape(-1, 6)
     wider = np.einsum("nk,nk->n", q[:, :3], mesh.D) / 2.5e-4
     assert wider == pytest.approx(p * R**2 / (PET.young_modulus * 5e-4), rel=0.01)
 

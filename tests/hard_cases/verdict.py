@@ -16,8 +16,8 @@ from tests.hard_cases.sources import accepts
 FINITE = ("closing", "e_n", "S", "F_N", "contact_area", "p_max", "quality", "f_x_max", "f_y_max", "tau_z_max")
 LIMITS = {
     "force_balance": checks.BALANCE,
-    "adhesion": checks.ADHESION,
-    "penetration": checks.PENETRATION,
+    "adhesion": checks.CONTACT_LAWS,
+    "penetration": checks.CONTACT_LAWS,
 }
 
 

@@ -198,7 +198,7 @@ def is_inverted(press, x):
         (lifts, "pressure and gap are both positive"),
         (is_unbalanced, "force balance is off by 1.0e-07"),
         (is_inverted, "an element is inverted: det F = -"),
-        (is_unbalanced_inside, "a node of the foam is out of balance by"),
+        (is_unbalanced_inside, "a node is out of balance by"),
     ],
     ids=lambda value: getattr(value, "__name__", ""),
 )

@@ -26,18 +26,18 @@ def tube(thickness, length, nu, around, along, planes, support="free"):
 
 def squeezed(body, weight):
     """State under the load at angles 0 and pi, shared by the nodes of these lines as ``weight (n,)`` says."""
-    mesh = body.shell.mesh
+    mesh = body[0].mesh
     load = np.zeros((len(mesh.X), 6))
     for angle, towards in ((0.0, -F), (np.pi, F)):
         i = np.abs(mesh.theta - angle).argmin()
         if abs(mesh.theta[i] - angle) < 1e-6:
             load[mesh.number[i], 0] = towards * weight * (0.5 if mesh.symmetry[1] else 1.0)
-    return LinearShell(body.shell, body.fixed).solve(load.ravel())
+    return LinearShell(*body).solve(load.ravel())
 
 
 def inward(body, q, s):
     """Displacement under the load at angle 0, half of what both of them come closer [m]."""
-    mesh, x = body.shell.mesh, q.reshape(-1, 6)[:, 0]
+    mesh, x = body[0].mesh, q.reshape(-1, 6)[:, 0]
     one, other = (x[mesh.number[np.abs(mesh.theta - angle).argmin(), s]] for angle in (0.0, np.pi))
     return -one if mesh.symmetry[0] else 0.5 * (other - one)
 
@@ -45,11 +45,11 @@ def inward(body, q, s):
 def ring(around, planes=PLANES[0], thickness=5e-4, length=0.02):
     """Of a tube without Poisson's effect under two line loads: displacement, stresses, over those of a thin ring."""
     body = tube(thickness, length, 0.0, around, 0.005, planes)
-    mesh = body.shell.mesh
+    mesh = body[0].mesh
     q = squeezed(body, np.gradient(mesh.s) * np.where(np.arange(len(mesh.s)) % (len(mesh.s) - 1), 1.0, 0.5) / length)
     middle, wall = len(mesh.s) // 2, length * thickness**2 / 6.0  # section modulus
     deflection = F * R**3 / (E * wall * thickness / 2.0) * (np.pi / 4.0 - 2.0 / np.pi) / 2.0
-    outer, inner = faces(body.shell, q)
+    outer, inner = faces(body[0], q)
     bending = 0.5 * (outer.stress - inner.stress)[:, middle, 0]
     side, load = (bending[np.abs(mesh.theta - angle).argmin()] for angle in (np.pi / 2, 0.0))
     moments = F * R * (0.5 - 1.0 / np.pi), -F * R / np.pi
@@ -75,9 +75,9 @@ def test_a_pinched_cylinder_with_diaphragms_meets_the_published_displacement():
     """164.24 P / (E t) under the load (MacNeal and Harder, 1985)."""
     thickness, length = R / 100.0, 2.0 * R
     body = tube(thickness, length, 0.3, R * np.pi / 64, length / 32, PLANES[0])
-    mesh = body.shell.mesh
+    mesh = body[0].mesh
     rims = np.unique(mesh.number[:, [0, -1]])
-    body.fixed.reshape(-1, 6)[np.ix_(rims, [0, 1, 3, 4])] = True
+    body[1].reshape(-1, 6)[np.ix_(rims, [0, 1, 3, 4])] = True
     weight = np.where(np.arange(len(mesh.s)) == len(mesh.s) // 2, 1.0, 0.0)
     u = inward(body, squeezed(body, weight), len(mesh.s) // 2)
     assert u == pytest.approx(164.24 * F / (E * thickness), rel=0.015)
@@ -86,8 +86,8 @@ def test_a_pinched_cylinder_with_diaphragms_meets_the_published_displacement():
 def test_a_clamped_tube_is_held_at_both_ends_and_a_standing_one_at_its_lower_rim():
     for support, rims in (("clamped", [0, -1]), ("standing", [0])):
         body = tube(5e-4, 0.04, 0.3, 0.006, 0.008, PLANES[3], support)
-        held = body.fixed.reshape(-1, 6)
+        held = body[1].reshape(-1, 6)
         expected = np.zeros_like(held)
-        nodes = np.unique(body.shell.mesh.number[:, rims])
+        nodes = np.unique(body[0].mesh.number[:, rims])
         expected[nodes if support == "clamped" else np.ix_(nodes, [2])] = True
         assert (held == expected).all()
