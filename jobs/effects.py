@@ -13,23 +13,25 @@ from __future__ import annotations
 import argparse
 import csv
 from collections.abc import Iterator
+from contextlib import suppress
 from itertools import chain, cycle
 from pathlib import Path
 
 import numpy as np
 
+from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.friction.motion import fibonacci_twists
 from softjaw.friction.wrench import friction_wrench
 from softjaw.scoring.bodies import polytope_volume
 from softjaw.study import pictures
-from softjaw.study.case import effects, model
+from softjaw.study.case import effects
 from softjaw.study.case.build import build_object
 from softjaw.study.case.candidates import units
-from softjaw.study.case.choosing import COUPLING as COUPLED
-from softjaw.study.case.choosing import Candidate, at_levels
 from softjaw.study.case.contact import Contact
+from softjaw.study.case.effects import COUPLING as COUPLED
+from softjaw.study.case.effects import EffectChoice
 from softjaw.study.case.limit_surface import SurfaceFit, fit_surface
-from softjaw.study.case.solving import Solved
+from softjaw.study.case.solver import CandidateSolver
 from softjaw.study.quantities import E_N_TARGET, EFFECTS
 from softjaw.study.scene import Scene, load_scene, parse_scene
 from softjaw.study.scene.sections import LimitSurfaceKeys
@@ -90,24 +92,27 @@ fitted ellipsoids (triangles), quartics (circles)"""
 Row = tuple[str, str, float, float, int, float]  # effect, case, indicator, measured change, whether taken, error
 
 
-def candidates(scene: Scene, **levels: str) -> Iterator[Candidate]:
-    """A scene's candidates, at some levels of effects."""
-    scene = at_levels(scene, **levels)
+def at_levels(scene: Scene, **levels: str) -> Scene:
+    """The scene with these levels of its effects."""
+    return scene.with_values({f"effects.{name}": level for name, level in levels.items()})
+
+
+def choices(scene: Scene) -> Iterator[EffectChoice]:
+    """Levels of the effects of a scene's candidates."""
     for unit in units(scene, lambda point: build_object(point.object).axis_symmetry):
-        obj, poses = build_object(scene.object), unit.candidate.poses
-        made = Candidate(scene, [model.approach(obj, pose, scene.gripper) for pose in poses], poses)
-        yield made
-        made.destroy()
+        solver = CandidateSolver(scene, unit.candidate.poses)
+        yield EffectChoice(solver)
+        solver.destroy()
 
 
 def contacts_at(scene: Scene, **levels: str) -> dict[tuple[int, float], list[Contact]]:
     """Contacts by candidate and force where there is a solution; effects that are not named are left out."""
-    found = {}
-    for n, candidate in enumerate(candidates(scene, **(PLAIN | levels))):
-        for k, outcome in candidate.solve(range(len(candidate.forces))):
-            if isinstance(outcome, Solved):
-                found[n, candidate.forces[k]] = [c for c, *_ in outcome.contacts]
-    return found
+    contacts = {}
+    for n, choice in enumerate(choices(at_levels(scene, **(PLAIN | levels)))):
+        for k, force in enumerate(choice.solver.forces):
+            with suppress(ConvergenceError, CheckError):
+                contacts[n, force] = choice.case(k).fine.contacts
+    return contacts
 
 
 def e_n(contacts: list[Contact], friction: str = "ccm") -> float:
@@ -155,8 +160,8 @@ def friction_rows() -> Iterator[Row]:
     """Friction that acts back, chosen at every force."""
     for label, scene in rigid_scenes():
         free, coupled = contacts_at(scene), contacts_at(scene, **{COUPLED: "tangential"})
-        for n, candidate in enumerate(candidates(at_levels(scene, sheet="rigid"))):
-            for force, level in zip(candidate.forces, candidate.levels[COUPLED], strict=True):
+        for n, choice in enumerate(choices(at_levels(scene, sheet="rigid"))):
+            for force, level in zip(choice.solver.forces, choice.chosen[COUPLED], strict=True):
                 if (n, force) in free and (n, force) in coupled:
                     error = off(e_n(free[n, force]), e_n(coupled[n, force]))
                     taken = int(level.level != "none")
@@ -167,8 +172,8 @@ def plate_rows() -> Iterator[Row]:
     """Backing plates, chosen for all forces of a candidate."""
     for label, scene in rigid_scenes():
         free, plate = contacts_at(scene), contacts_at(scene, sheet="elastic")
-        for n, candidate in enumerate(candidates(at_levels(scene, **{COUPLED: "none"}))):
-            for force, level in zip(candidate.forces, candidate.levels["sheet"], strict=True):
+        for n, choice in enumerate(choices(at_levels(scene, **{COUPLED: "none"}))):
+            for force, level in zip(choice.solver.forces, choice.chosen["sheet"], strict=True):
                 if (n, force) in free and (n, force) in plate:
                     error, taken = off(e_n(free[n, force]), e_n(plate[n, force])), int(level.level != "rigid")
                     yield "sheet", named(label, n, force), level.indicator, level.change, taken, error
@@ -197,16 +202,16 @@ def wall_rows() -> Iterator[Row]:
         )
         for force in scene.load.normal_force:
             alone = at_levels(scene.with_values({"load.normal_force_n": [force]}), **(PLAIN | {"object": "auto"}))
-            for n, candidate in enumerate(candidates(alone)):
-                key, name, level = (n, force), named(label, n, force), candidate.levels["object"][0]
+            for n, choice in enumerate(choices(alone)):
+                key, name, level = (n, force), named(label, n, force), choice.chosen["object"][0]
                 number = EFFECTS["object"].index(level.level)
                 if key in shell and key in rigid:
                     change = level.change if number < 2 else np.nan
-                    yield (SHELL, name, candidate.indentation[0], change, int(number > 0),
+                    yield (SHELL, name, choice.indentation[0], change, int(number > 0),
                            off(e_n(rigid[key]), e_n(shell[key])))  # fmt: skip
                 if key in shell and key in linear and number > 0:
                     error = off(e_n(linear[key]), e_n(shell[key]))
-                    yield SHELLS, name, candidate.indentation[1], level.change, int(number > 1), error
+                    yield SHELLS, name, choice.indentation[1], level.change, int(number > 1), error
 
 
 def of_effect(rows: list[Row], effect: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -7,21 +7,21 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Collection, Generator, Iterator, Sequence
+from collections.abc import Collection, Generator, Iterator
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from softjaw.study.case import model
-from softjaw.study.case.build import build_object, own_frame, pad_shape
-from softjaw.study.case.choosing import Candidate
-from softjaw.study.case.effects import Simulated, settled
-from softjaw.study.case.evaluate import EvaluationSettings, evaluate, mesh_errors, settings_of
-from softjaw.study.case.finer import stored, weight_of
+from softjaw.fem.errors import CheckError, ConvergenceError
+from softjaw.study.case.build import build_object, forces_apart, own_frame, pad_shape
+from softjaw.study.case.effects import EffectChoice, Simulated, settled
+from softjaw.study.case.errors import mesh_errors
+from softjaw.study.case.evaluate import EvaluationSettings, evaluate, settings_of
+from softjaw.study.case.pressing import state_flags
 from softjaw.study.case.result import CaseFailure, CaseResult
-from softjaw.study.case.solving import PressedContact, Solved, state_flags
-from softjaw.study.case.topology import of_fingers
+from softjaw.study.case.solver import CandidateSolver, Solution, Solved, join_notes
+from softjaw.study.case.topology import of_fingers, on_faces
 from softjaw.study.case.wall import wall_flags
 from softjaw.study.flags import Flag, flag_sentences
 from softjaw.study.quantities import misses
@@ -35,87 +35,69 @@ def solve_unit(
     Each force starts from the state at the one before, so that all up to the last one are solved; or it is independent
     of the others, and only those are. Not a bit of a case depends on what is wanted.
     """
-    scene = unit.scene
-    obj = build_object(scene.object)
-    settings = settings_of(scene, obj)
-    fingers = [model.approach(obj, pose, scene.gripper) for pose in unit.candidate.poses]
-    start = time.perf_counter()
-    solving = Candidate(scene, fingers, unit.candidate.poses)
-    choosing = time.perf_counter() - start
+    settings = settings_of(unit.scene, build_object(unit.scene.object))
+    solver = CandidateSolver(unit.scene, unit.candidate.poses)
     try:
-        for k, outcome in _outcomes(solving, wanted):
+        start = time.perf_counter()
+        choice = EffectChoice(solver)
+        choosing = time.perf_counter() - start
+        for k, outcome in _outcomes(choice, wanted):
             if isinstance(outcome, CaseFailure):
                 yield k, outcome
             else:
-                result = _result(settings, solving, k, outcome)
-                yield k, _with_note(result, unit.candidate.note, choosing)
+                yield k, _result(settings, choice, k, outcome, unit.candidate.note, choosing)
                 choosing = 0.0  # counted once for all forces
     finally:
-        solving.destroy()
+        solver.destroy()
 
 
-def _result(settings: EvaluationSettings, candidate: Candidate, k: int, outcome: Solved) -> CaseResult:
-    """Values, checks, work, effects and patches of one case."""
-    scene, solving = candidate.asked, candidate.solver
-    # of the two finest meshes the finer one is the result, the coarser one tells its error
-    start = time.perf_counter()
-    fine = [c for c, *_ in outcome.contacts]
-    values, fits = evaluate(fine, settings)
-    values |= _state_values(fine) | of_fingers(fine, fine[0].state.pad.shape.patch_faces)
-    values["maps/flags"] |= state_flags(fine) | candidate.flags_at(k)
-    values |= solving.wall_values(outcome)
-    if fine[0].state.wall is not None:
-        values["maps/flags"] |= wall_flags(scene, fine[0].state, values)
-    coarse = [c for _, *coarser in outcome.contacts for c in coarser]
-    if len(coarse) == len(fine):
-        views = list(zip(*(c.views for c in coarse), strict=True))
-        other = _state_values(coarse) | solving.wall_values(outcome, 1)
-        values |= mesh_errors(fine, coarse, values, other, settings, views, weight_of(fine, scene))
+def _result(
+    settings: EvaluationSettings, choice: EffectChoice, k: int, solved: Solved, note: str, choosing: float
+) -> CaseResult:
+    """Values, checks, work, effects and patches of one case; its effects took ``choosing`` seconds to choose."""
+    scene, fine, coarse = choice.solver.scene, solved.fine, solved.coarse
+    start, contacts = time.perf_counter(), fine.contacts
+    shape = contacts[0].state.pad.shape
+    values, fits = evaluate(contacts, settings)
+    values |= _state_values(fine) | of_fingers(contacts, shape.patch_faces)
+    values["maps/flags"] |= state_flags(contacts) | choice.flags_at(k)
+    if contacts[0].state.wall is not None:
+        values["maps/flags"] |= wall_flags(scene, contacts[0].state, values)
+    if coarse:
+        other = _state_values(coarse)
+        values |= mesh_errors(contacts, coarse.contacts, values, other, settings, coarse.views, solved.weight)
         # only where the scene asks for a target: without one the sums at the end say how many cases miss the usual one
         if (target := scene.accuracy.target) is not None:
             error = values[f"maps/{scene.accuracy.target_of}_error"]
             values["maps/flags"] |= Flag.COARSE * bool(misses(error, target))
-    values |= _work(fine, outcome, time.perf_counter() - start)
+    values |= _work(solved, time.perf_counter() - start, choosing)
     if scene.accuracy.target is not None:
-        values["maps/pad_elements"] = math.prod(fine[0].state.pad.shape.elements)
-    patches = [stored(c, pad_shape(scene.gripper)) for c in fine]
-    patch = {name: np.stack([own[name] for own in patches]) for name in patches[0]}
-    message = _notes(values["maps/flags"], fine, outcome.note)
-    case = Simulated(scene, fine, fits, solving.planes, solving.fingers_solved)
-    effects = candidate.effects_at(k, fine) | settled(case)
-    return CaseResult(values, patch, message, effects, tuple(fine))
+        values["maps/pad_elements"] = math.prod(shape.elements)
+    patches = [on_faces(c, pad_shape(scene.gripper)) for c in contacts]
+    patch = {name: np.stack([faces[name] for faces in patches]) for name in patches[0]}
+    notes = dict.fromkeys(note for c in contacts for note in c.state.notes)
+    message = join_notes(flag_sentences(values["maps/flags"]), *notes, solved.note, note)
+    case = Simulated(scene, contacts, fits, fine.fingers.planes, fine.fingers.fingers_solved)
+    effects = choice.effects_at(k, contacts) | settled(case)
+    return CaseResult(values, patch, message, effects, tuple(contacts))
 
 
-def _notes(flags: int, contacts: Sequence[PressedContact], note: str) -> str:
-    """What there is to know of a case: its flags, what it took to solve it, and a note."""
-    own = dict.fromkeys(note for c in contacts for note in c.state.notes)
-    return "; ".join(text for text in (flag_sentences(flags), *own, note) if text)
-
-
-def _with_note(result: CaseResult, note: str, choosing: float) -> CaseResult:
-    """The result with a note on the candidate, and the time in which the effects were chosen [s]."""
-    times = {key: result.values[key] + choosing for key in ("work/seconds_rest", "work/seconds_total")}
-    message = "; ".join(text for text in (result.message, note) if text)
-    return replace(result, values=result.values | times, message=message)
-
-
-def _outcomes(candidate: Candidate, wanted: Collection[int] | None) -> Iterator[tuple[int, Solved | CaseFailure]]:
-    """For every force the contacts of both fingers, or why there are none."""
-    forces, every = candidate.forces, range(len(candidate.forces))
-    if candidate.apart:
-        for k, found in candidate.solve(every if wanted is None else sorted(wanted)):
-            yield k, found if isinstance(found, Solved) else CaseFailure(str(found))
-        return
-    last, ended, failed = "no force below it was solved", -1, None
-    for k, found in candidate.solve(every):
-        if isinstance(found, Solved):
+def _outcomes(choice: EffectChoice, wanted: Collection[int] | None) -> Iterator[tuple[int, Solved | CaseFailure]]:
+    """For every force the solutions of its case, or why there are none."""
+    forces, apart = choice.solver.forces, forces_apart(choice.solver.scene)
+    last, failed = "no force below it was solved", None
+    for k in sorted(wanted) if apart and wanted is not None else range(len(forces)):
+        try:
+            yield k, choice.case(k)
             last = f"the last good force is {forces[k]:g} N"
-            yield k, found
-        elif found is failed:  # the load path has no further states
-            yield k, CaseFailure(f"not tried, because the load path ended at {forces[ended]:g} N: {found}")
-        else:
-            ended, failed = k, found
-            yield k, CaseFailure(f"{found}; {last}")
+        except (ConvergenceError, CheckError) as failure:
+            if apart:
+                text = str(failure)
+            elif failed and failure is failed[1]:  # the load path has no further states
+                text = f"not tried, because the load path ended at {failed[0]:g} N: {failure}"
+            else:
+                failed, text = (forces[k], failure), f"{failure}; {last}"
+            yield k, CaseFailure(text)
 
 
 def image(result: CaseResult, unit: Any, c: int) -> CaseResult:
@@ -133,25 +115,29 @@ def image(result: CaseResult, unit: Any, c: int) -> CaseResult:
     return replace(result, values=values)
 
 
-def _state_values(contacts: Sequence[PressedContact]) -> dict[str, Any]:
+def _state_values(solution: Solution) -> dict[str, Any]:
     """What the solved states say beside their patches."""
+    contacts = solution.contacts
     closing, checks = [c.state.closing for c in contacts], [vars(c.state.checks) for c in contacts]
     values = {"maps/closing": np.mean(closing), "fingers/closing": closing}
     # of the force that the gripper commands, which the checks compare with the force along the approach
     excess = [c.force_excess for c in contacts]
     values |= {"maps/force_excess": max(excess, key=abs), "fingers/force_excess": excess}
     values["maps/e_n_commanded"] = np.min([c.e_n_commanded for c in contacts], axis=0)
-    one, two = (c.pose for c in contacts)
-    opening = float((two.origin - one.origin) @ one.rotation[:, 2])
+    first, second = (c.pose for c in contacts)
+    opening = float((second.origin - first.origin) @ first.rotation[:, 2])
     values |= {"maps/opening": opening, "maps/opening_loaded": opening - sum(closing)}
-    return values | {f"checks/{name}": [own[name] for own in checks] for name in checks[0]}
+    values |= {f"checks/{name}": [check[name] for check in checks] for name in checks[0]}
+    return values | solution.wall_values
 
 
-def _work(contacts: Sequence[PressedContact], outcome: Solved, friction: float) -> dict[str, Any]:
-    """Work of one case, of which friction, fits and scores took so many seconds."""
+def _work(solved: Solved, friction: float, choosing: float) -> dict[str, Any]:
+    """Work of one case, of which friction, fits and scores, and the choice of its effects, took so many seconds."""
     names = (("newton_iterations", "iterations"), ("load_steps", "steps"), ("step_halvings", "halvings"))
-    work = {f"work/{key}": [getattr(c.state, name) for c in contacts] for key, name in names}
-    spent = [s.seconds for s in outcome.spent]
-    for part in ("assembly", "factorisation", "rest"):
-        work[f"work/seconds_{part}"] = sum(getattr(s, part) for s in spent)
-    return work | {"work/seconds_friction": friction, "work/seconds_total": friction + sum(s.total for s in spent)}
+    work = {f"work/{key}": [getattr(c.state, name) for c in solved.fine.contacts] for key, name in names}
+    seconds = [state.seconds for state in solved.states]
+    for part in ("assembly", "factorisation"):
+        work[f"work/seconds_{part}"] = sum(getattr(s, part) for s in seconds)
+    total = friction + choosing + sum(s.total for s in seconds)
+    work["work/seconds_rest"] = choosing + sum(s.rest for s in seconds)
+    return work | {"work/seconds_friction": friction, "work/seconds_total": total}

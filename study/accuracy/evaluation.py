@@ -18,10 +18,11 @@ from softjaw.scoring.bodies import PolytopeBody, fibonacci_vertices, hull_volume
 from softjaw.study.accuracy.parameters import HULL, POINTS, SURFACES, WINKLER
 from softjaw.study.case import model
 from softjaw.study.case.build import build_object
-from softjaw.study.case.choosing import Candidate
 from softjaw.study.case.contact import Contact
+from softjaw.study.case.effects import EffectChoice
 from softjaw.study.case.evaluate import EvaluationSettings, evaluate, lengths, quality, soft, volume_in_pose
 from softjaw.study.case.probes import Probe, winkler_pad
+from softjaw.study.case.solver import CandidateSolver
 from softjaw.study.quantities import MODELS
 
 FloatArray = NDArray[np.float64]
@@ -54,13 +55,13 @@ def solved(probe: Probe) -> SolvedProbe:
     """
     scene = probe.unit.scene
     obj = build_object(scene.object)
-    fingers = [model.approach(obj, pose, scene.gripper) for pose in probe.unit.candidate.poses]
     start = time.process_time()
-    solving = Candidate(scene, fingers, probe.unit.candidate.poses, probe.forces)
+    solver = CandidateSolver(scene, probe.unit.candidate.poses, probe.forces)
     try:
-        contacts = [[c for c, *_ in outcome.contacts] for outcome in solving.load_path(probe.forces)]
+        choice = EffectChoice(solver)
+        contacts = [choice.case(k).fine.contacts for k in range(len(probe.forces))]
     finally:
-        solving.destroy()
+        solver.destroy()
     return SolvedProbe(probe, obj, contacts, (time.process_time() - start) / len(probe.forces))
 
 

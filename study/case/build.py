@@ -237,11 +237,11 @@ def forces_apart(scene: Scene) -> bool:
 
 
 def pad_elements(scene: Scene, mesh: int) -> tuple[int, int, int]:
-    """Elements of a pad on the scene's mesh (1, 2) and on the finer ones of ``accuracy.target`` (3, 4)."""
-    found = scene.gripper.elements
-    for _ in range(2, mesh):
-        found = refined(found)
-    return found
+    """Elements of a pad on the scene's mesh (1) and on the finer ones of ``accuracy.target`` (2, 3)."""
+    elements = scene.gripper.elements
+    for _ in range(1, mesh):
+        elements = refined(elements)
+    return elements
 
 
 def pad_shape(gripper: Gripper, coarser: bool = False) -> PadShape:

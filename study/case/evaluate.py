@@ -23,18 +23,15 @@ from softjaw.scoring.pose import pose_volume
 from softjaw.scoring.quality import Score, grasp_score, score
 from softjaw.study.case.contact import Contact, angle, angles, pose_flags
 from softjaw.study.case.limit_surface import SurfaceFit, fit_flag, fit_surface, surface_values
-from softjaw.study.case.task import Task, payload_alone, payload_values, task_of
+from softjaw.study.case.task import Task, payload_values, task_of
 from softjaw.study.flags import raised
-from softjaw.study.quantities import MODELS, TABLE
+from softjaw.study.quantities import MODELS
 from softjaw.study.scene import Scene
 from softjaw.study.scene.sections import LimitSurfaceKeys as Choice
 from softjaw.study.units import in_si
 
 FloatArray = NDArray[np.float64]
 FACING = math.radians(0.5)  # misalignment up to which the closed form is off by less than 1e-4
-# Weights of what two meshes and two views of the coarser one tell of an error: on 111 cases with a reference they cover
-# 95 % of the errors of e_n, and are 4.6 times too large in the median (tests/study/test_mesh_errors.py).
-OF_MESHES, OF_VIEWS = 0.7, 0.2
 NEAR = 1e-2  # relative gap between the bounds of epsilon
 LIMITS = (("f_x", "f_x_max"), ("f_y", "f_y_max"), ("tau_z", "tau_z_max"))  # attribute, quantity
 ECCENTRICITIES = ("e_n", "e_n_ratio", "e_n_projected")  # attributes and quantities alike
@@ -171,10 +168,10 @@ def _friction_values(contacts: Sequence[Contact]) -> dict[str, Any]:
         values |= {f"maps/{key}": limits[name].min(axis=0), f"fingers/{key}": limits[name]}
     values |= {f"maps/{key}": limits[key].min(axis=0) for key in ECCENTRICITIES}
     values["fingers/e_n_ratio"] = limits["e_n_ratio"]
-    return values | {f"maps/{key}": value for key, value in _overestimates(contacts).items()}
+    return values | {f"maps/{key}": value for key, value in overestimates(contacts).items()}
 
 
-def _overestimates(contacts: Sequence[Contact]) -> dict[str, float]:
+def overestimates(contacts: Sequence[Contact]) -> dict[str, float]:
     """Share of each planar model's claim that the curved contact cannot carry, for both forces and the torque."""
     shares = {}
     for name, _ in LIMITS:
@@ -183,84 +180,6 @@ def _overestimates(contacts: Sequence[Contact]) -> dict[str, float]:
             # NaN where the planar model carries nothing: there is no claim to compare with.
             shares[f"{name}_overestimate{suffix}"] = max(1.0 - f / p if p > 0 else np.nan for f, p in pairs)
     return shares
-
-
-def mesh_errors(
-    fine: Sequence[Contact], coarse: Sequence[Contact], values: Mapping[str, Any], other: Mapping[str, Any],
-    settings: EvaluationSettings, views: Sequence[Sequence[Contact]] = (), weight: float = OF_MESHES,
-) -> dict[str, float]:  # fmt: skip
-    """Errors of all quantities that have one, from the contacts on the mesh and on a coarser one.
-
-    ``values`` are those of the fine mesh, ``other`` what the coarser one says beside its contacts; keyed alike.
-    ``views`` are the coarse contacts with their pressures at Gauss points and at nodes, ``weight`` that of the
-    difference: `OF_MESHES` where the coarser mesh is half as fine.
-    """
-    # of one value for each friction model the curved one's, which comes first; fits would double the time
-    fine_mesh: dict[str, Any] = {key: np.ravel(value)[:1] for key, value in values.items()} | _judged(fine)
-    seen = [_judged(view) | _held(view, settings) for view in views]
-    coarse_mesh: dict[str, Any] = {key: np.ravel(value)[:1] for key, value in other.items()}
-    coarse_mesh |= _held(coarse, settings) | _judged(coarse)
-    fine_mesh, coarse_mesh = fine_mesh | _of_faces(fine), coarse_mesh | _of_faces(coarse)
-    return {
-        q.of_error.key: estimate(
-            fine_mesh[q.key], coarse_mesh[q.key], [own[q.key] for own in seen if q.key in own], q.error, weight
-        )
-        for q in TABLE
-        if q.error and q.key in coarse_mesh
-    }
-
-
-def error_of_one(
-    name: str, fine: Sequence[Contact], coarse: Sequence[Contact], views: Sequence[Sequence[Contact]],
-    settings: EvaluationSettings, weight: float = OF_MESHES,
-) -> float:  # fmt: skip
-    """Relative error of ``e_n``, ``quality`` or ``payload`` alone, as `mesh_errors` has it."""
-    values = (_judged(c) if name == "e_n" else _held(c, settings) for c in (fine, coarse, *views))
-    own, other, *seen = (value[f"maps/{name}"] for value in values)
-    return estimate(own, other, seen, "relative", weight)
-
-
-def estimate(
-    fine: ArrayLike, coarse: ArrayLike, views: Sequence[ArrayLike], kind: str, weight: float = OF_MESHES
-) -> float:
-    """Error of a number, or the largest of those of the fingers, from its values on two meshes.
-
-    The difference alone passes through zero where the contact's edge lies alike on both meshes; that of the ``views``
-    of the coarse contact does not. ``kind`` as in `quantities.Quantity.error`; NaN where there is no value for the
-    error to be a share of.
-    """
-    f, c = np.asarray(fine, float), np.asarray(coarse, float)
-    error = np.abs(c - f)
-    if views:
-        one, two = (np.asarray(view, float) for view in views)
-        error = np.maximum(weight * error, OF_VIEWS * np.abs(one - two))
-    if kind == "relative":
-        error = np.divide(error, f, out=np.full(f.shape, np.nan), where=f > 0)
-    return float(error.max())
-
-
-def _held(contacts: Sequence[Contact], settings: EvaluationSettings) -> dict[str, Any]:
-    """Quality of the ellipsoids and payload ``(1,)`` in the curved model."""
-    found = {"maps/quality": quality(contacts, settings)}
-    if settings.task:
-        found |= payload_alone(contacts, settings.surface.samples, settings.task)
-    return {key: [value] for key, value in found.items()}
-
-
-def _of_faces(contacts: Sequence[Contact]) -> dict[str, Sequence[float]]:
-    """Quantities that are no sums over a contact, so that only its own faces tell them; of each finger."""
-    return {"maps/contact_area": [c.area for c in contacts], "maps/p_max": [c.largest_pressure for c in contacts]}
-
-
-def _judged(contacts: Sequence[Contact]) -> dict[str, Sequence[float]]:
-    """Quantities whose errors are told from sums over the contacts, of each finger where it has its own."""
-    ccm = [c.limits["ccm"] for c in contacts]
-    found: dict[str, Sequence[float]] = {
-        key: [getattr(own, name) for own in ccm] for name, key in (("e_n", "e_n"), *LIMITS)
-    }
-    found["curvature_loss"] = [1.0 - sum(own.F_N for own in ccm) / sum(own.S for own in ccm)]
-    found |= {key: [value] for key, value in _overestimates(contacts).items()}
-    return {f"maps/{key}": value for key, value in found.items()}
 
 
 # --- score ------------------------------------------------------------------------------------------------------------

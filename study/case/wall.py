@@ -89,7 +89,7 @@ def _indentations(shell: Shell, q: FloatArray) -> FloatArray:
     return -np.einsum("ki,ki->k", v - drift, normal)
 
 
-def wall_values(scene: Scene, held: Grasp, state: Pressed, shell: Shell) -> dict[str, Any]:
+def wall_values(held: Grasp, state: Pressed, shell: Shell) -> dict[str, Any]:
     """What the wall bears in one case, keyed as in ``study.quantities``."""
     q = state.wall.q.reshape(-1, 6)
     both = faces(shell, state.wall.q)

@@ -146,7 +146,7 @@ def sensible_ranks(costs: Sequence[float], efficiency: float = 0.8) -> int:
 
 def memory(scene: Any) -> float:
     """Rough memory of one rank [bytes]: the libraries, the factors of the whole pad's stiffness, those of a wall."""
-    pad = 8.0 * FILL * (3.0 * _pad_nodes(scene, scene.accuracy.most_meshes)) ** (4.0 / 3.0)
+    pad = 8.0 * FILL * (3.0 * _pad_nodes(scene, scene.accuracy.most_meshes - 1)) ** (4.0 / 3.0)
     wall = wall_size(scene) if shells(scene) else None
     return LIBRARIES + pad + (wall.memory if wall else 0.0)
 
@@ -361,6 +361,6 @@ def _pad(scene: Any, mirrors: tuple[bool, bool]) -> int:
     return round(3 * _pad_nodes(scene) * fingers * (0.5 if mirrors[1] else 1.0))
 
 
-def _pad_nodes(scene: Any, mesh: int = 2) -> int:
+def _pad_nodes(scene: Any, mesh: int = 1) -> int:
     """Nodes of one whole pad, on the scene's mesh or a finer one."""
     return math.prod(n * (2 if scene.gripper.element == "hex27" else 1) + 1 for n in pad_elements(scene, mesh))

@@ -132,18 +132,13 @@ def test_a_grasp_that_just_holds_is_not_too_weak(seed):
 
 
 @pytest.mark.parametrize("ulp", ULPS[::4])
-def test_an_indicator_on_its_limit_takes_the_dearer_level(ulp, monkeypatch):
+def test_an_indicator_on_its_limit_takes_the_dearer_level(ulp):
     """On the bound below which nothing is measured it is measured; on the target it is taken."""
-    from softjaw.study.case.choosing import Candidate
-    from softjaw.study.case.effects import ROWS, STIFF_PLATE
+    from softjaw.study.case.effects import ROWS, STIFF_PLATE, decided
 
-    on, row = 1.0 + ulp, ROWS["sheet"]
-    candidate = Candidate.__new__(Candidate)
-    candidate.target, candidate.forces, candidate.walled = 0.01, (1.0,), False
-    monkeypatch.setattr(Candidate, "plate_compliance", STIFF_PLATE * on)
+    on, [step] = 1.0 + ulp, ROWS["sheet"].steps
     for change, level in ((0.01 * on, "elastic plate"), (0.0099, "rigid")):
-        candidate._changes = {("sheet", "elastic", 0): (change, 0.0)}
-        assert candidate._step("sheet", row, row.steps[0], 0).level == level
+        assert decided("sheet", step, STIFF_PLATE * on, lambda: (change, 0.0, 0.0), 0.01).level == level  # noqa: B023
 
 
 # --- flags ------------------------------------------------------------------------------------------------------------
@@ -172,7 +167,7 @@ def facing(turn, lean, mu, distance=0.06, free=0.0, excess=0.0):
 def test_flags_of_a_pair_do_not_hang_on_its_rotation(seed):
     """Contacts that face each other without friction, and some that lean by just the angle that is too much."""
     from softjaw.study.case.contact import ANTIPODAL, pose_flags
-    from softjaw.study.case.solving import EXCESS, state_flags
+    from softjaw.study.case.pressing import EXCESS, state_flags
     from softjaw.study.flags import Flag
 
     turn = Rotation.random(random_state=seed)

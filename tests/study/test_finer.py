@@ -12,7 +12,7 @@ from softjaw.fem.contact.press import Press
 from softjaw.fem.errors import ConvergenceError
 from softjaw.friction.patch import ContactPatch
 from softjaw.study import pipeline
-from softjaw.study.case.finer import joined
+from softjaw.study.case.topology import joined
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import misses
 from tests.study.test_levels import WALL, bits, unit_of, whole

@@ -14,12 +14,13 @@ import pytest
 
 from softjaw.fem.errors import ConvergenceError
 from softjaw.study import pipeline
-from softjaw.study.case import solving
+from softjaw.study.case import pressing
 from softjaw.study.case.build import build_object
 from softjaw.study.case.candidates import units
-from softjaw.study.case.evaluate import OF_MESHES
+from softjaw.study.case.errors import OF_MESHES
 from softjaw.study.case.model import contact_rules
 from softjaw.study.case.result import CaseFailure
+from softjaw.study.case.solver import followed
 from softjaw.study.doctor import launch_environment
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import MODELS
@@ -166,7 +167,7 @@ def test_on_a_slope_the_force_along_the_normal_is_the_commanded_one_over_the_cos
     (OVAL, ("candidates.roll_deg=30",)), (BALL, ("candidates.roll_deg=70",)), (BOX, ()), (OVAL, ()),
 ])  # fmt: skip
 def test_both_fingers_are_alike_on_a_symmetric_object(monkeypatch, shape, overrides):
-    monkeypatch.setattr(solving, "turn_of_pose", lambda *_: None)  # solve them one after the other
+    monkeypatch.setattr(pressing, "turn_of_pose", lambda *_: None)  # solve them one after the other
     solved.cache_clear()
     for values in cases(shape, *overrides):
         for name, both in values.items():
@@ -184,7 +185,7 @@ def test_both_fingers_are_alike_on_a_symmetric_object(monkeypatch, shape, overri
 def test_a_finger_that_is_an_image_has_what_its_own_solution_gives(monkeypatch, shape):
     place = dict(stations="[75]" if shape == CONE else "[0]", angles="[20]")
     shared = cases(shape, **place)
-    monkeypatch.setattr(solving, "turn_of_pose", lambda *_: None)
+    monkeypatch.setattr(pressing, "turn_of_pose", lambda *_: None)
     solved.cache_clear()
     separate = cases(shape, **place)
     solved.cache_clear()
@@ -482,9 +483,11 @@ def test_forces_above_one_that_hardly_touches_begin_anew():
                 raise ConvergenceError("no first contact")
             yield force
 
-    failed, *_, one, two = solving.followed(load_path, (1e-9, 1e-4, 1.0, 2.0))
+    failed, again, *reached = followed(load_path, (1e-9, 1e-4, 1.0, 2.0))
     assert isinstance(failed, ConvergenceError)
-    assert (one, two) == (1.0, 2.0)
-    # a first force that is not small beside the others ends the path
-    [only] = solving.followed(load_path, (9e-4, 0.5))
-    assert isinstance(only, ConvergenceError)
+    assert isinstance(again, ConvergenceError)
+    assert reached == [1.0, 2.0]
+    # a first force that is not small beside the others ends the path, with one failure for all of them
+    ended, above = followed(load_path, (9e-4, 0.5))
+    assert isinstance(ended, ConvergenceError)
+    assert above is ended

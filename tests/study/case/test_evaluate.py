@@ -17,17 +17,8 @@ from softjaw.scoring.payload import GRAVITY
 from softjaw.scoring.pose import pose_volume
 from softjaw.study.case.build import build_object
 from softjaw.study.case.contact import Contact
-from softjaw.study.case.evaluate import (
-    FACING,
-    OF_MESHES,
-    OF_VIEWS,
-    EvaluationSettings,
-    estimate,
-    evaluate,
-    lengths,
-    mesh_errors,
-    quality,
-)
+from softjaw.study.case.errors import OF_MESHES, OF_VIEWS, estimate, mesh_errors
+from softjaw.study.case.evaluate import FACING, EvaluationSettings, evaluate, lengths, quality
 from softjaw.study.case.task import Task, centre_of_volume
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import MODELS, TABLE, misses

@@ -12,9 +12,9 @@ import pytest
 import xarray as xr
 
 from softjaw.study import pipeline
-from softjaw.study.case import effects, model
-from softjaw.study.case.build import build_object
-from softjaw.study.case.choosing import Candidate
+from softjaw.study.case import effects
+from softjaw.study.case.effects import EffectChoice
+from softjaw.study.case.solver import FINE, CandidateSolver
 from softjaw.study.flags import Flag
 from softjaw.study.ranking import borne_level, judged, ranking
 from softjaw.study.result import derived
@@ -128,10 +128,10 @@ def test_the_size_of_a_shell_is_that_of_the_mesh_that_is_solved(solved):
     scene = solved[0]
     size = wall_size(scene)
     unit = make_plan(scene).units[1]  # the middle station of an even number
-    fingers = [model.approach(build_object(scene.object), p, scene.gripper) for p in unit.candidate.poses]
-    made = Candidate(scene, fingers, unit.candidate.poses)
-    assert size.shell == pytest.approx(6 * made.solver.shell.nodes, rel=0.1)  # the axis is one node
-    made.destroy()
+    solver = CandidateSolver(scene, unit.candidate.poses)
+    fingers = solver.pressing(FINE, EffectChoice(solver).levels)
+    assert size.shell == pytest.approx(6 * fingers.shell.nodes, rel=0.1)  # the axis is one node
+    solver.destroy()
     fine = wall_size(scene.with_values({"accuracy.wall_element_mm": 1.0}))
     assert fine.shell > 4 * size.shell
     assert fine.memory > 4 * size.memory

@@ -1,0 +1,301 @@
+"""Both fingers of a candidate pressed on one mesh, each by itself or both on a wall, and the contacts they give."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property, partial
+from typing import Any
+
+import numpy as np
+
+from softjaw.fem.contact.edge import contact_area, largest_pressure
+from softjaw.fem.contact.extract import extract, turned
+from softjaw.fem.contact.path import Pressed
+from softjaw.fem.errors import CheckError
+from softjaw.fem.shell.grip import Grip
+from softjaw.fem.shell.thin_walled import Grasp, WallMesh, grasp, wall_between
+from softjaw.fem.shell.wall_problem import WallProblem
+from softjaw.friction.patch import ContactPatch
+from softjaw.friction.wrench import FrictionLimits
+from softjaw.study.case.build import has_wall, pad_shape
+from softjaw.study.case.candidates import turn_of_pose
+from softjaw.study.case.contact import ALIKE, Contact
+from softjaw.study.case.model import Finger, contact_rules, pad_of, press_of, settings
+from softjaw.study.case.wall import thin_body, wall_values
+from softjaw.study.flags import Flag
+from softjaw.study.quantities import MODELS
+from softjaw.study.scene import Scene
+
+EXCESS = 0.05  # of the commanded force: beyond it the force along the contact normal is another one
+OVERLAP = 0.1  # of the closing displacement, beyond which the mesh is coarse for the contact
+FEW_ELEMENTS, NARROW = 6, 2  # loaded ones in all, and along length or width, below which it is coarse too
+BENT = np.radians(120.0)  # between the object's normals at neighbouring loaded faces, beyond which it is coarse too
+MESH_HOLE = 0.01  # of a pad's face before a hole of the mesh, beyond which that is flagged
+LOCKING = 0.45  # Poisson's ratio above which trilinear elements are too stiff
+STEEPEST = np.radians(60.0)  # of an approach against the planes across a thin-walled object's axis
+UPRIGHT, HALF_TURN = (1.0, 1.0, 1.0), (-1.0, -1.0, 1.0)  # signs of the axes of a pad's frame
+
+
+class PressedContact(Contact):
+    """A contact that was solved: one finger at one force, its patch in the pad's frame.
+
+    ``signs`` are those of the axes of the frame that the state was solved in, in the finger's own one.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        finger: Finger,
+        state: Pressed,
+        signs: tuple[float, float, float] = UPRIGHT,
+    ) -> None:
+        self.finger, self.state, self._signs = finger, state, signs
+        self._reduced = scene.friction.used_by_pressing
+        self._views: list[Contact] = []  # shared by all copies, so that the first one asked fills it for all
+        super().__init__(self._extracted(), scene.friction.mu, finger.pose, whole_face=True)
+        self.nodal_instead = state.instead and state.pad.contact == "nodal"
+
+    def _extracted(self, rule: str = "") -> ContactPatch:
+        """Patch in the finger's own frame, from the pressures at the points of a rule."""
+        patch = extract(self.state.pad, self.state, rule)
+        return patch if self._signs == UPRIGHT else turned(self.state.pad, patch, self._signs)
+
+    def of(self, finger: Finger) -> PressedContact:
+        """The same contact of another finger, which stands where the object looks the same."""
+        # Touched here, because cached properties are copied only when they have been computed.
+        _ = self.ellipsoids, self.tau_pure, self.area, self.largest_pressure  # computed once for both
+        other = self.at(finger.pose)
+        other.finger = finger
+        return other
+
+    @cached_property
+    def used(self) -> np.ndarray:
+        """Friction wrench on the pad ``(f_x, f_y, tau_z)`` while it is pressed, in the contact frame [N, N, N m]."""
+        points, pad = self.state.points, self.state.pad
+        if points.friction is None:
+            return np.zeros(3)
+        # in a plane of symmetry the other half's forces across it and torques cancel
+        keeps = np.array([not mirrored for mirrored in pad.symmetry], float)
+        friction = points.friction * self._signs
+        force = friction.sum(axis=(0, 1)) / pad.share * [*keeps, 1.0]
+        arm = points.position * self._signs - self.frame.origin
+        torque = np.cross(arm, friction).sum(axis=(0, 1)) / pad.share
+        torque = torque * [keeps[1], keeps[0], keeps.prod()]
+        return np.array([*(self.frame.axes[:2] @ force), self.frame.axes[2] @ torque])
+
+    @cached_property
+    def limits(self) -> dict[str, FrictionLimits]:
+        """As of any contact; in the curved model less what pressing has used, where the scene says so."""
+        limits = super().limits
+        return limits | {"ccm": limits["ccm"].less(self.used)} if self._reduced else limits
+
+    @cached_property
+    def area(self) -> float:
+        """Area of the contact, with its edge inside the faces [m^2]."""
+        return contact_area(self.patch, self.state.pad.shape.patch_faces)
+
+    @cached_property
+    def largest_pressure(self) -> float:
+        """Largest pressure [Pa], as the mean over a few elements tells it."""
+        shape = self.state.pad.shape
+        return largest_pressure(self.patch, shape.patch_faces, shape.per_side)
+
+    @property
+    def views(self) -> list[Contact]:
+        """The contact of the same pressures at Gauss points and at nodes; a finer mesh would make them alike."""
+        if not self._views:
+            patches = (self._extracted(rule) for rule in ("weighted", "nodal"))
+            self._views += [Contact(patch, self.mu, self.pose, whole_face=True) for patch in patches]
+            _ = [view.ellipsoids for view in self._views]  # computed once for both fingers, as in `of`
+        return [view.at(self.pose) for view in self._views]
+
+    @property
+    def force_excess(self) -> float:
+        """Force along the contact normal over the one commanded, which is along the approach, less 1."""
+        return self.limits["ccm"].F_N / self.state.force - 1.0
+
+    @property
+    def e_n_commanded(self) -> list[float]:
+        """``max tau_z / (mu F)`` in each of `MODELS`, with the force ``F`` that is commanded [m]."""
+        return [self.unit_limits[name].tau_z / self.state.force for name in MODELS]
+
+    @property
+    def on_few_elements(self) -> bool:
+        """Whether so few elements are loaded that the contact's shape is theirs."""
+        return bool(np.count_nonzero(self.loaded) < FEW_ELEMENTS * self.state.pad.shape.per_side**2)
+
+    @property
+    def coarse(self) -> bool:
+        """Whether the mesh is coarse for this contact, or its elements are too stiff for the foam."""
+        shape, law = self.state.pad.shape, self.state.pad.material
+        (n, m, _), k = shape.elements, shape.per_side
+        loaded = self.loaded.reshape(n, k, m, k)
+        widths = [np.count_nonzero(loaded.any(axes)) for axes in ((1, 2, 3), (0, 1, 3))]
+        # a single line of nodes loads the elements on both sides of it
+        shared = self.state.pad.contact == "nodal"
+        few = self.on_few_elements or min(widths) - shared < NARROW
+        normals = self.patch.normal.reshape(n * k, m * k, 3)
+        # a blade thinner than an element is met on its flanks alone, or not on them, as the faces happen to lie
+        pairs = zip(_neighbours(normals), _neighbours(loaded.reshape(n * k, m * k)), strict=True)
+        bent = any((np.einsum("ijc,ijc->ij", a, b)[p & q] < np.cos(BENT)).any() for (a, b), (p, q) in pairs)
+        overlaps = self.state.checks.penetration_depth > OVERLAP * self.state.closing
+        # Trilinear elements alone lock when the foam is nearly incompressible.
+        return bool(overlaps or few or bent or (shape.element == "hex8" and law.poisson_ratio > LOCKING))
+
+    @property
+    def free_face(self) -> float:
+        """How far the unloaded part of the contact face has come beyond first touch [m]."""
+        return float(self.patch.centroid[self.patch.pressure == 0, 2].max(initial=0.0))
+
+
+def _neighbours(grid: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Values on a grid of faces beside those of their neighbours, along the one side and the other."""
+    return [(grid[:-1], grid[1:]), (grid[:, :-1], grid[:, 1:])]
+
+
+def state_flags(contacts: Sequence[PressedContact]) -> int:
+    """Flags of the solved states of both fingers."""
+    first, second = contacts
+    between_faces = float((second.finger.pose.origin - first.finger.pose.origin) @ first.finger.pose.rotation[:, 2])
+    flags = Flag.COLLISION * (first.free_face + second.free_face > between_faces * (1.0 - ALIKE))
+    flags |= Flag.UNSTABLE * (min(c.state.checks.ellipticity for c in contacts) <= 0)
+    flags |= Flag.JUMPED * any(c.state.path_dependent for c in contacts)
+    flags |= Flag.OBLIQUE * (max(abs(c.force_excess) for c in contacts) > EXCESS - ALIKE)
+    flags |= Flag.MESH_HOLE * (max(c.finger.hole_share for c in contacts) > MESH_HOLE)
+    for c in contacts:
+        flags |= Flag.NODAL * c.nodal_instead | Flag.COARSE * c.coarse
+    return flags
+
+
+class OnRigid:
+    """Fingers on a rigid object, which do not feel each other.
+
+    Attributes
+    ----------
+    parts : list
+        Load paths of what is pressed by itself: of two fingers that are images of each other the first alone.
+    fingers_solved, planes : int
+        Fingers that are solved, and planes of symmetry of each.
+    """
+
+    def __init__(self, scene: Scene, fingers: Sequence[Finger], poses: Sequence[Any], coarser: bool) -> None:
+        self.scene, self.fingers = scene, fingers
+        first, second = poses
+        self.images = turn_of_pose(first, second, scene.object.axis_symmetry) is not None
+        self.parts = [press_of(scene, finger, coarser) for finger in (fingers[:1] if self.images else fingers)]
+        self.fingers_solved, self.planes = 2, min(sum(part.pad.symmetry) for part in self.parts)
+
+    def contacts(self, states: Sequence[Any]) -> list[PressedContact]:
+        """Contacts of both fingers from the states of the parts."""
+        # Of two fingers that are images only the first has a state, so the lengths differ.
+        contacts = [PressedContact(self.scene, f, state) for f, state in zip(self.fingers, states, strict=False)]
+        return [*contacts, contacts[0].of(self.fingers[1])] if self.images else contacts
+
+    def wall_values(self, states: Sequence[Any]) -> dict[str, Any]:
+        """What the wall bears, keyed as in ``study.quantities``; a rigid object has none."""
+        return {}
+
+
+class OnWall:
+    """Fingers on a thin wall, which press against each other through it; one part, attributes as of `OnRigid`."""
+
+    def __init__(self, scene: Scene, fingers: Sequence[Finger], coarser: bool) -> None:
+        self.scene, self.fingers = scene, fingers
+        self.grasp = grasp_of(scene, fingers, coarser)
+        grip = _grip(scene, fingers, self.grasp, coarser)
+        self.parts, self.shell = [grip], grip.problem.model.shell
+        self.fingers_solved, self.planes = len(self.grasp.poses), sum(self.grasp.mirrors)
+
+    def contacts(self, states: Sequence[Any]) -> list[PressedContact]:
+        """See `OnRigid`."""
+        [state], flipped = states, self.grasp.flipped
+        contacts = [
+            PressedContact(self.scene, finger, pressed, HALF_TURN if turned else UPRIGHT)
+            for finger, pressed, turned in zip(self.fingers, state.fingers, flipped, strict=False)
+        ]
+        if len(state.fingers) == 1:
+            # a plane of symmetry lies between the fingers, in which y of the pad changes its sign
+            signs = (-1.0, 1.0, 1.0) if flipped[0] else (1.0, -1.0, 1.0)
+            contacts.append(PressedContact(self.scene, self.fingers[1], state.fingers[0], signs))
+        return contacts
+
+    def wall_values(self, states: Sequence[Any]) -> dict[str, Any]:
+        """See `OnRigid`."""
+        return wall_values(self.grasp, states[0], self.shell)
+
+
+def pressing(
+    scene: Scene, fingers: Sequence[Finger], poses: Sequence[Any], coarser: bool = False
+) -> OnRigid | OnWall:
+    """Both fingers at first touch, pressed at the levels that the scene names; an ``auto`` is the cheapest one.
+
+    ``coarser`` halves the elements of every direction.
+    """
+    if has_wall(scene.object):
+        refuse_along_axis(fingers)
+        if scene.effects.object.endswith("shell"):
+            return OnWall(scene, fingers, coarser)
+    return OnRigid(scene, fingers, poses, coarser)
+
+
+def refuse_along_axis(fingers: Sequence[Finger]) -> None:
+    """Lids, bottoms and rims of a thin-walled object are not pressed."""
+    steepest = max(abs(float(f.pose.rotation[2, 2])) for f in fingers)
+    if steepest > np.sin(STEEPEST):
+        raise CheckError(
+            f"a finger approaches a thin-walled object at {np.degrees(np.arcsin(min(steepest, 1.0))):.0f} degrees to "
+            f"the planes across its axis; its wall is simulated up to {np.degrees(STEEPEST):.0f} degrees: turn the "
+            "approach, or remove wall_mm"
+        )
+
+
+def grasp_of(scene: Scene, fingers: Sequence[Finger], coarser: bool = False) -> Grasp:
+    """Grasp frame and the planes of symmetry that meshes and scene allow."""
+    even = pad_shape(scene.gripper, coarser).elements[1] % 2 == 0
+    wanted = scene.effects.model_size
+    body, poses = thin_body(scene.object), (fingers[0].pose, fingers[1].pose)
+    held = grasp(body, poses, (wanted != "full", wanted != "full" and even))
+    # One plane was asked for where both exist: that between the fingers is given up.
+    if wanted == "half" and all(held.mirrors):
+        held = grasp(body, poses, (False, True))
+    # a coarser mesh for error estimates takes what it can use
+    need = {"half": 1, "quarter": 2}.get(wanted, 0) if not coarser else 0
+    if sum(held.mirrors) < need:
+        raise ValueError(
+            f"effects.model_size = '{wanted}' needs {need} plane(s) of symmetry, but object, fingers and mesh share "
+            f"{sum(held.mirrors)} here; use 'auto'"
+        )
+    return held
+
+
+def _grip(scene: Scene, fingers: Sequence[Finger], held: Grasp, coarser: bool) -> Grip:
+    """Both fingers on the wall."""
+    size = WallMesh(*scene.accuracy.wall_sizes)
+    mesh = size.halved() if coarser else size
+    body, linear = thin_body(scene.object), scene.effects.object == "linear_shell"
+    coupled = scene.effects.friction_pressure_coupling == "tangential"
+    wall, faces = wall_between(body, held, scene.gripper.pad_size, mesh, linear=linear)
+
+    gaps = [_gap(f, turned) for f, turned in zip(fingers, held.flipped, strict=False)]
+
+    def problem(rule: str) -> WallProblem:
+        pad = pad_of(scene, held.pad_symmetry, rule, coarser)
+        pads = [(pad, *where) for where in zip(gaps, held.poses, faces, strict=True)]
+        return WallProblem(wall, pads, scene.friction.mu if coupled else None)
+
+    problems = [partial(problem, rule) for rule in contact_rules(scene, walled=True)]
+    return Grip(problems, dict(scene.petsc), settings(scene))
+
+
+def _gap(finger: Finger, turned: bool):
+    """Gap function in the frame of the pad as it is solved."""
+    if not turned:
+        return finger.gap
+    # Half a turn about the approach flips x and y, and with them normals and mixed derivatives.
+    sign = [-1.0, -1.0, 1.0]
+
+    def gap(x):
+        g, normal, hessian = finger.gap(x * sign)
+        return g, normal * sign, hessian * [[s * t for t in sign] for s in sign]
+
+    return gap

@@ -1,0 +1,271 @@
+"""One solver of a candidate: the states of all forces, meshes and levels of the effects that somebody asks it for.
+
+What is asked for is a solution at a force, on a mesh, at levels of the effects. How it is started is known here and
+nowhere else: on the coarse mesh the load path leads through all forces of the scene, on the scene's mesh each force
+starts from the coarse states at it and below, on a finer one from the state on the mesh before. So forces do not depend
+on each other, or on who asks first. A state, or the failure that stands for it, is solved once.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import repeat
+from typing import Any, NamedTuple, TypeVar
+
+from softjaw.fem.contact.path import Pressed
+from softjaw.fem.errors import CheckError, ConvergenceError
+from softjaw.fem.objects.gap import Pose
+from softjaw.study.case.build import build_object, forces_apart, has_wall, pad_elements
+from softjaw.study.case.contact import Contact
+from softjaw.study.case.errors import OF_FINER_MESHES, OF_MESHES, error_of
+from softjaw.study.case.evaluate import settings_of
+from softjaw.study.case.model import approach
+from softjaw.study.case.pressing import OnRigid, OnWall, PressedContact, pressing, refuse_along_axis
+from softjaw.study.case.result import surely_below
+from softjaw.study.scene import Scene
+from softjaw.study.scene.sections import MOST_ELEMENTS, MOST_MESHES
+
+COARSE, FINE = 0, 1  # meshes: half as many elements in every direction, the scene's; each further one is finer still
+NEGLIGIBLE_FORCE = 1e-3  # of the largest one; below it a failed load step says nothing of the forces above
+MOST_STARTS = 3  # coarse states that a force on the scene's mesh is started from, before it starts from nothing
+NO_ERROR = "the error of the mesh is not known, for on the coarser one {reason}"
+NOT_REFINED = "on a finer mesh, which accuracy.target asks for, it was not solved ({reason})"
+Failure = ConvergenceError | CheckError
+State = TypeVar("State")
+
+
+class Levels(NamedTuple):
+    """Levels of the effects that a solver is made for, by their names in a scene."""
+
+    sheet: str
+    object: str
+    friction_pressure_coupling: str
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Both fingers in equilibrium at one force on one mesh.
+
+    Parameters
+    ----------
+    mesh : int
+        `COARSE`, `FINE`, or finer.
+    fingers : OnRigid or OnWall
+        What was pressed.
+    states : sequence
+        Of its parts.
+    contacts : sequence of PressedContact
+        Of both fingers.
+    """
+
+    mesh: int
+    fingers: OnRigid | OnWall
+    states: Sequence[Pressed]
+    contacts: Sequence[PressedContact]
+
+    @property
+    def views(self) -> list[tuple[Contact, ...]]:
+        """Contacts of the same pressures at Gauss points, and at nodes."""
+        return list(zip(*(c.views for c in self.contacts), strict=True))
+
+    @cached_property
+    def wall_values(self) -> dict[str, Any]:
+        """What the wall bears, keyed as in ``study.quantities``."""
+        return self.fingers.wall_values(self.states)
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """Solutions of one case on all its meshes, the finest first, and a note on meshes that have none."""
+
+    meshes: Sequence[Solution]
+    note: str = ""
+
+    @property
+    def fine(self) -> Solution:
+        """That on the finest mesh, which is the result."""
+        return self.meshes[0]
+
+    @property
+    def coarse(self) -> Solution | None:
+        """That on the next coarser mesh, which tells the error."""
+        return self.meshes[1] if len(self.meshes) > 1 else None
+
+    @property
+    def weight(self) -> float:
+        """Weight of the difference between these two in the error."""
+        return OF_MESHES if self.fine.mesh == FINE else OF_FINER_MESHES
+
+    @property
+    def states(self) -> list[Pressed]:
+        """States whose work was done for the case; that of two pads on a wall is counted with the first."""
+        return [state for mesh in self.meshes for state in mesh.states]
+
+
+def followed(
+    load_path: Callable[[Sequence[float]], Iterator[State]], forces: Sequence[float]
+) -> Iterator[State | Failure]:
+    """What a load path has at every force; where it ends, the same failure for all forces from there on."""
+    states, started = load_path(forces), False
+    for k, force in enumerate(forces):
+        try:
+            yield next(states)
+            started = True
+        except (ConvergenceError, CheckError) as failure:
+            # A force this small can fail before contact is established; the larger ones are still worth trying.
+            if started or not force < NEGLIGIBLE_FORCE * max(forces[k + 1 :], default=0.0):
+                yield from repeat(failure, len(forces) - k)
+                return
+            yield failure
+            states = load_path(forces[k + 1 :])
+
+
+class CandidateSolver:
+    """Solutions of one candidate.
+
+    Parameters
+    ----------
+    scene : Scene
+        Its levels of effects do not count: they are asked for.
+    poses : two Pose
+        Of the pads before they touch; ``fingers`` are they at first touch.
+    forces : sequence of float, optional
+        The load path: those of the scene, or others [N]; rising. Forces are asked for by their number in it.
+    """
+
+    def __init__(self, scene: Scene, poses: Sequence[Pose], forces: Sequence[float] | None = None) -> None:
+        self.scene, self.poses, self.walled = scene, poses, has_wall(scene.object)
+        self.fingers = [approach(build_object(scene.object), pose, scene.gripper) for pose in poses]
+        if self.walled:
+            refuse_along_axis(self.fingers)
+        self.forces = tuple(scene.load.normal_force if forces is None else forces)
+        self._pressing: dict[tuple[int, Levels], OnRigid | OnWall] = {}
+        self._paths: dict[tuple[int, Levels, int], Iterator[Any]] = {}
+        self._states: dict[tuple[int, int, Levels, int], Any] = {}  # or failures, of every part
+        self._solutions: dict[tuple[int, int, Levels], Solution] = {}
+
+    def at_levels(self, levels: Levels) -> Scene:
+        """The scene with these levels of its effects."""
+        # values that the scene itself could have, so nothing is checked again
+        effects = self.scene.effects.model_copy(update=levels._asdict())
+        return self.scene.model_copy(update={"effects": effects})
+
+    def pressing(self, mesh: int, levels: Levels) -> OnRigid | OnWall:
+        """What presses both fingers on a mesh."""
+        # each load path has a solver of its own, or what one needed would change the other
+        if (mesh, levels) not in self._pressing:
+            scene = self.at_levels(levels)
+            if mesh > FINE:
+                gripper = scene.gripper.model_copy(update={"elements": pad_elements(scene, mesh)})
+                scene = scene.model_copy(update={"gripper": gripper})
+            self._pressing[mesh, levels] = pressing(scene, self.fingers, self.poses, coarser=mesh == COARSE)
+        return self._pressing[mesh, levels]
+
+    def solve(self, k: int, mesh: int, levels: Levels) -> Solution:
+        """Both fingers at the ``k``-th force.
+
+        Raises
+        ------
+        ConvergenceError, CheckError
+            If there is no acceptable state; the same each time.
+        """
+        if (k, mesh, levels) not in self._solutions:
+            fingers = self.pressing(mesh, levels)
+            states = [self._state(k, mesh, levels, part) for part in range(len(fingers.parts))]
+            for state in states:
+                if isinstance(state, Failure):
+                    raise state
+            self._solutions[k, mesh, levels] = Solution(mesh, fingers, states, fingers.contacts(states))
+        return self._solutions[k, mesh, levels]
+
+    def failure(self, k: int, mesh: int, levels: Levels) -> Failure | None:
+        """Why there is no solution at the ``k``-th force; None where there is one."""
+        parts = range(len(self.pressing(mesh, levels).parts))
+        return next((s for part in parts if isinstance(s := self._state(k, mesh, levels, part), Failure)), None)
+
+    def case(self, k: int, levels: Levels) -> Solved:
+        """Solutions of a case on the scene's meshes, and on finer ones where ``accuracy.target`` asks for them.
+
+        Raises
+        ------
+        ConvergenceError, CheckError
+            If there is no acceptable state on the scene's mesh.
+        """
+        fine = self.solve(k, FINE, levels)
+        if not forces_apart(self.scene):
+            return Solved([fine])
+        if failure := self.failure(k, COARSE, levels):
+            solved = Solved([fine], NO_ERROR.format(reason=failure))
+        else:
+            solved = Solved([fine, self.solve(k, COARSE, levels)])
+        return self._refined(solved, k, levels) if isinstance(fine.fingers, OnRigid) else solved
+
+    def error(self, solved: Solved) -> float:
+        """Relative error of the quantity that ``accuracy.target`` is for; NaN where there is one mesh alone."""
+        fine, coarse, name = solved.fine, solved.coarse, self.scene.accuracy.target_of
+        if coarse is None:
+            return math.nan
+        settings = settings_of(self.scene, build_object(self.scene.object))
+        return error_of(name, fine.contacts, coarse.contacts, coarse.views, settings, solved.weight)
+
+    def _refined(self, solved: Solved, k: int, levels: Levels) -> Solved:
+        """The case as it is where its error is surely below the target, else on further meshes.
+
+        Where a finer mesh has no state the case keeps the answer of the one before, with a note.
+        """
+        if (target := self.scene.accuracy.target) is None:
+            return solved
+        for mesh in range(FINE + 1, MOST_MESHES):
+            # undecided, and unknown, is refined, which is right in both cases
+            too_large = math.prod(pad_elements(self.scene, mesh)) > MOST_ELEMENTS
+            if surely_below(self.error(solved), target) or too_large:
+                break
+            try:
+                solved = Solved([self.solve(k, mesh, levels), *solved.meshes])
+            except (ConvergenceError, CheckError, ArithmeticError) as error:
+                return replace(solved, note=join_notes(solved.note, NOT_REFINED.format(reason=error)))
+        return solved
+
+    def _state(self, k: int, mesh: int, levels: Levels, part: int) -> Any:
+        """State of one part at the ``k``-th force, or why there is none."""
+        on_path = mesh == COARSE or not forces_apart(self.scene)
+        for i in range(0 if on_path else k, k + 1):
+            if (i, mesh, levels, part) not in self._states:
+                solve = self._next if on_path else self._alone
+                self._states[i, mesh, levels, part] = solve(i, mesh, levels, part)
+        return self._states[k, mesh, levels, part]
+
+    def _next(self, _: int, mesh: int, levels: Levels, part: int) -> Any:
+        """The next state on a load path."""
+        if (mesh, levels, part) not in self._paths:
+            load_path = self.pressing(mesh, levels).parts[part].load_path
+            self._paths[mesh, levels, part] = followed(load_path, self.forces)
+        return next(self._paths[mesh, levels, part])
+
+    def _alone(self, k: int, mesh: int, levels: Levels, part: int) -> Any:
+        """A state that depends on no other one of its mesh."""
+        try:
+            press = self.pressing(mesh, levels).parts[part]
+            return press.at(self.forces[k], self._starts(k, mesh, levels, part))
+        except (ConvergenceError, CheckError) as failure:
+            return failure
+
+    def _starts(self, k: int, mesh: int, levels: Levels, part: int) -> list[Any]:
+        """States on the mesh before that a state is started from, the nearest first."""
+        forces = range(k, -1, -1) if mesh == FINE else (k,)
+        states = (self._state(i, mesh - 1, levels, part) for i in forces)
+        return [state for state in states if not isinstance(state, Failure)][:MOST_STARTS]
+
+    def destroy(self) -> None:
+        """Give the factors' memory back."""
+        for fingers in self._pressing.values():
+            for part in fingers.parts:
+                part.destroy()
+
+
+def join_notes(*notes: str) -> str:
+    """Notes in one line, without empty ones."""
+    return "; ".join(note for note in notes if note)
