@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from softjaw.study import pictures
-from softjaw.study.case.candidates import axis_poses
+from softjaw.study.case.poses import axis_poses
 from softjaw.study.export.selection import gripper_frame
 
 RADIUS, HEIGHT, LONG, SHORT, DEPTH = 20.0, 70.0, 30.0, 24.0, 75.0  # [mm]

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from softjaw.study import pipeline
-from softjaw.study.case.build import told, with_sampled_grasps
+from softjaw.study.case.build import told
+from softjaw.study.case.candidates import with_sampled_grasps
 from softjaw.study.case.model import check_petsc, check_poses
 from softjaw.study.result import derived
 from softjaw.study.result.read import dataset

@@ -19,10 +19,9 @@ from softjaw.friction.patch import ContactPatch
 from softjaw.friction.wrench import FrictionLimits
 from softjaw.lsfit.ellipsoid import Ellipsoid
 from softjaw.study import pipeline
-from softjaw.study.case.build import check_object, with_sampled_grasps
-from softjaw.study.case.candidates import units
+from softjaw.study.case.build import check_object
+from softjaw.study.case.candidates import decided, units, with_sampled_grasps
 from softjaw.study.case.contact import Contact
-from softjaw.study.case.fit import decided
 from softjaw.study.case.model import check_petsc
 from softjaw.study.case.result import CaseFailure, CaseResult
 from softjaw.study.flags import Flag, flags_in

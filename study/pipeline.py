@@ -134,7 +134,8 @@ def _state_values(solution: Solution) -> dict[str, Any]:
 def _work(solved: Solved, friction: float, choosing: float) -> dict[str, Any]:
     """Work of one case, of which friction, fits and scores, and the choice of its effects, took so many seconds."""
     names = (("newton_iterations", "iterations"), ("load_steps", "steps"), ("step_halvings", "halvings"))
-    work = {f"work/{key}": [getattr(c.state, name) for c in solved.fine.contacts] for key, name in names}
+    states = [c.state for c in solved.fine.contacts]
+    work: dict[str, Any] = {f"work/{key}": [getattr(s, name) for s in states] for key, name in names}
     seconds = [state.seconds for state in solved.states]
     for part in ("assembly", "factorisation"):
         work[f"work/seconds_{part}"] = sum(getattr(s, part) for s in seconds)

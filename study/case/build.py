@@ -215,22 +215,6 @@ def _remarks(scene: Scene) -> Iterator[str]:
             yield f"candidates: at {len(places)} of {len(where.station_values_mm)} stations ({listed} mm) {remark}"
 
 
-def with_sampled_grasps(scene: Scene) -> Scene:
-    """The scene with explicit poses where it asks for a sampler; see `study.case.sampler`.
-
-    Raises
-    ------
-    StudyError
-        For geometry that cannot be, or that leaves no grasp between the pads.
-    """
-    if scene.candidates.sampled is None:
-        return scene
-    check_object(scene)
-    from softjaw.study.case import sampler  # compiled loops, which most scenes are checked without
-
-    return sampler.with_sampled_grasps(scene)
-
-
 def forces_apart(scene: Scene) -> bool:
     """Whether every force is solved by itself, on a fine mesh that starts from a coarse one and its load path."""
     return scene.accuracy.meshes > 1

@@ -8,26 +8,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.fem.objects.gap import Pose
-from softjaw.study.case.build import forces_apart, middle_of, own_frame, pad_shape
+from softjaw.study.case.build import check_object, forces_apart, middle_of, own_frame, pad_shape, surface_triangles
+from softjaw.study.case.fit import doubt, fit_of, jaws_of
+from softjaw.study.case.poses import ROUNDING, axis_poses, explicit_poses, moved, turn_of_pose
 from softjaw.study.quantities import MISSING, REALISATION
 from softjaw.study.scene import Option, Scene
-from softjaw.study.scene.grasps import GraspPose
 from softjaw.study.units import UNITS, in_si, split_unit
 
-if TYPE_CHECKING:
-    from softjaw.fem.objects.centre_line import CentreLine
-
 FloatArray = NDArray[np.float64]
-STANDOFF = 5.0  # distance of a pad's origin from the point it is aimed at [m]; the press closes it to first touch
-ALIKE = 1e-9  # differences of directions [-] and of lines of approach [m] that are only rounding
 
 
 @dataclass(frozen=True)
@@ -67,105 +62,6 @@ def candidates(scene: Scene) -> list[Candidate]:
     ]  # fmt: skip
 
 
-def moved(poses: tuple[Pose, Pose], shift: float, turn: float) -> tuple[Pose, Pose]:
-    """Both pads turned about the approach of the first [rad], then shifted along their long side [m]."""
-    if not shift and not turn:
-        return poses
-    axis, point = poses[0].rotation[:, 2], poses[0].origin
-    K = np.cross(np.eye(3), axis)  # K @ v is axis x v
-    turning = np.eye(3) + math.sin(turn) * K + (1 - math.cos(turn)) * K @ K
-
-    def placed(pose: Pose) -> Pose:
-        rotation = turning @ pose.rotation
-        return Pose(rotation, point + turning @ (pose.origin - point) + shift * rotation[:, 0])
-
-    return placed(poses[0]), placed(poses[1])
-
-
-def axis_poses(station: float, angle: float, roll: float, middle: CentreLine | None = None) -> tuple[Pose, Pose]:
-    """Poses of the two pads at a station, which is a height, along the object's axis z or its centre line ``middle``.
-
-    Finger 1 stands at ``angle`` and approaches along ``-(cos, sin, 0)``, finger 2 comes from the opposite side. At roll
-    0 both long sides are the object's z; ``roll`` turns the gripper about finger 1's approach. On a centre line all of
-    this is tilted with it, by the shortest turn that takes z to its tangent.
-    """
-    approach = -np.array([math.cos(angle), math.sin(angle), 0.0])
-    # The rotation of z about the approach, which is normal to it.
-    long_side = math.cos(roll) * np.array([0.0, 0.0, 1.0]) + math.sin(roll) * np.cross(approach, [0.0, 0.0, 1.0])
-    if middle is None or middle.straight:
-        return opposed_poses(np.array([0.0, 0.0, station]), approach, long_side)
-    point, tangent = middle.at(station)
-    tilt = shortest_turn(tangent)
-    return opposed_poses(point, tilt @ approach, tilt @ long_side)
-
-
-def shortest_turn(tangent: FloatArray) -> FloatArray:
-    """Rotation ``(3, 3)`` that takes z to a unit vector above the plane z = 0 the shortest way."""
-    x, y, z = tangent
-    share = 1.0 / (1.0 + z)
-    return np.array([[1.0 - share * x * x, -share * x * y, x], [-share * x * y, 1.0 - share * y * y, y], [-x, -y, z]])
-
-
-def explicit_poses(pose: GraspPose, placed: Pose) -> tuple[Pose, Pose]:
-    """Poses of the two pads of an explicit grasp; of the long side only the part across the approach counts.
-
-    ``placed`` is where the object's frame lies in that of its file, in which the grasp is given.
-    """
-    approach = (np.array(pose.approach) / np.linalg.norm(pose.approach)) @ placed.rotation
-    long_side = across(approach, np.array(pose.long_side) @ placed.rotation)
-    return opposed_poses(placed.to_pad(np.array(pose.point)), approach, long_side)
-
-
-def across(approach: FloatArray, along: FloatArray) -> FloatArray:
-    """Unit vector ``(3,)`` of the part of ``along`` across the approach."""
-    part = along - np.dot(approach, along) * approach
-    return part / np.linalg.norm(part)
-
-
-def pad_axes(approach: FloatArray, long_side: FloatArray) -> FloatArray:
-    """Rotation of a pad: long side, short side and approach as columns ``(3, 3)``."""
-    return np.column_stack([long_side, np.cross(approach, long_side), approach])
-
-
-def opposed_poses(point: FloatArray, approach: FloatArray, long_side: FloatArray) -> tuple[Pose, Pose]:
-    """Two pads that face each other across a point, with the same long side in the object's frame.
-
-    Parameters
-    ----------
-    point : (3,) array
-        Any point on the common line of approach [m].
-    approach, long_side : (3,) arrays
-        Orthogonal unit vectors: finger 1's approach, and the long side of both pads.
-
-    Returns
-    -------
-    (Pose, Pose)
-        Finger 1 and finger 2, each `STANDOFF` away from the point.
-    """
-    return (_pose(point, approach, long_side), _pose(point, -approach, long_side))
-
-
-def _pose(point: FloatArray, approach: FloatArray, long_side: FloatArray) -> Pose:
-    return Pose(pad_axes(approach, long_side), point - STANDOFF * approach)
-
-
-def turn_of_pose(one: Pose, other: Pose, axis_symmetry: int) -> float | None:
-    """Angle about z [rad] that takes one approaching pad to another, if the object looks the same after it, else None.
-
-    A shift along the approach does not count: the press closes the fingers.
-    """
-    turn = other.rotation @ one.rotation.T
-    # Only turns about z take the object to itself, so all else is no image.
-    if abs(turn[2, 2] - 1) > ALIKE or np.abs(turn[2, :2]).max() > ALIKE:
-        return None
-    angle = math.atan2(turn[1, 0], turn[0, 0])
-    step = 2 * math.pi / axis_symmetry if axis_symmetry else 0.0
-    if step and abs(angle - step * round(angle / step)) > ALIKE:
-        return None
-    shift = other.rotation.T @ (turn @ one.origin - other.origin)  # in the pad's frame: z is along the approach
-    return None if np.abs(shift[:2]).max() > ALIKE else angle
-
-
 def turn_between(first: Candidate, second: Candidate, axis_symmetry: int) -> float | None:
     """Angle about z that turns both pads of one candidate into those of another, if the object looks the same then.
 
@@ -181,24 +77,24 @@ def turn_between(first: Candidate, second: Candidate, axis_symmetry: int) -> flo
         Angle in [0, 2 pi) [rad].
     """
     one, two = (turn_of_pose(*pair, axis_symmetry) for pair in zip(first.poses, second.poses, strict=True))
-    if one is None or two is None or abs(math.remainder(one - two, 2 * math.pi)) > ALIKE:
+    if one is None or two is None or abs(math.remainder(one - two, 2 * math.pi)) > ROUNDING:
         return None
     # A turn just below 0 by rounding would otherwise become a whole one.
-    return 0.0 if abs(one) <= ALIKE else one % (2 * math.pi)
+    return 0.0 if abs(one) <= ROUNDING else one % (2 * math.pi)
 
 
 def groups(places: Sequence[Candidate], axis_symmetry: int) -> list[list[tuple[int, float]]]:
     """Candidates that are images of each other: lists of (number, turn from the first of the list [rad])."""
-    found: dict[tuple[float, ...], list[list[tuple[int, float]]]] = {}
+    alike: dict[tuple[float, ...], list[list[tuple[int, float]]]] = {}
     for number, place in enumerate(places):
-        for group in (alike := found.setdefault(_invariants(place), [])):
+        for group in (similar := alike.setdefault(_invariants(place), [])):
             if (turn := turn_between(places[group[0][0]], place, axis_symmetry)) is not None:
                 group.append((number, turn))
                 break
         else:
-            alike.append([(number, 0.0)])
+            similar.append([(number, 0.0)])
     # By the first member, so that the units do not depend on how they were found.
-    return sorted((group for alike in found.values() for group in alike), key=lambda group: group[0][0])
+    return sorted((group for similar in alike.values() for group in similar), key=lambda group: group[0][0])
 
 
 def _invariants(place: Candidate) -> tuple[float, ...]:
@@ -207,6 +103,22 @@ def _invariants(place: Candidate) -> tuple[float, ...]:
     height = pose.origin[2] - (pose.origin @ pose.rotation[:, 2]) * pose.rotation[2, 2]
     # Adding 0 turns -0 into 0, which would be another key.
     return tuple(round(float(v), 6) + 0.0 for v in (*pose.rotation[2], height))
+
+
+def with_sampled_grasps(scene: Scene) -> Scene:
+    """The scene with explicit poses where it asks for a sampler; see `study.case.sampler`.
+
+    Raises
+    ------
+    StudyError
+        For geometry that cannot be, or that leaves no grasp between the pads.
+    """
+    if scene.candidates.sampled is None:
+        return scene
+    check_object(scene)
+    from softjaw.study.case import sampler  # compiled loops, which most scenes are checked without
+
+    return sampler.with_sampled_grasps(scene)
 
 
 # --- axes of the maps, and units of work ------------------------------------------------------------------------------
@@ -344,3 +256,17 @@ def meshes_cost(scene: Scene) -> float:
     """Elements of all meshes of a case over those of the fine one."""
     shares = [math.prod(pad_shape(scene.gripper, coarser).elements) for coarser in (False, True)]
     return sum(shares[: scene.accuracy.meshes]) / shares[0]
+
+
+def decided(units: Sequence[Unit]) -> list[Unit]:
+    """Units of work with the states of those whose candidate is too wide or collides; images share the state."""
+    states = []
+    for unit in units:
+        scene, jaws = unit.scene, jaws_of(unit.scene)
+        if math.isfinite(jaws.max_opening) or jaws.finger is not None:
+            points, triangles = surface_triangles(scene.object)
+            pose = unit.candidate.poses[0]
+            fit = fit_of((points - pose.origin) @ pose.rotation, triangles, jaws, doubt(points))
+            unit = replace(unit, state=fit.state, reason=fit.message)
+        states.append(unit)
+    return states

@@ -8,14 +8,11 @@ at its own corners: these are exact, with no grid to fall through.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from softjaw.study.case.build import surface_triangles
-from softjaw.study.case.candidates import Unit
 from softjaw.study.quantities import COLLIDES, MISSING, WIDE
 from softjaw.study.scene import Scene
 from softjaw.study.scene.sections import Gripper
@@ -162,17 +159,3 @@ def jaws_of(scene: Scene) -> Jaws:
 def doubt(points: FloatArray) -> float:
     """By how much triangles with these points ``(k, 3)`` may be off the surface that is solved with [m]."""
     return DRAWN * float(np.linalg.norm(np.ptp(points, axis=0)))
-
-
-def decided(units: Sequence[Unit]) -> list[Unit]:
-    """Units of work with the states of those whose candidate is too wide or collides; images share the state."""
-    found = []
-    for unit in units:
-        scene, jaws = unit.scene, jaws_of(unit.scene)
-        if math.isfinite(jaws.max_opening) or jaws.finger is not None:
-            points, triangles = surface_triangles(scene.object)
-            pose = unit.candidate.poses[0]
-            fit = fit_of((points - pose.origin) @ pose.rotation, triangles, jaws, doubt(points))
-            unit = replace(unit, state=fit.state, reason=fit.message)
-        found.append(unit)
-    return found

@@ -18,9 +18,9 @@ from softjaw.fem.shell.wall_problem import WallProblem
 from softjaw.friction.patch import ContactPatch
 from softjaw.friction.wrench import FrictionLimits
 from softjaw.study.case.build import has_wall, pad_shape
-from softjaw.study.case.candidates import turn_of_pose
 from softjaw.study.case.contact import ALIKE, Contact
 from softjaw.study.case.model import Finger, contact_rules, pad_of, press_of, settings
+from softjaw.study.case.poses import turn_of_pose
 from softjaw.study.case.wall import thin_body, wall_values
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import MODELS

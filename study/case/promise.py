@@ -12,9 +12,10 @@ import numpy as np
 from softjaw.friction.patch import NoContactError
 from softjaw.study.case.bed import JawsOnSurface
 from softjaw.study.case.build import surface_triangles
-from softjaw.study.case.candidates import STANDOFF, Unit
+from softjaw.study.case.candidates import Unit
 from softjaw.study.case.contact import slips
 from softjaw.study.case.fit import jaws_of
+from softjaw.study.case.poses import STANDOFF
 from softjaw.study.quantities import MISSING, SLIPS, WORSE
 from softjaw.study.scene import Scene
 

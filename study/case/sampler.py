@@ -20,9 +20,9 @@ from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.friction.patch import NoContactError
 from softjaw.study.case.bed import JawsOnSurface, Side
 from softjaw.study.case.build import build_object, own_frame, surface_triangles
-from softjaw.study.case.candidates import across, pad_axes
 from softjaw.study.case.contact import slips
 from softjaw.study.case.fit import Jaws, fit_of, jaws_of
+from softjaw.study.case.poses import across, pad_axes
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.quantities import MISSING, SLIPS, STATES
 from softjaw.study.scene import Scene

@@ -8,7 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from softjaw.study.case.build import build_object, check_object, geometry, told, with_sampled_grasps
+from softjaw.study.case.build import build_object, check_object, geometry, told
+from softjaw.study.case.candidates import with_sampled_grasps
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.run.plan import make_plan, plan_text
 from softjaw.study.run.scaling import scaling_text

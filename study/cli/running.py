@@ -7,7 +7,7 @@ from argparse import Namespace
 
 from mpi4py import MPI
 
-from softjaw.study.case.build import with_sampled_grasps
+from softjaw.study.case.candidates import with_sampled_grasps
 from softjaw.study.cli.quick import petsc_overrides, target
 from softjaw.study.launch import solve_scene
 from softjaw.study.run.progress import Unbreakable

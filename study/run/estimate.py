@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.study.case.build import surface_triangles
-from softjaw.study.case.candidates import meshes_cost, turn_of_pose
+from softjaw.study.case.candidates import meshes_cost
 from softjaw.study.case.fit import bed_closing, doubt, jaws_of
+from softjaw.study.case.poses import turn_of_pose
 
 FloatArray = NDArray[np.float64]
 GRID = (13, 7)  # points of a pad's face

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from softjaw.friction.patch import NoContactError
 from softjaw.study.case.build import build_object, own_frame, shapes_of, surface_triangles
-from softjaw.study.case.candidates import STANDOFF, explicit_poses
 from softjaw.study.case.fit import jaws_of
+from softjaw.study.case.poses import STANDOFF, explicit_poses
 from softjaw.study.case.result import MARGIN
 from softjaw.study.quantities import NO_GRASP
 from softjaw.study.ranking import largest

@@ -14,7 +14,7 @@ import numpy as np
 from softjaw.fem.objects.outer_surface import Turned
 from softjaw.study.case import candidates as grasps
 from softjaw.study.case.build import check_object, geometry, has_wall, outer_surface, own_frame, pad_elements, pad_shape
-from softjaw.study.case.fit import decided
+from softjaw.study.case.candidates import decided
 from softjaw.study.quantities import ALONG, AROUND, NO_GRASP, STATES
 from softjaw.study.result.derived import derived
 from softjaw.study.result.layout import Header, Layout

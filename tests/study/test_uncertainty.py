@@ -8,7 +8,8 @@ import xarray as xr
 from scipy.stats import norm
 
 import softjaw
-from softjaw.study.case.candidates import axes, axis_poses, candidates, moved
+from softjaw.study.case.candidates import axes, candidates
+from softjaw.study.case.poses import axis_poses, moved
 from softjaw.study.lookup import GraspMap
 from softjaw.study.result.intervals import half_width
 from softjaw.study.result.read import read_patch

@@ -10,8 +10,8 @@ from softjaw.fem.materials import material
 from softjaw.fem.pad.mesh import RULES, Pad
 from softjaw.fem.pad.shape import PadShape
 from softjaw.study.case.build import build_object
-from softjaw.study.case.candidates import axis_poses
 from softjaw.study.case.model import approach
+from softjaw.study.case.poses import axis_poses
 from softjaw.study.scene import parse_scene
 from tests.fem import reference
 

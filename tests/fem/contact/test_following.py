@@ -273,8 +273,8 @@ NECK = np.array([
 @pytest.mark.parametrize("station", [166.17647, 170.58824, 175.0])
 def test_on_a_bottles_shoulder_all_lists_of_forces_lead_to_one_state(station):
     """Travels of 9.85 and 15.24 mm, 9.95 and 12.45 mm, 8.34 and 9.27 mm at 13 N came of these lists."""
-    from softjaw.study.case.candidates import axis_poses
     from softjaw.study.case.model import approach
+    from softjaw.study.case.poses import axis_poses
     from softjaw.study.scene.sections import Gripper
 
     pads = Gripper(pad_length_mm=50, pad_width_mm=22, pad_thickness_mm=15, elements=(20, 10, 6))

@@ -11,8 +11,8 @@ import pytest
 
 from softjaw.fem.objects.shapes import Revolution
 from softjaw.study.case.build import build_object
-from softjaw.study.case.candidates import axis_poses
 from softjaw.study.case.model import approach, press_of
+from softjaw.study.case.poses import axis_poses
 from softjaw.study.scene import parse_scene
 from tests.fem import reference
 

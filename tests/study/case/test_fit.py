@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from softjaw.study.case.candidates import units
-from softjaw.study.case.fit import Jaws, decided, extremes, fit_of
+from softjaw.study.case.candidates import decided, units
+from softjaw.study.case.fit import Jaws, extremes, fit_of
 from softjaw.study.quantities import COLLIDES, MISSING, WIDE
 from softjaw.study.run.plan import make_plan
 from softjaw.study.scene import SceneError, parse_scene

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from softjaw.study.case import candidates
+from softjaw.study.case import candidates, poses
 from softjaw.study.case.build import build_object, warnings
 from softjaw.study.scene import load_scene, parse_scene
 from tests.fem.test_centre_line import bent
@@ -32,7 +32,7 @@ normal_force_n = [1]
 )
 
 
-def poses(*given):
+def posed(*given):
     """A scene with explicit poses (point, approach, long side)."""
     table = "\n[[candidates.poses]]\npoint_mm = {}\napproach = {}\nlong_side = {}"
     return parse_scene(POSES + "".join(table.format(*np.asarray(pose, float).tolist()) for pose in given))
@@ -57,14 +57,14 @@ def test_both_pads_face_each_other_with_the_same_long_side(angle, roll):
         for pose in place.poses:
             assert np.linalg.det(pose.rotation) == pytest.approx(1)
             assert pose.rotation.T @ pose.rotation == pytest.approx(np.eye(3), abs=1e-15)
-            aimed = pose.to_object(np.array([[0, 0, candidates.STANDOFF]]))[0]
+            aimed = pose.to_object(np.array([[0, 0, poses.STANDOFF]]))[0]
             assert aimed == pytest.approx([0, 0, place.station], abs=1e-14)
         assert place.roll == np.radians(roll)
 
 
 def test_roll_turns_the_gripper_about_the_approach_of_finger_1():
     """Rodrigues: the long side z turned by 90 degrees about the approach -x of finger 1 is (-x) x z = y."""
-    flat, turned = (candidates.axis_poses(0.0, 0.0, roll) for roll in (0.0, np.pi / 2))
+    flat, turned = (poses.axis_poses(0.0, 0.0, roll) for roll in (0.0, np.pi / 2))
     assert flat[0].rotation[:, 0] == pytest.approx(Z)
     for pose in turned:
         assert pose.rotation[:, 0] == pytest.approx([0, 1, 0], abs=1e-15)
@@ -73,8 +73,8 @@ def test_roll_turns_the_gripper_about_the_approach_of_finger_1():
 def test_an_explicit_pose_equals_the_station_that_it_describes():
     theta = np.radians(30)
     approach = (-np.cos(theta), -np.sin(theta), 0.0)
-    (place,) = candidates.candidates(poses(((0, 0, 30), [3 * a for a in approach], (approach[0], approach[1], 2.0))))
-    for pose, same in zip(place.poses, candidates.axis_poses(0.03, theta, 0.0), strict=True):
+    (place,) = candidates.candidates(posed(((0, 0, 30), [3 * a for a in approach], (approach[0], approach[1], 2.0))))
+    for pose, same in zip(place.poses, poses.axis_poses(0.03, theta, 0.0), strict=True):
         assert pose.rotation == pytest.approx(same.rotation, abs=1e-15)
         assert pose.origin == pytest.approx(same.origin, abs=1e-14)
     assert (place.station, place.angle, place.label) == (0.0, 0.0, "pose 0")
@@ -118,7 +118,7 @@ def test_stations_of_a_bent_mesh_follow_its_centre_line(tmp_path):
             assert pose.rotation[:, 0] == pytest.approx(tangent, abs=0.03)
             assert pose.rotation[:, 2] == pytest.approx(sign * outwards, abs=0.03)
             assert pose.rotation.T @ pose.rotation == pytest.approx(np.eye(3), abs=1e-14)
-            aimed = pose.to_object(np.array([[0, 0, candidates.STANDOFF]]))[0]
+            aimed = pose.to_object(np.array([[0, 0, poses.STANDOFF]]))[0]
             assert aimed == pytest.approx([middle, 0, place.station], abs=1.5 * 0.018**2 / 0.15)
         assert not place.note
 
@@ -127,7 +127,7 @@ def test_stations_of_a_straight_mesh_stay_on_the_axis_bit_for_bit(tmp_path):
     body = trimesh.creation.cylinder(0.03, 0.2, sections=48)
     body.vertices += 1e-5 * np.random.default_rng(0).normal(size=body.vertices.shape)
     for place in candidates.candidates(mesh_scene(body, tmp_path, [60, 100])):
-        for pose, same in zip(place.poses, candidates.axis_poses(place.station, place.angle, 0.0), strict=True):
+        for pose, same in zip(place.poses, poses.axis_poses(place.station, place.angle, 0.0), strict=True):
             assert pose.rotation.tobytes() == same.rotation.tobytes()
             assert pose.origin.tobytes() == same.origin.tobytes()
 
@@ -141,7 +141,7 @@ def test_what_is_doubtful_about_a_centre_line_is_said_in_check_and_with_the_case
     notes = [place.note for place in places if place.angle == 0]
     assert (bool(notes[0]), notes[1] == notes[2] != notes[3], bool(notes[3])) == (False, True, True)
     assert sum(note in text for text in warnings(scene) for note in {*notes} - {""}) == 2
-    assert places[2].poses[0].origin[0] - candidates.STANDOFF == pytest.approx(-0.019, abs=1e-7)
+    assert places[2].poses[0].origin[0] - poses.STANDOFF == pytest.approx(-0.019, abs=1e-7)
 
 
 def test_axes_end_with_station_angle_and_force_in_si_units():
@@ -161,7 +161,7 @@ def test_axes_end_with_station_angle_and_force_in_si_units():
 
 
 def test_axes_of_explicit_poses_number_the_candidates():
-    axes = candidates.axes(poses(((0, 0, 0), (1, 0, 0), (0, 0, 1)), ((0, 0, 9), (0, 1, 0), (0, 0, 1))))
+    axes = candidates.axes(posed(((0, 0, 0), (1, 0, 0), (0, 0, 1)), ((0, 0, 9), (0, 1, 0), (0, 0, 1))))
     assert [(a.name, a.values.tolist(), a.units) for a in axes[:2]] == [("station", [0, 1], ""), ("angle", [0], "rad")]
 
 
@@ -213,7 +213,7 @@ def test_explicit_poses_are_grouped_whatever_point_of_the_line_was_given():
         ((0, 0, 20), (1, 0, 1), (0, 1, 0)),  # tilted
         ((0, 0, 20), (0, -1, 1), (1, 0, 0)),  # tilted and turned by -90 degrees
     ]
-    places = candidates.candidates(poses(*given))
+    places = candidates.candidates(posed(*given))
     found = {order: [[n for n, _ in group] for group in candidates.groups(places, order)] for order in (0, 1, 2)}
     assert found[0] == [[0, 1, 2, 3], [4], [5], [6], [7, 8]]
     assert found[1] == [[0, 1], [2], [3], [4], [5], [6], [7], [8]]
@@ -226,7 +226,7 @@ def test_nothing_is_grouped_that_is_not_an_image_at_random():
     places = []
     for angle, roll, station in rng.uniform(-3, 3, (40, 3)):
         for turn in (0, 2 * np.pi / 3):
-            pair = candidates.axis_poses(station, angle + turn, roll)
+            pair = poses.axis_poses(station, angle + turn, roll)
             places.append(candidates.Candidate(station, angle + turn, roll, pair, ""))
     assert all(len(group) == 1 for group in candidates.groups(places, 1))
     assert all(len(group) == 1 for group in candidates.groups(places, 2))
