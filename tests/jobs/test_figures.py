@@ -25,8 +25,6 @@ from tests.generators import cylinder_grid
 from tests.study.formula_results import grid_axes, make
 from tests.study.launching import ROOT, launch
 
-pytestmark = pytest.mark.usefixtures("every_rank_speaks")
-
 PNG = b"\x89PNG\r\n\x1a\n"
 JOBS = ROOT / "jobs"
 MOST = 250_000  # bytes of a picture on a page

@@ -34,7 +34,6 @@ WALLED = {
 
 
 @pytest.mark.parametrize("name", JOBS)
-@pytest.mark.usefixtures("every_rank_speaks")
 def test_every_shipped_scene_passes_check(name, capsys):
     assert main(["check", str(JOBS[name])]) == 0
     told = capsys.readouterr()
@@ -46,9 +45,9 @@ def run(name, path, *words):
     return softjaw(0, "run", JOBS[name], "-o", path, *words)
 
 
-def test_the_smoke_scene_runs_as_it_is(once, shared_path):
-    path = shared_path / "smoke.hdf"
-    code, output, errors = once(run, "smoke", path)
+def test_the_smoke_scene_runs_as_it_is(tmp_path):
+    path = tmp_path / "smoke.hdf"
+    code, output, errors = run("smoke", path)
     assert (code, errors) == (0, "")
     assert "4 of 4 cases complete, 0 failed, 0 not computed" in output
     with open_result(path) as result:
@@ -59,17 +58,12 @@ def test_the_smoke_scene_runs_as_it_is(once, shared_path):
         assert result.read("F_N/F_N") == pytest.approx(np.broadcast_to([1.0, 2.0], (1, 2, 2)), rel=0.02)
 
 
-def quick(names, *chosen):
-    """Parameters of which all but the chosen ones are left to the long tests."""
-    return [name if name in chosen else pytest.param(name, marks=pytest.mark.long) for name in names]
-
-
 @pytest.mark.long
 @pytest.mark.parametrize("name", ONE)
-def test_a_coarse_variant_of_every_scene_is_solved(once, shared_path, name):
-    path = shared_path / f"{name}.hdf"
+def test_a_coarse_variant_of_every_scene_is_solved(tmp_path, name):
+    path = tmp_path / f"{name}.hdf"
     overrides = [word for value in ONE[name] for word in ("--set", value)]
-    code, output, errors = once(run, name, path, *COARSE, *overrides)
+    code, output, errors = run(name, path, *COARSE, *overrides)
     assert (code, errors) == (0, ""), output
     assert ", 0 failed, 0 not computed" in output
     with open_result(path) as result:
@@ -84,10 +78,10 @@ def test_a_coarse_variant_of_every_scene_is_solved(once, shared_path, name):
 
 @pytest.mark.long  # tests/study/test_walls.py presses thin walls in the fast stage
 @pytest.mark.parametrize("name", WALLED)
-def test_a_coarse_variant_of_every_scene_with_a_thin_wall_is_solved(once, shared_path, name):
-    path, (overrides, indentations) = shared_path / f"{name}.hdf", WALLED[name]
+def test_a_coarse_variant_of_every_scene_with_a_thin_wall_is_solved(tmp_path, name):
+    path, (overrides, indentations) = tmp_path / f"{name}.hdf", WALLED[name]
     words = [word for value in (*COARSE_WALL, *overrides) for word in ("--set", value)]
-    code, output, errors = once(run, name, path, *COARSE, *words)
+    code, output, errors = run(name, path, *COARSE, *words)
     assert (code, errors) == (0, ""), output
     assert ", 0 failed, 0 not computed" in output
     with open_result(path) as result:
@@ -104,10 +98,10 @@ def test_a_coarse_variant_of_every_scene_with_a_thin_wall_is_solved(once, shared
 
 
 @pytest.mark.long
-def test_the_curvature_study_shows_that_curvature_costs_and_against_what_to_draw_it(once, shared_path):
-    path = shared_path / "fig4.hdf"
+def test_the_curvature_study_shows_that_curvature_costs_and_against_what_to_draw_it(tmp_path):
+    path = tmp_path / "fig4.hdf"
     words = "--set", "gripper.elements=[8, 20, 4]", "--set", 'effects.friction_pressure_coupling="none"'
-    code, output, errors = once(run, "fig4-curvature", path, *words)
+    code, output, errors = run("fig4-curvature", path, *words)
     assert (code, errors) == (0, ""), output
     with open_result(path) as result:
         b = result.axes[0].values

@@ -27,7 +27,7 @@ claims = Claims(comm, {count}, node)
 mine = []
 for position in claims:
     mine.append(position)
-    time.sleep(0.002 * (1 + 4 * (comm.rank == 0)))
+    time.sleep(0.002 * (1 + 99 * (comm.rank == 0)))
     if position == {stop}:
         claims.stop()
 everybody = comm.gather(mine)
@@ -48,31 +48,31 @@ def claims(ranks, **values):
 
 
 @pytest.mark.ranks
-def test_every_position_goes_to_one_rank_and_a_slow_rank_takes_fewer(once):
-    taken, _ = once(lambda: claims(3, count=60))
+def test_every_position_goes_to_one_rank_and_a_slow_rank_takes_fewer():
+    taken, _ = claims(3, count=60)
     assert sorted(list(chain(*taken))) == list(range(60))
     assert all(own == sorted(own) for own in taken)
-    assert len(taken[0]) < min(len(taken[1]), len(taken[2]))
+    assert len(taken[0]) < 20  # of equal shares
 
 
 @pytest.mark.ranks
-def test_nodes_take_positions_in_turn(once):
+def test_nodes_take_positions_in_turn():
     """Ranks 0 and 2 share one memory, rank 1 has its own: even positions there, odd ones here."""
-    taken, _ = once(lambda: claims(3, count=21, color="comm.rank % 2"))
+    taken, _ = claims(3, count=21, color="comm.rank % 2")
     assert sorted(taken[0] + taken[2]) == list(range(0, 21, 2))
     assert taken[1] == list(range(1, 21, 2))
 
 
 @pytest.mark.ranks
 @pytest.mark.parametrize("count", [pytest.param(0, marks=pytest.mark.long), 1])
-def test_more_ranks_than_work(once, count):
-    taken, _ = once(lambda: claims(3, count=count))
+def test_more_ranks_than_work(count):
+    taken, _ = claims(3, count=count)
     assert list(chain(*taken)) == list(range(count))
 
 
 @pytest.mark.ranks
-def test_a_stop_reaches_the_other_ranks(once):
-    taken, stopped = once(lambda: claims(2, count=100_000, stop=20))
+def test_a_stop_reaches_the_other_ranks():
+    taken, stopped = claims(2, count=100_000, stop=20)
     assert stopped == [True, True]
     assert 20 < len(list(chain(*taken))) < 200
 

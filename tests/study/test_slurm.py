@@ -96,7 +96,6 @@ def test_a_scene_that_is_not_named_is_asked_for(tmp_path, slurm):
     assert not (tmp_path / "calls").exists()
 
 
-@pytest.mark.usefixtures("every_rank_speaks")
 def test_all_scripts_are_sound_and_share_what_they_do(tmp_path, slurm, monkeypatch, capsys):
     texts = [path.read_text() for path in (*SCRIPTS, HERE / "run.sbatch")]
     assert len(texts) == 4

@@ -36,7 +36,7 @@ SMALL = {  # what makes a run of a second or two of each kind
 
 
 @pytest.fixture(autouse=True)
-def _here(tmp_path, monkeypatch, every_rank_speaks):
+def _here(tmp_path, monkeypatch):
     """Each test in a folder of its own, and every rank speaks."""
     monkeypatch.chdir(tmp_path)
 

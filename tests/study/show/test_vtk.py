@@ -10,7 +10,6 @@ from softjaw.study.cli import main
 from softjaw.study.messages import USAGE
 from tests.study.view_files import FAILED, GRID, PRESSURE, SIZE, make, quality
 
-pytestmark = pytest.mark.usefixtures("every_rank_speaks")
 RING = 0.14181  # circumference of an ellipse with semi-axes 25 and 20 mm [m]
 
 
