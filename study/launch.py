@@ -16,8 +16,8 @@ from softjaw.study.run.plan import make_plan
 from softjaw.study.run.refine import Rounds, added_cases, next_round, refined
 from softjaw.study.run.session import Growth, Work, on_rank0, run_study
 from softjaw.study.scene import Scene
+from softjaw.study.show.best_grasps import summary
 from softjaw.study.show.report.verdict import plain_report
-from softjaw.study.show.tables.summary import summary
 
 
 def solve_scene(
@@ -85,7 +85,7 @@ def work(scene: Scene) -> Work:
 
     def finalise(writer: Any) -> None:
         derived.finalise(writer, scene)
-        writer.write_report(plain_report(dataset(writer.result()), scene.friction.mu))
+        writer.write_report(plain_report(dataset(writer.result())))
 
     return Work(
         solve_unit=pipeline.solve_unit,

@@ -16,6 +16,9 @@ from typing import Any
 import jinja2
 from plotly.offline import get_plotlyjs
 
+from softjaw.study.table import Table, with_unit
+from softjaw.study.units import shown_unit
+
 Block = dict[str, Any]
 Section = tuple[str, str, list[Block]]
 FOLDER = "softjaw.study.templates"
@@ -67,6 +70,15 @@ def table(
     """A table with row headers; columns but ``texts`` and ``wide`` ones hold numbers. ``first`` marks the first row."""
     looks = ["wide" if j in wide else "text" if j in texts else "n" for j in range(len(head))]
     return {"kind": "table", "caption": caption, "head": head, "rows": rows, "looks": looks, "first": first}
+
+
+def block_of(found: Table, first: bool = False) -> Block:
+    """The columns for people of a table, as a block; what is wrapped in a text is text here."""
+    columns = [c for c in found.columns if c.people]
+    heads = [with_unit(c.label or c.name, shown_unit(c.unit)) for c in columns]
+    rows = [[found.cell(row, c) for c in columns] for row in found.rows]
+    texts = [i for i, c in enumerate(columns) if c.wrap]
+    return table(found.title, heads, rows, texts[:-1], texts[-1:], first)
 
 
 def plot(figure: Any, caption: str, alt: str, height: int = 360) -> Block:

@@ -50,7 +50,7 @@ COMMANDS = {  # by what they are for, in the order of use: name, what it does, a
          "run jobs/smoke.toml -o results/smoke.hdf -- -contact_snes_monitor", "cli.running"),
         ("watch", "live view of a run, in another terminal", "watch results/bottle-rigid.hdf --every 5", "cli.results"),
         ("status", "what a result file holds so far, also while it grows", "status results/bottle-rigid.hdf",
-         "show.tables.status"),
+         "show.status"),
     ),
     "look at results": (
         ("show", "the best grasps as a table", "show results/bottle-rigid.hdf --force 4 --top 3 --json",

@@ -9,11 +9,13 @@ from softjaw.study.messages import OTHER_FILE, USAGE, StudyError
 from softjaw.study.result.read import open
 from softjaw.study.result.store import open_result, torn_rows
 from softjaw.study.scene import SceneError
-from softjaw.study.show.tables import watch as watching
-from softjaw.study.show.tables.columns import terminal_width
-from softjaw.study.show.tables.compare import compare as compared
-from softjaw.study.show.tables.compare import comparison_csv, comparison_json, comparison_text
-from softjaw.study.show.tables.show import as_csv, as_json, as_text, best
+from softjaw.study.show import watch as watching
+from softjaw.study.show.best_grasps import best, best_text
+from softjaw.study.show.compare import compare as compared
+from softjaw.study.show.compare import compare_text
+from softjaw.study.table import as_csv, as_json, terminal_width
+
+FORMS = {"json": as_json, "csv": as_csv}
 
 
 def watch(options: Namespace) -> int:
@@ -23,21 +25,19 @@ def watch(options: Namespace) -> int:
 
 def show(options: Namespace) -> str:
     """Print the best grasps."""
-    whole = options.form is None
+    ds = open(options.file)
     try:
-        table = best(open(options.file), options.force, options.top, whole, options.by)
+        if options.form is None:
+            return best_text(ds, terminal_width(), options.force, options.top, options.by)
+        return FORMS[options.form](best(ds, options.force, options.top, by=options.by))
     except ValueError as error:
         raise StudyError(USAGE, f"{options.file}: --force: {error}") from error
-    forms = {"json": as_json, "csv": as_csv}
-    return forms[options.form](table) if options.form else as_text(table, terminal_width())
 
 
 def compare(options: Namespace) -> str:
     """Print two maps side by side."""
-    one, other = map(open, options.files)
-    found = compared(one, other, options.quantity, options.model)
-    forms = {"json": comparison_json, "csv": comparison_csv}
-    return forms[options.form](found) if options.form else comparison_text(found, options.top, terminal_width())
+    table = compared(*map(open, options.files), options.quantity, options.model)
+    return FORMS[options.form](table) if options.form else compare_text(table, options.top, terminal_width())
 
 
 def damage(options: Namespace, error: Exception) -> StudyError | None:

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-
 from softjaw.study.export.csv_yaml import csv_text, with_unit
+
 from softjaw.study.flags import OF_FILE, flags_in
 from softjaw.study.quantities import FINGERS, MONOMIALS, STATES
 from softjaw.study.result.layout import DONE

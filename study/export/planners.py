@@ -27,8 +27,8 @@ from typing import Any
 import xarray as xr
 
 from softjaw.study.export.cases import MEANING, plain
-from softjaw.study.export.csv_yaml import yaml_text
 from softjaw.study.export.selection import GripperFrame, RankedGrasp
+from softjaw.study.export.yaml import yaml_text
 from softjaw.study.ranking import task_keys
 from softjaw.study.units import UNITS
 

@@ -6,7 +6,6 @@ grasp are shown. A case is named by its index ``(..., station, angle, force)`` o
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +13,13 @@ import numpy as np
 import xarray as xr
 
 from softjaw.study.case.result import TIE
-from softjaw.study.flags import LOST, Flag, flag_words, flags_in
-from softjaw.study.quantities import MODELS
+from softjaw.study.flags import LOST, OF_FILE, Flag, flag_words, flags_in
+from softjaw.study.quantities import MODELS, NO_GRASP
 from softjaw.study.ranking import judged, ranked, score_of, shown_level
 from softjaw.study.result.layout import DONE, FAILED
+from softjaw.study.show.status import Reason
+from softjaw.study.show.status import grouped as kinds_of
+from softjaw.study.table import number
 from softjaw.study.units import shown, shown_unit
 
 Index = tuple[int, ...]
@@ -33,22 +35,6 @@ def unit_of(units: str) -> tuple[str, float]:
     """Displayed unit, and the factor from SI to it."""
     unit = shown_unit(units)
     return TYPESET.get(unit, unit), shown(1.0, units)
-
-
-def number(value: float, digits: int = 3) -> str:
-    """A number as displayed; a dash where there is none.
-
-    >>> number(0.0123456), number(1.6e-9), number(float("nan")), number(120000.0)
-    ('0.0123', '1.6 × 10⁻⁹', '–', '120000')
-    """
-    value = float(value)
-    if not np.isfinite(value):
-        return "–"
-    if value and not 1e-4 <= abs(value) < 1e6:
-        mantissa, _, power = f"{value:.{max(digits - 2, 1)}e}".partition("e")
-        return f"{mantissa} × 10{str(int(power)).translate(str.maketrans('-0123456789', '⁻⁰¹²³⁴⁵⁶⁷⁸⁹'))}"
-    text = f"{value:.{digits}g}"
-    return f"{float(text):.0f}" if "e" in text else text
 
 
 def judge(ds: xr.Dataset, chosen: Index | None = None) -> xr.Dataset:
@@ -225,14 +211,16 @@ def flagged(ds: xr.Dataset, index: Index) -> list[str]:
     return [f"{spoken(n)} {number(v)}" for n, v in values.items() if np.isfinite(v) and not passes(n, v)]
 
 
-def grouped(ds: xr.Dataset, state: int) -> list[tuple[int, str, list[Index]]]:
-    """Messages of the cases in a state: how many, an example, where; alike but for their numbers is one kind."""
-    messages, kinds = ds["message"].values, dict[str, tuple[str, list[Index]]]()
-    for row in np.argwhere(ds.status.values == state):
-        index = tuple(int(i) for i in row)
-        text = str(messages[index])
-        if text or state == FAILED:
-            # Messages carry values of their case: without the numbers the kinds can be counted.
-            kind = re.sub(r"[-+]?\d[\d.]*(e[-+]?\d+)?", "#", text)
-            kinds.setdefault(kind, (text or "no reason was given", []))[1].append(index)
-    return sorted(((len(where), text, where) for text, where in kinds.values()), key=lambda g: -g[0])
+def note(ds: xr.Dataset, index: Index) -> str:
+    """Why a case has no result; the checks that a solved one misses, and its flags."""
+    state = ds.variables["status"].values[index]
+    if state == FAILED or state in NO_GRASP:
+        return str(ds.variables["message"].values[index]) or "no reason was given"
+    if state != DONE:
+        return ""
+    return ", ".join(text for text in (*flagged(ds, index), words_of(ds, index)) if text)
+
+
+def grouped(ds: xr.Dataset) -> list[Reason]:
+    """Reasons of failed cases and of what is no grasp, and notes on solved ones, alike messages together."""
+    return kinds_of(ds.status.values, ds.message.values, lambda: ds["flags"].values & OF_FILE)

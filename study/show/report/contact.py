@@ -8,8 +8,8 @@ import numpy as np
 
 from softjaw.study.page import Block, plot
 from softjaw.study.show import plots
-from softjaw.study.show.grasps import Index, at, number, place, quantity
-from softjaw.study.show.report.verdict import value
+from softjaw.study.show.best_grasps import value_text
+from softjaw.study.show.grasps import Index, at, number, place
 from softjaw.study.show.stored_surface import (
     NAMES,
     PLANES,
@@ -45,7 +45,7 @@ def patch(view: View, index: Index) -> Block | None:
                 made.add_trace(trace, row=row, col=column)
     eye = {"eye": {"x": 0, "y": 0, "z": 2.1}, "up": {"x": 0, "y": 1, "z": 0}, "projection": {"type": "orthographic"}}
     made.update_scenes(plots.scene(camera=eye)).update_layout(margin={"l": 0, "r": 80, "t": 58, "b": 0})
-    words = {name: value(view.ds, name, index) + f" {quantity(view.ds, name)[1]}" for name in ("p_max", "contact_area")}
+    words = {name: value_text(view.ds, name, index, unit=True) for name in ("p_max", "contact_area")}
     summary = f"largest pressure {words['p_max']}, contact area {words['contact_area']}"
     caption = (
         f"{place(view.ds, index, force=True)}: {summary}. The pad's deformed face in its own frame: x along the pad,"

@@ -20,6 +20,7 @@ from softjaw.study.show.grasps import (
     field,
     forces,
     label_of,
+    note,
     number,
     place,
     quantity,
@@ -27,7 +28,6 @@ from softjaw.study.show.grasps import (
     unit_of,
     unravelled,
 )
-from softjaw.study.show.report.tables import note
 
 MOST_PANELS, MOST_LABELS, MOST_NOTES = 6, 16, 8000
 MORE = ("quality_fitted", "epsilon", "f_x_max", "f_y_max", "tau_z_max", "safety_factor", "contact_area", "p_max",

@@ -2,29 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from softjaw.study.flags import flags_in
-from softjaw.study.page import Block, bullets, details, table, text, verbatim
-from softjaw.study.quantities import DONE, EFFECTS, FAILED, MISSING, MODEL_NAMES, NO_GRASP, PARTS, REASONS
-from softjaw.study.quantities import STATES as OF_CASES
+from softjaw.study.page import Block, block_of, bullets, details, table, text, verbatim
+from softjaw.study.quantities import DONE, EFFECTS, NO_GRASP, PARTS, REASONS, STATES
 from softjaw.study.ranking import largest
 from softjaw.study.run.progress import duration
+from softjaw.study.show.best_grasps import best, case_table, safe_range, value_text
 from softjaw.study.show.grasps import (
     ABOVE,
     LIMITS,
-    Index,
-    at,
-    check,
     field,
-    flagged,
-    flags_of,
     forces,
     grouped,
-    images,
     label_of,
     number,
     order,
@@ -32,16 +27,14 @@ from softjaw.study.show.grasps import (
     place,
     spoken,
     unravelled,
-    words_of,
 )
-from softjaw.study.show.report.verdict import VALUES, listed, safe_range, value
+from softjaw.study.show.status import MOST_PLACES
 from softjaw.study.show.tables.overview import RULE, wall_text
 
-HEADS = dict(zip(VALUES, ("payload [g]", "quality", "quality, fitted", "e_n [mm]", "max f_x [N]", "max f_y [N]",
-                          "max tau_z [N mm]"), strict=True))  # fmt: skip
-BEST, MOST_REASONS, MOST_PLACES = 6, 20, 4
+BEST, MOST_REASONS = 6, 20
 MOST_CASES = 8000  # that a page lists one by one; more would make it heavy
-STATES = {DONE: "solved", FAILED: "failed", MISSING: "missing"} | {state: OF_CASES[state] for state in NO_GRASP}
+# Columns of a page that has room for them.
+SHOWN = ("payload", "quality", "quality_fitted", "e_n", "f_x_max", "f_y_max", "tau_z_max")
 MORE = ("epsilon", "contact_area", "p_max", "closing", "indentation", "wall_stress", "safety_factor")
 WALL = ("indentation", "wall_stress", "wall_strain", "support_force", "safety_factor")
 FORCED = REASONS.index("forced by the scene")
@@ -57,109 +50,58 @@ STRESS = (
 
 def best_grasps(ds: xr.Dataset) -> list[Block]:
     """The best grasps at the force shown, and the best one at each force."""
-    k, ranked = ds.attrs["level"], order(ds, ds.attrs["level"])
-    if not ranked:
+    if ds.attrs["best"] is None:
         return []
-    walled = "force_high" in ds
-    heads = ["grasp", *HEADS.values(), "safe forces [N]" if walled else f"e_n, {MODEL_NAMES[ds.attrs['planar']]} [mm]",
-             "checks and notes"]  # fmt: skip
-    shown: list[Index] = []
-    merged: set[Index] = set()
-    for index in ranked:
-        if index not in merged and len(shown) < BEST:
-            shown.append(index)
-            merged |= set(_turned(ds, index))
-    rows = [[_with_angles(ds, index), *_row(ds, index)] for index in shown]
-    at_force = f"at {number(forces(ds)[k])} N per finger, candidates solved: {len(ranked)} (CCM)"
-    caption = f"Best grasps by {ds.attrs['score']} {at_force}"
-    found = [table(caption, heads, rows, texts=(0,), wide=(len(heads) - 1,), first=True)]
-    tops = [order(ds, level)[:1] for level in range(len(forces(ds)))]
-    if len(tops) > 1:
-        none = ["–"] * (len(heads) - 1) + ["not solved"]
-        rows = [[number(force), *([place(ds, top[0]), *_row(ds, top[0])] if top else none)]
-                for force, top in zip(forces(ds), tops, strict=True)]  # fmt: skip
-        found.append(table("Best grasp at each force", ["force [N]", *heads], rows, wide=(1, len(heads))))
-    if walled:
-        found.append(text(SAFE, "note"))
-    flags = {flag for index in (*shown, *(index for top in tops for index in top)) for flag in flags_of(ds, index)}
-    return found + [text(f"{flag.word}: {flag.sentence}.", "note") for flag in sorted(flags)]
-
-
-def _turned(ds: xr.Dataset, index: Index) -> list[Index]:
-    """The same place under other angles, with the same score."""
-    return [i for i in images(ds, index) if i[:-2] == index[:-2]]
-
-
-def _with_angles(ds: xr.Dataset, index: Index) -> str:
-    angles = [number(np.degrees(ds.angle.values[i[-2]]), 4) + "°" for i in _turned(ds, index)]
-    return place(ds, index) + (f" (and {listed(angles)})" if angles else "")
-
-
-def _row(ds: xr.Dataset, index: Index) -> list[str]:
-    known = any(np.isfinite(check(ds, name, index)) for name in LIMITS)
-    checks = flagged(ds, index) or ["passed" if known else "not stored"]
-    notes = ", ".join(text for text in (*checks, words_of(ds, index)) if text)
-    planar = number(at(ds, "e_n", index, ds.attrs["planar"]) * 1e3, 4)
-    last = safe_range(ds, index) if "force_high" in ds else planar
-    return [*(value(ds, name, index) for name in VALUES), last, notes]
-
-
-def note(ds: xr.Dataset, index: Index) -> str:
-    """Why a case has no result; the checks that a solved one misses, and its flags."""
-    state = ds.variables["status"].values[index]
-    if state == FAILED or state in NO_GRASP:
-        return str(ds.variables["message"].values[index]) or "no reason was given"
-    if state != DONE:
-        return ""
-    return ", ".join(text for text in (*flagged(ds, index), words_of(ds, index)) if text)
+    table_ = best(ds, top=BEST, lines=True, maps=SHOWN)
+    tops = [top for k in range(len(forces(ds))) for top in order(ds, k)[:1]]
+    found = [block_of(table_, first=True)]
+    if len(forces(ds)) > 1:
+        found.append(block_of(replace(case_table(ds, tops, maps=SHOWN), title="Best grasp at each force")))
+    marks = int(np.bitwise_or.reduce([ds["flags"].values[index] for index in tops]))
+    marks |= int(np.bitwise_or.reduce([row["flags"] for row in table_.rows]))
+    words = [f"{flag.word}: {flag.sentence}." for flag in flags_in(marks)]
+    return found + [text(sentence, "note") for sentence in [*[SAFE] * ("force_high" in ds), *words]]
 
 
 def states(ds: xr.Dataset) -> list[Block]:
-    """Counts of the cases by state and by flag, and notes on solved cases, alike messages together."""
+    """Counts of the cases by state, and notes on solved cases, alike ones together."""
     status = ds.status.values
-    counts = [[name, str(int(np.sum(status == state)))] for state, name in STATES.items()
+    counts = [[name, str(int(np.sum(status == state)))] for state, name in enumerate(STATES)
               if state not in NO_GRASP or np.any(status == state)]  # fmt: skip
-    found = [table("State of the cases", ["state", "cases"], counts, texts=(0,))]
-    flags = ds["flags"].values[status == DONE]
-    raised = flags_in(int(np.bitwise_or.reduce(flags))) if flags.size else []
-    rows = [[f.word, str(int(np.sum(flags & f > 0))), f.sentence] for f in raised]
-    if rows:
-        found.append(table("Flags of solved cases", ["flag", "cases", "meaning"], rows, texts=(0,), wide=(2,)))
-    return found + reasons(ds, DONE)
+    return [table("State of the cases", ["state", "cases"], counts, texts=(0,)), *reasons(ds, DONE)]
 
 
-def reasons(ds: xr.Dataset, state: int) -> list[Block]:
+def reasons(ds: xr.Dataset, *wanted: int) -> list[Block]:
     """Why cases have no result, or notes on solved ones, alike messages together; empty where there are none."""
-    captions = {FAILED: "Why cases failed", DONE: "Notes on solved cases"}
-    caption = captions.get(state, f"No grasp: {STATES[state]}")
-    groups = grouped(ds, state)
-    rows = [[str(count), message, _places(ds, where)] for count, message, where in groups[:MOST_REASONS]]
-    found = [table(caption, ["cases", "message (one example)", "where"], rows, wide=(1, 2))] if rows else []
-    if len(groups) > MOST_REASONS:
-        more = f"{len(groups) - MOST_REASONS} more kinds of messages are in status/message of the file."
+    kinds = [reason for reason in grouped(ds) if reason.state in wanted]
+    rows = [[STATES[kind.state], str(len(kind.cases)), kind.message, _places(ds, kind.cases)]
+            for kind in kinds[:MOST_REASONS]]  # fmt: skip
+    caption = "Notes on solved cases" if wanted == (DONE,) else "Why cases have no result"
+    head = ["state", "cases", "message (one example)", "where"]
+    found = [table(caption, head, rows, texts=(0,), wide=(2, 3))] if rows else []
+    if len(kinds) > MOST_REASONS:
+        more = f"{len(kinds) - MOST_REASONS} more kinds of messages are in status/message of the file."
         found.append(text(more, "note"))
     return found
 
 
-def _places(ds: xr.Dataset, where: list[Index]) -> str:
-    return "; ".join([*(place(ds, index, force=True) for index in where[:MOST_PLACES]),
-                      *["…"] * (len(where) > MOST_PLACES)])  # fmt: skip
+def _places(ds: xr.Dataset, cases: list[tuple[int, ...]]) -> str:
+    places = [place(ds, index, force=True) for index in cases[: 2 * MOST_PLACES]]
+    return "; ".join([*places, *["…"] * (len(cases) > len(places))])
 
 
 def every_case(ds: xr.Dataset) -> list[Block]:
     """A folded table of all cases."""
-    status = ds.status.values
-    if status.size == 1:
+    count = ds.status.size
+    if count == 1:
         return []
-    if status.size > MOST_CASES:
-        summary = f"The {status.size} cases are too many to be listed here; softjaw export writes all of them."
+    if count > MOST_CASES:
+        summary = f"The {count} cases are too many to be listed here; softjaw export writes all of them."
         return [text(summary, "note")]
-    names = [name for name in (*VALUES, *MORE) if field(ds, name) is not None]
-    rows = [[place(ds, i, force=True), STATES[int(status[i])], *(value(ds, name, i) for name in names), note(ds, i)]
-            for i in np.ndindex(status.shape)]  # fmt: skip
-    heads = ["case", "state", *(HEADS.get(name) or label_of(ds, name) for name in names), "notes"]
-    whole = table(f"All {len(rows)} cases (CCM, weaker finger)", heads, rows, texts=(0, 1), wide=(len(heads) - 1,))
-    return [details(f"All {len(rows)} cases as a table", [whole])]
+    names = [name for name in (*SHOWN, *MORE) if field(ds, name) is not None]
+    cases = case_table(ds, np.ndindex(ds.status.shape), maps=names)
+    title = f"All {count} cases (CCM, weaker finger)"
+    return [details(f"All {count} cases as a table", [block_of(replace(cases, title=title))])]
 
 
 def checks(ds: xr.Dataset) -> Block:
@@ -171,8 +113,8 @@ def checks(ds: xr.Dataset) -> Block:
             continue
         index = unravelled(largest(-found if name in ABOVE else found), found.shape)
         worst = float(found[index])
-        limit = f"> {LIMITS[name]:g}" if name in ABOVE else f"≤ {number(LIMITS[name])}" if name in LIMITS else "–"
-        state = "–" if name not in LIMITS else "passed" if passes(name, worst) else "not passed"
+        limit = f"> {LIMITS[name]:g}" if name in ABOVE else f"≤ {number(LIMITS[name])}" if name in LIMITS else "-"
+        state = "-" if name not in LIMITS else "passed" if passes(name, worst) else "not passed"
         rows.append([spoken(name), number(worst), limit, state, place(ds, index[:-1], force=True)])
     if not rows:
         return text("No checks are stored.", "note")
@@ -186,9 +128,9 @@ def wall(ds: xr.Dataset, shape: Any) -> list[Block]:
     there = [name for name in WALL if field(ds, name) is not None]
     level, rows = field(ds, "effect_object_level"), []
     for index in order(ds, ds.attrs["level"])[:BEST]:
-        values = [value(ds, name, index, 3) for name in there]
+        values = [value_text(ds, name, index, 3) for name in there]
         known = level is not None and level[index] >= 0
-        simulated = EFFECTS["object"][int(level[index])] if known else "–"
+        simulated = EFFECTS["object"][int(level[index])] if known else "-"
         rows.append([place(ds, index), *values, safe_range(ds, index), simulated])
     head = ["grasp", *(label_of(ds, name) for name in there), "safe forces [N]", "wall simulated as"]
     caption = f"The wall in the best grasps at {number(forces(ds)[ds.attrs['level']])} N per finger"
@@ -246,7 +188,7 @@ def time_split(ds: xr.Dataset) -> list[Block]:
         return []
     whole = float(np.nansum(total))
     sums = {part: float(np.nansum(s)) for part in PARTS if (s := field(ds, f"work_seconds_{part}")) is not None}
-    rows = [[part, duration(seconds), f"{seconds / whole:.0%}" if whole else "–"] for part, seconds in sums.items()]
+    rows = [[part, duration(seconds), f"{seconds / whole:.0%}" if whole else "-"] for part, seconds in sums.items()]
     rows.append(["all", duration(whole), "100%"])
     longest = unravelled(int(np.nanargmax(total)), total.shape)
     slowest = f"Longest case: {number(total[longest])} s ({place(ds, longest, force=True)})."
@@ -278,7 +220,7 @@ def provenance(ds: xr.Dataset) -> list[Block]:
     if not sessions:
         return [text("No session is recorded.", "note")]
     rows = [
-        [str(i), s["start"], s["stop"] or "–", s["reason"] if s["stop"] else "running, or killed", str(s["ranks"]),
+        [str(i), s["start"], s["stop"] or "-", s["reason"] if s["stop"] else "running, or killed", str(s["ranks"]),
          str(s["done"]), str(s["failed"])]
         for i, s in enumerate(sessions, start=1)
     ]  # fmt: skip

@@ -66,10 +66,10 @@ def build(ds: xr.Dataset, candidate: int | None = None, place: Place = (None, No
     best = ds.attrs["best"] or (*(0 for _ in ds.status.shape[:-1]), ds.attrs["level"])
     view = View(ds, best[:-3])
     sections: list[Section] = [
-        ("verdict", "", the_answer(ds, scene)),
+        ("verdict", "", the_answer(ds)),
         ("object", "The object", the_object(view, best)),
         ("maps", "Maps", (maps.maps(ds, best) if ds.status.size > 1 else []) +
-         [block for state in (FAILED, *NO_GRASP) for block in tables.reasons(ds, state)]),
+         tables.reasons(ds, FAILED, *NO_GRASP)),
         ("wall", "What the wall bears", wall(view, best)),
         ("curvature", "What curvature costs", curves.differences(ds, scene, best)),
         *(cases(view, scene) if ds.attrs["best"] is not None else []),
@@ -90,16 +90,14 @@ def _there(*blocks: Block | None) -> list[Block]:
     return [block for block in blocks if block is not None]
 
 
-def the_answer(ds: xr.Dataset, scene: Any) -> list[Block]:
+def the_answer(ds: xr.Dataset) -> list[Block]:
     """The best grasp at a glance, in sentences, what speaks against it, and the tables of the best grasps."""
     found = [answer(verdict.key_values(ds))] if ds.attrs["best"] is not None else []
-    found.append(box(verdict.verdict(ds, scene.friction.mu if scene else None), "verdict"))
+    found.append(box(verdict.verdict(ds), "verdict"))
     if warnings := verdict.warnings(ds):
         found.append(box(warnings, "warn"))
     if chosen := verdict.chosen(ds):
         found.append(box([chosen], "verdict"))
-    if meaning := verdict.meaning(ds):
-        found.append(text(meaning, "note"))
     return found + tables.best_grasps(ds)
 
 

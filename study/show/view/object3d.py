@@ -18,8 +18,7 @@ from softjaw.study.page import Block, Section, label, page, plot, text
 from softjaw.study.quantities import ALONG, AROUND, STATES
 from softjaw.study.result.layout import DONE
 from softjaw.study.show import plots
-from softjaw.study.show.grasps import Index, field, forces, label_of, order, place
-from softjaw.study.show.report.tables import note
+from softjaw.study.show.grasps import Index, field, forces, label_of, note, order, place
 from softjaw.study.show.stored_surface import NAMES
 from softjaw.study.show.view.model import CROSSED, FORCE, LONGEST, NEUTRAL, OPEN, PAD, View
 

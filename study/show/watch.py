@@ -18,14 +18,14 @@ from rich.text import Text
 
 from softjaw.study.messages import DONE as ENDED
 from softjaw.study.messages import SOME_FAILED, STOPPED
-from softjaw.study.quantities import DONE, FAILED, MISSING, STATES
+from softjaw.study.quantities import DONE, FAILED, FIRST, MISSING, STATES
 from softjaw.study.result.lock import holder
 from softjaw.study.result.read import dataset
 from softjaw.study.result.store import open_result
 from softjaw.study.run.progress import Progress, duration
-from softjaw.study.show.tables.show import best
-from softjaw.study.show.tables.status import no_grasps, place, reasons
-from softjaw.study.units import shown_text
+from softjaw.study.show.best_grasps import best
+from softjaw.study.show.status import no_grasps, place, reasons
+from softjaw.study.units import shown_text, shown_unit
 
 INTERRUPTED = 130  # what shells say of a program that Ctrl-C ended
 BAR = 40
@@ -113,7 +113,8 @@ class View:
         bar = ProgressBar(total=codes.size, completed=int(np.sum(codes != MISSING)), width=BAR)
         lines = [line, *([f"{runner}{_since(result)}"] if runner else []), best_so_far(result, codes)]
         if self._failure >= 0:
-            lines += [f"failed last: {result.messages.ravel()[self._failure]}, at {place(result, self._failure)}"]
+            where = tuple(int(i) for i in np.unravel_index(self._failure, result.layout.shape))
+            lines += [f"failed last: {result.messages.ravel()[self._failure]}, at {place(result, where)}"]
         return Group(Text(f"{result.path}{title}"), bar, *map(Text, lines))
 
     def _end(self, result: Any, codes: np.ndarray) -> None:
@@ -152,10 +153,10 @@ def best_so_far(result: Any, codes: np.ndarray) -> str:
     solved = (codes.reshape(-1, result.layout.shape[-1]) == DONE).any(axis=0)
     if not solved.any():
         return "best so far: no case is complete yet"
-    table = best(dataset(result), float(result.axes[-1].values[np.flatnonzero(solved)[-1]]), top=1)
-    row = dict(zip((name for name, _ in table.columns), table.rows[0], strict=True))
-    where = [f'"{row["label"]}"'] if "label" in row else []
-    axes = result.axes[:-3] if where else result.axes[:-1]
-    where += [f"{axis.name} {shown_text(row[axis.name], axis.units, 5)}" for axis in axes]
-    numbers = [f"quality {row['quality']:.4g}", f"e_n {shown_text(row['e_n'], 'm')}"]
-    return f"best so far at {table.force:g} N: {', '.join(numbers)}, at {', '.join(where)}"
+    ds, level = dataset(result), np.flatnonzero(solved)[-1]
+    table = best(ds, float(result.axes[-1].values[level]), top=1)
+    row, poses = table.rows[0], ds.attrs["poses"]
+    where = [f'"{row["label"]}"'] * poses
+    where += [f"{axis.name} {shown_text(row[axis.name], axis.units, 5)}" for axis in result.axes[: -3 if poses else -1]]
+    cells = [f"{c.name} {table.cell(row, c)} {shown_unit(c.unit)}".rstrip() for c in table.columns if c.name in FIRST]
+    return f"best so far at {table.facts['force']:g} N: {', '.join(cells)}, at {', '.join(where)}"

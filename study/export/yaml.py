@@ -1,41 +1,11 @@
-"""Texts that programs read: lines of CSV, and YAML."""
+"""YAML as readers of versions 1.1 and 1.2 take it."""
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import math
 import re
-from collections.abc import Iterable, Sequence
 from typing import Any
-
-
-def with_unit(name: str, unit: str) -> str:
-    """Name of a column in one line: ``e_n [m]``."""
-    return f"{name} [{unit}]" if unit else name
-
-
-def csv_text(rows: Iterable[Sequence[Any]]) -> str:
-    """Rows as CSV without a line end after the last; None is an empty cell."""
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows([[cell(v) for v in row] for row in rows])
-    return text.getvalue().rstrip("\n")
-
-
-def cell(value: Any) -> Any:
-    """A value as a cell of CSV: None is empty, and a text that a spreadsheet would compute stands behind an apostrophe.
-
-    >>> cell("=1+1"), cell("-3.5"), cell("at 0 mm"), cell(None)
-    ("'=1+1", '-3.5', 'at 0 mm', '')
-    """
-    if not isinstance(value, str) or value[:1] not in ("=", "+", "-", "@", "\t", "\r"):
-        return "" if value is None else value
-    try:
-        float(value)
-    except ValueError:
-        return f"'{value}"
-    return value
 
 
 def yaml_text(value: Any, indent: int = 0) -> str:

@@ -1,0 +1,236 @@
+"""Two result files side by side: which settings and cases differ, and which differences exceed the stated errors."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from softjaw.study.case.result import TIE
+from softjaw.study.messages import USAGE, StudyError
+from softjaw.study.quantities import TABLE, map_row
+from softjaw.study.ranking import falling
+from softjaw.study.result.layout import DONE
+from softjaw.study.result.read import axes_of, mesh_error, values_of
+from softjaw.study.scene.text import changes, value_text
+from softjaw.study.table import PAPER, Column, Row, Table, as_text, with_unit, wrapped
+from softjaw.study.units import shown, shown_unit
+
+FloatArray = NDArray[np.float64]
+SAME_PLACE = 1e-9  # relative difference of coordinates that is only rounding
+MOST_SETTINGS, MOST_VALUES = 12, 8  # that a text lists
+STATES = ("solved in both", "only in a", "only in b", "in neither")
+
+
+@dataclass(frozen=True)
+class Match:
+    """Values of one axis that both files have, at which positions, and those that only one of them has."""
+
+    name: str
+    units: str
+    common: FloatArray
+    at: tuple[NDArray[np.int64], NDArray[np.int64]]
+    only: tuple[FloatArray, FloatArray]
+
+
+def compare(one: xr.Dataset, other: xr.Dataset, quantity: str = "e_n", model: str = "ccm") -> Table:
+    """Every common case of one map of two result files (``a`` and ``b``), and counts for all maps as facts.
+
+    A difference exceeds the errors if it is larger than the sum of both: half-widths of intervals, or else errors of
+    the mesh.
+
+    Parameters
+    ----------
+    one, other : xarray.Dataset
+        As `study.result.read.open` gives them.
+    quantity : str
+        Map to be listed case by case.
+    model : str
+        Friction model of all quantities.
+
+    Raises
+    ------
+    StudyError
+        Different kinds of axes, nothing in common, or an unknown quantity.
+    """
+    pair = (one, other)
+    axes = _matched(*pair)
+    done = [ds.status.values[_block(axes, i)] == DONE for i, ds in enumerate(pair)]
+    names = [q.name for q in TABLE if q.group == "maps" and q.name != "flags" and q.name in one and q.name in other]
+    if quantity not in names:
+        text = f"--quantity: found '{quantity}', expected one that both files have: {', '.join(names)}"
+        raise StudyError(USAGE, text)
+    units = map_row(quantity).unit
+    values = _values(pair, axes, quantity, model)
+    labels = None if one[axes[-3].name].units else one.label.values[axes[-3].at[0]][:, 0]
+    rows: list[Row] = []
+    for index in np.ndindex(done[0].shape):
+        place: Row = {axis.name: float(axis.common[i]) for axis, i in zip(axes, index, strict=True)}
+        place |= {} if labels is None else {"label": str(labels[index[-3]])}
+        rows.append(place | {name: found[index] for name, found in values.items()})
+    few = [axis.name for axis in axes if len(axis.common) < 2 and axis is not axes[-1]]
+    hidden = few if labels is None else [*few, "station", "angle"]
+    columns = [Column(axis.name, axis.units, digits=5, people=axis.name not in hidden) for axis in axes]
+    columns += [Column("label", wrap=MOST_VALUES * 3)] * (labels is not None)
+    judged = any(value is not None for value in values["beyond_error"].ravel())
+    columns += [Column("a", units), Column("b", units), Column("difference", units, "b-a"), Column("relative"),
+                Column("error", units, "errors", digits=2, people=judged),
+                Column("beyond_error", "", "exceeds\nerrors", people=judged)]  # fmt: skip
+    facts = {"files": {"a": str(one.file), "b": str(other.file)}, "settings": _settings(*pair),
+             "axes": {x.name: {"units": x.units, "common": x.common, "only_a": x.only[0], "only_b": x.only[1]}
+                      for x in axes},
+             "states": dict(zip(STATES, (int(np.sum(which)) for which in _states(*done)), strict=True)),
+             "quantity": quantity,
+             "summary": [_summary(name, _values(pair, axes, name, model)) for name in names
+                         if map_row(name).rank or name == quantity]}  # fmt: skip
+    return Table("", columns, rows, _verdict(pair, quantity, model, values), facts, "cases")
+
+
+def compare_text(table: Table, top: int = 10, width: int = PAPER) -> str:
+    """What differs, in lines of at most ``width`` characters; the ``top`` largest differences (0: all) case by case."""
+    facts, quantity = table.facts, str(table.facts["quantity"])
+    lines = [f"{letter}: {file}" for letter, file in facts["files"].items()] + _setting_lines(facts["settings"], width)
+    lines.append(f"common cases: {', '.join(f'{n} {words}' for words, n in facts['states'].items() if n)}")
+    lines += [wrapped(line, width, more="  ") for name, axis in facts["axes"].items() for line in _left_out(name, axis)]
+    columns = [Column("quantity", wrap=30), Column("mean_a", label="mean\na"), Column("mean_b", label="mean\nb"),
+               Column("mean", label="mean b-a\n[%]"), Column("largest", label="largest\n[%]"),
+               Column("exceed", label="exceed\nerrors")]  # fmt: skip
+    summary = Table("", columns, [_shown_summary(row) for row in facts["summary"] if row["compared"]])
+    known = [row for row in table.rows if np.isfinite(row["difference"])]
+    if not known:
+        return "\n".join([*lines, "", "no case is solved in both"])
+    listed = [known[i] for i in falling(np.abs([row["difference"] for row in known]))][: top or None]
+    percent = [row | {"relative": 100 * row["relative"]} for row in listed]
+    title = f"{with_unit(quantity, shown_unit(map_row(quantity).unit))}: {len(listed)} of {len(known)} differences, "
+    heads = [replace(c, label="b-a\n[%]") if c.name == "relative" else c for c in table.columns]
+    cases = replace(table, title=f"{title}the largest first", columns=heads, rows=percent)
+    return "\n".join([*lines, "", as_text(summary, width), "", as_text(cases, width)])
+
+
+def _settings(one: xr.Dataset, other: xr.Dataset) -> list[Row] | None:
+    """Settings that differ; None where the scene of a file cannot be read."""
+    try:
+        return [{"key": key, "a": a, "b": b} for key, a, b in changes(one.scene, other.scene)]
+    except ValueError:
+        return None
+
+
+def _setting_lines(settings: list[Row] | None, width: int) -> list[str]:
+    if not settings:
+        return ["settings: no difference" if settings == [] else "settings: the scene of a file cannot be read"]
+    rows = [{"key": row["key"], **{f: value_text(row[f]) for f in "ab"}} for row in settings]
+    columns = [Column("key", label="setting", wrap=width // 2), Column("a"), Column("b")]
+    more = len(rows) - MOST_SETTINGS
+    return [as_text(Table("", columns, rows[:MOST_SETTINGS]), width)] + [f"and {more} more settings"] * (more > 0)
+
+
+# --- axes ------------------------------------------------------------------------------------------------------------
+
+
+def _matched(one: xr.Dataset, other: xr.Dataset) -> tuple[Match, ...]:
+    both = axes_of(one), axes_of(other)
+    kinds = [[(axis.name, axis.units) for axis in axes] for axes in both]
+    if kinds[0] != kinds[1]:
+        words = [", ".join(with_unit(*axis) for axis in kind) for kind in kinds]
+        text = f"the maps have different axes: {words[0]} in {one.file}, {words[1]} in {other.file}"
+        raise StudyError(USAGE, f"{text}; compare files with the same kind of candidates and the same swept keys")
+    axes = tuple(_match(*pair) for pair in zip(*both, strict=True))
+    for axis in axes:
+        if not len(axis.common):
+            a, b = (", ".join(f"{v:.6g}" for v in values[:5]) for values in axis.only)
+            text = f"no common {axis.name} [{axis.units or '-'}]: {a} in {one.file}, {b} in {other.file}"
+            raise StudyError(USAGE, f"{text}; there is nothing to compare")
+    return axes
+
+
+def _match(one: Any, other: Any) -> Match:
+    scale = max(np.abs(one.values).max(), np.abs(other.values).max(), 1e-300)
+    same = np.abs(one.values[:, None] - other.values) <= SAME_PLACE * scale
+    if one.options and other.options:  # numbers stand for texts
+        same = np.array(one.options)[:, None] == np.array(other.options)
+    at = np.nonzero(same)
+    only = one.values[~same.any(axis=1)], other.values[~same.any(axis=0)]
+    return Match(one.name, one.units, one.values[at[0]], (at[0], at[1]), only)
+
+
+def _block(axes: tuple[Match, ...], i: int) -> tuple[NDArray[np.int64], ...]:
+    return np.ix_(*(axis.at[i] for axis in axes))
+
+
+def _left_out(name: str, axis: dict[str, Any]) -> list[str]:
+    lines = []
+    for letter in "ab":
+        if len(values := axis[f"only_{letter}"]):
+            texts = [f"{shown(v, axis['units']):.5g}" for v in values]
+            texts = texts if len(texts) <= MOST_VALUES else [*texts[:3], "...", texts[-1], f"({len(texts)} values)"]
+            lines.append(f"{name} only in {letter}, left out: {' '.join(texts)} {shown_unit(axis['units'])}".rstrip())
+    return lines
+
+
+def _states(a: NDArray[np.bool_], b: NDArray[np.bool_]) -> tuple[Any, ...]:
+    """Where cases are in each of `STATES`."""
+    return a & b, a & ~b, ~a & b, ~a & ~b
+
+
+# --- differences -----------------------------------------------------------------------------------------------------
+
+
+def _values(
+    pair: tuple[xr.Dataset, xr.Dataset], axes: tuple[Match, ...], name: str, model: str
+) -> dict[str, NDArray[Any]]:
+    """Columns of a map over the common cases; NaN where a file has no result, None where an error is unknown."""
+    a, b = (values_of(ds, name, model)[_block(axes, i)] for i, ds in enumerate(pair))
+    errors = [_error(ds, name, model) for ds in pair]
+    error = sum(np.full(a.shape, np.nan) if e is None else e[_block(axes, i)] for i, e in enumerate(errors))
+    change, size = b - a, np.abs(a)
+    beyond = (np.abs(change) > error + TIE * size).astype(object)
+    beyond[~(np.isfinite(change) & np.isfinite(error))] = None
+    relative = np.divide(change, size, out=np.full(size.shape, np.nan), where=size > 0)
+    found = {"a": a, "b": b, "difference": change, "relative": relative, "error": error}
+    return {name: values.astype(object) for name, values in found.items()} | {"beyond_error": beyond}
+
+
+def _error(ds: xr.Dataset, name: str, model: str) -> FloatArray | None:
+    """Error of a map in its unit; None where the file has none, as for models other than CCM."""
+    if map_row(name).by_model and model != "ccm":
+        return None
+    return values_of(ds, f"{name}_interval") if f"{name}_interval" in ds else mesh_error(ds, name)
+
+
+def _summary(name: str, values: dict[str, NDArray[Any]]) -> Row:
+    """Means, mean and largest relative difference of a map, and how many differences exceed the errors."""
+    a, b, change, relative = (values[k].astype(float) for k in ("a", "b", "difference", "relative"))
+    both, judged = np.isfinite(change), [value for value in values["beyond_error"].ravel() if value is not None]
+    row: Row = {"quantity": name, "units": map_row(name).unit, "compared": int(both.sum()), "judged": len(judged)}
+    row["beyond_error"] = sum(map(bool, judged))
+    if both.any():
+        row |= {"mean_a": float(a[both].mean()), "mean_b": float(b[both].mean())}
+        row["mean"] = float(change[both].mean() / max(np.abs(a[both]).mean(), 1e-300))
+        row["largest"] = float(np.nanmax(np.abs(relative))) if np.isfinite(relative).any() else np.nan
+    return row
+
+
+def _shown_summary(row: Row) -> Row:
+    means = {name: float(shown(row[name], row["units"])) for name in ("mean_a", "mean_b")}
+    exceed = f"{row['beyond_error']} of {row['judged']}" if row["judged"] else "-"
+    shares = {name: round(100 * row[name], 2) for name in ("mean", "largest")}
+    return means | shares | {"quantity": with_unit(row["quantity"], shown_unit(row["units"])), "exceed": exceed}
+
+
+def _verdict(pair: tuple[xr.Dataset, xr.Dataset], name: str, model: str, values: dict[str, Any]) -> list[str]:
+    """How many differences of the quantity that was asked for exceed the errors; or which file states none."""
+    row = _summary(name, values)
+    silent = " and ".join(x for x, ds in zip("ab", pair, strict=True) if _error(ds, name, model) is None)
+    if not row["compared"]:
+        return []
+    if silent:
+        states = "states" if len(silent) == 1 else "state"
+        text = f"whether the differences exceed the errors is not known: {silent} {states} no error of {name}"
+        return [f"{text}; accuracy.meshes = 2 in a scene gives the errors of e_n and of the friction limits"]
+    open_ = row["compared"] - row["judged"]
+    more = f", {open_} could not be judged" * (open_ > 0)
+    both = f"exceed the errors of both files together{more}"
+    return [f"{row['beyond_error']} of {row['judged']} differences of {name} {both}"]

@@ -1,0 +1,231 @@
+"""What a result file holds so far: complete cases, failed ones with reasons, the rest, and how each session ended."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from argparse import Namespace
+from collections.abc import Callable, Sequence
+from datetime import datetime
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softjaw.study.flags import flag_sentences, flags_in
+from softjaw.study.quantities import DONE, E_N_TARGET, FAILED, MISSING, NO_GRASP, PARTS, STATES, map_row, misses
+from softjaw.study.result.lock import holder
+from softjaw.study.result.store import open_result, place_text
+from softjaw.study.run.progress import duration
+from softjaw.study.run.refine import about
+from softjaw.study.table import MOST_NOTES, PAPER, Column, Row, Table, as_csv, as_json, terminal_width, wrapped
+
+MOST_PLACES = 2
+NO_ERRORS = "errors of the mesh: not known; accuracy.meshes = 2 in the scene gives them"
+RESUME = "run the same command again to resume"
+Index = tuple[int, ...]
+
+
+class Reason(NamedTuple):
+    """Why cases are in a state, or a note on solved ones: an example of the message, and which cases have its like."""
+
+    state: int
+    message: str
+    cases: list[Index]
+
+    def text(self, place: Callable[[Index], str]) -> str:
+        """Count, state, message and some places in one line."""
+        places = "; ".join(map(place, self.cases[:MOST_PLACES]))
+        more = len(self.cases) - MOST_PLACES
+        word = "note" if self.state == DONE else STATES[self.state]
+        return f"{len(self.cases)} x {word}: {self.message} ({places}{f'; and {more} more' * (more > 0)})"
+
+
+def status(options: Namespace) -> str:
+    """Say what a result file holds so far, as text, JSON or CSV."""
+    with open_result(options.file) as result:
+        if options.form is None:
+            return status_text(result, terminal_width())
+        return {"json": as_json, "csv": as_csv}[options.form](status_table(result))
+
+
+def status_table(result: Any) -> Table:
+    """Every case with its state and message; counts, sessions and what a refinement added beside them."""
+    axes, poses = result.axes, not result.axes[-3].units
+    columns = [Column("row"), Column("state"), Column("message"), *(Column(axis.name, axis.units) for axis in axes)]
+    columns += [Column("label")] * poses
+    rows = []
+    for row, index in enumerate(np.ndindex(result.status.shape)):
+        where: Row = {axis.name: float(axis.values[i]) for axis, i in zip(axes, index, strict=True)}
+        where |= {"row": row, "state": STATES[int(result.status[index])], "message": str(result.messages[index])}
+        rows.append(where | ({"label": str(result.labels[index[-3:-1]])} if poses else {}))
+    counts = {name.replace(" ", "_"): int(np.sum(result.status == code)) for code, name in enumerate(STATES)}
+    facts: Row = {"file": str(result.path), "running": holder(result.path) or None, **counts}
+    facts |= {"largest_error": largest_mesh_error(result), **_added(result), "sessions": list(result.sessions)}
+    notes = [reason.text(lambda index: place(result, index)) for reason in reasons_in(result)]
+    return Table(result.title, columns, rows, notes, facts, "cases")
+
+
+def status_text(result: Any, width: int = PAPER) -> str:
+    """Answer of ``softjaw status``; the file may be growing meanwhile."""
+    runner = holder(result.path)
+    state = f"running now: {runner}" if runner else RESUME if np.any(result.status == MISSING) else ""
+    error = largest_mesh_error(result)
+    known = [wrapped(error, width, "  ", "  ")] * bool(error)
+    lines = [counts(result), *known, *[wrapped(state, width)] * bool(state), *reasons(result, width)]
+    return "\n".join([*lines, *sessions(result, bool(runner), width)])
+
+
+# --- errors ----------------------------------------------------------------------------------------------------------
+
+
+def largest_mesh_error(result: Any) -> str:
+    """The largest error by the mesh so far of what the scene's target is for."""
+    row = map_row(aim(result)[0]).of_error
+    errors = result.read(f"{row.name}/{row.name}") if row in result.layout.quantities else None
+    return largest_error(errors, result, result.axes, result.labels)
+
+
+def aim(cases: Any) -> tuple[str, float]:
+    """What the target of a file's scene is for, and the relative error; e_n and the usual one where it names none."""
+    accuracy = tomllib.loads(cases.scene).get("accuracy", {})
+    if "target" not in accuracy:
+        return "e_n", E_N_TARGET
+    return accuracy["target_of"], accuracy["target"]
+
+
+def largest_error(errors: NDArray[np.float64] | None, cases: Any, axes: Sequence[Any], labels: Any) -> str:
+    """The largest error by the mesh, how many are above the target, and how many solved cases have none.
+
+    Parameters
+    ----------
+    errors : array over the cases
+        Relative errors; None where a file has none.
+    cases : Result or xarray.Dataset
+        Has ``status`` and ``scene``.
+    axes, labels
+        As `result.store.place_text` takes them.
+    """
+    status = np.asarray(cases.status)
+    solved = int(np.count_nonzero(status == DONE))
+    if not solved or errors is None:
+        return NO_ERRORS if solved else ""
+    known = np.where(status == DONE, errors, np.nan)
+    count = int(np.count_nonzero(np.isfinite(known)))
+    if not count:
+        return f"errors of the mesh: none of {solved} solved cases has one"
+    worst = tuple(map(int, np.unravel_index(int(np.nanargmax(known)), status.shape)))
+    name, target = aim(cases)
+    parts = [f"largest error of {name} by the mesh: {100 * known[worst]:.2g} % ({place_text(axes, labels, worst)})"]
+    if above := int(np.count_nonzero(misses(known, target))):
+        parts.append(f"{above} of {count} cases above {100 * target:g} %")
+    if count < solved:
+        parts.append(f"{solved - count} of {solved} cases have none")
+    return "; ".join(parts)
+
+
+# --- counts and reasons ----------------------------------------------------------------------------------------------
+
+
+def counts(result: Any) -> str:
+    """How many cases are in which state, and how many grasps a refinement added."""
+    title = f" ({result.title})" if result.title else ""
+    states = [*(f"{int(np.sum(result.status == state))} {STATES[state]}" for state in (FAILED, MISSING)),
+              *no_grasps(result.status)]  # fmt: skip
+    done = f"{int(np.sum(result.status == DONE))} of {result.status.size} cases {STATES[DONE]}"
+    stations = f"\n{wrapped(text, PAPER, '  ', '    ')}" if (text := about(result)) else ""
+    return f"{result.path}{title}:\n  {', '.join([done, *states])}{stations}"
+
+
+def no_grasps(codes: NDArray[np.integer]) -> list[str]:
+    """How many cases have each of the states that are no grasp, as far as there are any."""
+    known = {state: int(np.sum(codes == state)) for state in NO_GRASP}
+    return [f"{count} {STATES[state]}" for state, count in known.items() if count]
+
+
+def grouped(status: NDArray[np.integer], messages: Any, flags: Callable[[], Any]) -> list[Reason]:
+    """Reasons of failed cases, of what is no grasp, and notes on solved cases, each state's most frequent one first.
+
+    Messages that differ in their numbers only are of one kind; of a solved case each flag counts by itself.
+    """
+    kinds: dict[tuple[int, str], Reason] = {}
+    marks: Any = None
+    for row in np.argwhere((messages != "") | (status == FAILED)):
+        index = tuple(int(i) for i in row)
+        state, text = int(status[index]), str(messages[index])
+        texts = [text or "no reason was given"]
+        if state == DONE:
+            marks = flags() if marks is None else marks  # read only where it is needed
+            value = int(np.nan_to_num(marks[index]))
+            more = text.removeprefix(flag_sentences(value)).removeprefix("; ")
+            texts = [*(flag.sentence for flag in flags_in(value)), *[more] * bool(more)]
+        for message in texts:
+            kind = re.sub(r"[-+]?\d[\d.]*(e[-+]?\d+)?", "#", message)
+            kinds.setdefault((state, kind), Reason(state, message, [])).cases.append(index)
+    order = (FAILED, *NO_GRASP, DONE)
+    listed = (reason for reason in kinds.values() if reason.state in order)
+    return sorted(listed, key=lambda reason: (order.index(reason.state), -len(reason.cases)))
+
+
+def reasons_in(result: Any) -> list[Reason]:
+    """The same of an open result file."""
+    return grouped(result.status, result.messages, lambda: result.read("flags/flags"))
+
+
+def reasons(result: Any, width: int = PAPER) -> list[str]:
+    """The most frequent reasons, one line each."""
+    found = reasons_in(result)
+    lines = [reason.text(lambda index: place(result, index)) for reason in found[:MOST_NOTES]]
+    rest = found[MOST_NOTES:]
+    cases = sum(len(reason.cases) for reason in rest)
+    lines += [f"and {len(rest)} more kinds on {cases} cases: 'softjaw status --json' lists all"] * bool(rest)
+    return [wrapped(line, width, "  ", "    ") for line in lines]
+
+
+def place(result: Any, index: Index) -> str:
+    """A case in words."""
+    return place_text(result.axes, result.labels, index)
+
+
+def _added(result: Any) -> dict[str, Any]:
+    """What each round of a refinement added: stations, or poses in the frame of the object's own file."""
+    rounds = result.layout.added
+    if result.axes[-3].units:
+        return {"added_stations_mm": [list(some) for some in rounds]}
+    poses = [[{"step": x[0], "point_mm": x[1:4], "approach": x[4:7], "long_side": x[7:]} for x in r] for r in rounds]
+    return {"added_poses": poses}
+
+
+# --- time ------------------------------------------------------------------------------------------------------------
+
+
+def time_split(result: Any) -> list[str]:
+    """Where the seconds of all cases went; nothing where no time was measured."""
+    # NaN where a case was served by symmetry: it cost nothing.
+    seconds = result.read("work/seconds_total")
+    total = float(np.nansum(seconds))
+    if not total:
+        return []
+    shares = {part: float(np.nansum(result.read(f"work/seconds_{part}"))) / total for part in PARTS}
+    shares["failed cases"] = float(np.nansum(seconds[result.status == FAILED])) / total
+    words = [f"{part} {share:.0%}" for part, share in shares.items() if share >= 0.005]
+    return [f"time in cases: {duration(total)} on all ranks" + (f" ({', '.join(words)})" if words else "")]
+
+
+def sessions(result: Any, running: bool, width: int = PAPER) -> list[str]:
+    """One line for each time the study was started."""
+    lines = []
+    for i, s in enumerate(result.sessions, start=1):
+        now = running and i == len(result.sessions)
+        reason = s["reason"] if s["stop"] else "running" if now else "no end was recorded (killed?)"
+        ranks = f"{s['ranks']} rank{'s' * (s['ranks'] != 1)} on {s['host']}"
+        wall = _between(s["start"], s["stop"])
+        lines.append(wrapped(f"session {i}: {s['start']}, {ranks}{wall}, {reason}", width, "  ", "  "))
+    return lines
+
+
+def _between(start: str, stop: str) -> str:
+    try:
+        return f", {duration((datetime.fromisoformat(stop) - datetime.fromisoformat(start)).total_seconds())}"
+    except ValueError:
+        return ""
