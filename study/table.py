@@ -151,13 +151,14 @@ def with_unit(name: str, unit: str) -> str:
 
 
 def plain(value: Any) -> Any:
-    """Numbers, lists and texts that JSON knows: an array as lists, None for what is no number."""
+    """Numbers, lists and texts that JSON knows: an array as lists, None for what has no number."""
     if isinstance(value, dict):
         return {key: plain(v) for key, v in value.items()}
-    if hasattr(value, "tolist"):
-        value = value.tolist()
     if isinstance(value, list | tuple):
         return [plain(v) for v in value]
+    if hasattr(value, "tolist"):
+        found = plain(value.tolist())
+        return None if isinstance(found, list) and found and all(v is None for v in found) else found
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from softjaw.study.export.csv_yaml import csv_text, with_unit
 
 from softjaw.study.flags import OF_FILE, flags_in
 from softjaw.study.quantities import FINGERS, MONOMIALS, STATES
 from softjaw.study.result.layout import DONE
 from softjaw.study.result.read import axes_of, maps_in, values_of
+from softjaw.study.table import Column, Table, plain
+from softjaw.study.table import as_csv as rendered
 
 XYZ, WRENCH = ("x", "y", "z"), ("f_x", "f_y", "tau_z")
 NINE = tuple(f"{row}_{column}" for row in XYZ for column in XYZ)
@@ -102,44 +104,27 @@ def as_json(ds: xr.Dataset, model: str = "ccm", listed: Iterable[dict[str, Any]]
         place, words = case["place"], [flag.word for flag in flags_in(case["flags"])]
         case = {**case, "flags": case["flags"] & OF_FILE}
         del case["place"]
-        rows.append(place | {k: plain(v) for k, v in case.items()} | {"flag_words": words})
+        rows.append(place | plain(case) | {"flag_words": words})
     about = {"file": Path(ds.file).name, "model": model, "units": units, "meaning": MEANING}
     return json.dumps({**about, "cases": rows}, indent=1)
 
 
 def as_csv(ds: xr.Dataset, model: str = "ccm", listed: Iterable[dict[str, Any]] | None = None) -> str:
-    """One line for each case (`listed`, or all), SI units in the header, empty where there is nothing."""
-    maps = {name: unit for name, unit in maps_in(ds).items() if name != "flags"}
-    head = [with_unit(axis.name, axis.units) for axis in axes_of(ds)]
-    head += ["label", "state", "message", "flags", *(with_unit(*pair) for pair in maps.items())]
-    for f in (1, 2):
-        for name, unit, parts in FINGER:
-            each = [unit] * max(len(parts), 1) if isinstance(unit, str) else unit
-            names = [f"finger{f}.{name}.{part}" for part in parts] or [f"finger{f}.{name}"]
-            head += [with_unit(n, u) for n, u in zip(names, each, strict=True)]
-    rows = cases(ds, model) if listed is None else listed
-    return csv_text([head, *(_line(case, tuple(maps)) for case in rows)])
-
-
-def _line(case: dict[str, Any], maps: tuple[str, ...]) -> list[Any]:
-    """A case as a line of CSV."""
-    flat = [float(v) for values in case["fingers"] for part in values.values() for v in np.ravel(part)]
-    numbers = [*(float(case["maps"][name]) for name in maps), *flat]
-    lead = [*case["place"].values(), case["label"], case["state"], case["message"], case["flags"] & OF_FILE]
-    # repr loses no digit, so what is read back is what was stored.
-    return [*lead, *(None if np.isnan(v) else repr(v) for v in numbers)]
-
-
-def plain(value: Any) -> Any:
-    """A value as JSON takes it: nested lists, None for what is not there; an array without any number is None."""
-    if isinstance(value, dict):
-        return {key: plain(v) for key, v in value.items()}
-    if isinstance(value, list):
-        return [plain(v) for v in value]
-    if isinstance(value, str | int):
-        return value
-    numbers = np.asarray(value, float)
-    if not numbers.ndim:
-        # JSON has no NaN.
-        return float(numbers) if np.isfinite(numbers) else None
-    return [plain(v) for v in numbers] if np.isfinite(numbers).any() else None
+    """One line for each case (`listed`, or all), each component of the fingers' arrays in a column of its own."""
+    columns = [Column(axis.name, axis.units) for axis in axes_of(ds)]
+    columns += [Column(name) for name in ("label", "state", "message", "flags")]
+    columns += [Column(name, unit) for name, unit in maps_in(ds).items() if name != "flags"]
+    of_finger = []
+    for name, unit, parts in FINGER:
+        units = [unit] * max(len(parts), 1) if isinstance(unit, str) else unit
+        names = [f"{name}.{part}" for part in parts] or [name]
+        of_finger += [Column(n, u) for n, u in zip(names, units, strict=True)]
+    columns += [replace(c, name=f"finger{f}.{c.name}") for f in (1, 2) for c in of_finger]
+    rows = []
+    for case in cases(ds, model) if listed is None else listed:
+        row = {**case["place"], **case["maps"], **case, "flags": case["flags"] & OF_FILE}
+        for f, finger in enumerate(case["fingers"], start=1):
+            flat = (float(v) for part in finger.values() for v in np.ravel(part))
+            row |= {f"finger{f}.{c.name}": v for c, v in zip(of_finger, flat, strict=True)}
+        rows.append(row)
+    return rendered(Table("", columns, rows))

@@ -26,10 +26,11 @@ from typing import Any
 
 import xarray as xr
 
-from softjaw.study.export.cases import MEANING, plain
+from softjaw.study.export.cases import MEANING
 from softjaw.study.export.selection import GripperFrame, RankedGrasp
 from softjaw.study.export.yaml import yaml_text
 from softjaw.study.ranking import task_keys
+from softjaw.study.table import plain
 from softjaw.study.units import UNITS
 
 CLOSING = {"isaac_grasp": "y", "graspgen": "x", "moveit": "y"}  # as Franka's hand, and as GraspGen wants it

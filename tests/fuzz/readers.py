@@ -111,12 +111,13 @@ def _result(path):
     from softjaw.study.export.cases import as_csv
     from softjaw.study.result.read import dataset
     from softjaw.study.result.store import open_result
-    from softjaw.study.show.tables.show import as_json, best
-    from softjaw.study.show.tables.status import status_text
+    from softjaw.study.show.best_grasps import best
+    from softjaw.study.show.status import status_text
+    from softjaw.study.table import as_json
 
     with open_result(path) as result:
         ds = dataset(result)
-        return as_csv(ds), as_json(best(ds, None, 3, whole_lines=False)), status_text(result, 80)
+        return as_csv(ds), as_json(best(ds, None, 3)), status_text(result, 80)
 
 
 def _cost(path):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import os
 import shutil
 import signal
@@ -18,7 +16,6 @@ from softjaw.fem.objects import mesh_file
 from softjaw.fem.objects.mesh_file import read_triangles
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.study.cli import main
-from softjaw.study.export.csv_yaml import csv_text
 from softjaw.study.messages import OTHER_FILE, UNPRINTABLE, USAGE, StudyError
 from softjaw.study.patch.patch_reader import Reading, read_patch
 from softjaw.study.patch.trial import trouble
@@ -223,12 +220,6 @@ def test_a_file_that_hdf5_breaks_on_is_refused(tmp_path):
     path.write_bytes(content)
     with pytest.raises(StudyError, match=r"a\.hdf"):
         open_result(path)
-
-
-def test_no_cell_of_a_csv_is_computed_by_a_spreadsheet():
-    cells = ["=1+1", "+A1", "-A1", "@x", "\tx", "-3.5", "+2e-3", "at 0 mm", None]
-    (row,) = csv.reader(io.StringIO(csv_text([cells])))
-    assert row == ["'=1+1", "'+A1", "'-A1", "'@x", "'\tx", "-3.5", "+2e-3", "at 0 mm", ""]
 
 
 def test_limits_are_stated_where_users_look():

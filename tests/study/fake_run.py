@@ -139,7 +139,7 @@ def main(arguments=None):
 
     from softjaw.study.messages import StudyError, complain
     from softjaw.study.run.session import Work, run_study
-    from softjaw.study.show.tables.summary import summary
+    from softjaw.study.show.best_grasps import summary
 
     comm = MPI.COMM_WORLD
     if options.file_limit:

@@ -24,7 +24,7 @@ from softjaw.study.result.store import open_result
 from softjaw.study.result.write import ResultWriter, record
 from softjaw.study.run.plan import make_plan
 from softjaw.study.scene import parse_scene
-from softjaw.study.show.tables.show import FLAGS_WIDTH
+from softjaw.study.show.best_grasps import LABEL_WIDTH
 
 ROOT = Path(__file__).parents[2]
 BITWISE = (ast.BitOr, ast.BitAnd)
@@ -82,7 +82,7 @@ def test_words_fit_their_column_and_sentences_their_message():
     assert len({flag.word for flag in Flag}) == len({flag.sentence for flag in Flag}) == len(Flag)
     for flag in Flag:
         assert flag.value.bit_count() == 1
-        assert 0 < len(flag.word) <= FLAGS_WIDTH
+        assert 0 < len(flag.word) <= LABEL_WIDTH
         assert flag.sentence
         assert ";" not in flag.sentence + flag.word
     assert len(flag_sentences(OF_FILE).encode()) < MESSAGE - 400

@@ -17,8 +17,8 @@ from softjaw.study.run.plan import make_plan
 from softjaw.study.scene import parse_scene
 from softjaw.study.scene.errors import SceneError
 from softjaw.study.scene.samples import latin_hypercube
+from softjaw.study.show.best_grasps import best
 from softjaw.study.show.tables.certainty import Sure
-from softjaw.study.show.tables.show import best
 
 BALL = """
 [object]
@@ -167,8 +167,8 @@ def test_maps_are_those_of_the_scene_as_given_with_what_the_samples_say(file, tm
 
 def test_the_interval_is_told_where_the_maps_are(file):
     table = best(softjaw.open(file))
-    assert "quality_interval" in [name for name, _ in table.columns]
-    row = dict(zip((name for name, _ in table.columns), table.rows[0], strict=True))
+    assert "quality_interval" in [c.name for c in table.columns]
+    row = table.rows[0]
     ds = softjaw.open(file)
     assert row["quality_interval"] == float(ds.quality_interval.sel(station=row["station"]).squeeze())
     look_up = GraspMap(file)

@@ -13,7 +13,7 @@ from softjaw.study.units import SHOWN, UNITS, in_si, shown, shown_text, shown_un
 
 STUDY = Path(__file__).parents[2] / "study"
 # Folders whose modules take their factors from the table; the others follow as they are rebuilt.
-KEPT = ("result", "lookup", "scene", "show/tables", "quantities.py", "flags.py")
+KEPT = ("result", "lookup", "scene", "show/tables", "table.py", "quantities.py", "flags.py")
 FILES = sorted(f for f in (p.relative_to(STUDY).as_posix() for p in STUDY.rglob("*.py")) if f.startswith(KEPT))
 FACTORS = {1e3, 1e-3, 180 / math.pi, math.pi / 180}
 

@@ -14,9 +14,9 @@ from softjaw.study.cli import main
 from softjaw.study.cli.exporting import PLANNERS, SIMULATORS, TABLES
 from softjaw.study.cli.options import APPROACHES, FORMATS
 from softjaw.study.export import selection as module
-from softjaw.study.export.csv_yaml import yaml_text
 from softjaw.study.export.planners import CLOSING
 from softjaw.study.export.selection import GripperFrame, Selection, grasps, quaternion
+from softjaw.study.export.yaml import yaml_text
 from softjaw.study.flags import Flag
 from softjaw.study.messages import CANNOT_WRITE, USAGE
 from tests.study.export.grasp_results import RADIUS, STATIONS, geometry, opened, write
@@ -110,7 +110,7 @@ def station_of(position):
 
 
 def test_every_format_of_the_command_has_a_writer_and_the_other_way_round():
-    assert set(FORMATS) == {*TABLES, *PLANNERS, *SIMULATORS}
+    assert set(FORMATS) == {*TABLES, *PLANNERS, *SIMULATORS, "vtk"}
     assert tuple(module.APPROACHES) == APPROACHES
     assert set(CLOSING) == set(PLANNERS)
 

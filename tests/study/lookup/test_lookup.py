@@ -350,7 +350,7 @@ def test_the_page_says_how(tmp_path, monkeypatch):
 
 def test_the_best_grasps_are_those_of_show_as_points_of_the_map(tmp_path):
     from softjaw.study.result.read import open as open_dataset
-    from softjaw.study.show.tables.show import best
+    from softjaw.study.show.best_grasps import best
 
     held = np.random.default_rng(2).permutation(np.arange(float(len(STATIONS) * len(ANGLES) * len(FORCES))))
     held = 0.01 * held.reshape(len(STATIONS), len(ANGLES), len(FORCES))
@@ -358,11 +358,10 @@ def test_the_best_grasps_are_those_of_show_as_points_of_the_map(tmp_path):
     found, ds = GraspMap(path), open_dataset(path)
     for by, force in ((None, None), ("payload", None), ("payload", FORCES[0]), ("e_n", FORCES[1])):
         table = best(ds, force=force, by=by, top=3)
-        names = [name for name, _ in table.columns]
         points = found.best(3, by, force)
         for row, point in zip(table.rows, points, strict=True):
-            assert point.place[0].tolist() == [row[1], row[2], table.force]
-            assert [point.payload, point.e_n] == [row[names.index("payload")], row[names.index("e_n")]]
+            assert point.place[0].tolist() == [row["station"], row["angle"], table.facts["force"]]
+            assert [point.payload, point.e_n] == [row["payload"], row["e_n"]]
     assert len(found.best(10_000)) == len(STATIONS) * len(ANGLES)
     with pytest.raises(ValueError, match=r"force is 1\.5"):
         found.best(force=1.5)

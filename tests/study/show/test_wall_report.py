@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 import shutil
 
@@ -25,11 +24,11 @@ from softjaw.study.result.store import open_result
 from softjaw.study.result.write import ResultWriter, record
 from softjaw.study.run.plan import make_plan, memory, plan_text, wall_size
 from softjaw.study.scene import parse_scene
+from softjaw.study.show.best_grasps import best, safe_range
 from softjaw.study.show.grasps import at, judge
 from softjaw.study.show.object_surface import undeformed
 from softjaw.study.show.report import curves, maps, tables, verdict, writing
 from softjaw.study.show.tables.overview import RULE, scene_text
-from softjaw.study.show.tables.show import as_csv, as_json, as_text, best
 from softjaw.study.show.view.model import View, read_scene, view_of
 from tests.study.sealing import sealed
 
@@ -139,37 +138,27 @@ def test_the_size_of_a_shell_is_that_of_the_mesh_that_is_solved(solved):
 
 def test_show_has_indentations_stress_and_the_window_of_forces(can):
     with open_result(can) as result:
-        text = as_text(best(dataset(result)), 240).partition("\n\n")[2]
-        strong = best(dataset(result), force=3.0)
+        table, strong = best(dataset(result)), best(dataset(result), force=3.0)
         low, high = result.derived("force_low"), result.derived("force_high")
-    names, units = text.splitlines()[1:3]
-    assert names.split()[-4:] == ["stress", "+-", "force", "range"]
-    assert units.split()[-4:] == ["[kPa]", "[%]", "[N]", "flags"]
-    assert "payload" in names
-    assert text.splitlines()[0].endswith("at 1 N, the lowest solved force at which a grasp holds the object")
-    assert f"{low[0, 0]:.3g}..{high[0, 0]:.3g}" in text
-    assert "force range: normal forces" in text
+    assert table.facts["force"] == 1.0
+    names = [c.name for c in table.columns if c.people]
+    assert {"payload", "indentation", "wall_stress", "safe_forces"} <= set(names)
+    assert table.rows[0]["safe_forces"] == f"{low[0, 0]:.3g}..{high[0, 0]:.3g}"
+    assert (table.rows[0]["force_low"], table.rows[0]["force_high"]) == (low[0, 0], high[0, 0])
     # 3 N dents both stations deeper than 1.5 mm
-    assert as_text(strong).count("too strong") == 3
-    told = json.loads(as_json(strong))
-    assert told["force"] == 3.0
-    assert told["units"]["wall_stress"] == "Pa"
-    assert {"indentation", "wall_stress", "force_low", "force_high", "safety_factor", "flags"} <= told["grasps"][
-        0
-    ].keys()
-    assert [g["flags"] & (Flag.TOO_WEAK | Flag.TOO_STRONG) for g in told["grasps"]] == [0, 0]  # as in the file
-    assert "force_low [N]" in as_csv(strong).splitlines()[0]
+    assert [row["notes"] for row in strong.rows] == [Flag.TOO_STRONG.word] * 2
+    assert [row["flags"] & (Flag.TOO_WEAK | Flag.TOO_STRONG) for row in strong.rows] == [0, 0]  # as in the file
 
 
-@pytest.mark.parametrize(("bit", "word"), [(16384, "slides out"), (32768, "yields"), (8192, "snapped")])
-def test_grasps_that_slide_out_or_yield_come_last_and_are_named(tmp_path, can, bit, word):
+@pytest.mark.parametrize("flag", [Flag.SLIDES_OUT, Flag.YIELDS, Flag.SNAPPED])
+def test_grasps_that_slide_out_or_yield_come_last(tmp_path, can, flag):
     with open_result(can) as result:
-        first = best(dataset(result), force=1.0).rows[0][1]
+        first = best(dataset(result), force=1.0).rows[0]["station"]
         index = (int(np.abs(result.axes[0].values - first).argmin()), 0, 0)
-    with open_result(changed(can, tmp_path, "flags/flags", bit, index)) as result:
+    with open_result(changed(can, tmp_path, "flags/flags", int(flag), index)) as result:
         table = best(dataset(result), force=1.0)
-    assert (table.rows[0][1] == first) == (word == "snapped")
-    assert f"\n{word}: " in as_text(table)
+    assert (table.rows[0]["station"] == first) == (flag == Flag.SNAPPED)
+    assert any(flag.word in row["notes"] for row in table.rows)
 
 
 def test_cases_outside_their_window_are_judged_by_the_force():
@@ -192,10 +181,10 @@ def test_the_report_answers_at_a_force_that_the_wall_bears(can, solved):
         data = judge(dataset(result))
         high = result.derived("force_high")[0, 0]
         assert data.normal_force.values[data.attrs["best"][-1]] == 1.0
-        said = " ".join(verdict.verdict(data, 0.8))
+        said = " ".join(verdict.verdict(data))
         assert any("No grasp is safe above 1 N" in warning for warning in verdict.warnings(data))
-        assert f"to {high:.3g} N, which its wall bears" in said
-        assert verdict.safe_range(data, (0, 0, 0)).endswith(f"{high:.3g}")
+        assert f"{safe_range(data, data.attrs['best'])} N" in said
+        assert safe_range(data, (0, 0, 0)).endswith(f"{high:.3g}")
         words, limits, *figures = writing.wall(View(data), data.attrs["best"])
         (bars,) = [t for t in maps.safe_forces(data, data.attrs["best"])["figure"].data if t.type == "bar"]
         level = maps.levels(data, data.attrs["best"])["figure"].data[0]
@@ -237,9 +226,9 @@ def test_failed_candidates_are_shown_as_failed(tmp_path, solved):
         level = maps.levels(data, data.attrs["best"])["figure"].data[0]
         assert np.isfinite(np.array(bars.y, float)).tolist() == [True, False]
         assert np.ravel(level.z).tolist() == [2.0, None]
-        assert verdict.safe_range(data, (1, 0, 0)) == "–"
+        assert safe_range(data, (1, 0, 0)) == "-"
         (table,) = tables.reasons(data, FAILED)
-        assert table["rows"][0][:2] == ["2", "the wall gave way"]
+        assert table["rows"][0][:3] == ["failed", "2", "the wall gave way"]
 
 
 def test_forced_levels_are_told_as_the_scene_says(tmp_path, can):

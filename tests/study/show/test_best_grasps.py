@@ -1,0 +1,242 @@
+"""The best grasps: which force, which order, which errors; the same numbers in text, CSV and JSON."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from softjaw.study.cli import main
+from softjaw.study.flags import Flag
+from softjaw.study.quantities import MODELS, quantities
+from softjaw.study.result.layout import DONE, FAILED
+from softjaw.study.show.best_grasps import answer, best, best_text, safe_range
+from softjaw.study.show.status import grouped
+from softjaw.study.table import as_csv, as_json, as_text
+
+FORCES = np.array([1.0, 5.0])
+
+
+def study(quality, flags=0.0, labels=None, status=DONE, needs=()):
+    """Result with this quality ``(stations, angles)`` at both forces; with ``labels`` its candidates are poses."""
+    quality = np.asarray(quality, dtype=float)
+    shape = (*quality.shape, len(FORCES))
+    over = ("station", "angle", "normal_force")
+    every = np.broadcast_to(quality[..., None], shape)
+    maps = {
+        q.name: ((*over, *q.dims), np.broadcast_to(every[..., None], (*shape, 3)) if q.by_model else every,
+                 {"units": q.unit})
+        for q in quantities(needs) if q.group == "maps"
+    }  # fmt: skip
+    maps["flags"] = (over, np.broadcast_to(np.reshape(flags, (-1, 1, 1)), shape).astype(np.int64))
+    maps["status"] = (over, np.full(shape, status))
+    given = np.array(labels).reshape(-1, 1) if labels else np.full(quality.shape, "")
+    axes = {"station": (np.arange(shape[0], dtype=float), "" if labels else "m"),
+            "angle": (np.arange(shape[1]) * np.pi / 2, "rad"), "normal_force": (FORCES, "N")}  # fmt: skip
+    coordinates = {name: (name, v, {"units": u, "long_name": name}) for name, (v, u) in axes.items()}
+    coordinates |= {"label": (over[:2], given), "model": list(MODELS)}
+    return xr.Dataset(maps, coordinates, {"planar": "pcm", "poses": bool(labels), "derived": (), "scene": ""})
+
+
+def cells(table, name):
+    """What people read in a column."""
+    column = next(c for c in table.columns if c.name == name)
+    return [table.cell(row, column) for row in table.rows]
+
+
+@pytest.mark.parametrize("top", [1, 2, 3, 0])
+def test_images_of_a_grasp_share_a_line_and_count_as_one(top):
+    pairs = study([[4, 4], [3, 3], [2, 1]])
+    table = best(pairs, top=top, lines=True)
+    assert len(table.rows) == (top or 4)
+    assert cells(table, "rank") == ["1,2", "3,4", "5", "6"][: top or 4]
+    assert cells(table, "angle")[0] == "0,90"
+    assert str({1: 2, 2: 4, 3: 5, 0: 6}[top]) in table.title.split()
+    assert len(as_csv(best(pairs, top=top)).splitlines()) == 1 + (top or 6)
+
+
+def test_flags_are_counted_words_for_people_and_bits_for_programs():
+    both = float(Flag.HOLE | Flag.COARSE)
+    table = best(study([[3.0], [2.0], [1.0]], flags=[0.0, float(Flag.HOLE), both]))
+    assert cells(table, "notes") == ["", Flag.HOLE.word, f"{Flag.HOLE.word}, {Flag.COARSE.word}"]
+    assert [row["flags"] for row in table.rows] == [0, Flag.HOLE, Flag.HOLE | Flag.COARSE]
+    legend = next(note for note in table.notes if Flag.HOLE.sentence in note)
+    assert f"{Flag.HOLE.word} (2 of 3)" in legend
+    assert f"{Flag.COARSE.word} (1 of 3)" in legend
+
+
+def test_messages_that_differ_in_numbers_are_one_kind_and_failures_come_first():
+    status = np.array([FAILED, DONE, FAILED, DONE])
+    messages = np.array(["residual 1e-3", f"{Flag.HOLE.sentence}; slow", "residual 2.5", Flag.HOLE.sentence])
+    kinds = grouped(status, messages, lambda: np.full(4, int(Flag.HOLE)))
+    assert [(kind.state, len(kind.cases), kind.message) for kind in kinds] == [
+        (FAILED, 2, "residual 1e-3"), (DONE, 2, Flag.HOLE.sentence), (DONE, 1, "slow"),
+    ]  # fmt: skip
+    assert kinds[0].cases == [(0,), (2,)]
+    text = kinds[0].text(str)
+    assert "2 x" in text
+    assert "(0,); (2,)" in text
+    assert "1 more" in kinds[0]._replace(cases=[(0,), (1,), (2,)]).text(str)
+
+
+@pytest.mark.parametrize("force", ["-3", "0", "nan", "inf", "ten"])
+@pytest.mark.usefixtures("every_rank_speaks")
+def test_a_force_that_is_none_is_bad_usage(force, capsys):
+    assert main(["show", "any.hdf", "--force", force]) == 2
+    assert "--force" in capsys.readouterr().err
+
+
+def rising(masses=None, safety=2, flags=0, **more):
+    """Two stations: payload 0.1 and 0.2 kg per newton at 1 and 5 N, quality the other way round."""
+    ds = study([[2.0], [1.0]], flags, needs=["mass"] if masses else (), **more)
+    held = np.array([0.1, 0.2])[:, None, None] * FORCES
+    ds["payload"] = (ds.payload.dims, np.repeat(held[..., None], 3, axis=-1), {"units": "kg"})
+    if masses:
+        ds["safety_factor"] = ds.payload / masses
+        over = ds.status.dims[:-1]
+        force = safety * masses / np.array([[0.1], [0.2]])
+        ds = ds.assign(force_low=(over, np.where(force <= 5, force, np.nan)), force_low_error=(over, 0.01 * force))
+        scene = f"[object]\nmass_g = {1e3 * masses}\n[task]\nsafety = {safety}\nweight_direction = 'worst'"
+        ds = ds.assign_attrs(scene=scene, has=("mass", "task"))
+    return ds
+
+
+def stations(table):
+    return [row["station"] for row in table.rows]
+
+
+def test_a_force_between_two_solved_ones_lies_on_straight_lines():
+    columns = best(rising()).columns
+    for force, held in ((1.0, 0.2), (2.5, 0.5), (5.0, 1.0)):
+        table = best(rising(), force=force, by="payload")
+        assert table.facts["force"] == force
+        assert table.columns == columns
+        assert table.rows[0]["payload"] == pytest.approx(held, rel=1e-12)
+    for force in (0.9, 5.1):
+        with pytest.raises(ValueError, match=f"{force:g} N"):
+            best(rising(), force=force)
+
+
+def test_between_forces_a_case_needs_both_and_carries_the_flags_of_both():
+    ds = rising()
+    ds.status.values[0, 0, 1] = FAILED
+    ds.flags.values[1, 0, 0], ds.flags.values[1, 0, 1] = Flag.HOLE, Flag.COARSE
+    table = best(ds, force=2.0)
+    assert stations(table) == [1.0]
+    assert table.rows[0]["flags"] == Flag.HOLE | Flag.COARSE
+    ds.flags.values[1, 0, 1] = Flag.SNAPPED
+    assert not best(ds, force=2.0).rows
+
+
+def test_grasps_are_ranked_by_what_is_named_and_by_payload_where_there_is_a_task():
+    assert stations(best(rising())) == [0.0, 1.0]
+    assert stations(best(rising(), by="payload")) == [1.0, 0.0]
+    assert stations(best(rising(0.3))) == [1.0, 0.0]
+    assert stations(best(rising(0.3), by="quality", force=5.0)) == [1.0, 0.0]  # the other is too weak there
+    assert stations(best(rising(0.1), by="quality")) == [1.0, 0.0]
+    assert stations(best(rising(0.1), by="quality", force=5.0)) == [0.0, 1.0]
+
+
+def test_the_smallest_force_that_holds_the_object_is_the_best_and_at_a_given_force_the_largest_payload():
+    """At 5 N the second holds more, but the first needs less force to hold 150 g twice over."""
+    ds = rising(0.15)
+    ds.payload.values[0, 0], ds.payload.values[1, 0] = [[0.12], [0.45]], [[0.11], [0.9]]
+    ds["force_low"].values[:] = [[3.2], [3.5]]
+    ds["safety_factor"] = ds.payload / 0.15
+    assert stations(best(ds)) == [0.0, 1.0]
+    assert stations(best(ds, force=5.0)) == [1.0, 0.0]
+    ds["force_low"].values[0] = np.nan
+    assert stations(best(ds)) == [1.0, 0.0]
+
+
+def test_without_a_mass_the_force_is_the_largest_that_most_share_and_with_one_the_lowest_that_holds():
+    assert best(rising()).facts["force"] == 5.0
+    some = rising()
+    some.status.values[0, 0, 1] = FAILED
+    assert best(some).facts["force"] == 1.0
+    assert best(rising(0.3)).facts["force"] == 5.0
+    assert best(rising(0.1)).facts["force"] == 1.0
+    assert best(rising(3.0)).facts["force"] == 5.0  # none holds it
+
+
+def test_the_answer_has_the_force_to_use_and_what_is_held():
+    told = best(rising(0.3)).facts["answer"]
+    assert "3.000 ± 0.030 N" in told
+    assert "2 times" in told
+    assert "300 g" in told
+    assert "500 g" in best(rising()).facts["answer"]
+    assert best(rising()).facts["answer"] == answer(rising(), (0, 0, 1))
+    assert json.loads(as_json(best(rising())))["answer"] == best(rising()).facts["answer"]
+    assert best_text(rising(), 200).splitlines()[0] == best(rising()).facts["answer"]
+
+
+def test_the_payload_is_shown_in_grams_and_stored_in_kilograms():
+    table = best(study([[0.2], [0.1]]))
+    assert cells(table, "payload") == ["200", "100"]
+    assert [row["payload"] for row in table.rows] == [0.2, 0.1]
+    assert "payload [kg]" in as_csv(table).splitlines()[0].split(",")
+
+
+WIDE = ("mass", "wall", "two meshes")
+
+
+@pytest.mark.parametrize("width", [60, 80, 100, 200])
+def test_where_to_grasp_and_the_first_maps_stay_in_a_narrow_terminal(width):
+    walls = study([[4, 4], [3, 3]], flags=[0.0, float(Flag.SLIPS + Flag.COARSE + Flag.NOT_ANTIPODAL)], needs=WIDE)
+    lines = as_text(best(walls), width).splitlines()
+    heads = " ".join(lines[:4]).split()
+    for name in ("rank", "station", "quality", "e_n", "payload", "notes"):
+        assert name in heads
+    assert max(map(len, lines)) <= max(width, 80)
+
+
+def test_errors_stand_with_what_they_belong_to():
+    known = study([[0.04]], needs=WIDE)
+    table = best(known)
+    for name in ("quality", "e_n", "f_x_max", "f_y_max", "tau_z_max"):
+        column = next(c for c in table.columns if c.name == name)
+        assert column.error == f"{name}_error"
+        assert table.rows[0][column.error] == 0.04
+    assert cells(table, "e_n") == ["40.0 ± 1.6"]  # mm, 4 %
+    assert cells(table, "opening_loaded") == ["40 ± 40"]  # its error is absolute
+    assert table.facts["largest_error"]
+    assert not any(c.error for c in best(study([[4.0]])).columns)
+
+
+def test_the_largest_error_is_found_with_its_place_and_how_many_have_none():
+    known = study([[0.5, 0.5], [0.5, 0.5]], needs=WIDE)
+    errors = np.array([[[0.01, 0.002], [np.nan, np.nan]], [[0.018, np.nan], [0.5, 0.001]]])
+    over, states = known.status.dims, np.full((2, 2, 2), DONE)
+    states[1, 1, 0] = FAILED
+    known["e_n_error"], known["status"] = (over, errors, {"units": ""}), (over, states)
+    told = best(known).facts["largest_error"]
+    for words in ("1.8 %", "station 1000 mm, angle 0 deg, normal_force 1 N", "3 of 7", "1 of 4"):
+        assert words in told
+    assert best(known, force=5.0).facts["largest_error"] == told
+    known["e_n_error"] = (over, np.full((2, 2, 2), np.nan), {"units": ""})
+    assert "none of 7" in best(known).facts["largest_error"]
+
+
+def test_a_pose_is_shown_by_number_and_label_alone():
+    table = best(study([[2.0], [1.0]], labels=["near", "far"]))
+    assert [c.label or c.name for c in table.columns if c.people][:4] == ["rank", "pose", "label", "quality"]
+    assert cells(table, "label") == ["near", "far"]
+    assert {"station", "angle"} <= table.rows[0].keys()
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "text"),
+    [(0.8, 2.5, "0.8..2.5"), (0.8, 5.0, "0.8..5+"), (3.0, 2.5, "none"), (np.nan, np.nan, "-"), (None, 2.5, "..2.5")],
+)
+def test_the_safe_forces_of_a_grasp(low, high, text):
+    ds = study([[1.0]], needs=["mass"])
+    bounds = {"force_low": low, "force_high": high}
+    over = ds.status.dims[:-1]
+    ds = ds.assign({name: (over, np.full((1, 1), bound)) for name, bound in bounds.items() if bound is not None})
+    assert safe_range(ds, (0, 0, 0)) == text
+    assert cells(best(ds), "safe_forces") == [text]
+    row = json.loads(as_json(best(ds)))["grasps"][0]
+    assert row["force_high"] == (None if np.isnan(high) else high)
+    assert "safe_forces" not in row

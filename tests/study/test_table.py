@@ -1,0 +1,104 @@
+"""One table, four renderings: the same cells in text, page, CSV and JSON, none lost, none made up."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+
+import numpy as np
+import pytest
+
+from softjaw.study.page import block_of
+from softjaw.study.table import MOST_NOTES, Column, Table, as_csv, as_json, as_text, with_error
+
+COLUMNS = (
+    Column("grasp"),
+    Column("e_n", "m", error="e_n_error"),
+    Column("e_n_error", people=False),
+    Column("opening", "m", "open", error="opening_error", drop=1),
+    Column("opening_error", "m", people=False),
+    Column("force", "N", digits=5, drop=2),
+    Column("range", programs=False, wrap=8),
+)
+ROWS = (
+    {"grasp": 1, "e_n": 0.0171, "e_n_error": 0.01, "opening": 0.06, "opening_error": 2e-4, "force": 2.0,
+     "range": "a, b"},
+    {"grasp": 2, "e_n": math.nan, "opening": 0.06, "opening_error": 2e-4, "force": math.inf, "range": "-"},
+)
+TABLE = Table("two grasps", COLUMNS, ROWS, [f"note {k}" for k in range(5)], {"best": np.float64(1.5)}, "grasps")
+
+
+def test_people_read_units_and_as_many_digits_as_the_errors_leave():
+    title, heads, units, first, second, *notes = as_text(TABLE).splitlines()
+    assert title == "two grasps"
+    assert heads.split() == ["e_n", "open", "force"]
+    assert units.split() == ["grasp", "[mm]", "[mm]", "[N]", "range"]
+    assert first.split() == ["1", "17.10", "±", "0.17", "60.00", "±", "0.20", "2", "a,", "b"]
+    assert second.split() == ["2", "-", "60.00", "±", "0.20", "-", "-"]
+    assert notes[:MOST_NOTES] == list(TABLE.notes[:MOST_NOTES])
+    assert len(notes) == MOST_NOTES + 1
+    assert "2 more" in notes[-1]
+
+
+@pytest.mark.parametrize(("width", "hidden"), [(80, []), (40, ["force"]), (32, ["opening", "force"])])
+def test_a_narrow_text_hides_the_least_important_columns_and_names_them(width, hidden):
+    lines = as_text(TABLE, width).splitlines()
+    assert max(map(len, lines)) <= max(width, 40)
+    heads = lines[1].split()
+    assert [name for name in ("opening", "force") if (name.replace("opening", "open")) not in heads] == hidden
+    assert all(name in " ".join(lines[-3:]).replace("force,", "force") for name in hidden)
+
+
+def test_the_page_has_the_cells_of_the_text():
+    block = block_of(TABLE, first=True)
+    assert block["head"] == ["grasp", "e_n [mm]", "open [mm]", "force [N]", "range"]
+    assert block["rows"][0] == ["1", "17.10 ± 0.17", "60.00 ± 0.20", "2", "a, b"]
+    assert block["looks"] == ["n", "n", "n", "n", "wide"]
+    assert block["first"]
+
+
+def test_programs_get_every_column_and_note_in_si_units():
+    record = json.loads(as_json(TABLE))
+    assert record["best"] == 1.5
+    assert record["notes"] == list(TABLE.notes)
+    assert record["units"] == {c.name: c.unit for c in COLUMNS if c.name != "range"}
+    assert [row["e_n"] for row in record["grasps"]] == [0.0171, None]
+    assert record["grasps"][1]["e_n_error"] is None
+    assert record["grasps"][1]["force"] is None
+    head, first, second = csv.reader(io.StringIO(as_csv(TABLE)))
+    assert head == ["grasp", "e_n [m]", "e_n_error", "opening [m]", "opening_error [m]", "force [N]"]
+    assert [float(cell) for cell in first] == [1, 0.0171, 0.01, 0.06, 2e-4, 2.0]
+    assert second == ["2", "", "", "0.06", "0.0002", ""]
+
+
+def test_no_cell_of_a_csv_is_computed_by_a_spreadsheet():
+    cells = ["=1+1", "+A1", "-A1", "@x", "\tx", "-3.5", "+2e-3", "at 0 mm", None]
+    table = Table("", [Column("a"), Column("b")], [{"a": cell, "b": 1} for cell in cells])
+    _, *found = csv.reader(io.StringIO(as_csv(table)))
+    assert [row[0] for row in found] == ["'=1+1", "'+A1", "'-A1", "'@x", "'\tx", "-3.5", "+2e-3", "at 0 mm", ""]
+
+
+def test_neighbours_that_look_alike_share_a_row():
+    angles = [{"rank": k, "angle": k * np.pi / 6, "value": 1.0 + (k > 3)} for k in range(1, 7)]
+    table = Table("", [Column("rank"), Column("angle", "rad"), Column("value")], [*angles, angles[0]])
+    merged = table.merged("rank", "angle")
+    assert [[merged.cell(row, c) for c in table.columns] for row in merged.rows] == [
+        ["1..3", "30..90", "1"], ["4..6", "120..180", "2"], ["1", "30", "1"],
+    ]  # fmt: skip
+    assert [row["rank"] for row in table.first(2).rows] == [1, 2]
+    assert len(table.first(0).rows) == 7
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "text"),
+    [
+        (-17.0812, 0.152, "-17.08 ± 0.15"),
+        (123456.0, 1234.0, "123456 ± 1234"),
+        (0.0, 0.02, "0.000 ± 0.020"),
+        (9.9996, 0.0009, "10.000 ± 0.001"),
+    ],
+)
+def test_an_error_decides_on_the_digits_of_its_value(value, error, text):
+    assert with_error(value, error) == text
