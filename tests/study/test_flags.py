@@ -171,7 +171,7 @@ def test_every_reader_tells_every_flag(all_flags, capsys, monkeypatch):
     assert point.flags == exported["flags"] == OF_FILE
     assert str(OF_FILE) in csv
     for flag in flags_in(OF_FILE):
-        assert f"{flag.word}: {flag.sentence}" in table
+        assert f"{flag.word} (1 of 1): {flag.sentence}" in table
         assert flag.sentence in state
         assert flag.word in exported["flag_words"]
         assert flag.sentence in exported["message"]
