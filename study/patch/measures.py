@@ -223,7 +223,7 @@ def fit_quartic(
         As for `fit_ellipsoid`.
     wrench : str
         ``3-D``: the components ``(f_x, f_y, tau_z)``; ``6-D``: all of ``(f, tau)``, for which 1000 samples are few
-        and the fit takes some 0.3 s.
+        and the fit takes some 0.7 s.
 
     Returns
     -------
