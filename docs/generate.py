@@ -23,7 +23,7 @@ from softjaw.study.cli.options import COMMANDS, program
 from softjaw.study.flags import DERIVED, Flag
 from softjaw.study.messages import MEANING
 from softjaw.study.quantities import EFFECT_TABLE, MODEL_NAMES, REASONS, STATES, TABLE, Quantity
-from softjaw.study.scene.grasps import GraspPose, Refinement
+from softjaw.study.scene.grasps import GraspPose
 from softjaw.study.scene.model import SECTIONS, Scene
 from softjaw.study.scene.objects import SHAPES, SectionTable, Shape, Walled
 from softjaw.study.scene.section import SceneSection
@@ -34,7 +34,6 @@ ROOT = Path(__file__).parents[1]
 WIDTH = 96  # columns of a command's help
 NESTED = {  # tables within a section, with an example of where they stand
     "[[candidates.poses]]": GraspPose,
-    "candidates.refine = { ... }": Refinement,
     "[[object.sections]]": SectionTable,
 }
 

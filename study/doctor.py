@@ -111,7 +111,7 @@ def mpirun(ranks: int) -> list[str]:
         timeout=60,
         check=False,
     )
-    return command if trial.returncode == 0 else [*command, "--oversubscribe"]
+    return command if trial.returncode == 0 else f"mpirun -n {ranks} --oversubscribe".split()
 
 
 @dataclass(frozen=True)

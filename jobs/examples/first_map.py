@@ -19,7 +19,7 @@ FILE = Path("results/first-map.hdf")
 scene = sj.Scene.from_dict({
     "object": {"name": "flask", "shape": "mesh", "mesh": str(MESH), "unit": "mm", "axis": "z", "mass_g": 60},
     "gripper": {"elements": [12, 6, 4], "max_opening_mm": 85},  # a coarse mesh, good to a few per cent
-    "candidates": {"stations": 6, "station_range_mm": [20, 95], "angles_deg": [0]},
+    "candidates": {"stations": 6, "stations_mm": [20, 95], "angles_deg": [0]},
     "load": {"normal_force_n": [2, 5]},
     "run": {"patches": "none"},
 })  # fmt: skip

@@ -21,7 +21,6 @@ from softjaw.study.scene.sections import Accuracy, Effects, WallSize
 HEX8 = (0.5, 0.5**0.5, 1.0, 2.0**0.5, 2.0, 2.0**1.5)  # elements along a side over those of the reference mesh
 HEX27 = (0.3, 0.5, 0.7, 1.0)
 WALL = (2.0, 2.0**0.5, 1.0, 0.5**0.5, 0.5)  # sizes over those of the scene
-TOLERANCES = (1e-9, 1e-10, 1e-11, 1e-12)
 LIMITS = get_args(WallSize)[1].metadata  # of the sizes that a scene may give
 STEPS_PER_ELEMENT = 4  # of a mesh object's automatic grid, as fem.objects.mesh_object has it
 OWN = ("friction", "limit_surface")  # effects whose levels are evaluation parameters
@@ -97,7 +96,7 @@ class Skipped:
 
 def contact_parameters(scene: Scene) -> tuple[list[Parameter], list[Skipped]]:
     """Discretisation parameters of a scene; every level is a scene that its checks accept."""
-    made = [*_pad_meshes(scene), *_object_mesh(scene), _tolerance(scene), _load_steps(), _collocation()]
+    made = [*_pad_meshes(scene), *_object_mesh(scene), _load_steps(), _collocation()]
     parameters, skipped = [], []
     for parameter in (*made, *_effects(scene)):
         good: list[Level] = []
@@ -200,12 +199,6 @@ def _object_mesh(scene: Scene) -> Iterable[Parameter]:
                   for step, size in grid.items()]  # fmt: skip
         long_name = "step of the grid on which the object's distance is sampled"
         yield Parameter("object grid", long_name, tuple(levels), formal=2.0)
-
-
-def _tolerance(scene: Scene) -> Parameter:
-    tolerances = sorted({*TOLERANCES, scene.accuracy.residual_tolerance}, reverse=True)
-    levels = tuple(Level(f"{t:g}", (("accuracy.residual_tolerance", t),)) for t in tolerances)
-    return Parameter("solver tolerance", "residual over load at which a contact solve ends", levels)
 
 
 def _load_steps() -> Parameter:

@@ -183,7 +183,7 @@ def usable_symmetry(scene: Scene, finger: Finger, elements: tuple[int, int, int]
 
 def settings(scene: Scene) -> Settings:
     """When a solve ends and a step is given up."""
-    return Settings(scene.accuracy.residual_tolerance, scene.accuracy.min_step_fraction)
+    return Settings()
 
 
 def pad_of(scene: Scene, symmetry: tuple[bool, bool], rule: str, coarser: bool) -> Pad:

@@ -35,7 +35,7 @@ def export(options: Namespace) -> str:
     closing = options.closing or CLOSING.get(options.form, "x")
     gripper = GripperFrame(
         tuple(options.approaches or ("minus-x",)), closing, in_si("depth_mm", options.depth),
-        in_si("wider_mm", options.wider), options.joints, options.gripper_frame, options.object_frame,
+        in_si("wider_mm", options.wider), options.joints, *options.frames,
     )  # fmt: skip
     found = grasps(ds, choice, gripper)
     if options.form != "graspgen":  # which has a field for those that do not hold

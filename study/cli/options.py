@@ -179,7 +179,6 @@ def _add_init_options(parser: argparse.ArgumentParser) -> None:
     add("--unit", choices=("mm", "cm", "m", "inch"), help="unit of the mesh's coordinates")
     add("--axis", choices=("x", "y", "z"), help="axis of the mesh along which grasps are spread (default: the longest)")
     add("--force", action="store_true", help="replace existing files")
-    add("--list", action="version", version=kinds, help="list the kinds and exit")
     more = "softjaw init mesh --mesh jobs/objects/flask.stl --unit mm -o scenes/flask"
     parser.epilog = f"{parser.epilog}\n  {more}\n\n{kinds}"
 
@@ -249,8 +248,8 @@ def _add_export_options(parser: argparse.ArgumentParser) -> None:
         "touch (default 20)")  # fmt: skip
     add("--joints", type=values.names, default=("finger_joint1", "finger_joint2"), metavar="A,B", help="joints of the "
         "fingers, each at half the opening (default finger_joint1,finger_joint2)")  # fmt: skip
-    add("--gripper-frame", default="gripper", metavar="NAME", help="name of the gripper's frame (default gripper)")
-    add("--object-frame", default="object", metavar="NAME", help="name of the object's frame (default object)")
+    add("--frames", type=values.pair, default=("gripper", "object"), metavar="A,B", help="names of the gripper's and "
+        "the object's frame (default gripper,object)")  # fmt: skip
     listed = "\n".join(f"  {name:<12} {text}" for name, text in FORMATS.items())
     parser.epilog = f"{parser.epilog}\n\nformats:\n{listed}"
 
@@ -296,8 +295,8 @@ def _add_choice(parser: argparse.ArgumentParser) -> None:
     """Options that choose a candidate."""
     add = parser.add_argument
     add("--candidate", type=int, metavar="N", help="candidate, counted over stations and angles")
-    add("--station", type=values.finite, metavar="MM", help="candidate nearest to this station [mm]")
-    add("--angle", type=values.finite, metavar="DEG", help="candidate nearest to this angle [deg]")
+    add("--at", type=values.place, default=(None, None), metavar="MM,DEG", help="candidate nearest to this station "
+        "[mm] and, if given, angle [deg]; write --at=-5 for negative numbers")  # fmt: skip
 
 
 def _add_view_options(parser: argparse.ArgumentParser) -> None:

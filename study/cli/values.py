@@ -35,6 +35,22 @@ def names(text: str) -> tuple[str, ...]:
     return found
 
 
+def pair(text: str) -> tuple[str, ...]:
+    """Two names with a comma between them."""
+    if len(two := names(text)) != 2:
+        raise argparse.ArgumentTypeError(f"found {text}, expected two names with a comma between them")
+    return two
+
+
+def place(text: str) -> tuple[float, float | None]:
+    """A station and perhaps an angle, with a comma between them."""
+    station, comma, angle = text.partition(",")
+    try:
+        return finite(station), finite(angle) if comma else None
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"found {text}, expected a station, or station,angle as in 75,90") from None
+
+
 def not_negative(text: str) -> float:
     """A number, 0 or above."""
     if not 0 <= (value := float(text)) < math.inf:

@@ -38,7 +38,7 @@ def git_state(folder: Path) -> str:
     # Asked first, because git would also find a repository that merely contains the installed package.
     if not (folder / ".git").exists():
         return ""
-    command = ["git", "-C", str(folder), "describe", "--always", "--dirty", "--abbrev=12"]
+    command = ["git", "-C", str(folder), *"describe --always --dirty --abbrev=12".split()]
     # A missing git or a slow disk must not keep a study from starting.
     try:
         return subprocess.run(command, capture_output=True, text=True, timeout=10, check=True).stdout.strip()

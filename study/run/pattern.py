@@ -76,18 +76,18 @@ def next_poses(result: Any, values: FloatArray, scene: Scene, each: int) -> tupl
     each : int
         Cases of a pose.
     """
-    asked, rounds = scene.candidates.refine, result.layout.added
-    if asked is None:
+    where, rounds = scene.candidates, result.layout.added
+    if where.refine is None:
         return ()
     given = len(values) - sum(map(len, rounds))
     added = np.moveaxis(result.status.reshape(-1, *result.layout.shape[-3:]), 1, 0)[given:]
-    left = (asked.budget - int(np.sum(~np.isin(added, NO_GRASP)))) // each
+    left = (where.refine - int(np.sum(~np.isin(added, NO_GRASP)))) // each
     share = rounds[-1][0][0] if rounds else 1.0
     while left > 0 and share >= FINEST:
         if found := _neighbours(scene, rounds, values, share):
             return tuple(found[: min(left, ROUND)])
         before = given + sum(len(some) for some in rounds if some[0][0] > share)
-        if share < 1.0 and gained(values, before) < asked.best_within * (1 + MARGIN):
+        if share < 1.0 and gained(values, before) < where.refine_within * (1 + MARGIN):
             return ()
         share /= 2
     return ()

@@ -220,7 +220,7 @@ def _rounds(plan: Plan, scene: Any) -> str:
         return ""
     each = added_cases(plan.units, plan.layout)
     what = "poses" if scene.candidates.poses else "stations"
-    text = f"up to {asked.budget // each} more {what}, {each} cases each, {scene.candidates.refined_until}"
+    text = f"up to {asked // each} more {what}, {each} cases each, {scene.candidates.refined_until}"
     return f"{text}; not in the numbers above and below"
 
 

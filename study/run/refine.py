@@ -41,7 +41,7 @@ def refined(scene: Scene, rounds: Rounds) -> Scene:
         return _with_poses(scene, rounds)
     stations = tuple(sorted({*given, *(s for added in rounds for s in added)}))
     numbers = _Renumbered(given, stations, len(where.angles_deg))
-    fixed: dict[str, Any] = {"stations": None, "station_range_mm": None, "stations_mm": stations, "refine": None}
+    fixed: dict[str, Any] = {"stations": None, "stations_mm": stations, "refine": None}
     # What was left out as not among the best stays so in the file; the added stations are all solved.
     fixed["solve_best"] = None
     parts: dict[str, Any] = {"candidates": where.model_copy(update=fixed)}
@@ -159,14 +159,14 @@ def next_stations(result: Any, scene: Scene, each: int) -> tuple[float, ...]:
 
     ``each`` is the number of cases that are solved at a station.
     """
-    asked = scene.candidates.refine
-    if asked is None:
+    where = scene.candidates
+    if where.refine is None:
         return ()
-    given, added = scene.candidates.station_values_mm, [s for some in result.layout.added for s in some]
-    left = asked.budget // each - len(added)
+    given, added = where.station_values_mm, [s for some in result.layout.added for s in some]
+    left = where.refine // each - len(added)
     chance = chances_in(result)
     stations = sorted({*given, *added})
-    limit = max(asked.best_within * (1 + MARGIN), TOGETHER * float(chance.max(initial=0.0)) * (1 - MARGIN))
+    limit = max(where.refine_within * (1 + MARGIN), TOGETHER * float(chance.max(initial=0.0)) * (1 - MARGIN))
     # Rounded, so that chances that are equal but for rounding come in the order of their stations.
     order = np.lexsort((np.arange(len(chance)), -chance.round(6)))
     chosen = [i for i in order if chance[i] > limit][: max(left, 0)]

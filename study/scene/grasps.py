@@ -11,16 +11,17 @@ from pydantic import AfterValidator, BeforeValidator, Field
 from softjaw.study.messages import closest, shown
 from softjaw.study.scene.errors import Errors, wrong
 from softjaw.study.scene.objects import LARGEST_MM, Plate, Shape, Span, SphereShape
-from softjaw.study.scene.section import Direction, Interval, SceneSection, Text, Vector, once_and_rising
+from softjaw.study.scene.section import Direction, SceneSection, Text, Vector, once_and_rising
 from softjaw.study.scene.sections import Gripper
 from softjaw.study.units import converted, si
 
 Angle = Annotated[float, Field(ge=-360, le=360)]
 POSE = [{"point_mm": [0, 0, 20], "approach": [1, 0, 0], "long_side": [0, 0, 1]}]
-EXAMPLE = "for example `stations = 35` with `station_range_mm = [25, 175]`"
+EXAMPLE = "for example `stations = 35` with `stations_mm = [25, 175]`"
+BUDGET = 120  # cases of a refinement
 NARROW = 0.01  # stations within this share of the object are all but one; in metres they would spread over it
 # keys that stations, poses and a sampler share
-OF_EVERY_KIND = ("roll_deg", "shift_mm", "refine", "solve_best", "skip_hopeless")
+OF_EVERY_KIND = ("roll_deg", "shift_mm", "refine", "refine_within", "solve_best", "skip_hopeless")
 ALONG = 0.996  # cosine between approach and long side from which they are parallel
 
 
@@ -70,43 +71,27 @@ class GraspPose(SceneSection):
         return max(passing)
 
 
-class Refinement(SceneSection):
-    """How grasps are refined once the scene's own are solved; `study.run.refine` and `study.run.pattern` say how."""
-
-    best_within: float = Field(
-        0.02,
-        ge=0.001,
-        le=0.5,
-        description="stop when no station is expected to beat the best by more than this share, or when a finer step"
-        " between poses gained less",
-    )
-    budget: int = Field(120, ge=1, le=100_000, description="cases that are solved at most beside the scene's own")
-
-
-def _switched(given: Any) -> Any:
-    """A table of defaults for true, nothing for false."""
-    return {} if given is True else None if given is False else given
-
-
-def _also_a_switch(schema: dict[str, Any]) -> None:
-    schema["anyOf"].append({"type": "boolean"})
+def _budget(given: Any) -> Any:
+    """The default number of cases for true, none for false."""
+    return BUDGET if given is True else None if given is False else given
 
 
 class Candidates(SceneSection):
     """Where to grasp: stations along the object's axis x angles about it, explicit poses, or sampled grasps."""
 
     stations: int | None = Field(
-        None, ge=2, le=10_000, description="number of stations, spread evenly over station_range_mm"
-    )
-    station_range_mm: Interval | None = Field(
-        None, description="first and last station along the object's axis", examples=[[25, 175]]
+        None, ge=2, le=10_000, description="number of stations, spread evenly from the first to the last of stations_mm"
     )
     stations_mm: (
         Annotated[
             tuple[float, ...], Field(strict=False, min_length=1, max_length=10_000), AfterValidator(once_and_rising)
         ]
         | None
-    ) = Field(None, description="stations along the object's axis", examples=[[25, 50, 75]])
+    ) = Field(
+        None,
+        description="stations along the object's axis; with `stations` the first and the last",
+        examples=[[25, 50, 75]],
+    )
     angles_deg: Annotated[
         tuple[Angle, ...], Field(strict=False, min_length=1, max_length=3600), AfterValidator(once_and_rising)
     ] = Field((0.0, 90.0), description="angles about the axis", examples=[[0, 90]])
@@ -121,11 +106,18 @@ class Candidates(SceneSection):
         None, ge=1, le=1000, description="looks for so many distinct grasps itself: pairs of places of the surface that"
         " face each other"
     )
-    refine: Annotated[Refinement | None, BeforeValidator(_switched)] = Field(
+    refine: Annotated[Annotated[int, Field(ge=1, le=100_000)] | None, BeforeValidator(_budget)] = Field(
         None,
-        description="solves further stations between the given ones, or further poses around the best given ones",
-        examples=[True],
-        json_schema_extra=_also_a_switch,
+        description="most cases that are solved beside the scene's own, at stations between the given ones or at poses"
+        f" around the best; true is {BUDGET}",
+        examples=[BUDGET],
+    )
+    refine_within: float = Field(
+        0.02,
+        ge=0.001,
+        le=0.5,
+        description="refining stops when no station is expected to beat the best by more than this share, or when a"
+        " finer step between poses gained less",
     )
     solve_best: int | None = Field(
         None, ge=1, le=100_000, description="solve only so many candidates, the best on a bed of springs"
@@ -137,10 +129,10 @@ class Candidates(SceneSection):
     @property
     def station_values_mm(self) -> tuple[float, ...]:
         """Stations along the object's axis, rising [mm]; empty with explicit poses."""
-        if self.stations_mm is not None or self.stations is None or self.station_range_mm is None:
+        if self.stations is None or self.stations_mm is None:
             return self.stations_mm or ()
-        (low, high), n = self.station_range_mm, self.stations
-        return tuple(low + (high - low) * i / (n - 1) for i in range(n))
+        low, high = self.stations_mm
+        return tuple(low + (high - low) * i / (self.stations - 1) for i in range(self.stations))
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -159,7 +151,7 @@ class Candidates(SceneSection):
     @property
     def refined_until(self) -> str:
         """What ends a refinement, in words."""
-        share = self.refine.best_within if self.refine else 0.0
+        share = self.refine_within
         if self.poses or self.sampled:
             return f"until a finer step between poses gains less than {share:.2g} of the best"
         return f"until the best is known to {share:.2g} of itself"
@@ -170,16 +162,15 @@ class Candidates(SceneSection):
 
     def rules(self) -> Errors:
         """Exactly one way of giving the candidates."""
-        spread = self.stations is not None or self.station_range_mm is not None
-        given = {"stations": spread, "stations_mm": self.stations_mm is not None, "poses": bool(self.poses)}
-        given["sampled"] = self.sampled is not None
-        ways = [way for way in given if given[way]]
-        if len(ways) != 1:
-            expected = "one of stations_mm, stations with station_range_mm, sampled, or [[candidates.poses]]"
+        given = {"stations_mm": self.stations_mm, "poses": self.poses or None, "sampled": self.sampled}
+        ways = [way for way, value in given.items() if value is not None]
+        if self.stations is not None and len(self.stations_mm or ()) != 2:
+            key = "stations_mm" if self.stations_mm else "stations"
+            expected = f"the first and the last of stations_mm beside stations, {EXAMPLE}"
+            yield wrong(getattr(self, key), expected, key)
+        elif len(ways) != 1:
+            expected = "one of stations_mm, also with the number of stations, sampled, or [[candidates.poses]]"
             yield wrong(ways, f"{expected}, {EXAMPLE}", *ways[-1:])
-        if spread and (self.stations is None or self.station_range_mm is None):
-            key, missing = ("stations", "station_range_mm") if self.stations else ("station_range_mm", "stations")
-            yield wrong(getattr(self, key), f"{missing} beside it, {EXAMPLE}", key)
         if (self.poses or self.sampled) and self.angles_deg != Candidates.model_fields["angles_deg"].default:
             yield wrong(self.angles_deg, "stations beside it", "angles_deg")
 
@@ -189,7 +180,7 @@ class Candidates(SceneSection):
         outside = [s for s in self.station_values_mm if not low <= s <= high]
         if outside:
             expected = f"stations [mm] along the object's axis, from {low:g} to {high:g} mm"
-            yield wrong(outside, expected, self._station_key)
+            yield wrong(outside, expected, "stations_mm")
         for angle in self.angles_deg if isinstance(shape, Plate) and self.station_values_mm else ():
             if abs(math.cos(math.radians(angle))) < 0.5:
                 yield wrong(angle, "angles within 60 of 0 or 180: the two planes face x", "angles_deg")
@@ -226,7 +217,7 @@ class Candidates(SceneSection):
         spread = places[-1] - places[0]
         if len(places) > 1 and spread < NARROW * (high - low) and low <= first <= last <= high:
             yield (
-                f"candidates.{self._station_key}: {spread:.3g} mm between first and last station of an object of"
+                f"candidates.stations_mm: {spread:.3g} mm between first and last station of an object of"
                 f" {high - low:g} mm; metres? Then write {first:g} to {last:g}"
             )
         slack = 1e-6 * (high - low)
@@ -237,10 +228,6 @@ class Candidates(SceneSection):
                 f" along the object's axis, leaves the object, which reaches from {low:g} to {high:g} mm: it meets the"
                 " edge"
             )
-
-    @property
-    def _station_key(self) -> str:
-        return "stations_mm" if self.stations_mm is not None else "station_range_mm"
 
 
 def _listed(places: Sequence[float]) -> str:

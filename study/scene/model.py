@@ -17,7 +17,7 @@ from pydantic import ConfigDict, Field, ValidationError, ValidationInfo, field_v
 
 from softjaw.study.messages import Problem, closest, shortened, shown
 from softjaw.study.scene.errors import Errors, KeyPath, Place, SceneError, lines_of, problems_of, refuse, wrong
-from softjaw.study.scene.grasps import OF_EVERY_KIND, Candidates, GraspPose, Refinement
+from softjaw.study.scene.grasps import OF_EVERY_KIND, Candidates, GraspPose
 from softjaw.study.scene.objects import SHAPES, Mesh, Object, SectionTable
 from softjaw.study.scene.section import SceneSection
 from softjaw.study.scene.sections import (
@@ -38,7 +38,12 @@ from softjaw.study.scene.text import flat, parse_toml, read_text, toml_text
 
 Option = str | int | float | bool
 WATCHING = ("monitor", "view", "converged_reason")  # PETSc options that only print
-ALTERNATIVES = (("stations_mm",), ("stations", "station_range_mm"), ("poses",))  # ways of giving candidates
+ALTERNATIVES = {  # what an override of a way of giving candidates replaces
+    "stations": ("poses", "sampled"),
+    "stations_mm": ("stations", "poses", "sampled"),
+    "poses": ("stations", "stations_mm", "sampled"),
+    "sampled": ("stations", "stations_mm", "poses"),
+}
 NOT_SWEPT = {
     "object.shape": "write one scene per shape",
     "object.mesh": "write one scene per mesh",
@@ -278,7 +283,10 @@ class Scene(SceneSection):
         >>> Scene.from_dict(tables).with_values(**{"object.radius_mm": 20}).object.radius
         0.02
         """
-        return Scene.of_tables(put(self.effective(), plain_tables({**(values or {}), **more})))
+        given = {**(values or {}), **more}
+        if "candidates.stations_mm" in given:  # which are not the first and the last of the scene's own number
+            given.setdefault("candidates.stations", None)
+        return Scene.of_tables(put(self.effective(), plain_tables(given)))
 
     @classmethod
     def of_tables(cls, tables: Mapping[str, Any]) -> Scene:
@@ -307,7 +315,7 @@ def tables_of(data: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     shape = data.get("object")
     model = SHAPES.get(str(shape.get("shape"))) if isinstance(shape, Mapping) else None
     tables["object"] = {**SectionTable.model_fields, **(model.model_fields if model else {})}
-    tables["candidates"] |= {**GraspPose.model_fields, **Refinement.model_fields}
+    tables["candidates"] |= GraspPose.model_fields
     return tables
 
 
@@ -451,10 +459,9 @@ def _override(text: str) -> dict[str, Any] | None:
 
 def _drop_alternatives(table: dict[str, Any], key: str, given: Mapping[KeyPath, Place]) -> None:
     """Let an override of one way of giving candidates replace the others, unless they are overrides too."""
-    for way in ALTERNATIVES if any(key in way for way in ALTERNATIVES) else ():
-        if key not in way and not any(("candidates", name) in given for name in way):
-            for name in way:
-                table.pop(name, None)
+    for way in ALTERNATIVES.get(key, ()):
+        if ("candidates", way) not in given:
+            table.pop(way, None)
 
 
 def axis_rules(sweep: Mapping[str, Sequence[Any]], sections: Mapping[str, Any]) -> Errors:

@@ -291,10 +291,6 @@ class Accuracy(SceneSection):
     contact: Literal["auto", "weighted", "nodal", "blended"] = Field(
         "auto", description="how gaps are collocated; auto is blended for hex8, else weighted"
     )
-    residual_tolerance: float = Field(1e-10, ge=1e-13, le=1e-9, description="residual over load at which a solve ends")
-    min_step_fraction: float = Field(
-        1 / 8, gt=0, le=1, description="shortest part of a load step that is tried before displacement control"
-    )
     wall_element_mm: WallSize = Field(
         1.5, description="size of a thin wall's elements round the object, under the pads; along it 5/3, elsewhere 4"
         " times as large"

@@ -24,7 +24,7 @@ from softjaw.study.scene.text import toml_text
 
 FOLDER = Path(__file__).parent
 MAPS = {q.name: q for q in quantities(NEEDS) if q.group == "maps"}
-WHOLE = {"object": ("shape",), "candidates": sum(ALTERNATIVES, ())}  # keys that make a section replace its base's
+WHOLE = {"object": ("shape",), "candidates": tuple(ALTERNATIVES)}  # keys that make a section replace its base's
 CHECKS = {"force_balance": max, "adhesion": max, "penetration": max, "min_det_f": min, "ellipticity": min}
 
 

@@ -65,7 +65,7 @@ def fake_growth(digest, stations, work):
     from softjaw.study.run.session import Growth
 
     given = (1e3 * np.linspace(0, 0.1, stations)).tolist()
-    asked = SimpleNamespace(refine=SimpleNamespace(best_within=0.01, budget=36), station_values_mm=given)
+    asked = SimpleNamespace(refine=36, refine_within=0.01, station_values_mm=given)
     scene = SimpleNamespace(candidates=asked)
     return Growth(
         lambda rounds: (fake_plan(digest, stations, rounds=rounds), work),

@@ -89,7 +89,7 @@ def test_claims_of_the_lookup_hold(tmp_path):
 
     own = np.linspace(25, 175, 35)
     between = ((own[1:] + own[:-1]) / 2).round(6).tolist()
-    text = re.sub(r"\n(station_range_mm|refine|normal_force_n) .*", "", pathlib.Path(BOTTLE).read_text())
+    text = re.sub(r"\n(stations_mm|refine|normal_force_n) .*", "", pathlib.Path(BOTTLE).read_text())
     more = [1, 1.5, 2, 3, 4, 5.5, 7, 8.5, 10, 11.5, 13]
     for name, stations, forces in (("map", own.tolist(), more[::2]), ("held", between[::2], more)):
         scene = re.sub(r"stations = 35.*", f"stations_mm = {stations}", text)

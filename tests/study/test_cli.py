@@ -37,7 +37,7 @@ QUICK = {
     "plan": lambda scene, finished: ["plan", OUTLINE],
     "status": lambda scene, finished: ["status", finished],
     "show": lambda scene, finished: ["show", finished],
-    "init": lambda scene, finished: ["init", "--list"],
+    "init": lambda scene, finished: ["init", "--help"],
 }
 SCENE = """
 [object]

@@ -24,7 +24,7 @@ WAIST = 67.5  # station in the middle of the waist [mm], where the bottle is its
 def grasps(first, last, count, forces="[1, 2]"):
     """Stations [mm] ``(count,)`` and results of every force ``[station][force]`` of the shipped scene."""
     overrides = (
-        f"candidates.stations={count}", f"candidates.station_range_mm=[{first}, {last}]", "candidates.angles_deg=[0]",
+        f"candidates.stations={count}", f"candidates.stations_mm=[{first}, {last}]", "candidates.angles_deg=[0]",
         f"load.normal_force_n={forces}",
     )  # fmt: skip
     scene = load_scene(ROOT / "jobs" / "bottle-rigid.toml", overrides)

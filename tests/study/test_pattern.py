@@ -31,7 +31,8 @@ edge_radius_mm = 6
 elements = [8, 4, 2]
 max_opening_mm = 65
 [candidates]
-refine = { best_within = 0.02, budget = BUDGET }
+refine = BUDGET
+refine_within = 0.02
 [[candidates.poses]]
 label = "wide"
 point_mm = [0, 0, 8]
@@ -180,8 +181,8 @@ def test_a_grown_file_of_poses_keeps_rows_labels_and_places(tmp_path):
 
 
 def test_scenes_of_poses_and_samplers_can_be_refined():
-    assert load_scene("jobs/box-poses.toml", ["candidates.refine=true"]).candidates.refine.budget == 120
-    assert load_scene("jobs/smoke.toml", ["candidates.refine=true"]).candidates.refine.budget == 120
+    assert load_scene("jobs/box-poses.toml", ["candidates.refine=true"]).candidates.refine == 120
+    assert load_scene("jobs/smoke.toml", ["candidates.refine=true"]).candidates.refine == 120
     assert load_scene("jobs/smoke.toml", ["candidates.refine=false"]).candidates.refine is None
 
 

@@ -28,7 +28,7 @@ def tent(x, peak, width):
 def rounds_until_known(formula, budget=30, has=()):
     """Stations that are added before nothing is expected to be better, by the rule of a study."""
     score = "payload/ccm" if has else "quality/ccm"
-    asked = SimpleNamespace(refine=SimpleNamespace(best_within=BEST_WITHIN, budget=budget))
+    asked = SimpleNamespace(refine=budget, refine_within=BEST_WITHIN)
     scene = SimpleNamespace(candidates=asked)
     asked.station_values_mm = GIVEN.tolist()
     added = []
@@ -91,7 +91,8 @@ elements = [8, 4, 2]
 [candidates]
 stations_mm = [28, 38, 46, 54, 64]
 angles_deg = [0, 90]
-refine = { best_within = 0.02, budget = 12 }
+refine = 12
+refine_within = 0.02
 [load]
 normal_force_n = [1, 2]
 [limit_surface]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import sys
 from argparse import Namespace
@@ -12,14 +11,15 @@ from softjaw.study.messages import CANNOT_WRITE, USAGE, StudyError, beside, writ
 from softjaw.study.result.read import open
 from softjaw.study.show.grasps import judge
 from softjaw.study.show.view import model, object3d, window
+from softjaw.study.units import in_si
 
 ENDINGS = {"screenshot": (".png",), "html": (".html", ".htm")}
 
 
 def choice(options: Namespace) -> tuple[int | None, tuple[float | None, float | None]]:
     """Candidate, and station [m] and angle [rad], as far as they were given."""
-    angle = None if options.angle is None else math.radians(options.angle)
-    return options.candidate, (None if options.station is None else 1e-3 * options.station, angle)
+    station, angle = options.at
+    return options.candidate, (in_si("station_mm", station), in_si("angle_deg", angle))
 
 
 def view(options: Namespace) -> None:

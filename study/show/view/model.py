@@ -241,7 +241,7 @@ def view_of(ds: xr.Dataset, candidate: int | None, where: Place, force: float | 
         best = (*unravelled(candidate, shape[:-1]), k)
     elif where != (None, None):
         if ds.attrs["poses"]:
-            text = "--station, --angle: the candidates of this file are poses; choose with --candidate"
+            text = "--at: the candidates of this file are poses; choose with --candidate"
             raise StudyError(USAGE, text)
         _check_station(ds, where[0])
         best = _nearest(ds, best, where, k)
@@ -256,7 +256,7 @@ def _check_station(ds: xr.Dataset, station: float | None) -> None:
     if max(places[0] - station, station - places[-1]) > max(np.diff(places), default=0.0) + 1e-9:
         found, low, high = (f"{1e3 * value:.6g}" for value in (station, places[0], places[-1]))
         expected = f"{low} to {high} mm, the stations of this file" if low != high else f"{low} mm, the only station"
-        raise StudyError(USAGE, f"--station: found {found} mm, expected {expected}")
+        raise StudyError(USAGE, f"--at: found {found} mm, expected {expected}")
 
 
 def _nearest(ds: xr.Dataset, best: Index, where: Place, k: int) -> Index:

@@ -141,7 +141,7 @@ def test_half_turns_have_one_quaternion(half_turn):
 
 
 def test_isaac_grasp_has_the_fields_of_its_documentation(said):
-    text = said("--format", "isaac_grasp", "--force", 4, "--joints", "left,right", "--gripper-frame", "hand")
+    text = said("--format", "isaac_grasp", "--force", 4, "--joints", "left,right", "--frames", "hand,object")
     found = read_yaml(text)
     assert set(found) == ISAAC_FILE
     assert (found["format"], found["format_version"], found["gripper_frame"]) == ("isaac_grasp", 1.0, "hand")
@@ -164,7 +164,7 @@ def test_isaac_grasp_has_the_fields_of_its_documentation(said):
 
 
 def test_moveit_grasps_have_the_fields_of_their_messages(said):
-    found = read_yaml(said("--format", "moveit", "--force", 16, "--depth", 103.4, "--object-frame", "mug"))
+    found = read_yaml(said("--format", "moveit", "--force", 16, "--depth", 103.4, "--frames", "gripper,mug"))
     assert set(found) == {"grasps"}
     assert len(found["grasps"]) == 4
     for grasp in found["grasps"]:

@@ -162,9 +162,9 @@ def test_a_swept_pad_that_leaves_the_object_gets_a_warning():
 
 
 def test_stations_in_metres_get_a_warning():
-    (text, *_) = warnings(at([100], BOTTLE, "candidates.stations=7", "candidates.station_range_mm=[0.025, 0.175]"))
+    (text, *_) = warnings(at([100], BOTTLE, "candidates.stations=7", "candidates.stations_mm=[0.025, 0.175]"))
     assert text == (
-        "candidates.station_range_mm: 0.15 mm between first and last station of an object of 200 mm; metres? "
+        "candidates.stations_mm: 0.15 mm between first and last station of an object of 200 mm; metres? "
         "Then write 25 to 175"
     )
     assert not any("metres" in text for text in warnings(at([100, 101], BOTTLE)))

@@ -122,8 +122,9 @@ WRONG_VALUES = [
     ("stations_mm = [0]", "", 5, "candidates", "[]"),
     ("stations_mm = [0]", "stations = [0, 1]", 6, "candidates.stations", "[0, 1]"),
     ("stations_mm = [0]", "stations = 3", 6, "candidates.stations", "3"),
-    ("[0]", "[0]\nstations = 3\nstation_range_mm = [0, 9]", 6, "candidates.stations_mm", '["stations", "stations_mm"]'),
-    ("stations_mm = [0]", "stations = 3\nstation_range_mm = [9, 0]", 7, "candidates.station_range_mm", "[9, 0]"),
+    ("[0]", "[0, 5, 9]\nstations = 3", 6, "candidates.stations_mm", "[0.0, 5.0, 9.0]"),
+    ("[0]", "[0]\nsampled = 3", 7, "candidates.sampled", '["stations_mm", "sampled"]'),
+    ("stations_mm = [0]", "station_range_mm = [0, 9]", 6, "candidates.station_range_mm", "an unknown key"),
     ("[0]", "[0]\nangles_deg = [0, 400]", 7, "candidates.angles_deg[1]", "400"),
     ("[1]", "[1, -2]", 9, "load.normal_force_n[1]", "-2"),
     ("[1]", "[0]", 9, "load.normal_force_n[0]", "0"),
@@ -242,10 +243,9 @@ def test_an_override_that_a_terminal_would_obey_is_refused():
 
 def test_overrides_replace_values_and_the_other_way_of_giving_stations():
     given = ["object.radius_mm=40", "gripper.material=linear", 'object.name="a ball"', "candidates.stations=3"]
-    scene = parse_scene(BALL, overrides=[*given, "candidates.station_range_mm=[-9, 9]", "sweep.friction.mu=[0.5, 1]"])
+    scene = parse_scene(BALL, overrides=[*given, "candidates.stations_mm=[-9, 9]", "sweep.friction.mu=[0.5, 1]"])
     assert (scene.object.radius_mm, scene.gripper.material, scene.object.name) == (40, "linear", "a ball")
     assert scene.candidates.station_values_mm == (-9, 0, 9)
-    assert scene.candidates.stations_mm is None
     assert scene.sweep == {"friction.mu": (0.5, 1.0)}
 
 
@@ -301,7 +301,7 @@ def test_combinations_of_a_sweep_that_make_no_scene_are_named():
 def test_too_many_cases_are_refused():
     many = (
         "candidates.stations=10000",
-        "candidates.station_range_mm=[-30, 30]",
+        "candidates.stations_mm=[-30, 30]",
         "load.normal_force_n=" + str(list(range(1, 60))),
     )
     assert problem(BALL, *many).found == "1180000"
@@ -387,7 +387,7 @@ def test_the_digest_follows_results_only():
                    "accuracy.meshes=1", "score.contact_length_mm=object", "load.normal_force_n=[1, 2]"):  # fmt: skip
         assert parse_scene(BALL, overrides=[change]).digest != digest, change
     listed = parse_scene(BALL, overrides=["candidates.stations_mm=[0, 5, 10]"])
-    spread = parse_scene(BALL, overrides=["candidates.stations=3", "candidates.station_range_mm=[0, 10]"])
+    spread = parse_scene(BALL, overrides=["candidates.stations=3", "candidates.stations_mm=[0, 10]"])
     assert listed.digest == spread.digest
 
 

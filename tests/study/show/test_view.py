@@ -293,7 +293,7 @@ def test_the_command_refuses_names_that_nothing_would_open(file, tmp_path, capsy
         (["--screenshot", tmp_path / "a.jpg"], USAGE),
         (["--html", tmp_path / "no" / "a.html"], CANNOT_WRITE),
         (["--candidate", "17", "--html", tmp_path / "a.html"], USAGE),
-        (["--station", "500", "--html", tmp_path / "a.html"], USAGE),
+        (["--at", "500", "--html", tmp_path / "a.html"], USAGE),
     ):
         assert main(["view", str(file), *map(str, words)]) == code
     errors = capsys.readouterr().err.splitlines()
@@ -304,7 +304,7 @@ def test_the_command_refuses_names_that_nothing_would_open(file, tmp_path, capsy
 
 
 def test_the_command_writes_the_page(file, tmp_path, capsys):
-    assert main(["view", str(file), "--station", "20", "--force", "1", "--html", str(tmp_path / "a.html")]) == 0
+    assert main(["view", str(file), "--at", "20", "--force", "1", "--html", str(tmp_path / "a.html")]) == 0
     assert capsys.readouterr().out == f"written: {tmp_path / 'a.html'}\n"
     html = (tmp_path / "a.html").read_text()
     text = re.search(r'<script type="application/json">(.*?)</script>', html, re.S)[1]
