@@ -117,7 +117,7 @@ def friction_wrench(
     Examples
     --------
     >>> patch = ContactPatch([[0.1, 0, 0], [-0.1, 0, 0]], [1e-4] * 2, [[0, 0, 1]] * 2, [1e4] * 2)
-    >>> friction_wrench(patch, TURN_Z, mu=0.5).round(12)[0, 5]
+    >>> float(friction_wrench(patch, TURN_Z, mu=0.5).round(12)[0, 5])
     0.1
     """
     return checked_mu(mu) * _sums(patch, twist, model, unrolled)[0][:, :6]

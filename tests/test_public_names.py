@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import doctest
+import importlib
 import inspect
 import json
 import os
@@ -91,6 +92,20 @@ def test_the_example_of_a_name_is_true(name, tmp_path, monkeypatch):
     [example] = doctest.DocTestFinder(recurse=False).find(what, name, module=False, globs=names)
     assert example.examples
     assert doctest.DocTestRunner().run(example).failed == 0
+
+
+PACKAGES = ("friction", "lsfit", "scoring", "fem", "study")
+FILES = [path.relative_to(ROOT) for folder in PACKAGES for path in sorted((ROOT / folder).rglob("*.py"))]
+WITH_EXAMPLES = [path for path in FILES if ">>>" in (ROOT / path).read_text(encoding="utf-8")]
+
+
+@pytest.mark.parametrize("path", WITH_EXAMPLES, ids=str)
+def test_the_examples_of_a_module_are_true(path):
+    """Those of the public names are run above, where the files are that they read."""
+    module = importlib.import_module(".".join(("softjaw", *path.with_suffix("").parts)).removesuffix(".__init__"))
+    for example in doctest.DocTestFinder().find(module):
+        if example.examples and example.name.rpartition(".")[2] not in EXAMPLES:
+            assert doctest.DocTestRunner().run(example).failed == 0, example.name
 
 
 @pytest.mark.long

@@ -158,7 +158,7 @@ def friction_wrench(
     Examples
     --------
     >>> patch = ContactPatch([[0.01, 0, 0], [-0.01, 0, 0]], [1e-4, 1e-4], [[0, 0, 1]] * 2, [1e4, 1e4])
-    >>> friction_wrench(patch, [0, 0, 1], mu=0.8).round(9)[0, 5]
+    >>> float(friction_wrench(patch, [0, 0, 1], mu=0.8).round(9)[0, 5])
     0.016
     """
     return wrench_in_frame(contact_of(patch, mu, x_axis).local, twist, mu, checked_model(model))

@@ -13,7 +13,7 @@ UNCERTAIN_MAPS = tuple(q.name for q in TABLE if q.group == "maps" and q.error an
 def half_width(values: xr.DataArray) -> xr.DataArray:
     """Half of the range of 95 % of some samples; NaN where one of them has no value.
 
-    >>> float(half_width(xr.DataArray(np.arange(40.0), dims=REALISATION)))
+    >>> float(half_width(xr.DataArray(list(range(40)), dims=REALISATION)))
     19.0
     """
     # hazen: of n samples that take the middles of n intervals of equal probability, as the scene's do

@@ -40,20 +40,14 @@ def launch(ranks, *words):
 
 def study(ranks, *words):
     """Run the fake study to its end; without mpirun in this process where it can do no harm there."""
-    if ranks or among_others() or HARMFUL.intersection(words):
+    if ranks or HARMFUL.intersection(words):
         return launch(ranks, SCRIPT, *words)
     return here(fake_run.main, *words)
 
 
 def softjaw(ranks, *words):
-    """Run a command of the program to its end; without mpirun in this process, if it is alone."""
-    return launch(ranks, "-m", "softjaw", *words) if ranks or among_others() else here(main, *words)
-
-
-def among_others():
-    """Whether this process is one rank of several, which would have to run a study together."""
-    mpi = sys.modules.get("mpi4py.MPI")
-    return mpi is not None and mpi.COMM_WORLD.Get_size() > 1
+    """Run a command of the program to its end; without mpirun in this process."""
+    return launch(ranks, "-m", "softjaw", *words) if ranks else here(main, *words)
 
 
 def here(program, *words):
