@@ -149,13 +149,13 @@ class GraspMap:
         order = ranked(ds, k, by, each=force is None)[:n]
         each = force is None and "force_low" in ds
         low = ds["force_low"].values.ravel() if each else np.full(self.source.status[..., k].size, np.nan)
-        found = []
+        points = []
         for i in order:
             station, angle = np.unravel_index(i, self.source.status.shape[:-1])
             at = self.source.axes[0].values[station], self.source.axes[1].values[angle]
             use = forces[k] if np.isnan(low[i]) else max(low[i], forces[0])
-            found.append(self.point(int(station) if self.by_poses else at[0], at[1], use))
-        return found
+            points.append(self.point(int(station) if self.by_poses else at[0], at[1], use))
+        return points
 
     def value(
         self, name: str, station: ArrayLike, angle: ArrayLike, force: ArrayLike, model: str = "ccm"
@@ -174,8 +174,8 @@ class GraspMap:
             or not isinstance(force, float | int)
         ):
             return self.point(station, angle, force).value(name, model)
-        one, two, three = self.axes
-        a, b, c = place(one.quick, station), place(two.quick, angle), place(three.quick, force)
+        along, two, three = self.axes
+        a, b, c = place(along.quick, station), place(two.quick, angle), place(three.quick, force)
         if a is None or b is None or c is None:
             return math.nan
         (i, r), (j, s), (k, t) = a, b, c
@@ -209,15 +209,15 @@ class GraspMap:
 
     def interpolated(self, name: str, model: str, at: Corners) -> FloatArray:
         """A quantity at many points, whether they can be trusted or not."""
-        found = blend(self.table(name, model), at)
-        return np.where(_like(at.swap, found, 0), found[:, ::-1], found) if "/" in name else found
+        values = blend(self.table(name, model), at)
+        return np.where(_like(at.swap, values, 0), values[:, ::-1], values) if "/" in name else values
 
     def errors(self, name: str, model: str, at: Corners) -> FloatArray:
         """Error of `interpolated` for a quantity of the case, at many points."""
         key = name, model
         if key not in self._bends:
-            found = bends(self.table(name, model).reshape(self.shape), self.axes, self.snapped)
-            self._bends[key] = claims(found, self.shape)
+            bent = bends(self.table(name, model).reshape(self.shape), self.axes, self.snapped)
+            self._bends[key] = claims(bent, self.shape)
         return error(self._bends[key], at)
 
     def states(self, at: Corners) -> np.ndarray:
@@ -225,8 +225,8 @@ class GraspMap:
         used, done, snapped = at.weight > 0, self.done.ravel()[at.index], self.snapped.ravel()[at.index]
         across = (used & snapped).any(axis=1) & (used & ~snapped).any(axis=1)
         kind = self.kind.ravel()[at.index]
-        one = np.take_along_axis(kind, used.argmax(axis=1)[:, None], axis=1)
-        jump = (used & (kind != one)).any(axis=1)
+        first = np.take_along_axis(kind, used.argmax(axis=1)[:, None], axis=1)
+        jump = (used & (kind != first)).any(axis=1)
         kinds = [~at.inside.all(axis=1), (used & ~done).any(axis=1), across, jump]
         return np.select(kinds, [OUTSIDE, NO_RESULT, SNAP, JUMP], INSIDE)
 
@@ -255,18 +255,18 @@ class GraspMap:
 
     def _kinds(self) -> np.ndarray:
         """A number for each kind of contact at the nodes; 0 where a file does not tell."""
-        found = np.zeros(self.shape, np.int64)
+        kinds = np.zeros(self.shape, np.int64)
         for name, most in KINDS.items() if self.source.has("fingers/rims") else ():
             values = contact_kinds(name, self._read(f"fingers/{name}"))
             for finger in range(values.shape[-1]):
-                found = found * (most + 1) + values[..., finger]
-        return found
+                kinds = kinds * (most + 1) + values[..., finger]
+        return kinds
 
     def _whole_cells(self) -> list[bool]:
         """Whether all corners of the cell above each node are solved and of one kind, with no snap-in, flat."""
-        own = np.where(self.done, 2 * self.kind + self.snapped, -1)
-        corner = np.stack([np.roll(own, (-i, -j, -k), (0, 1, 2)) for i, j, k in np.ndindex(2, 2, 2)])
-        return ((corner == corner[0]).all(axis=0) & (own >= 0)).ravel().tolist()
+        kind = np.where(self.done, 2 * self.kind + self.snapped, -1)
+        corner = np.stack([np.roll(kind, (-i, -j, -k), (0, 1, 2)) for i, j, k in np.ndindex(2, 2, 2)])
+        return ((corner == corner[0]).all(axis=0) & (kind >= 0)).ravel().tolist()
 
 
 def _one(si: Any, other: Any, unit: str, name: str, default: Any = None) -> Any:

@@ -4,7 +4,7 @@ Straight lines never overshoot and stay between the values of the nodes around a
 ``h`` apart the line misses a smooth function by ``f'' / 2 (x - x_0) (x_1 - x)``; the second derivative is taken from
 the three-point differences at both nodes, whichever is larger, and the errors along the axes add up. Maps of contacts
 have kinks, which three nodes see or miss by chance: an estimate is the largest of a cell and those around it, times
-`SAFE`, which was measured on cases that a map does not hold.
+`CLAIM_FACTOR`, which was measured on cases that a map does not hold.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from numpy.typing import ArrayLike, NDArray
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
-ALIKE = 1e-9  # differences of coordinates that are only rounding, in units of their size
-SAFE = 2.0  # between estimate and claim: with less, less than 95 % of the errors stay within it
-WIDER = 1.5  # a gap that closes a circle may be this much wider than the others
+COORDINATE_ROUNDING = 1e-9  # differences of coordinates that are only rounding, in units of their size
+CLAIM_FACTOR = 2.0  # between estimate and claim: with less, less than 95 % of the errors stay within it
+CLOSING_GAP_RATIO = 1.5  # a gap that closes a circle may be this much wider than the others
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +47,7 @@ class Nodes:
     @property
     def slack(self) -> float:
         """How far beside the ends a coordinate still counts as on them."""
-        return ALIKE * max(abs(float(self.x[0])), abs(float(self.x[-1])))
+        return COORDINATE_ROUNDING * max(abs(float(self.x[0])), abs(float(self.x[-1])))
 
     @cached_property
     def quick(self) -> tuple[list[float], list[float], int, float, float, bool]:
@@ -75,21 +75,21 @@ def circle(name: str, units: str, values: ArrayLike, period: float, half_turn: b
     if not period:
         x = np.array([angles[0], angles[0] + 2 * math.pi])
         return Nodes(name, units, x, np.zeros(2, np.int64), np.zeros(2, bool), 2 * math.pi, free=True)
-    turns = np.floor((angles - angles[0]) / period + ALIKE)
+    turns = np.floor((angles - angles[0]) / period + COORDINATE_ROUNDING)
     folded = np.maximum(angles - turns * period, angles[0])
     order = np.argsort(folded, kind="stable")
-    order = order[np.concatenate([[True], np.diff(folded[order]) > ALIKE * period])]
+    order = order[np.concatenate([[True], np.diff(folded[order]) > COORDINATE_ROUNDING * period])]
     x, swapped = folded[order], half_turn & (turns[order] % 2 == 1)
     if len(x) == 1:
         return Nodes(name, units, _point(float(x[0])), order.repeat(2), swapped.repeat(2), period, half_turn)
-    if x[0] + period - x[-1] <= WIDER * np.diff(x).max() * (1 + ALIKE):
+    if x[0] + period - x[-1] <= CLOSING_GAP_RATIO * np.diff(x).max() * (1 + COORDINATE_ROUNDING):
         x, order = np.append(x, x[0] + period), np.append(order, order[0])
         swapped = np.append(swapped, swapped[0] ^ half_turn)
     return Nodes(name, units, x, order, swapped, period, half_turn)
 
 
 def _point(x: float) -> FloatArray:
-    slack = ALIKE * max(abs(x), 1.0)
+    slack = COORDINATE_ROUNDING * max(abs(x), 1.0)
     return np.array([x - slack, x + slack])
 
 
@@ -122,7 +122,7 @@ def corners(axes: Sequence[Nodes], points: FloatArray) -> Corners:
         v = np.clip(np.nan_to_num(v), x[0], x[-1])
         i = np.clip(np.searchsorted(x, v, "right") - 1, 0, len(x) - 2)
         s = (v - x[i]) / (x[i + 1] - x[i])
-        s = np.where(s < ALIKE, 0.0, np.where(s > 1 - ALIKE, 1.0, s))
+        s = np.where(s < COORDINATE_ROUNDING, 0.0, np.where(s > 1 - COORDINATE_ROUNDING, 1.0, s))
         inside[:, a] &= (s == 0) | (s == 1) | (not nodes.exact)
         cell[:, a], share[:, a] = i, s
     upper = np.array(list(np.ndindex(2, 2, 2)))
@@ -142,14 +142,14 @@ def place(quick: tuple, v: float) -> tuple[int, float] | None:
             return None
         return (0, 0.0) if i < 0 else (last, 1.0)
     share = (v - x[i]) * inverse[i]
-    return None if exact and ALIKE < share < 1 - ALIKE else (i, share)
+    return None if exact and COORDINATE_ROUNDING < share < 1 - COORDINATE_ROUNDING else (i, share)
 
 
 def blend(table: FloatArray, at: Corners) -> FloatArray:
     """Trilinear values of ``table (nodes, ...)`` at ``m`` points, ``(m, ...)``; corners without weight do not count."""
-    found = table[at.index]
+    values = table[at.index]
     weight = at.weight.reshape(at.weight.shape + (1,) * (table.ndim - 1))
-    return np.where(weight > 0, found * weight, 0.0).sum(axis=1)
+    return np.where(weight > 0, values * weight, 0.0).sum(axis=1)
 
 
 def bends(table: FloatArray, axes: Sequence[Nodes], side: NDArray[np.bool_]) -> FloatArray:
@@ -159,15 +159,15 @@ def bends(table: FloatArray, axes: Sequence[Nodes], side: NDArray[np.bool_]) -> 
     other. Where no three nodes are left, the difference of the cell's two values stands in: a guess; across a jump,
     where there is no value, it is 0.
     """
-    found = np.zeros((3, *table.shape))
+    bent = np.zeros((3, *table.shape))
     for a, nodes in enumerate(axes):
-        f, one, x = np.moveaxis(table, a, -1), np.moveaxis(side, a, -1), nodes.x
+        f, branch, x = np.moveaxis(table, a, -1), np.moveaxis(side, a, -1), nodes.x
         if closed := bool(nodes.period) and np.isclose(x[-1] - x[0], nodes.period, rtol=1e-6, atol=0):
             x = np.concatenate([[x[-2] - nodes.period], x, [x[1] + nodes.period]])
-            f, one = (np.concatenate([v[..., -2:-1], v, v[..., 1:2]], axis=-1) for v in (f, one))
+            f, branch = (np.concatenate([v[..., -2:-1], v, v[..., 1:2]], axis=-1) for v in (f, branch))
         h, slope = np.diff(x), np.diff(f) / np.diff(x)
         half = np.abs(np.diff(slope) / (h[1:] + h[:-1]))
-        half[(one[..., :-2] != one[..., 1:-1]) | (one[..., 1:-1] != one[..., 2:])] = np.nan
+        half[(branch[..., :-2] != branch[..., 1:-1]) | (branch[..., 1:-1] != branch[..., 2:])] = np.nan
         if not closed:
             missing = np.full((*half.shape[:-1], 1), np.nan)
             half = np.concatenate([missing, half, missing], axis=-1)
@@ -177,18 +177,18 @@ def bends(table: FloatArray, axes: Sequence[Nodes], side: NDArray[np.bool_]) -> 
         cell = np.where(np.isnan(cell), np.abs(np.diff(f)), cell)
         across = np.moveaxis(side, a, -1)
         cell[across[..., :-1] != across[..., 1:]] = 0.0
-        np.moveaxis(found[a], a, -1)[..., :-1] = cell
-    return found.reshape(3, -1)
+        np.moveaxis(bent[a], a, -1)[..., :-1] = cell
+    return bent.reshape(3, -1)
 
 
 def claims(bend: FloatArray, shape: tuple[int, ...]) -> FloatArray:
-    """`bends` ``(3, nodes)`` of this shape of nodes as claims: the largest around along stations and forces, `SAFE`."""
-    found = np.nan_to_num(bend.reshape(3, *shape))
+    """`bends` ``(3, nodes)`` of this shape of nodes as claims: the largest around along stations and forces."""
+    claimed = np.nan_to_num(bend.reshape(3, *shape))
     for axis in (1, 3):
-        wide = np.pad(found, [(1, 1) if i == axis else (0, 0) for i in range(4)])
-        beside = [np.take(wide, np.arange(found.shape[axis]) + k, axis=axis) for k in range(3)]
-        found = np.maximum.reduce(beside)
-    return SAFE * found.reshape(3, -1)
+        wide = np.pad(claimed, [(1, 1) if i == axis else (0, 0) for i in range(4)])
+        beside = [np.take(wide, np.arange(claimed.shape[axis]) + k, axis=axis) for k in range(3)]
+        claimed = np.maximum.reduce(beside)
+    return CLAIM_FACTOR * claimed.reshape(3, -1)
 
 
 def error(bend: FloatArray, at: Corners) -> FloatArray:

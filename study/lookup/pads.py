@@ -9,7 +9,7 @@ from softjaw.study.lookup.interpolation import FloatArray
 from softjaw.study.lookup.source import Source
 from softjaw.study.quantities import DONE
 
-EDGE = 1e-9  # how far beside a solved place [m, rad] counts as on it
+PLACE_ROUNDING = 1e-9  # how far beside a solved place [m, rad] counts as on it
 
 
 def pad_poses(source: Source, place: FloatArray, by_poses: bool) -> tuple[FloatArray, FloatArray]:
@@ -31,10 +31,10 @@ def pad_poses(source: Source, place: FloatArray, by_poses: bool) -> tuple[FloatA
     for a, along in enumerate((1 - r, r)):
         for b, about in enumerate((1 - t, t)):
             weight, at = along * about, (i[a], j[b], solved[i[a], j[b]])
-            for name, found in (("pose_rotation", R), ("pose_origin", x)):
+            for name, pose in (("pose_rotation", R), ("pose_origin", x)):
                 values = source.read(f"fingers/{name}")[at]
                 share = weight.reshape(-1, *[1] * (values.ndim - 1))
-                found += np.where(share == 0, 0.0, share * values)  # a corner that does not count may have no value
+                pose += np.where(share == 0, 0.0, share * values)  # a corner that does not count may have no value
     whole = np.isfinite(R).all(axis=(1, 2, 3))
     U, _, V = np.linalg.svd(R[whole])
     R[whole] = U @ V
@@ -49,4 +49,4 @@ def _neighbours(values: FloatArray, x: FloatArray) -> tuple[NDArray[np.int64], F
     low = np.clip(np.searchsorted(v, near, side="right") - 1, 0, max(len(v) - 2, 0))
     high = np.minimum(low + 1, len(v) - 1)
     share = (near - v[low]) / np.where(high > low, v[high] - v[low], 1.0)
-    return np.stack([order[low], order[high]]), np.where(np.abs(x - near) > EDGE, np.nan, share)
+    return np.stack([order[low], order[high]]), np.where(np.abs(x - near) > PLACE_ROUNDING, np.nan, share)

@@ -70,14 +70,14 @@ class GraspPoint:
 
     def value(self, name: str, model: str = "ccm") -> Any:
         """A quantity of the grasp, in SI units; NaN where there is none."""
-        found = self.map.interpolated(name, model, self.corners)
-        return self._shaped(np.where(self.states == INSIDE, found, np.nan))
+        values = self.map.interpolated(name, model, self.corners)
+        return self._shaped(np.where(self.states == INSIDE, values, np.nan))
 
     def error(self, name: str, model: str = "ccm") -> Any:
         """Estimated error of `value` by the interpolation, in the quantity's unit; see `study.lookup.GraspMap`."""
-        found = self.map.errors(name, model, self.corners)
+        errors = self.map.errors(name, model, self.corners)
         valid = (self.states == INSIDE) & np.isfinite(self.map.interpolated(name, model, self.corners))
-        return self._shaped(np.where(valid, found, np.nan))
+        return self._shaped(np.where(valid, errors, np.nan))
 
     def mesh_error(self, name: str) -> Any:
         """Estimated error of `value` (CCM) by the mesh, in the quantity's unit; NaN where the file has none."""
@@ -88,9 +88,9 @@ class GraspPoint:
 
     def fingers(self, name: str, model: str = "ccm") -> FloatArray:
         """A quantity of both fingers ``(..., 2, ...)``: ``f_x_max`` or ``fingers/S``, ``limit_surface/rho``."""
-        found = self.map.interpolated(name if "/" in name else f"fingers/{name}", model, self.corners)
-        found[self.states != INSIDE] = np.nan
-        return found.reshape(self.shape + found.shape[1:])
+        values = self.map.interpolated(name if "/" in name else f"fingers/{name}", model, self.corners)
+        values[self.states != INSIDE] = np.nan
+        return values.reshape(self.shape + values.shape[1:])
 
     @property
     def e_n(self) -> Any:
@@ -221,8 +221,8 @@ class GraspPoint:
                 " ask at one of the solved cases"
             )
         if state == JUMP:
-            one, other = (f"{source.case(c)} ({self._contact(n)})" for c, n in self._unlike(cases))
-            return f"no smooth value: the contact changes between {one} and {other}; take `nearest`, a solved case"
+            first, other = (f"{source.case(c)} ({self._contact(n)})" for c, n in self._unlike(cases))
+            return f"no smooth value: the contact changes between {first} and {other}; take `nearest`, a solved case"
         return ""
 
     def _unlike(self, cases: list[tuple[tuple[int, ...], int]]) -> list[tuple[tuple[int, ...], int]]:
@@ -232,9 +232,9 @@ class GraspPoint:
 
     def _contact(self, node: int) -> str:
         """The kind of contact of both fingers at a node, in words."""
-        found = [self.map.table(f"fingers/{name}")[node].astype(int) for name in ("pieces", "holes", "rims")]
+        counts = [self.map.table(f"fingers/{name}")[node].astype(int) for name in ("pieces", "holes", "rims")]
         words = []
-        for pieces, holes, rims in np.transpose(found).tolist():
+        for pieces, holes, rims in np.transpose(counts).tolist():
             hole = f", {holes} hole{'s' * (holes > 1)}" if holes else ""
             ends = ", on both ends" if rims & BOTH_ENDS == BOTH_ENDS else ""
             words.append(f"{pieces} piece{'s' * (pieces != 1)}{hole}{ends}")
@@ -243,16 +243,16 @@ class GraspPoint:
     def _outside(self, i: int) -> str:
         a = int(np.argmin(self.corners.inside[i]))
         nodes, value, axis = self.map.axes[a], self.place[i, a], self.map.source.axes[a]
-        found = f"outside the map: {nodes.name} {shown_text(value, nodes.units, 5)}"
+        text = f"outside the map: {nodes.name} {shown_text(value, nodes.units, 5)}"
         if nodes.exact:
-            return f"{found}, there are candidates 0 to {len(axis.values) - 1} and nothing between them"
+            return f"{text}, there are candidates 0 to {len(axis.values) - 1} and nothing between them"
         low, high = (shown_text(v, nodes.units, 5) for v in (axis.values.min(), axis.values.max()))
-        return f"{found}, solved: {low}" + (f" to {high}" if low != high else " only")
+        return f"{text}, solved: {low}" + (f" to {high}" if low != high else " only")
 
     def _cases(self, i: int) -> list[tuple[tuple[int, ...], int]]:
         """Indices of the cases around a point along the file's axes, with their nodes."""
-        found = []
+        cases = []
         for n in self.corners.index[i][self.corners.weight[i] > 0]:
             at = np.unravel_index(n, self.map.shape)
-            found.append((tuple(int(x.take[k]) for x, k in zip(self.map.axes, at, strict=True)), int(n)))
-        return found
+            cases.append((tuple(int(x.take[k]) for x, k in zip(self.map.axes, at, strict=True)), int(n)))
+        return cases

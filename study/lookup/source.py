@@ -39,8 +39,8 @@ class Source:
             return values_of(self.data, name, model)
         if not self.has(name):
             raise KeyError(f"{name} is not in {self.file}; it has {', '.join(sorted(self.maps))}")
-        found = self.data[BY_KEY[name].variable]
-        return (found.sel(model=model) if "model" in found.dims else found).values
+        variable = self.data[BY_KEY[name].variable]
+        return (variable.sel(model=model) if "model" in variable.dims else variable).values
 
     def has(self, name: str) -> bool:
         """Whether the file has such a map or dataset of the fingers."""
@@ -67,11 +67,11 @@ def _sweep_point(axes: Any, where: Mapping[str, Any]) -> tuple[tuple[int, ...], 
         else:
             given = left.pop(key) if key in left else left.pop(axis.name)
             given = given / factor if key not in where and not isinstance(given, str) else given
-        found = [i for i, option in enumerate(options) if _same(option, given)]
-        if not found:
+        matching = [i for i, option in enumerate(options) if _same(option, given)]
+        if not matching:
             raise ValueError(f"where has {key} = {_text(given)}: expected one of {known}; there is no interpolation")
-        index.append(found[0])
-        point[key] = options[found[0]]
+        index.append(matching[0])
+        point[key] = options[matching[0]]
     if left:
         known = ", ".join(axis.long_name for axis in axes) or "nothing: the file has no sweep"
         raise ValueError(f"where has {', '.join(left)}: expected {known}")

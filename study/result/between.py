@@ -42,23 +42,23 @@ def at_force(ds: xr.Dataset, force: float) -> xr.Dataset:
     k = min(int(np.searchsorted(forces, force, side="right")) - 1, len(forces) - 2)
     share = (force - forces[k]) / (forces[k + 1] - forces[k])
     low, high = (ds.isel(normal_force=[i]).assign_coords(normal_force=[force]) for i in (k, k + 1))
-    found = low.copy()
+    between = low.copy()
     for name in (str(n) for n, v in ds.data_vars.items() if "normal_force" in v.dims):
         if ds[name].dtype.kind == "f":
-            found[name] = (ds[name].dims, (1 - share) * low[name].values + share * high[name].values, ds[name].attrs)
+            between[name] = (ds[name].dims, (1 - share) * low[name].values + share * high[name].values, ds[name].attrs)
         elif name == "flags":
-            found[name] = (ds[name].dims, low[name].values | high[name].values, ds[name].attrs)
+            between[name] = (ds[name].dims, low[name].values | high[name].values, ds[name].attrs)
     states = np.where(low["status"].values == DONE, high["status"].values, low["status"].values)
     states = np.where((states == DONE) & _apart(low, high), MISSING, states)
-    found["status"] = (ds["status"].dims, states, ds["status"].attrs)
-    found["normal_force"].attrs.update(ds["normal_force"].attrs)
-    return found
+    between["status"] = (ds["status"].dims, states, ds["status"].attrs)
+    between["normal_force"].attrs.update(ds["normal_force"].attrs)
+    return between
 
 
 def _apart(low: xr.Dataset, high: xr.Dataset) -> NDArray[np.bool_]:
     """Cases that no straight line may join."""
     apart = (low["flags"].values ^ high["flags"].values) & int(Flag.SNAPPED) > 0
     for name in KINDS if "finger_rims" in low else ():
-        one, other = (contact_kinds(name, ds[f"finger_{name}"].values) for ds in (low, high))
-        apart |= (one != other).any(axis=-1)
+        lower, upper = (contact_kinds(name, ds[f"finger_{name}"].values) for ds in (low, high))
+        apart |= (lower != upper).any(axis=-1)
     return np.asarray(apart, bool)

@@ -11,7 +11,7 @@ import numpy as np
 
 from softjaw.study.quantities import BY_KEY, MISSING, MODELS, Quantity
 
-MESSAGE = 2000  # bytes of a message: all flags of a case have room
+MESSAGE_BYTES = 2000  # bytes of a message: all flags of a case have room
 ROOT = "/study"
 CODE = f"{ROOT}/status/code"
 SUMS, CLOSING_SUMS = f"{ROOT}/checksums/rows", f"{ROOT}/checksums/closing"  # of rows; of what is filled after all rows
@@ -60,7 +60,7 @@ def columns_of(layout: Any) -> Iterator[Column]:
         elif q.group != "status":
             yield Column(q.key, f"{ROOT}/{q.key}", shape, np.dtype(dtype), fill, q.among)
     # The message stays last: `blank` and `record` address it as the last column.
-    yield Column("status/message", f"{ROOT}/status/message", (), np.dtype(f"S{MESSAGE}"), b"")
+    yield Column("status/message", f"{ROOT}/status/message", (), np.dtype(f"S{MESSAGE_BYTES}"), b"")
 
 
 def datasets_of(layout: Any) -> Iterator[Dataset]:

@@ -68,25 +68,25 @@ def _fill_sweep(writer: ResultWriter, scene: Scene) -> None:
 def _of_force_range(scene: Scene) -> list[Derived]:
     """Force to use and bounds of the safe force range, as far as the scene asks for them."""
     over = tuple(axis.name for axis in axes(scene)[:-1])
-    found = []
+    bounds = []
     if scene.object.mass is not None:
-        found.append(Derived(
+        bounds.append(Derived(
             LOW, "N", "force to use", "Smallest normal force per finger that holds the object: at which safety_factor"
             " (CCM) passes task.safety, between the solved forces by straight lines, and from 0 at 0 N. NaN: none of"
             " them holds it.", over,
         ))  # fmt: skip
-        found.append(Derived(
+        bounds.append(Derived(
             LOW_ERROR, "N", "error of the force to use", "What the bend of safety_factor over the solved forces may"
             " move it; NaN where fewer than two of them are solved up to it.", over,
         ))  # fmt: skip
     if getattr(scene.object, "wall", None) is not None:
-        found.append(Derived(
+        bounds.append(Derived(
             HIGH, "N", "largest force that the wall bears", "Normal force per finger at which the indentation passes"
             " object.allowed_dent_mm or the stress the yield strength, between the solved forces by straight lines, and"
             " from 0 at 0 N; where neither does, the largest solved force: the wall bears at least that. NaN where the"
             " wall was taken as rigid.", over,
         ))  # fmt: skip
-    return found
+    return bounds
 
 
 def _fill_force_range(writer: ResultWriter, scene: Scene) -> None:
@@ -178,5 +178,5 @@ def first_crossing(forces: ArrayLike, values: ArrayLike, limit: float) -> FloatA
     low, high = np.take_along_axis(y, k - 1, -1)[..., 0], np.take_along_axis(y, k, -1)[..., 0]
     # Equal neighbours would divide by 0; the clip then gives an end of their interval.
     share = np.clip((limit - low) / np.where(high > low, high - low, 1.0), 0.0, 1.0)
-    found = x[k[..., 0] - 1] + share * (x[k[..., 0]] - x[k[..., 0] - 1])
-    return np.where(above.any(axis=-1), found, np.nan)
+    crossing = x[k[..., 0] - 1] + share * (x[k[..., 0]] - x[k[..., 0] - 1])
+    return np.where(above.any(axis=-1), crossing, np.nan)

@@ -34,7 +34,7 @@ from softjaw.study.result.datasets import CODE, Column, Dataset, columns_of, dat
 from softjaw.study.result.datasets import ROOT as ROOT
 
 PROGRAM, VERSION = "softjaw", 8
-LABEL, SESSIONS, REPORT = 80, 256, 8192
+LABEL_BYTES, MOST_SESSIONS, REPORT_BYTES = 80, 256, 8192
 # Fixed lengths: a run writes to space that is there already, and text of any length would need more.
 SESSION = np.dtype(
     [("start", "S32"), ("stop", "S32"), ("reason", "S120"), ("ranks", "<i4"), ("hosts", "<i4"), ("done", "<i8"),
@@ -153,7 +153,7 @@ class Layout:
     def lengths(self) -> dict[str, int]:
         """Dimensions of the quantities besides the axes, and their lengths."""
         parts = {"finger": FINGERS, "model": len(MODELS), "component": 3, "monomial": len(MONOMIALS)}
-        parts |= {"session": SESSIONS, "component_2": 3}
+        parts |= {"session": MOST_SESSIONS, "component_2": 3}
         parts |= {"wrench": 6, "wrench_2": 6} if "six components" in self.has else {}
         if self.cor_grid:
             parts["cor"] = self.cor_grid**2
@@ -186,7 +186,8 @@ class Layout:
     def nbytes(self) -> int:
         """Size of the file, rounded up generously for what HDF5 adds."""
         count = len(self.datasets) + len(self.axes) + 16
-        return sum(d.nbytes for d in self.datasets) + SESSIONS * SESSION.itemsize + REPORT + 4096 * count + 2**16
+        texts = MOST_SESSIONS * SESSION.itemsize + REPORT_BYTES
+        return sum(d.nbytes for d in self.datasets) + texts + 4096 * count + 2**16
 
     @property
     def chosen(self) -> dict[str, tuple[int, ...]]:
@@ -195,13 +196,13 @@ class Layout:
 
     @cached_property
     def _slots(self) -> dict[str, dict[int, int]]:
-        return {name: {number: slot for slot, number in enumerate(own)} for name, own in self.chosen.items()}
+        return {name: {number: slot for slot, number in enumerate(numbers)} for name, numbers in self.chosen.items()}
 
     def places(self, row: int) -> list[tuple[int, ...] | None]:
         """Where a row's values stand in the columns' datasets; None for what is stored of other candidates only."""
         index = tuple(int(i) for i in np.unravel_index(row, self.shape))
         number = index[-3] * self.shape[-2] + index[-2]
-        slots = {name: own.get(number) for name, own in self._slots.items()}
+        slots = {name: slot_of.get(number) for name, slot_of in self._slots.items()}
         among = {name: None if slot is None else (*index[:-3], slot, index[-1]) for name, slot in slots.items()}
         return [among[c.among] if c.among else index for c in self.columns]
 

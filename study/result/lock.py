@@ -127,13 +127,13 @@ class OpenedFile:
     def check(self) -> None:
         """Raise `StudyError` if the file was moved or removed, or its folder cannot be reached."""
         try:
-            found = self._now()
+            identity = self._now()
         except FileNotFoundError:
-            found = None
+            identity = None
         except OSError as error:
             raise self._lost(error.strerror or str(error)) from error
-        if found != self._identity:
-            what = "was moved or removed" if found is None else "was replaced by another file"
+        if identity != self._identity:
+            what = "was moved or removed" if identity is None else "was replaced by another file"
             remedy = "put it back, or begin again with the same command"
             raise StudyError(CANNOT_WRITE, f"{self.path}: {what} while the run was writing it; {remedy}")
 

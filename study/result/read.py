@@ -84,14 +84,14 @@ def read_patch(file: str | Path, **at: int | slice) -> xr.Dataset:
         rows = xr.DataArray(np.arange(result.layout.rows).reshape(result.layout.shape), dims=result.layout.names)
         rows = rows.isel(_as_given(result) | at)
         faces = [result.patch(int(row)) for row in rows.values.ravel()] if result.layout.patches else []
-        found = {}
+        variables = {}
         for name in faces[0] if faces else ():
-            values = np.stack([one[name] for one in faces]).reshape(rows.shape + faces[0][name].shape)
+            values = np.stack([case[name] for case in faces]).reshape(rows.shape + faces[0][name].shape)
             # Rows that are not complete may hold what a killed run began to write.
             values[(result.status.ravel()[rows.values] != DONE)] = np.nan
             q = BY_KEY[f"patch/{name}"]
-            found[name] = xr.Variable((*rows.dims, *q.dims), values, _about(q))
-        return xr.Dataset(found, {"finger": np.arange(1, FINGERS + 1), "component": [*XYZ]} if found else {})
+            variables[name] = xr.Variable((*rows.dims, *q.dims), values, _about(q))
+        return xr.Dataset(variables, {"finger": np.arange(1, FINGERS + 1), "component": [*XYZ]} if variables else {})
 
 
 def read_field(file: str | Path, path: str, **at: int | slice) -> xr.DataArray:
@@ -133,8 +133,8 @@ def dataset(result: Result) -> xr.Dataset:
             about = {"units": d.units, "long_name": d.long_name, "definition": d.definition}
             variables[d.name] = xr.Variable(_scales(d), result.derived(d.name), about)
     for name in ("attempts", "message"):
-        found = result.messages if name == "message" else result.read(f"status/{name}")
-        variables[name] = xr.Variable(layout.names, found, _about(BY_KEY[f"status/{name}"]))
+        values = result.messages if name == "message" else result.read(f"status/{name}")
+        variables[name] = xr.Variable(layout.names, values, _about(BY_KEY[f"status/{name}"]))
     status = result.status  # last: rows that a run began anew meanwhile are missing now
     for variable in variables.values():
         if variable.dims[: len(layout.names)] == layout.names and variable.dtype.kind == "f":
@@ -162,10 +162,10 @@ def values_of(ds: xr.Dataset, name: str, model: str = "ccm") -> np.ndarray:
 
     What is known of a candidate only has the same value at every force.
     """
-    found = ds[name].sel(model=model, drop=True) if "model" in ds[name].dims else ds[name]
-    if found.dims != ds.status.dims:  # rarely, and xarray takes its time
-        found = found.broadcast_like(ds.status).transpose(*ds.status.dims)
-    return found.values
+    variable = ds[name].sel(model=model, drop=True) if "model" in ds[name].dims else ds[name]
+    if variable.dims != ds.status.dims:  # rarely, and xarray takes its time
+        variable = variable.broadcast_like(ds.status).transpose(*ds.status.dims)
+    return variable.values
 
 
 def mesh_error(ds: xr.Dataset, name: str) -> np.ndarray | None:
@@ -210,18 +210,18 @@ def _about(q: Quantity) -> dict[str, Any]:
 
 def _coordinates(result: Result, variables: dict[str, Any]) -> dict[str, Any]:
     layout = result.layout
-    found: dict[str, Any] = {
+    coordinates: dict[str, Any] = {
         name: xr.Variable(name, axis.values, {"units": axis.units, "long_name": axis.long_name})
         for name, axis in zip(layout.names, result.axes, strict=True)
     }
     for name, axis in zip(layout.names, result.axes, strict=True):
         if axis.options:
-            found[name].attrs["options"] = axis.options
-    found["label"] = xr.Variable(layout.names[-3:-1], result.labels, {"long_name": "name of the candidate"})
+            coordinates[name].attrs["options"] = axis.options
+    coordinates["label"] = xr.Variable(layout.names[-3:-1], result.labels, {"long_name": "name of the candidate"})
     known = {"finger": [*range(1, FINGERS + 1)], "model": [*MODELS], "component": [*XYZ], "component_2": [*XYZ]}
     used = {dim for variable in variables.values() for dim in variable.dims}
-    found |= {name: values for name, values in known.items() if name in used}
-    return found
+    coordinates |= {name: values for name, values in known.items() if name in used}
+    return coordinates
 
 
 def _attributes(result: Result) -> dict[str, Any]:

@@ -24,12 +24,12 @@ from softjaw.study.result import checksums
 from softjaw.study.result.datasets import CLOSING_SUMS, described
 from softjaw.study.result.hdf5 import StoredFile, reason
 from softjaw.study.result.layout import (
-    LABEL,
+    LABEL_BYTES,
+    MOST_SESSIONS,
     PROGRAM,
-    REPORT,
+    REPORT_BYTES,
     ROOT,
     SESSION,
-    SESSIONS,
     VERSION,
     Dataset,
     Header,
@@ -39,9 +39,9 @@ from softjaw.study.result.provenance import SAMPLING
 from softjaw.study.result.store import open_result
 from softjaw.study.units import shown_text
 
-LIBVER = ("earliest", "v110")  # programs that bring an older HDF5 of their own can read it
+HDF5_VERSIONS = ("earliest", "v110")  # programs that bring an older HDF5 of their own can read it
 TEXT = h5py.string_dtype("utf-8")
-EVEN = 1e-6  # relative difference of steps that makes an axis uneven
+EVEN_STEPS = 1e-6  # relative difference of steps that makes an axis uneven
 SESSION_ROWS = f"{ROOT}/provenance/sessions"
 # What a grown file has of its own, or what is filled again once nothing is missing.
 NOT_COPIED = (f"{ROOT}/derived/", CLOSING_SUMS, f"{ROOT}/wrenches/motion", f"{ROOT}/wrenches/candidate")
@@ -61,10 +61,10 @@ def create(path: Path, layout: Layout, header: Header) -> None:
     _reserve(path, layout.nbytes)
     part = path.with_name(path.name + ".part")
     try:
-        with h5py.File(part, "w", libver=LIBVER) as file:
+        with h5py.File(part, "w", libver=HDF5_VERSIONS) as file:
             _write_skeleton(file, layout, header)
         # Opened anew: the sums are of what a reader will find in the file.
-        with h5py.File(part, "r+", libver=LIBVER) as file:
+        with h5py.File(part, "r+", libver=HDF5_VERSIONS) as file:
             _write_checksums(file, StoredFile(part, file), layout)
         with part.open("r+b") as handle:
             # Blocks that exist now cannot be missing when a rank writes.
@@ -89,7 +89,7 @@ def grow(path: Path, layout: Layout, header: Header) -> None:
     grown = path.with_name(path.name + ".grown")
     create(grown, layout, header)
     try:
-        with open_result(path, unchecked=True) as old, h5py.File(grown, "r+", libver=LIBVER) as file:
+        with open_result(path, unchecked=True) as old, h5py.File(grown, "r+", libver=HDF5_VERSIONS) as file:
             places = _places(old.layout, layout)
             known = {d.path for d in old.layout.datasets}
             for dataset in (d for d in layout.datasets if d.path in known and not d.path.startswith(NOT_COPIED)):
@@ -111,23 +111,23 @@ def _places(old: Layout, new: Layout) -> dict[str, Any]:
     stations = np.searchsorted(now, before)
     if not np.array_equal(now[np.minimum(stations, len(now) - 1)], before):
         raise ValueError("a station of the file is not among those of its scene")
-    found = {"station": stations}
+    places = {"station": stations}
     angles = new.shape[-2]
     for name, numbers in old.chosen.items():
         moved = [int(stations[n // angles]) * angles + n % angles for n in numbers]
-        found[name] = np.array([new.chosen[name].index(n) for n in moved], int)
-    return found
+        places[name] = np.array([new.chosen[name].index(n) for n in moved], int)
+    return places
 
 
 def _spread(values: np.ndarray, dataset: Dataset, places: dict[str, Any]) -> np.ndarray:
     """The values at their places in the new shape, and the dataset's fill value elsewhere."""
-    found = np.full(dataset.shape, dataset.fill, dataset.dtype)
-    index: list[Any] = [slice(None)] * found.ndim
-    for axis, name in enumerate(dataset.scales[: found.ndim]):
+    spread = np.full(dataset.shape, dataset.fill, dataset.dtype)
+    index: list[Any] = [slice(None)] * spread.ndim
+    for axis, name in enumerate(dataset.scales[: spread.ndim]):
         if name in places:
             index[axis] = places[name]
-    found[tuple(index)] = values
-    return found
+    spread[tuple(index)] = values
+    return spread
 
 
 def put_in_place(part: Path, path: Path) -> None:
@@ -204,11 +204,11 @@ def _write_texts(study: h5py.Group, layout: Layout, header: Header) -> None:
     if header.placed is not None:
         study["scene"].attrs.update(object_rotation=header.placed.rotation, object_origin=header.placed.origin)
     study["scene"].attrs["overrides"] = "\n".join(header.overrides)
-    sessions = study["provenance"].create_dataset("sessions", data=np.zeros(SESSIONS, SESSION))
+    sessions = study["provenance"].create_dataset("sessions", data=np.zeros(MOST_SESSIONS, SESSION))
     sessions.attrs["long_name"] = "one row for each time the study was started: program, machine, start, end"
     _attach_scales(sessions, ["session"])
-    labels = np.zeros(int(np.prod(layout.shape[-3:-1])), h5py.string_dtype("utf-8", LABEL))
-    labels[: len(header.labels)] = [text_bytes(label, LABEL) for label in header.labels]
+    labels = np.zeros(int(np.prod(layout.shape[-3:-1])), h5py.string_dtype("utf-8", LABEL_BYTES))
+    labels[: len(header.labels)] = [text_bytes(label, LABEL_BYTES) for label in header.labels]
     named = study["candidates"].create_dataset("label", data=labels.reshape(layout.shape[-3:-1]))
     named.attrs["long_name"] = "name of the candidate in the scene"
     _attach_scales(named, layout.names[-3:-1])
@@ -232,8 +232,8 @@ def text_bytes(text: str, length: int) -> bytes:
 
 def report_bytes(text: str) -> np.ndarray:
     """Text of fixed length, filled up with blanks: zeros would be shown by tools that print it."""
-    data = text.encode()[:REPORT].decode(errors="ignore").encode()
-    return np.array(data.ljust(REPORT), h5py.string_dtype("utf-8", REPORT))
+    data = text.encode()[:REPORT_BYTES].decode(errors="ignore").encode()
+    return np.array(data.ljust(REPORT_BYTES), h5py.string_dtype("utf-8", REPORT_BYTES))
 
 
 def _create_dataset(file: h5py.File, dataset: Dataset) -> None:
@@ -299,7 +299,7 @@ def axes_of(layout: Layout, chosen: Sequence[int]) -> dict[str, Any]:
     there. Beside an uneven axis it draws dots instead, and then needs both.
     """
     values = [np.asarray(layout.axes[i].values, float) for i in chosen]
-    even = all(np.ptp(np.diff(v)) <= EVEN * np.ptp(v) for v in values[-2:] if len(v) > 2)
+    even = all(np.ptp(np.diff(v)) <= EVEN_STEPS * np.ptp(v) for v in values[-2:] if len(v) > 2)
     names = ["." if len(v) == 2 and even else layout.names[i] for v, i in zip(values, chosen, strict=True)]
     return {"axes": names, **{f"{name}_indices": i for i, name in enumerate(names) if name != "."}}
 
@@ -311,15 +311,15 @@ def groups(layout: Layout) -> dict[str, dict[str, Any]]:
     at = [f"{axis.name} {shown_text(axis.values[i], axis.units, 5)}" for axis, i in others]
     title = ", ".join(["grasp map, curved contact model", *at])
     first = {"signal": FIRST[0], "auxiliary_signals": list(FIRST[1:]), "title": title}
-    found: dict[str, dict[str, Any]] = {"map": {"NX_class": "NXdata", **axes_of(layout, layout.shown), **first}}
+    attributes: dict[str, dict[str, Any]] = {"map": {"NX_class": "NXdata", **axes_of(layout, layout.shown), **first}}
     for q in layout.quantities:
         if q.group != "maps":
             continue
         several = {"signal": MODELS[0], "auxiliary_signals": list(layout.models[1:])}
         signal = several if q.by_model else {"signal": q.name}
-        found[q.name] = {**plot, **signal, "title": q.label, "definition": q.definition}
-    found["status"] = {**plot, "signal": "code", "title": "state of the cases"}
+        attributes[q.name] = {**plot, **signal, "title": q.label, "definition": q.definition}
+    attributes["status"] = {**plot, "signal": "code", "title": "state of the cases"}
     collections = ["axes", "candidates", "checksums", "provenance", *{q.group for q in layout.quantities} - {"status"}]
     collections += ["derived"] * bool(layout.derived)
-    found.update({name: {"NX_class": "NXcollection"} for name in sorted(collections) if name != "maps"})
-    return found
+    attributes.update({name: {"NX_class": "NXcollection"} for name in sorted(collections) if name != "maps"})
+    return attributes

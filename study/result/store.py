@@ -21,12 +21,12 @@ from softjaw.study.quantities import STATES
 from softjaw.study.result import checksums
 from softjaw.study.result.hdf5 import opened, text_of
 from softjaw.study.result.layout import (
-    LABEL,
+    LABEL_BYTES,
     MISSING,
+    MOST_SESSIONS,
     PROGRAM,
     ROOT,
     SESSION,
-    SESSIONS,
     VERSION,
     Layout,
     layout_from_options,
@@ -34,7 +34,7 @@ from softjaw.study.result.layout import (
 from softjaw.study.result.lock import holder
 from softjaw.study.units import shown_text
 
-BEYOND = 1e100  # no value of a study in SI units comes near it, and its square can be computed
+LARGEST_VALUE = 1e100  # no value of a study in SI units comes near it, and its square can be computed
 
 
 class StoredAxis(NamedTuple):
@@ -169,13 +169,13 @@ class Result:
     @property
     def labels(self) -> np.ndarray:
         """Names of the candidates, ``(stations, angles)``."""
-        found = self.file.checked(f"{ROOT}/candidates/label", self.layout.shape[-3:-1], np.dtype(f"S{LABEL}"))
-        return _texts(self.file.values(found))
+        dataset = self.file.checked(f"{ROOT}/candidates/label", self.layout.shape[-3:-1], np.dtype(f"S{LABEL_BYTES}"))
+        return _texts(self.file.values(dataset))
 
     @property
     def sessions(self) -> list[dict[str, Any]]:
         """One entry for each time the study was started: start, stop, reason, ranks, versions, ..."""
-        rows = self.file.values(self.file.checked(f"{ROOT}/provenance/sessions", (SESSIONS,), SESSION))
+        rows = self.file.values(self.file.checked(f"{ROOT}/provenance/sessions", (MOST_SESSIONS,), SESSION))
         # A session that lost its start still has its sum: it counts as damage, not as none.
         used = [row for row in rows if row["crc"] or row["start"]]
         if not self._unchecked and any(row["crc"] != checksums.of_session(row) for row in used):
@@ -206,18 +206,18 @@ class Result:
             cases = f"case {some}" if rows.size == 1 else f"{rows.size} cases ({some})"
             raise self._damaged(f"{what} of {cases} does not match its checksum")
 
-    def _believable(self, path: str, found: np.ndarray) -> np.ndarray:
-        if found.dtype.kind == "f" and (np.isfinite(found) & (np.abs(found) > BEYOND)).any():
-            raise self._damaged(f"{path} has values beyond {BEYOND:g}")
-        return found
+    def _believable(self, path: str, values: np.ndarray) -> np.ndarray:
+        if values.dtype.kind == "f" and (np.isfinite(values) & (np.abs(values) > LARGEST_VALUE)).any():
+            raise self._damaged(f"{path} has values beyond {LARGEST_VALUE:g}")
+        return values
 
     def _closing(self, name: str) -> np.ndarray:
         """What is filled after all rows, by its name in ``layout.closing``."""
         for patience in (0.02, 0.2, 0.0):  # a run may be writing it just now
             dataset = self._checked(name) if f"{ROOT}/{name}" in self._known else self._text(name)
-            found = np.asarray(self.file.values(dataset))
-            if self._unchecked or checksums.of_array(found) == checksums.closing_sum(self.file, self.layout, name):
-                return found
+            values = np.asarray(self.file.values(dataset))
+            if self._unchecked or checksums.of_array(values) == checksums.closing_sum(self.file, self.layout, name):
+                return values
             time.sleep(patience)
         raise self._damaged(f"{name} does not match its checksum")
 
@@ -233,13 +233,13 @@ class Result:
 
     def _axis(self, name: str) -> StoredAxis:
         path = f"{ROOT}/axes/{name}"
-        found, attributes = self.file.plain(path), self.file.attributes(path)
-        if found.ndim != 1 or found.dtype != np.dtype("<f8"):
+        dataset, attributes = self.file.plain(path), self.file.attributes(path)
+        if dataset.ndim != 1 or dataset.dtype != np.dtype("<f8"):
             raise ValueError(f"axis '{name}' is not a list of numbers")
         units = str(attributes.get("units", ""))
-        values = self.file.values(found)
+        values = self.file.values(dataset)
         # Put this way round so that NaN is refused as well.
-        if not (np.abs(values) < BEYOND).all():
+        if not (np.abs(values) < LARGEST_VALUE).all():
             raise ValueError(f"axis '{name}' has values that are not numbers")
         label = str(attributes.get("long_name", name)).removesuffix(f" [{units}]")
         options = tuple(text_of(text) for text in np.ravel(attributes.get("options", ())))
@@ -248,18 +248,18 @@ class Result:
         return StoredAxis(name, values, units, label, options)
 
     def _text(self, name: str) -> Any:
-        found = self.file.plain(f"{ROOT}/{name}")
-        if found.shape != () or found.dtype.kind != "S":
+        dataset = self.file.plain(f"{ROOT}/{name}")
+        if dataset.shape != () or dataset.dtype.kind != "S":
             raise self._damaged(f"{ROOT}/{name} is not a text")
-        return found
+        return dataset
 
     def _string(self, name: str) -> str:
         return text_of(self.file.values(self._text(name)).strip(b"\0 "))
 
 
-def _texts(found: np.ndarray) -> np.ndarray:
+def _texts(strings: np.ndarray) -> np.ndarray:
     """Texts of an array of fixed-length strings."""
-    return np.array([text_of(text) for text in found.ravel().tolist()], dtype=str).reshape(found.shape)
+    return np.array([text_of(text) for text in strings.ravel().tolist()], dtype=str).reshape(strings.shape)
 
 
 def place_text(axes: Sequence[Any], labels: Any, index: Sequence[int]) -> str:

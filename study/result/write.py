@@ -15,10 +15,10 @@ from softjaw.study.case.result import CaseResult
 from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, StudyError
 from softjaw.study.quantities import EFFECT_TABLE, EFFECTS, MEASURED, MODELS
 from softjaw.study.result import checksums
-from softjaw.study.result.datasets import CLOSING_SUMS, MESSAGE, SUMS
+from softjaw.study.result.datasets import CLOSING_SUMS, MESSAGE_BYTES, SUMS
 from softjaw.study.result.hdf5 import StoredFile
 from softjaw.study.result.layout import DONE, FAILED, MISSING, ROOT, SESSION, Header, Layout
-from softjaw.study.result.skeleton import LIBVER, report_bytes, text_bytes
+from softjaw.study.result.skeleton import HDF5_VERSIONS, report_bytes, text_bytes
 from softjaw.study.result.store import Result, open_result
 from softjaw.study.scene.text import differences
 
@@ -37,7 +37,7 @@ class ResultWriter:
             comm = None
         self.path, self.layout = path, layout
         shared = {} if comm is None else {"driver": "mpio", "comm": comm}
-        self._file = h5py.File(path, "r+", libver=LIBVER, **shared)
+        self._file = h5py.File(path, "r+", libver=HDF5_VERSIONS, **shared)
         # Opened once: finding an object by its path takes longer than a small write.
         self._columns = [self._file[c.path] for c in layout.columns]
         self._code, self._attempts = (self._file[f"{ROOT}/status/{name}"] for name in ("code", "attempts"))
@@ -110,15 +110,15 @@ class ResultWriter:
 
     def write_report(self, text: str) -> None:
         """Write the report, cut where it is too long; by one rank, after all rows."""
-        self._file[f"{ROOT}/report"][()] = found = report_bytes(text)
+        self._file[f"{ROOT}/report"][()] = report = report_bytes(text)
         # The sum follows the values: a reader that comes in between looks again.
-        self._close("report", found)
+        self._close("report", report)
 
     def write_derived(self, name: str, values: Any) -> None:
         """Fill a derived dataset; by one rank, after all rows."""
         dataset = self._file[f"{ROOT}/derived/{name}"]
-        dataset[...] = found = np.broadcast_to(np.asarray(values, dataset.dtype), dataset.shape)
-        self._close(f"derived/{name}", found)
+        dataset[...] = filled = np.broadcast_to(np.asarray(values, dataset.dtype), dataset.shape)
+        self._close(f"derived/{name}", filled)
 
     def _close(self, name: str, values: np.ndarray) -> None:
         self._closing_sums[self.layout.closing.index(name)] = checksums.of_array(values)
@@ -157,7 +157,7 @@ def blank(layout: Layout, message: str = "", seconds: float = math.nan) -> list[
     """A row without values, as a case without a result leaves it; ``seconds`` is what was spent on it."""
     spent = {"work/seconds_total": seconds}
     row = [np.full(c.shape, spent.get(c.key, c.fill), c.dtype) for c in layout.columns]
-    row[-1] = np.array(text_bytes(message, MESSAGE), layout.columns[-1].dtype)
+    row[-1] = np.array(text_bytes(message, MESSAGE_BYTES), layout.columns[-1].dtype)
     return row
 
 

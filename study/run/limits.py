@@ -24,11 +24,11 @@ from softjaw.study.messages import USAGE, StudyError
 # Seconds to finish the case in flight. mpirun kills its ranks about two seconds after it was interrupted; USR1 is what
 # batch systems are asked to send a minute before the time limit.
 GRACE = {signal.SIGUSR1: 30.0, signal.SIGTERM: 0.5, signal.SIGINT: 0.5}
-AGAIN = 1.0  # s; what a handler raises inside a finaliser is printed and lost, so it is raised once more
-ITSELF = 1.2e9  # bytes of addresses for the program with its libraries, which take 0.97, and the smallest cases
+RAISE_AGAIN_S = 1.0  # s; what a handler raises inside a finaliser is printed and lost, so it is raised once more
+PROGRAM_BYTES = 1.2e9  # bytes of addresses for the program with its libraries, which take 0.97, and the smallest cases
 SIGNS = ("Cannot allocate memory", "failed to map segment")  # of a file or library that finds no memory
-LEAST = 1e9  # bytes for the cases of a rank: with less than that, nothing could be solved at all
-KEPT = 0.9  # share of the free memory that is handed out; the rest is for the file's pages and for other programs
+MIN_RANK_BYTES = 1e9  # bytes for the cases of a rank: with less than that, nothing could be solved at all
+SHARE_HANDED_OUT = 0.9  # of the free memory; the rest is for the file's pages and for other programs
 CGROUPS = Path("/sys/fs/cgroup")
 
 
@@ -109,7 +109,7 @@ class Stopper:
     def _set_alarm(self) -> None:
         left = min(self._leave, self._case_ends) - time.monotonic()
         # A timer of 0 would be off, so a moment that has passed already gets a millisecond.
-        signal.setitimer(signal.ITIMER_REAL, 0 if left == math.inf else max(left, 1e-3), AGAIN)
+        signal.setitimer(signal.ITIMER_REAL, 0 if left == math.inf else max(left, 1e-3), RAISE_AGAIN_S)
 
     def _alarm(self, *_: Any) -> None:
         now = time.monotonic()
@@ -146,7 +146,8 @@ def limited_memory(setting: float | str, ranks: int) -> Iterator[None]:
     soft, hard = resource.getrlimit(resource.RLIMIT_AS)
     if setting != "none":
         # With almost nothing free a case still gets a chance; the system has the last word.
-        share = max(KEPT * available() / ranks, LEAST) if setting == "auto" else 1e9 * float(setting)
+        auto = setting == "auto"
+        share = max(SHARE_HANDED_OUT * available() / ranks, MIN_RANK_BYTES) if auto else 1e9 * float(setting)
         # A huge setting must not overflow what the system takes.
         wanted = _own_addresses() + int(min(share, 2.0**60))
         resource.setrlimit(resource.RLIMIT_AS, (wanted if hard == resource.RLIM_INFINITY else min(wanted, hard), hard))
@@ -166,16 +167,16 @@ def require_room() -> None:
     """
     limit = resource.getrlimit(resource.RLIMIT_AS)[0]
     # With less than this some libraries hang instead of failing, so the run is refused before.
-    if limit != resource.RLIM_INFINITY and limit < ITSELF:
-        raise StudyError(USAGE, no_room(f"softjaw with its libraries takes {ITSELF / 1e9:g} GB for small cases"))
+    if limit != resource.RLIM_INFINITY and limit < PROGRAM_BYTES:
+        raise StudyError(USAGE, no_room(f"softjaw with its libraries takes {PROGRAM_BYTES / 1e9:g} GB for small cases"))
 
 
 def no_room(reason: str) -> str:
     """A sentence for memory that was missing outside of a case."""
     limit = resource.getrlimit(resource.RLIMIT_AS)[0]
-    found = "unlimited" if limit == resource.RLIM_INFINITY else f"limited to {limit / 1e9:.2f} GB"
+    text = "unlimited" if limit == resource.RLIM_INFINITY else f"limited to {limit / 1e9:.2f} GB"
     return (
-        f"out of memory: addresses of a process are {found} (ulimit -v); {reason}; raise the limit to 2 GB or more, or "
+        f"out of memory: addresses of a process are {text} (ulimit -v); {reason}; raise the limit to 2 GB or more, or "
         "ask the batch system for more memory"
     )
 
@@ -211,9 +212,9 @@ def _groups_free() -> Iterator[float]:
 
 def _file_pages(group: Path) -> float:
     words = [line.split() for line in _lines(group / "memory.stat")]
-    found = {name: float(value) for name, value in words}
+    counts = {name: float(value) for name, value in words}
     # Version 1 counts pages of groups below under total_ only.
-    return sum(found.get(f"total_{name}", found.get(name, 0.0)) for name in ("inactive_file", "active_file"))
+    return sum(counts.get(f"total_{name}", counts.get(name, 0.0)) for name in ("inactive_file", "active_file"))
 
 
 def _own_addresses() -> int:

@@ -190,8 +190,8 @@ def fail_from(writer: Any, pending: Pending, message: str, above: str, seconds: 
 
 def _pending(share: Share, codes: np.ndarray) -> Pending:
     """Missing rows of a share: for each force, rising, the candidates and their rows."""
-    found = {k: [(c, rows[k]) for c, rows in enumerate(share.unit.rows)] for k in share.forces}
-    missing = {k: [(c, row) for c, row in served if codes[row] == MISSING] for k, served in found.items()}
+    rows_at = {k: [(c, rows[k]) for c, rows in enumerate(share.unit.rows)] for k in share.forces}
+    missing = {k: [(c, row) for c, row in served if codes[row] == MISSING] for k, served in rows_at.items()}
     return {k: served for k, served in missing.items() if served}
 
 

@@ -30,12 +30,12 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 Frame = tuple[FloatArray, FloatArray]  # a point [m]; long side, short side and approach as columns
 Place = tuple[float, ...]  # share of the first step, then point [mm], approach and long side, as a scene gives them
-SIDE = 0.25  # first step of a shift, of the pad's side
+FIRST_STEP_SHARE = 0.25  # first step of a shift, of the pad's side
 ROLL, TILT = math.radians(15.0), math.radians(5.0)  # first steps of a turn about the approach and of a tilt of it
-FINEST = 1 / 8  # of the first step: 1.6 mm along a pad of 50 mm, 0.6 degrees of tilt
-SAME = 0.5  # of a step, within which two poses are one
-ROUND = 4  # poses of a round: few, so that the next ones start from the better of them
-LEAST = 1e-9  # [m], below which the quality on a bed of springs is none
+FINEST_STEP_SHARE = 1 / 8  # of the first step: 1.6 mm along a pad of 50 mm, 0.6 degrees of tilt
+SAME_POSE_STEPS = 0.5  # of a step, within which two poses are one
+POSES_PER_ROUND = 4  # poses of a round: few, so that the next ones start from the better of them
+MIN_BED_QUALITY_M = 1e-9  # [m], below which the quality on a bed of springs is none
 
 
 def with_places(poses: Sequence[GraspPose], rounds: Sequence[Sequence[Place]]) -> tuple[GraspPose, ...]:
@@ -83,9 +83,9 @@ def next_poses(result: Any, values: FloatArray, scene: Scene, each: int) -> tupl
     added = np.moveaxis(result.status.reshape(-1, *result.layout.shape[-3:]), 1, 0)[given:]
     left = (where.refine - int(np.sum(~np.isin(added, NO_GRASP)))) // each
     share = rounds[-1][0][0] if rounds else 1.0
-    while left > 0 and share >= FINEST:
-        if found := _neighbours(scene, rounds, values, share):
-            return tuple(found[: min(left, ROUND)])
+    while left > 0 and share >= FINEST_STEP_SHARE:
+        if poses := _neighbours(scene, rounds, values, share):
+            return tuple(poses[: min(left, POSES_PER_ROUND)])
         before = given + sum(len(some) for some in rounds if some[0][0] > share)
         if share < 1.0 and gained(values, before) < where.refine_within * (1 + MARGIN):
             return ()
@@ -101,11 +101,11 @@ def _neighbours(scene: Scene, rounds: Any, values: FloatArray, share: float) -> 
     shape, jaws = shapes_of(scene)[0], jaws_of(scene)
     placed, surface, lids = own_frame(shape), surface_triangles(shape), lids_of(build_object(shape))
     known = [_frame(pose, placed) for pose in with_places(scene.candidates.poses, rounds)]
-    found: list[tuple[float, Place]] = []
+    poses: list[tuple[float, Place]] = []
     for best in best_places(values):
-        own = max(JawsOnSurface(surface, *known[best], jaws).quality, LEAST)
+        quality = max(JawsOnSurface(surface, *known[best], jaws).quality, MIN_BED_QUALITY_M)
         for point, axes in _moved(known[best], share, jaws.pad):
-            if any(apart((point, axes), other, jaws.pad) < SAME * share for other in known):
+            if any(apart((point, axes), other, jaws.pad) < SAME_POSE_STEPS * share for other in known):
                 continue
             try:
                 grip = JawsOnSurface(surface, point, axes, jaws)
@@ -116,8 +116,8 @@ def _neighbours(scene: Scene, rounds: Any, values: FloatArray, share: float) -> 
             # In the middle between both contacts, where the next tilt turns about.
             point = point + 0.5 * (grip.sides[0].touch - grip.sides[1].touch) * axes[:, 2]
             known.append((point, axes))
-            found.append((round(grip.quality / own, 6), (share, *_in_file(point, axes, placed))))
-    return [place for _, place in sorted(found, key=lambda pair: -pair[0])]
+            poses.append((round(grip.quality / quality, 6), (share, *_in_file(point, axes, placed))))
+    return [place for _, place in sorted(poses, key=lambda pair: -pair[0])]
 
 
 def _frame(pose: GraspPose, placed: Any) -> Frame:
@@ -138,7 +138,7 @@ def _moved(frame: Frame, share: float, pad: Sequence[float]) -> Iterator[Frame]:
     """The ten neighbours of a grasp: shifts to both sides along both sides of the pads, and turns about all axes."""
     point, axes = frame
     for side, sign in product((0, 1), (1.0, -1.0)):
-        yield point + sign * share * SIDE * pad[side] * axes[:, side], axes
+        yield point + sign * share * FIRST_STEP_SHARE * pad[side] * axes[:, side], axes
     for axis, sign in product((2, 0, 1), (1.0, -1.0)):
         turn, (i, j) = sign * share * (ROLL if axis == 2 else TILT), ((axis + 1) % 3, (axis + 2) % 3)
         R = np.eye(3)
@@ -146,9 +146,9 @@ def _moved(frame: Frame, share: float, pad: Sequence[float]) -> Iterator[Frame]:
         yield point, axes @ R
 
 
-def apart(one: Frame, other: Frame, pad: Sequence[float]) -> float:
+def apart(first: Frame, other: Frame, pad: Sequence[float]) -> float:
     """How far two grasps are apart, in first steps; shifts along the approach and swapped fingers do not count."""
-    off, R = one[1].T @ (other[0] - one[0]), np.abs(one[1].T @ other[1])
-    shift = max(abs(float(off[k])) / (SIDE * pad[k]) for k in (0, 1))
+    off, R = first[1].T @ (other[0] - first[0]), np.abs(first[1].T @ other[1])
+    shift = max(abs(float(off[k])) / (FIRST_STEP_SHARE * pad[k]) for k in (0, 1))
     roll, tilt = math.atan2(R[1, 0], R[0, 0]), math.atan2(math.hypot(R[0, 2], R[1, 2]), R[2, 2])
     return max(shift, roll / ROLL, tilt / TILT)

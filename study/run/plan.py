@@ -19,19 +19,19 @@ from softjaw.study.quantities import ALONG, AROUND, NO_GRASP, STATES
 from softjaw.study.result.derived import derived
 from softjaw.study.result.layout import Header, Layout
 from softjaw.study.result.store import open_result
-from softjaw.study.run.estimate import START, estimated
+from softjaw.study.run.estimate import START_S, estimated
 from softjaw.study.run.progress import duration
 from softjaw.study.run.refine import Rounds, added_cases, refined
 from softjaw.study.run.shares import by_cost
 
-LIBRARIES = 3e8  # bytes of a rank that has loaded PETSc, numba and scipy and nothing else
-FILL = 20.0  # factor entries over dofs^(4/3), the growth of nested dissection in 3-D
+LIBRARY_BYTES = 3e8  # bytes of a rank that has loaded PETSc, numba and scipy and nothing else
+FILL_FACTOR = 20.0  # factor entries over dofs^(4/3), the growth of nested dissection in 3-D
 # Measured on a cup of 0.4 mm, 5 000 to 21 000 unknowns: a force takes 7 Newton steps of 15 us per unknown each; the
 # factors, what they are made from and what is not given back take 16 kB per unknown of the wall.
-SECONDS, BYTES = 1e-4, 1.6e4
-DENSE = 8  # copies of a linear wall's dense stiffness: compliance, inverse, assembled entries and their factors
-CUBE = 2.1e-10  # seconds per force and cube of the unknowns of that stiffness
-MARGIN = 0.1  # of the pad's length, round what it covers
+SECONDS_PER_UNKNOWN, BYTES_PER_UNKNOWN = 1e-4, 1.6e4
+DENSE_COPIES = 8  # copies of a linear wall's dense stiffness: compliance, inverse, assembled entries and their factors
+SECONDS_PER_CUBE = 2.1e-10  # seconds per force and cube of the unknowns of that stiffness
+COVER_MARGIN = 0.1  # of the pad's length, round what it covers
 
 
 @dataclass(frozen=True)
@@ -146,9 +146,9 @@ def sensible_ranks(costs: Sequence[float], efficiency: float = 0.8) -> int:
 
 def memory(scene: Any) -> float:
     """Rough memory of one rank [bytes]: the libraries, the factors of the whole pad's stiffness, those of a wall."""
-    pad = 8.0 * FILL * (3.0 * _pad_nodes(scene, scene.accuracy.most_meshes - 1)) ** (4.0 / 3.0)
+    pad = 8.0 * FILL_FACTOR * (3.0 * _pad_nodes(scene, scene.accuracy.most_meshes - 1)) ** (4.0 / 3.0)
     wall = wall_size(scene) if shells(scene) else None
-    return LIBRARIES + pad + (wall.memory if wall else 0.0)
+    return LIBRARY_BYTES + pad + (wall.memory if wall else 0.0)
 
 
 def shells(scene: Any) -> bool:
@@ -205,12 +205,12 @@ def _no_grasps(plan: Plan) -> str:
 
     The first of a state stands for the others.
     """
-    found = []
+    texts = []
     for state in NO_GRASP:
         units = [unit for unit in plan.units if unit.state == state]
         count = sum(len(unit.rows) for unit in units)
-        found += [f"{count} of {plan.served} {STATES[state]}: {units[0].reason}"] if units else []
-    return "; ".join(found)
+        texts += [f"{count} of {plan.served} {STATES[state]}: {units[0].reason}"] if units else []
+    return "; ".join(texts)
 
 
 def _rounds(plan: Plan, scene: Any) -> str:
@@ -239,13 +239,13 @@ def _estimated_time(plan: Plan, scene: Any, ranks: int) -> str:
     times = _wall_seconds(plan, scene)
     if not times:
         seconds = makespan(plan.in_parts(estimated(plan.tried)), ranks)
-        return f"about {duration(START + seconds)} {on}, estimated on a bed of springs"
+        return f"about {duration(START_S + seconds)} {on}, estimated on a bed of springs"
     paths = [plan.layout.shape[-1] * (1.25 if scene.accuracy.meshes > 1 else 1.0)] * len(plan.tried)
     low, high = (each * makespan(paths, ranks) for each in (times[0], times[-1]))
     if low == high:
-        return f"about {duration(START + low)} {on} ({scene.effects.object.replace('_', ' ')})"
+        return f"about {duration(START_S + low)} {on} ({scene.effects.object.replace('_', ' ')})"
     ends = f"{duration(low)} if all candidates are rigid, {duration(high)} if all take the costliest shell"
-    return f"about {duration(START + math.sqrt(low * high))} {on} ({ends})"
+    return f"about {duration(START_S + math.sqrt(low * high))} {on} ({ends})"
 
 
 def _wall_seconds(plan: Plan, scene: Any) -> list[float]:
@@ -265,8 +265,8 @@ def measured_seconds(layout: Layout, path: Path) -> Any:
     if not path.is_file():
         return None
     with open_result(path) as result:
-        own = np.flatnonzero(np.isin(result.axes[-3].values, layout.axes[-3].values))
-        seconds = result.read("work/seconds_total").take(own, axis=-3)
+        planned = np.flatnonzero(np.isin(result.axes[-3].values, layout.axes[-3].values))
+        seconds = result.read("work/seconds_total").take(planned, axis=-3)
         # A file of another shape has other cases in the same places.
         return seconds.ravel() if seconds.shape == layout.shape else None
 
@@ -299,14 +299,14 @@ class WallSize:
     @property
     def seconds(self) -> tuple[float, float, float]:
         """Time of one force on a rigid object, a linear and a nonlinear shell [s]."""
-        rigid = SECONDS * self.pad
-        return rigid, rigid + CUBE * self.touched**3, rigid + SECONDS * self.shell
+        rigid = SECONDS_PER_UNKNOWN * self.pad
+        return rigid, rigid + SECONDS_PER_CUBE * self.touched**3, rigid + SECONDS_PER_UNKNOWN * self.shell
 
     @property
     def memory(self) -> float:
         """Memory of the costlier of both shells [bytes]."""
-        linear = BYTES * self.whole + 8.0 * DENSE * float(self.touched) ** 2
-        return max(BYTES * self.shell, linear)
+        linear = BYTES_PER_UNKNOWN * self.whole + 8.0 * DENSE_COPIES * float(self.touched) ** 2
+        return max(BYTES_PER_UNKNOWN * self.shell, linear)
 
 
 def wall_size(scene: Any) -> WallSize | None:
@@ -341,7 +341,7 @@ def _mirrors(scene: Any, symmetric: tuple[bool, bool]) -> tuple[bool, bool]:
 def _covered(scene: Any, surface: Any) -> tuple[float, float, float]:
     """Heights that a pad reaches over at the middle station, and half of what it covers round the object [m]."""
     gripper, where = scene.gripper, scene.candidates
-    margin = MARGIN * max(gripper.pad_size[:2])
+    margin = COVER_MARGIN * max(gripper.pad_size[:2])
     ends = _heights(surface)
     middle = 0.5 * sum(ends) if where.poses else where.station_values[len(where.station_values) // 2]
     along = 1e-3 * where.half_extent_mm(gripper) + margin

@@ -29,7 +29,7 @@ def duration(seconds: float) -> str:
     return f"{hours} h {minutes} min" if hours < 48 else f"{hours // 24} d {hours % 24} h"
 
 
-FEWEST, MOST_WAITED, SHORTEST = 5, 50, 3.0  # cases and seconds from the first case on, before a rest is foretold
+MIN_CASES, MOST_CASES, MIN_SECONDS = 5, 50, 3.0  # cases and seconds from the first case on, before a rest is foretold
 
 
 class Progress:
@@ -99,8 +99,8 @@ class Progress:
             self._first = now, count, gone
         since, cases, weight = (b - a for a, b in zip(self._first or (now, 0, 0.0), (now, count, gone), strict=True))
         # A few cases of one load path tell little of the others; too many would keep the reader waiting.
-        enough = min(max(FEWEST, 0.03 * int(self._todo.sum())), MOST_WAITED)
-        if cases >= enough and since >= SHORTEST and weight > 0:
+        enough = min(max(MIN_CASES, 0.03 * int(self._todo.sum())), MOST_CASES)
+        if cases >= enough and since >= MIN_SECONDS and weight > 0:
             # By cost, not by number: the most expensive load paths come first.
             left = since * float(self._weights[self._todo & ~solved].sum()) / weight
             text += f", {since / cases:.3g} s/case, {duration(left)} left"

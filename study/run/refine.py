@@ -1,9 +1,9 @@
 """Further grasps, in rounds: where the best may still lie between two solved stations, by stored numbers alone.
 
-Between two stations a score is taken to rise no faster than `STEEPER` times the steepest slope of the interval and of
-the two beside it. Where that lets it pass the best one by more than the scene tolerates, the middle of the interval is
-solved. Poses have no order: around the best of them `study.run.pattern` searches. Angles are not refined, every
-station has all.
+Between two stations a score is taken to rise no faster than `STEEPER_SLOPE` times the steepest slope of the interval
+and of the two beside it. Where that lets it pass the best one by more than the scene tolerates, the middle of the
+interval is solved. Poses have no order: around the best of them `study.run.pattern` searches. Angles are not refined,
+every station has all.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 Rounds = tuple[tuple[Any, ...], ...]  # what each round added: stations [mm], or poses as `pattern.Place`
-STEEPER = 1.5  # how much steeper a score may be than its slopes between stations show
-FINEST = 1 / 64  # of the scene's mean distance of stations; nearer ones would only follow a jump
-TOGETHER = 0.5  # of the largest chance: intervals with at least that are divided in the same round
+STEEPER_SLOPE = 1.5  # how much steeper a score may be than its slopes between stations show
+FINEST_SPACING_SHARE = 1 / 64  # of the scene's mean distance of stations; nearer ones would only follow a jump
+SAME_ROUND_SHARE = 0.5  # of the largest chance: intervals with at least that are divided in the same round
 
 
 def refined(scene: Scene, rounds: Rounds) -> Scene:
@@ -98,20 +98,20 @@ def chances(stations: FloatArray, score: FloatArray, sound: NDArray[np.bool_], f
     steepest[:, 1:] = np.fmax(steepest[:, 1:], slope[:, :-1])
     steepest[:, :-1] = np.fmax(steepest[:, :-1], slope[:, 1:])
     middle = (score[:, 1:] + score[:, :-1]) / 2
-    most = middle + STEEPER * steepest * h[None, :, None, None] / 2
+    most = middle + STEEPER_SLOPE * steepest * h[None, :, None, None] / 2
     most[~(sound[:, 1:] | sound[:, :-1])] = np.nan
     best = np.where(sound, score, -np.inf).max(axis=(1, 2))[:, None, None, :]
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.nan_to_num(np.where(best > 0, most / best - 1, 0.0), nan=0.0)
-    found = np.maximum(share.max(axis=(0, 2, 3)), 0.0)
-    return np.where(h >= 2 * finest * (1 - MARGIN), found, 0.0)
+    slopes = np.maximum(share.max(axis=(0, 2, 3)), 0.0)
+    return np.where(h >= 2 * finest * (1 - MARGIN), slopes, 0.0)
 
 
 def chances_in(result: Any) -> FloatArray:
     """`chances` of a result file of stations."""
     values, sound = _scores(result)
     stations, added = result.axes[-3].values, sum(map(len, result.layout.added))
-    finest = FINEST * np.ptp(stations) / max(len(stations) - added - 1, 1)
+    finest = FINEST_SPACING_SHARE * np.ptp(stations) / max(len(stations) - added - 1, 1)
     return chances(stations, values, sound, finest)
 
 
@@ -166,7 +166,8 @@ def next_stations(result: Any, scene: Scene, each: int) -> tuple[float, ...]:
     left = where.refine // each - len(added)
     chance = chances_in(result)
     stations = sorted({*given, *added})
-    limit = max(where.refine_within * (1 + MARGIN), TOGETHER * float(chance.max(initial=0.0)) * (1 - MARGIN))
+    widest = SAME_ROUND_SHARE * float(chance.max(initial=0.0))
+    limit = max(where.refine_within * (1 + MARGIN), widest * (1 - MARGIN))
     # Rounded, so that chances that are equal but for rounding come in the order of their stations.
     order = np.lexsort((np.arange(len(chance)), -chance.round(6)))
     chosen = [i for i in order if chance[i] > limit][: max(left, 0)]
@@ -187,13 +188,13 @@ def about(result: Any) -> str:
     rounds = result.layout.added
     if not rounds:
         return ""
-    count, own = sum(map(len, rounds)), result.layout.shape[-3]
+    count, stations = sum(map(len, rounds)), result.layout.shape[-3]
     what = "stations" if result.axes[-3].units else "poses"
-    text = f"{own - count} {what} of the scene and {count} added in {_counted(len(rounds), 'round')}"
+    text = f"{stations - count} {what} of the scene and {count} added in {_counted(len(rounds), 'round')}"
     if (result.status == MISSING).any():
         return f"{text}, the last of which is not complete"
     if what == "poses":
-        by = gained(_of_poses(result), own - count)
+        by = gained(_of_poses(result), stations - count)
         return f"{text}, the last by {rounds[-1][0][0]:g} of the first step; the best gained {by:.1%} at most"
     chance = float(chances_in(result).max(initial=0.0))
     known = f"; between them the best may be beaten by {chance:.1%} at most, judged by the slopes beside"

@@ -21,8 +21,8 @@ from softjaw.study.run.progress import duration
 from softjaw.study.run.shares import by_cost
 
 STATE_WRITES = 3  # of a case besides its values: begun, checksums, state
-NOTHING = 0.05  # share of the time below which something does not count as the limit
-GOOD = 0.8
+MIN_LIMIT_SHARE = 0.05  # share of the time below which something does not count as the limit
+GOOD_EFFICIENCY = 0.8
 # Measured on one machine with a local disk: a look at a node's counter [s], and one write of a rank [s].
 CLAIM, WRITE = 2e-5, 1.5e-5
 # Assumed: ranks that share a node, and what a file system takes from all ranks together, in writes/s and bytes/s.
@@ -64,7 +64,7 @@ def replayed(paths: Sequence[LoadPath], ranks: int, machine: Machine) -> float:
     >>> replayed([LoadPath((1.0, 1.0), 2.0), LoadPath((3.0,), 3.0)], 2, Machine(2, 0.0, 0.0, 0.0))
     3.0
     """
-    order = by_cost([own.cost for own in paths])
+    order = by_cost([path.cost for path in paths])
     # Rounded up: a node that is not full is a node too.
     nodes = -(-ranks // machine.per_node)
     taken, counter, disk, last = [0] * nodes, [0.0] * nodes, 0.0, 0.0
@@ -92,11 +92,11 @@ def replayed(paths: Sequence[LoadPath], ranks: int, machine: Machine) -> float:
 
 def replay(paths: Sequence[LoadPath], ranks: int, machine: Machine) -> Replay:
     """Time, efficiency against one rank that neither waits nor writes, and what limits it."""
-    whole = sum(sum(own.seconds) for own in paths)
+    whole = sum(sum(path.seconds) for path in paths)
     time = replayed(paths, ranks, machine)
     unwritten = replayed(paths, ranks, replace(machine, write=0.0, service=0.0))
     free = replayed(paths, ranks, replace(machine, claim=0.0, write=0.0, service=0.0))
-    longest = max(sum(own.seconds) for own in paths)
+    longest = max(sum(path.seconds) for path in paths)
     shares = {
         "file system": time - unwritten,
         "counter": unwritten - free,
@@ -105,7 +105,7 @@ def replay(paths: Sequence[LoadPath], ranks: int, machine: Machine) -> Replay:
         "division of load paths": free - max(longest, whole / ranks),
     }
     worst = max(shares, key=lambda name: shares[name])
-    return Replay(ranks, time, whole / ranks / time, worst if shares[worst] > NOTHING * time else "-")
+    return Replay(ranks, time, whole / ranks / time, worst if shares[worst] > MIN_LIMIT_SHARE * time else "-")
 
 
 def measured_paths(plan: Plan, seconds: NDArray[np.float64]) -> list[LoadPath]:
@@ -113,15 +113,15 @@ def measured_paths(plan: Plan, seconds: NDArray[np.float64]) -> list[LoadPath]:
 
     NaN is a case without a time.
     """
-    found = []
+    paths = []
     for unit in plan.tried:
         times = seconds[list(unit.rows[0])]
         taken = tuple(map(float, times[np.isfinite(times)]))  # the forces above a failed one were not tried
         if unit.apart:
-            found += [LoadPath((t,), unit.cost / len(times), len(unit.rows)) for t in taken]
+            paths += [LoadPath((t,), unit.cost / len(times), len(unit.rows)) for t in taken]
         elif taken:
-            found.append(LoadPath(taken, unit.cost, len(unit.rows)))
-    return found
+            paths.append(LoadPath(taken, unit.cost, len(unit.rows)))
+    return paths
 
 
 def scaling_text(plan: Plan, path: Path, ranks: Sequence[int], repeat: int = 1) -> str:
@@ -141,7 +141,7 @@ def scaling_text(plan: Plan, path: Path, ranks: Sequence[int], repeat: int = 1) 
     writes = len(columns) + STATE_WRITES
     machine = Machine(PER_NODE, CLAIM, WRITE * writes, max(writes / WRITES_PER_S, row / BYTES_PER_S))
     replays = [replay(paths, n, machine) for n in ranks]
-    times = [sum(own.seconds) for own in paths]
+    times = [sum(load_path.seconds) for load_path in paths]
     rows = plan.layout.rows * repeat
     head = [
         f"{path}: {rows} cases in {len(paths)} load paths, {duration(sum(times))} of solving",
@@ -150,8 +150,9 @@ def scaling_text(plan: Plan, path: Path, ranks: Sequence[int], repeat: int = 1) 
         f"  assumed    {PER_NODE} ranks per node, {WRITES_PER_S:g} writes/s and {BYTES_PER_S / 1e6:g} MB/s to one file",
         "  left out   starting the ranks, and cores that share caches and memory",
     ]
-    good = [r.ranks for r in replays if r.efficiency >= GOOD]
-    advice = f"at least {GOOD:.0%} efficient up to {max(good)} ranks" if good else f"never {GOOD:.0%} efficient"
+    good = [r.ranks for r in replays if r.efficiency >= GOOD_EFFICIENCY]
+    share = f"{GOOD_EFFICIENCY:.0%} efficient"
+    advice = f"at least {share} up to {max(good)} ranks" if good else f"never {share}"
     return "\n".join([*head, *_table(replays), advice])
 
 

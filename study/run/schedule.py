@@ -10,7 +10,7 @@ import numpy as np
 from mpi4py import MPI
 
 NEXT, STOP, SPOKEN = range(3)  # what the counters of a node are for
-PATIENCE = 2.0  # of the time limit, after which a rank that has not even heard its own alarm counts as lost
+PATIENCE_LIMITS = 2.0  # of the time limit, after which a rank that has not even heard its own alarm counts as lost
 IDLE = -1
 
 
@@ -109,7 +109,7 @@ class LostRanks:
     """
 
     def __init__(self, node: Any, limit: float) -> None:
-        self.patience, self._node = PATIENCE * limit, node
+        self.patience, self._node = PATIENCE_LIMITS * limit, node
         self._window, numbers = _shared(node, 2 * node.size, float)
         self._share, self._since = numbers.reshape(2, node.size)
         if node.rank == 0:

@@ -55,19 +55,19 @@ def shares(units: Iterable[Any], codes: np.ndarray, ranks: int) -> list[Share]:
     ranks : int
     """
     waiting = _in_order([Share(unit, forces) for unit in units if (forces := _missing(unit, codes))])
-    left, found = sum(own.cost for own in waiting), list[Share]()
-    for own in waiting:
-        left -= own.cost
+    left, divided = sum(share.cost for share in waiting), list[Share]()
+    for share in waiting:
+        left -= share.cost
         # what follows keeps the others busy meanwhile
-        whole = not own.unit.apart or left >= ranks * own.cost
-        found += [own] if whole or ranks == 1 else own.divided(ranks)
-    return _in_order(found)
+        whole = not share.unit.apart or left >= ranks * share.cost
+        divided += [share] if whole or ranks == 1 else share.divided(ranks)
+    return _in_order(divided)
 
 
-def _in_order(found: Sequence[Share]) -> list[Share]:
+def _in_order(listed: Sequence[Share]) -> list[Share]:
     """The costliest first, so that no rank ends long after the others; what cannot hold comes after all others."""
-    order = sorted(by_cost([own.cost for own in found]), key=lambda i: found[i].unit.hopeless)
-    return [found[i] for i in order]
+    order = sorted(by_cost([share.cost for share in listed]), key=lambda i: listed[i].unit.hopeless)
+    return [listed[i] for i in order]
 
 
 def _missing(unit: Any, codes: np.ndarray) -> tuple[int, ...]:

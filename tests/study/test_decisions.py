@@ -199,9 +199,9 @@ def test_a_wall_that_pushes_along_nothing_does_not_slide(seed):
 @given(st.floats(-3.0, 3.0), seeds)
 def test_a_circle_is_closed_or_not_whatever_its_first_angle(first, seed):
     """The gap that closes it is just as wide as is allowed."""
-    from softjaw.study.lookup.interpolation import WIDER, circle
+    from softjaw.study.lookup.interpolation import CLOSING_GAP_RATIO, circle
 
-    step = math.pi / (1 + WIDER)
+    step = math.pi / (1 + CLOSING_GAP_RATIO)
     angles = np.array([first, first + step])
     assert len(circle("angle", "rad", moved(angles, seed), math.pi, True).x) == 3
     assert len(circle("angle", "rad", [first, first + 0.99 * step], math.pi, True).x) == 2

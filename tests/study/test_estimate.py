@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from softjaw.fem.objects.shapes import Sphere
-from softjaw.study.run.estimate import CASE, ELEMENT, FIRST, GRID, HARD, estimated, heights
+from softjaw.study.run.estimate import CASE, ELEMENT, FACE_GRID, FIRST_FORCE_FACTOR, HARD, estimated, heights
 from softjaw.study.run.plan import make_plan
 from softjaw.study.scene import load_scene, parse_scene
 from tests.study.launching import ROOT
@@ -40,7 +40,7 @@ def seconds(station=0, angle=0, forces="[1]"):
 def test_heights_over_a_pad_are_those_of_a_ball():
     radius, side = 0.03, 0.02
     low, high = heights(*Sphere(radius).surface(), (side, side))
-    x, y = (side * ((np.arange(n) + 0.5) / n - 0.5) for n in GRID)
+    x, y = (side * ((np.arange(n) + 0.5) / n - 0.5) for n in FACE_GRID)
     cap = np.sqrt(radius**2 - x[:, None] ** 2 - y**2)
     np.testing.assert_allclose(high, cap, atol=2e-4)
     np.testing.assert_allclose(low, -cap, atol=2e-4)
@@ -48,10 +48,10 @@ def test_heights_over_a_pad_are_those_of_a_ball():
 
 def test_a_grasp_costs_what_its_elements_and_forces_cost():
     one = CASE + ELEMENT * 64  # of one finger, which stands for its image
-    assert seconds() == pytest.approx(FIRST * (one - ELEMENT * 48), rel=1e-12)  # a quarter of it
+    assert seconds() == pytest.approx(FIRST_FORCE_FACTOR * (one - ELEMENT * 48), rel=1e-12)  # a quarter of it
     assert seconds(angle=30) > seconds()  # no plane of symmetry across the long side
-    assert seconds(forces="[1, 2]") - seconds() == pytest.approx(seconds() / FIRST, rel=1e-12)
-    assert seconds(forces="[1, 500]") - seconds() == pytest.approx(HARD * seconds() / FIRST, rel=1e-12)
+    assert seconds(forces="[1, 2]") - seconds() == pytest.approx(seconds() / FIRST_FORCE_FACTOR, rel=1e-12)
+    assert seconds(forces="[1, 500]") - seconds() == pytest.approx(HARD * seconds() / FIRST_FORCE_FACTOR, rel=1e-12)
 
 
 @pytest.mark.parametrize("job", sorted(MEASURED))

@@ -18,7 +18,7 @@ from softjaw.study.cli import main
 from softjaw.study.flags import OF_FILE, Flag, flag_definitions, flag_sentences, flag_words, flags_in, raised
 from softjaw.study.lookup import GraspMap
 from softjaw.study.quantities import map_row
-from softjaw.study.result.datasets import MESSAGE
+from softjaw.study.result.datasets import MESSAGE_BYTES
 from softjaw.study.result.skeleton import create
 from softjaw.study.result.store import open_result
 from softjaw.study.result.write import ResultWriter, record
@@ -85,7 +85,7 @@ def test_words_fit_their_column_and_sentences_their_message():
         assert 0 < len(flag.word) <= LABEL_WIDTH
         assert flag.sentence
         assert ";" not in flag.sentence + flag.word
-    assert len(flag_sentences(OF_FILE).encode()) < MESSAGE - 400
+    assert len(flag_sentences(OF_FILE).encode()) < MESSAGE_BYTES - 400
 
 
 def test_the_definition_in_the_file_tells_every_bit_of_a_file_and_no_other():

@@ -15,7 +15,7 @@ from softjaw.study.quantities import DONE, WIDE
 from softjaw.study.result.layout import MISSING, layout_from_options
 from softjaw.study.result.skeleton import grow
 from softjaw.study.result.store import open_result
-from softjaw.study.run.pattern import FINEST, SAME, apart, gained, next_poses, with_places
+from softjaw.study.run.pattern import FINEST_STEP_SHARE, SAME_POSE_STEPS, apart, gained, next_poses, with_places
 from softjaw.study.run.plan import make_plan
 from softjaw.study.scene import load_scene, parse_scene
 from tests.study.launching import ROOT, command, contents, differing, wait_for
@@ -116,11 +116,11 @@ def test_the_top_of_a_hill_is_found_and_no_pose_is_tried_twice():
     assert values.max() > 0.1 * (1 - 0.02)
     shares = [added[0][0] for added in rounds]
     assert shares == sorted(shares, reverse=True)
-    assert shares[-1] >= FINEST
+    assert shares[-1] >= FINEST_STEP_SHARE
     places = [(x[0], 1e-3 * np.array(x[1:4]), np.column_stack([x[7:], np.cross(x[4:7], x[7:]), x[4:7]]))
               for added in rounds for x in added]  # fmt: skip
     for (_, *one), (share, *other) in combinations(places, 2):
-        assert apart(one, other, scene.gripper.pad_size) > SAME * share * 0.999
+        assert apart(one, other, scene.gripper.pad_size) > SAME_POSE_STEPS * share * 0.999
 
 
 def test_new_poses_stand_in_the_middle_of_the_object_and_none_passes_it():

@@ -12,7 +12,7 @@ from softjaw.study.result.layout import DONE, MISSING
 from softjaw.study.result.skeleton import grow
 from softjaw.study.result.store import open_result, torn_rows
 from softjaw.study.run.plan import make_plan, measured_seconds
-from softjaw.study.run.refine import FINEST, chances, next_stations
+from softjaw.study.run.refine import FINEST_SPACING_SHARE, chances, next_stations
 from softjaw.study.scene import parse_scene
 from tests.study.launching import contents, differing, launch
 
@@ -67,7 +67,7 @@ def test_nothing_is_added_where_nothing_can_be_gained():
 def test_a_jump_is_followed_to_the_finest_distance_and_no_further():
     added, _ = rounds_until_known(lambda x: np.where(x < 90.0, 0.1, 0.2))
     assert len(added) < 16
-    assert np.diff(sorted([*GIVEN, *added])).min() > 0.9 * FINEST * np.diff(GIVEN)[0]
+    assert np.diff(sorted([*GIVEN, *added])).min() > 0.9 * FINEST_SPACING_SHARE * np.diff(GIVEN)[0]
 
 
 def test_a_budget_is_kept():

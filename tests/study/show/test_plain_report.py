@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import h5py
 
-from softjaw.study.result.layout import REPORT
+from softjaw.study.result.layout import REPORT_BYTES
 from softjaw.study.result.read import dataset
 from softjaw.study.result.store import open_result
 from softjaw.study.show.report.verdict import plain_report
@@ -24,7 +24,7 @@ def test_it_says_what_it_is_the_best_grasps_the_failures_and_how_to_read_them(tm
     assert "0 missing, 1 done, 2 failed" in text.partition("How to read the file")[2]
     assert str(tmp_path) not in text  # the same bits wherever it is solved
     assert max(map(len, text.splitlines())) <= 120
-    assert len(text.encode()) < REPORT
+    assert len(text.encode()) < REPORT_BYTES
 
 
 def test_a_study_that_failed_everywhere_has_its_reasons(tmp_path):
