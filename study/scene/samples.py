@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from scipy.special import ndtri
-from scipy.stats import qmc
 
 SEED = 20240229  # any number; the samples of a scene are always the same
 DIGITS = 9  # of a sample, so that no rounding error of a machine makes another one
@@ -31,6 +29,9 @@ def latin_hypercube(
     >>> [round(sample["mu"], 3) for sample in sorted(latin_hypercube({"mu": 0.8}, {"mu": 0.1}, 4), key=str)]
     [0.741, 0.784, 0.816, 0.859]
     """
+    from scipy.special import ndtri  # slow to load; readers of results need UPPER alone
+    from scipy.stats import qmc
+
     cube = qmc.LatinHypercube(len(half_widths), scramble=False, optimization="random-cd", seed=SEED).random(count)
     normal = ndtri(cube) / ndtri(UPPER)
     values = np.array([means[key] for key in half_widths]) + normal * np.array([*half_widths.values()])
