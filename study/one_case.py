@@ -76,14 +76,14 @@ class Case:
         KeyError
             For a name that the case does not have.
         """
-        found = np.asarray(self._read(f"maps/{name}"))
-        return float(found[MODELS.index(checked_model(model))] if found.ndim else found)
+        values = np.asarray(self._read(f"maps/{name}"))
+        return float(values[MODELS.index(checked_model(model))] if values.ndim else values)
 
     def fingers(self, name: str, model: str = "ccm") -> FloatArray:
         """A quantity of both fingers ``(2, ...)``: ``f_x_max`` or ``fingers/S``, ``limit_surface/rho``."""
         key = name if "/" in name else f"fingers/{name}"
-        found = np.asarray(self._read(key))
-        return found[:, MODELS.index(checked_model(model))] if "model" in BY_KEY[key].dims else found
+        values = np.asarray(self._read(key))
+        return values[:, MODELS.index(checked_model(model))] if "model" in BY_KEY[key].dims else values
 
     @property
     def errors(self) -> dict[str, float]:
@@ -132,14 +132,14 @@ class Case:
     @property
     def contacts(self) -> tuple[Contact, Contact]:
         """Both fingers: patch, contact frame, friction limits, in the frame of the object's own file."""
-        one, two = (c.at(Pose(R, x)) for c, R, x in zip(self.result.contacts, *self.pose, strict=True))
-        return one, two
+        first, second = (c.at(Pose(R, x)) for c, R, x in zip(self.result.contacts, *self.pose, strict=True))
+        return first, second
 
     @property
     def weaker(self) -> int:
         """The finger with the smaller e_n (CCM), 1 or 2; 1 where they are alike."""
-        one, two = (c.limits["ccm"].e_n for c in self.result.contacts)
-        return 2 if two < one else 1
+        first, second = (c.limits["ccm"].e_n for c in self.result.contacts)
+        return 2 if second < first else 1
 
     @property
     def patch(self) -> ContactPatch:
@@ -204,7 +204,7 @@ def solved_case(
     if scene.petsc:
         check_petsc(dict(scene.petsc))
     row = number * len(scene.load.normal_force_n) + k
-    served = ((u, c) for u in units(scene, lambda s: s.axis_symmetry) for c, own in enumerate(u.rows) if row in own)
+    served = ((u, c) for u in units(scene, lambda s: s.axis_symmetry) for c, rows in enumerate(u.rows) if row in rows)
     unit, c = next(served)
     place, what = unit.served[c], f"{unit.served[c].label}, {scene.load.normal_force_n[k]:g} N"
     unit = decided([unit])[0]
@@ -218,14 +218,14 @@ def _outcome(unit: Any, k: int, what: str) -> CaseResult:
     """Result of the ``k``-th force of a unit."""
     outcomes = pipeline.solve_unit(unit, [k])
     try:
-        found = next(result for number, result in outcomes if number == k)
+        result = next(result for number, result in outcomes if number == k)
     except (ArithmeticError, MemoryError, RuntimeError, ValueError) as error:  # a run stores it as the case's failure
         raise CaseError(f"{what}: {type(error).__name__}: {error}") from error
     finally:
         outcomes.close()
-    if isinstance(found, CaseFailure):
-        raise CaseError(f"{what}: {found.message}")
-    return found
+    if isinstance(result, CaseFailure):
+        raise CaseError(f"{what}: {result.message}")
+    return result
 
 
 def _refuse_open_questions(scene: Scene) -> None:
@@ -244,8 +244,8 @@ def _asked(
     """The scene with the candidate that is asked for among its own, and the candidate's number."""
     given = {"station": station is not None, "candidate": candidate is not None, "pose": pose is not None}
     if sum(given.values()) != 1:
-        found = " and ".join(name for name in given if given[name]) or "none of them"
-        raise ValueError(f"found {found}, expected one of station (with an angle), candidate and pose")
+        names = " and ".join(name for name in given if given[name]) or "none of them"
+        raise ValueError(f"found {names}, expected one of station (with an angle), candidate and pose")
     if pose is not None:
         poses = [*scene.effective()["candidates"].get("poses", ()), grasp_pose(pose)]
         return _with_candidates(scene, {"poses": poses}), len(poses) - 1

@@ -176,7 +176,7 @@ def warnings(scene: Scene) -> tuple[str, ...]:
     shapes = shapes_of(scene)
     edges = (scene.candidates.warnings(shape, axis_span(shape), scene.gripper) for shape in shapes)
     walls = [geometry().trace_warning(shape) for shape in shapes if shape.shape == "mesh" and shape.wall is not None]
-    placed = next((found for found in map(tuple, edges) if found), ())
+    placed = next((warned for warned in map(tuple, edges) if warned), ())
     return (*scene.warnings, *placed, *_remarks(scene), *walls)
 
 

@@ -76,11 +76,11 @@ def turn_between(first: Candidate, second: Candidate, axis_symmetry: int) -> flo
     float or None
         Angle in [0, 2 pi) [rad].
     """
-    one, two = (turn_of_pose(*pair, axis_symmetry) for pair in zip(first.poses, second.poses, strict=True))
-    if one is None or two is None or abs(math.remainder(one - two, 2 * math.pi)) > ROUNDING:
+    angle, other = (turn_of_pose(*pair, axis_symmetry) for pair in zip(first.poses, second.poses, strict=True))
+    if angle is None or other is None or abs(math.remainder(angle - other, 2 * math.pi)) > ROUNDING:
         return None
     # A turn just below 0 by rounding would otherwise become a whole one.
-    return 0.0 if abs(one) <= ROUNDING else one % (2 * math.pi)
+    return 0.0 if abs(angle) <= ROUNDING else angle % (2 * math.pi)
 
 
 def groups(places: Sequence[Candidate], axis_symmetry: int) -> list[list[tuple[int, float]]]:
@@ -201,11 +201,11 @@ def _realisation_axis(scene: Scene) -> list[Axis]:
 def _sweep_axes(sweep: Mapping[str, Sequence[Option]]) -> list[Axis]:
     """One axis per key, named by the key without section and unit where that is unambiguous."""
     stems = [split_unit(key.partition(".")[2]) for key in sweep]
-    taken = ["station", "angle", "normal_force", *(stem for stem, _ in stems)]
+    known = ["station", "angle", "normal_force", *(stem for stem, _ in stems)]
     made = []
     for (key, values), (stem, unit) in zip(sweep.items(), stems, strict=True):
         # Keys of two sections with one stem keep their section in the name.
-        name = stem if taken.count(stem) == 1 else split_unit(key.replace(".", "_"))[0]
+        name = stem if known.count(stem) == 1 else split_unit(key.replace(".", "_"))[0]
         if any(isinstance(v, str) for v in values):
             made.append(Axis(name, np.arange(len(values), dtype=float), "", key, tuple(map(str, values))))
         else:
@@ -227,12 +227,13 @@ def units(scene: Scene, axis_symmetry: Callable[[Scene], int]) -> list[Unit]:
     made: list[Unit] = []
     forces, count = len(scene.load.normal_force_n), scene.candidates.total
     for point, values in enumerate(scene.points):
-        here = scene.with_values(values | {"uncertainty.spread": {}})
-        places, cost = candidates(here), path_cost(here)
-        for group in groups(places, axis_symmetry(here)):
+        at_point = scene.with_values(values | {"uncertainty.spread": {}})
+        places, cost = candidates(at_point), path_cost(at_point)
+        for group in groups(places, axis_symmetry(at_point)):
             rows = tuple(tuple(range(r, r + forces)) for r in ((point * count + n) * forces for n, _ in group))
             served, turns = tuple(places[n] for n, _ in group), tuple(turn for _, turn in group)
-            made.append(Unit(len(made), here, served[0], rows, served, turns, cost * narrowness(here, served[0])))
+            work = cost * narrowness(at_point, served[0])
+            made.append(Unit(len(made), at_point, served[0], rows, served, turns, work))
     return made
 
 

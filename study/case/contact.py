@@ -80,14 +80,14 @@ class Contact:
     def limits(self) -> dict[str, FrictionLimits]:
         """Friction limits by friction model."""
         return {
-            name: replace(found, f_x=self.mu * found.f_x, f_y=self.mu * found.f_y, tau_z=self.mu * found.tau_z)
-            for name, found in self.unit_limits.items()
+            name: replace(limits, f_x=self.mu * limits.f_x, f_y=self.mu * limits.f_y, tau_z=self.mu * limits.tau_z)
+            for name, limits in self.unit_limits.items()
         }
 
     @cached_property
     def ellipsoids(self) -> dict[str, Ellipsoid]:
         """Ellipsoid through the three motions of the limits, by friction model, per unit of S."""
-        return {name: three_motion_ellipsoid(*found.per_unit_force, self.rho) for name, found in self.limits.items()}
+        return {name: three_motion_ellipsoid(*limits.per_unit_force, self.rho) for name, limits in self.limits.items()}
 
     @cached_property
     def tau_pure(self) -> float:
@@ -148,10 +148,10 @@ def angle(u: FloatArray, v: FloatArray) -> float:
     return float(np.arctan2(np.linalg.norm(np.cross(u, v)), u @ v))
 
 
-def angles(one: Contact, two: Contact) -> tuple[float, float]:
+def angles(first: Contact, second: Contact) -> tuple[float, float]:
     """How far the contacts are from antipodal [rad]: between their normals, and between their line and each normal."""
-    line = two.origin - one.origin
-    return angle(one.normal, -two.normal), max(angle(one.normal, line), angle(two.normal, -line))
+    line = second.origin - first.origin
+    return angle(first.normal, -second.normal), max(angle(first.normal, line), angle(second.normal, -line))
 
 
 def slips(lean: float, mu: float) -> bool:
@@ -162,10 +162,10 @@ def slips(lean: float, mu: float) -> bool:
 
 def pose_flags(contacts: Sequence[Contact]) -> Flag:
     """Flags of how two contacts stand, and of their frames."""
-    one, two = contacts
-    normals, line = angles(one, two)
-    found = Flag.NOT_ANTIPODAL * (max(normals, line) > ANTIPODAL - ALIKE)
-    found |= Flag.SLIPS * slips(line, one.mu)
+    first, second = contacts
+    normals, line = angles(first, second)
+    flags = Flag.NOT_ANTIPODAL * (max(normals, line) > ANTIPODAL - ALIKE)
+    flags |= Flag.SLIPS * slips(line, first.mu)
     for c in contacts:
-        found |= raised(c.frame.flag)
-    return found
+        flags |= raised(c.frame.flag)
+    return flags

@@ -215,7 +215,7 @@ def _friction(case: Simulated) -> Level:
 
 
 def _wrench(case: Simulated) -> Level:
-    dropped = max(dropped_share(own["ccm"].wrench, own["ccm"].rho) for own in case.fits)
+    dropped = max(dropped_share(finger["ccm"].wrench, finger["ccm"].rho) for finger in case.fits)
     wanted = case.scene.effects.wrench
     return Level("3-D" if wanted == "auto" else wanted, dropped, _forced(case, "wrench", APART))
 
@@ -223,7 +223,7 @@ def _wrench(case: Simulated) -> Level:
 def _limit_surface(case: Simulated) -> Level:
     """An ellipsoid, whose quality is 5 to 10 % off, only where the scene asks for it."""
     model = case.scene.limit_surface.model
-    error = float(np.max([own["ccm"].fit_error.Erad for own in case.fits]))
+    error = float(np.max([finger["ccm"].fit_error.Erad for finger in case.fits]))
     return Level(SURFACES[model], error, CHEAP if model == "quartic" else FORCED)
 
 

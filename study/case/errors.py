@@ -50,11 +50,11 @@ def error_of(
 ) -> float:  # fmt: skip
     """Error of one quantity, ``e_n``, ``quality`` or ``payload``, as `mesh_errors` has it."""
     key = f"maps/{name}"
-    own, other, *viewed = (
+    value, other, *viewed = (
         _sums(contacts)[key] if name == "e_n" else _grasp(contacts, settings)[key]
         for contacts in (fine, coarse, *views)
     )
-    return estimate(own, other, viewed, BY_KEY[key].error, weight)
+    return estimate(value, other, viewed, BY_KEY[key].error, weight)
 
 
 def estimate(

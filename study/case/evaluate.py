@@ -121,8 +121,8 @@ def evaluate(
     values = _friction_values(contacts) | scores | surface_values(contacts, fits, settings.sampled, settings.six)
     values["maps/flags"] = pose_flags(contacts) | raised(best.flag) | fit_flag(fits)
     if settings.task:
-        held, flag = payload_values(contacts, fits, settings.task)
-        values |= held
+        payloads, flag = payload_values(contacts, fits, settings.task)
+        values |= payloads
         values["maps/flags"] |= flag
     return values, fits
 
@@ -193,18 +193,18 @@ def _scores(
     In closed form where the contacts face each other, exactly in any pose elsewhere.
     """
     facing = faces(contacts, settings)
-    found: dict[str, list[float]] = {"quality": [], "quality_fitted": [], "epsilon": []}
+    scores: dict[str, list[float]] = {"quality": [], "quality_fitted": [], "epsilon": []}
     closed = {m: _closed(contacts, m, settings) for m in MODELS}
     tilt = math.nan  # what the pose makes of the closed form; for all models that of the curved one, which comes first
     for m in MODELS:
         both = _closed_volume(
-            [(c.mu**3 * own[m].rho / settings.torques * own[m].surface.volume, c.mu**2 * own[m].surface.shadow_area)
-             for own, c in zip(fits, contacts, strict=True)], contacts, settings)  # fmt: skip
+            [(c.mu**3 * fit[m].rho / settings.torques * fit[m].surface.volume, c.mu**2 * fit[m].surface.shadow_area)
+             for fit, c in zip(fits, contacts, strict=True)], contacts, settings)  # fmt: skip
         # a contact that carries nothing in some direction leaves no volume in any pose
         if facing or closed[m].quality == 0:
             values = closed[m].quality, both, closed[m].epsilon
         else:
-            bodies = [own[m].body(c.mu) for own, c in zip(fits, contacts, strict=True)]
+            bodies = [fit[m].body(c.mu) for fit, c in zip(fits, contacts, strict=True)]
             if not any(isinstance(body, Quartic) for body in bodies):
                 both = _volume(contacts, bodies, settings)
             else:
@@ -215,8 +215,8 @@ def _scores(
             least = _epsilon(contacts, ellipsoids, settings) if settings.epsilon_everywhere else math.nan
             values = _volume(contacts, ellipsoids, settings), both, least
         for name, value in zip(("quality", "quality_fitted", "epsilon"), values, strict=True):
-            found[name].append(value)
-    return {f"maps/{name}": values for name, values in found.items()}, closed[MODELS[0]]
+            scores[name].append(value)
+    return {f"maps/{name}": values for name, values in scores.items()}, closed[MODELS[0]]
 
 
 def quality(contacts: Sequence[Contact], settings: EvaluationSettings, model: str = MODELS[0]) -> float:
@@ -229,9 +229,9 @@ def quality(contacts: Sequence[Contact], settings: EvaluationSettings, model: st
 
 def faces(contacts: Sequence[Contact], settings: EvaluationSettings) -> bool:
     """Whether the contacts face each other, up to `FACING`, also where their line is scaled along the object's axes."""
-    one, two = contacts
+    first, second = contacts
     line = _line(contacts, settings)
-    return max(*angles(*contacts), angle(one.normal, line), angle(two.normal, -line)) <= FACING
+    return max(*angles(*contacts), angle(first.normal, line), angle(second.normal, -line)) <= FACING
 
 
 def _line(contacts: Sequence[Contact], settings: EvaluationSettings) -> FloatArray:
@@ -241,8 +241,8 @@ def _line(contacts: Sequence[Contact], settings: EvaluationSettings) -> FloatArr
 
 def _closed(contacts: Sequence[Contact], model: str, settings: EvaluationSettings) -> Score:
     """Score of the ellipsoids of contacts that face each other."""
-    one, two = (c.ellipsoids[model].semi_axes for c in contacts)
-    return score(one, two, float(np.linalg.norm(_line(contacts, settings))), 1.0, settings.torques)
+    first, second = (c.ellipsoids[model].semi_axes for c in contacts)
+    return score(first, second, float(np.linalg.norm(_line(contacts, settings))), 1.0, settings.torques)
 
 
 def _closed_volume(
@@ -280,8 +280,8 @@ def soft(contacts: Sequence[Contact], bodies: Sequence[Any]) -> list[SoftContact
 
 def volume_in_pose(pair: Sequence[SoftContact], arms: ArrayLike, torques: float) -> float:
     """Volume of the grasp wrench space (L-infinity) of two contacts with any full bodies, in any pose."""
-    one, two = pair
-    return pose_volume(one, two, arms, torques, with_l1=False).linf
+    first, second = pair
+    return pose_volume(first, second, arms, torques, with_l1=False).linf
 
 
 def exact_score(pair: Sequence[SoftContact], arms: float, torques: float) -> dict[str, Any]:

@@ -43,9 +43,9 @@ STANDS_IN, ELLIPSOID, AS_FITTED, PROGRAMME = range(4)  # certificates, as study.
 class SurfaceFit(NamedTuple):
     """Limit surface of a contact in one friction model, with what it was fitted to.
 
-    ``wrench (samples, 6)`` are the wrenches of the fitted motions for mu = 1 [N, N m]; ``own`` is the fit error on
-    those motions, ``fit_error`` and ``ellipsoid_fit_error`` are those of the surface and of the ellipsoid from three
-    motions on others, ``overclaim`` and ``ellipsoid_overclaim`` the largest shares by which they claim too much there.
+    ``wrench (samples, 6)`` are the wrenches of the fitted motions for mu = 1 [N, N m]; ``errors_fitted`` is the fit
+    error on those motions, ``fit_error`` and ``ellipsoid_fit_error`` are those of the surface and of the ellipsoid from
+    three motions on others, ``overclaim`` and ``ellipsoid_overclaim`` the largest shares by which they claim too much there.
     """
 
     rho: float
@@ -53,7 +53,7 @@ class SurfaceFit(NamedTuple):
     surface: LimitSurface
     certificate: int
     wrench: FloatArray
-    own: FitErrors
+    errors_fitted: FitErrors
     fit_error: FitErrors
     ellipsoid_fit_error: FitErrors
     overclaim: float
@@ -92,17 +92,17 @@ def fit_surfaces(
     f_x, f_y, tau_z = limits.per_unit_force
     ellipsoid = three_motion_ellipsoid(f_x, f_y, tau_z / rho, 1.0)
     # a fit is judged by motions that it has not seen
-    own, others = slice(samples), slice(samples, None)
+    fitted_to, others = slice(samples), slice(samples, None)
     reference, too_much = _fit_error(ellipsoid, W[others], T[others]), overclaim(ellipsoid, W[others])
-    found = {}
+    surfaces = {}
     for kind in kinds:
-        surface, certificate = fitted(ellipsoid, W[own], T[own], kind, objective)
+        surface, certificate = fitted(ellipsoid, W[fitted_to], T[fitted_to], kind, objective)
         judged = reference if surface is ellipsoid else _fit_error(surface, W[others], T[others])
-        on_own = _fit_error(surface, W[own], T[own])
+        on_own = _fit_error(surface, W[fitted_to], T[fitted_to])
         claim = too_much if surface is ellipsoid else overclaim(surface, W[others])
         errors = on_own, judged, reference, claim, too_much
-        found[kind] = SurfaceFit(rho, ellipsoid, surface, certificate, wrench[:samples], *errors)
-    return found
+        surfaces[kind] = SurfaceFit(rho, ellipsoid, surface, certificate, wrench[:samples], *errors)
+    return surfaces
 
 
 def sampled_wrenches(contact: Contact, model: str, samples: int) -> tuple[FloatArray, FloatArray]:
@@ -142,7 +142,7 @@ def fitted(ellipsoid: Ellipsoid, W: FloatArray, T: FloatArray, model: str, objec
 
 def fit_flag(fits: Sequence[Mapping[str, SurfaceFit]]) -> int:
     """`Flag.NO_FIT` if the ellipsoid from three motions stands in for any surface that was asked for, else 0."""
-    return Flag.NO_FIT * any(b.certificate == STANDS_IN for own in fits for b in own.values())
+    return Flag.NO_FIT * any(b.certificate == STANDS_IN for finger in fits for b in finger.values())
 
 
 def matrix(surface: LimitSurface) -> FloatArray:
@@ -161,34 +161,34 @@ def _fit_error(surface: LimitSurface, W: FloatArray, T: FloatArray) -> FitErrors
     """Fit error with the angle in rad; NaN where a flat body has no value at the samples."""
     with np.errstate(divide="ignore", invalid="ignore"):
         E1, radius, angle = fit_error(surface, W, T)
-    found = (E1, radius, np.radians(angle))
+    errors = (E1, radius, np.radians(angle))
     # All or nothing: an angle without a radius would be read as a good fit.
-    return FitErrors(*found) if np.isfinite(found).all() else FitErrors(np.nan, np.nan, np.nan)
+    return FitErrors(*errors) if np.isfinite(errors).all() else FitErrors(np.nan, np.nan, np.nan)
 
 
 def surface_values(
     contacts: Sequence[Contact], fits: Sequence[Mapping[str, SurfaceFit]], sampled: bool, six: bool
 ) -> dict[str, Any]:
     """What is stored of both fingers' surfaces, keyed as in ``study.quantities``."""
-    every = [list(own.values()) for own in fits]
+    every = [list(finger.values()) for finger in fits]
     per_model = {
         "matrix": lambda b: matrix(b.surface),
         "coefficients": lambda b: coefficients(b.surface),
         "certificate": lambda b: b.certificate,
         "fit_flag": lambda b: int(getattr(b.surface, "flag", 0)),
         "fit_error": lambda b: b.fit_error,
-        "fit_error_own": lambda b: b.own,
+        "fit_error_own": lambda b: b.errors_fitted,
         "fit_error_ellipsoid": lambda b: b.ellipsoid_fit_error,
     }
-    found = {f"limit_surface/{name}": [[of(b) for b in own] for own in every] for name, of in per_model.items()}
-    curved = [own["ccm"] for own in fits]
+    values = {f"limit_surface/{name}": [[of(b) for b in finger] for finger in every] for name, of in per_model.items()}
+    curved = [finger["ccm"] for finger in fits]
     if six:
-        found |= six_values(contacts)
+        values |= six_values(contacts)
     if sampled:
-        found["wrenches/wrench"] = [
-            [c.mu * b.wrench[:, [0, 1, 5]] for b in own] for c, own in zip(contacts, every, strict=True)
+        values["wrenches/wrench"] = [
+            [c.mu * b.wrench[:, [0, 1, 5]] for b in finger] for c, finger in zip(contacts, every, strict=True)
         ]
-    return found | {
+    return values | {
         "limit_surface/rho": [b.rho for b in curved],
         "maps/fit_error": np.max([b.fit_error.Erad for b in curved]),
         "maps/fit_error_ellipsoid": np.max([b.ellipsoid_fit_error.Erad for b in curved]),
@@ -199,9 +199,9 @@ def surface_values(
 
 def six_values(contacts: Sequence[Contact]) -> dict[str, Any]:
     """The 6-D ellipsoids of both fingers in the curved model, keyed as in ``study.quantities``."""
-    found = [six_ellipsoid(c.local, c.rho, c.unit_limits["ccm"].S) for c in contacts]
+    fits = [six_ellipsoid(c.local, c.rho, c.unit_limits["ccm"].S) for c in contacts]
     names = ("matrix_6d", "rank_6d", "fit_error_6d")
-    return {f"limit_surface/{name}": list(part) for name, part in zip(names, zip(*found, strict=True), strict=True)}
+    return {f"limit_surface/{name}": list(part) for name, part in zip(names, zip(*fits, strict=True), strict=True)}
 
 
 def six_ellipsoid(patch: ContactPatch, rho: float, S: float) -> tuple[FloatArray, int, FitErrors]:

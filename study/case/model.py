@@ -167,8 +167,8 @@ def usable_symmetry(scene: Scene, finger: Finger, elements: tuple[int, int, int]
     wanted = scene.effects.model_size
     if wanted == "full":
         return False, False
-    found = mirror_planes(finger.gap, scene.gripper.pad_size)
-    usable = found[0] and elements[0] % 2 == 0, found[1] and elements[1] % 2 == 0
+    planes = mirror_planes(finger.gap, scene.gripper.pad_size)
+    usable = planes[0] and elements[0] % 2 == 0, planes[1] and elements[1] % 2 == 0
     # a coarser mesh for error estimates takes what it can use
     need = {"auto": 0, "half": 1, "quarter": 2}[wanted] if elements == scene.gripper.elements else 0
     if sum(usable) < need:

@@ -86,12 +86,12 @@ def _pose(point: FloatArray, approach: FloatArray, long_side: FloatArray) -> Pos
     return Pose(pad_axes(approach, long_side), point - STANDOFF * approach)
 
 
-def turn_of_pose(one: Pose, other: Pose, axis_symmetry: int) -> float | None:
+def turn_of_pose(first: Pose, other: Pose, axis_symmetry: int) -> float | None:
     """Angle about z [rad] that takes one approaching pad to another, if the object looks the same after it, else None.
 
     A shift along the approach does not count: the press closes the fingers.
     """
-    turn = other.rotation @ one.rotation.T
+    turn = other.rotation @ first.rotation.T
     # Only turns about z take the object to itself, so all else is no image.
     if abs(turn[2, 2] - 1) > ROUNDING or np.abs(turn[2, :2]).max() > ROUNDING:
         return None
@@ -99,7 +99,7 @@ def turn_of_pose(one: Pose, other: Pose, axis_symmetry: int) -> float | None:
     step = 2 * math.pi / axis_symmetry if axis_symmetry else 0.0
     if step and abs(angle - step * round(angle / step)) > ROUNDING:
         return None
-    shift = other.rotation.T @ (turn @ one.origin - other.origin)  # in the pad's frame: z is along the approach
+    shift = other.rotation.T @ (turn @ first.origin - other.origin)  # in the pad's frame: z is along the approach
     return None if np.abs(shift[:2]).max() > ROUNDING else angle
 
 

@@ -254,33 +254,33 @@ def grasp_of(scene: Scene, fingers: Sequence[Finger], coarser: bool = False) -> 
     even = pad_shape(scene.gripper, coarser).elements[1] % 2 == 0
     wanted = scene.effects.model_size
     body, poses = thin_body(scene.object), (fingers[0].pose, fingers[1].pose)
-    held = grasp(body, poses, (wanted != "full", wanted != "full" and even))
+    grasp_frame = grasp(body, poses, (wanted != "full", wanted != "full" and even))
     # One plane was asked for where both exist: that between the fingers is given up.
-    if wanted == "half" and all(held.mirrors):
-        held = grasp(body, poses, (False, True))
+    if wanted == "half" and all(grasp_frame.mirrors):
+        grasp_frame = grasp(body, poses, (False, True))
     # a coarser mesh for error estimates takes what it can use
     need = {"half": 1, "quarter": 2}.get(wanted, 0) if not coarser else 0
-    if sum(held.mirrors) < need:
+    if sum(grasp_frame.mirrors) < need:
         raise ValueError(
             f"effects.model_size = '{wanted}' needs {need} plane(s) of symmetry, but object, fingers and mesh share "
-            f"{sum(held.mirrors)} here; use 'auto'"
+            f"{sum(grasp_frame.mirrors)} here; use 'auto'"
         )
-    return held
+    return grasp_frame
 
 
-def _grip(scene: Scene, fingers: Sequence[Finger], held: Grasp, coarser: bool) -> Grip:
+def _grip(scene: Scene, fingers: Sequence[Finger], grasp_frame: Grasp, coarser: bool) -> Grip:
     """Both fingers on the wall."""
     size = WallMesh(*scene.accuracy.wall_sizes)
     mesh = size.halved() if coarser else size
     body, linear = thin_body(scene.object), scene.effects.object == "linear_shell"
     coupled = scene.effects.friction_pressure_coupling == "tangential"
-    wall, faces = wall_between(body, held, scene.gripper.pad_size, mesh, linear=linear)
+    wall, faces = wall_between(body, grasp_frame, scene.gripper.pad_size, mesh, linear=linear)
 
-    gaps = [_gap(f, turned) for f, turned in zip(fingers, held.flipped, strict=False)]
+    gaps = [_gap(f, turned) for f, turned in zip(fingers, grasp_frame.flipped, strict=False)]
 
     def problem(rule: str) -> WallProblem:
-        pad = pad_of(scene, held.pad_symmetry, rule, coarser)
-        pads = [(pad, *where) for where in zip(gaps, held.poses, faces, strict=True)]
+        pad = pad_of(scene, grasp_frame.pad_symmetry, rule, coarser)
+        pads = [(pad, *where) for where in zip(gaps, grasp_frame.poses, faces, strict=True)]
         return WallProblem(wall, pads, scene.friction.mu if coupled else None)
 
     problems = [partial(problem, rule) for rule in contact_rules(scene, walled=True)]

@@ -69,12 +69,12 @@ def payload_values(
     The friction of a finger is the hull of the sampled wrenches, which lies inside the exact limit surface: what is
     found errs on the safe side, by about 1 % with 500 samples.
     """
-    found = [_payload(contacts, [own[m].wrench for own in fits], task) for m in MODELS]
-    mass = np.array([f.force for f in found]) / GRAVITY
+    payloads = [_payload(contacts, [fit[m].wrench for fit in fits], task) for m in MODELS]
+    mass = np.array([f.force for f in payloads]) / GRAVITY
     values = {"maps/payload": mass.tolist()}
     if task.mass is not None:
         values["maps/safety_factor"] = (mass / task.mass).tolist()
-    return values, Flag(0) if found[0].borne else Flag.NOT_BORNE
+    return values, Flag(0) if payloads[0].borne else Flag.NOT_BORNE
 
 
 def payload_alone(contacts: Sequence[Contact], samples: int, task: Task) -> dict[str, float]:

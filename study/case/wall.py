@@ -44,7 +44,7 @@ def thin_body(shape: Walled) -> ThinWalled:
 
 
 def estimated_indentation(
-    body: ThinWalled, held: Grasp, scene: Scene, closing: float, force: float
+    body: ThinWalled, grasp: Grasp, scene: Scene, closing: float, force: float
 ) -> tuple[float, float]:
     """Indentation of the linear wall at a force [N], where undeformed pads would overlap it [m], and ratio.
 
@@ -55,11 +55,11 @@ def estimated_indentation(
     """
     length, width, _ = scene.gripper.pad_size
     # A round object is the same at every angle, so all candidates share its factors.
-    linear = object_factors(body, 0.0 if body.round else held.angle, held.mirrors, ESTIMATE, 0.6 * width)
+    linear = object_factors(body, 0.0 if body.round else grasp.angle, grasp.mirrors, ESTIMATE, 0.6 * width)
     mesh, area = linear.shell.mesh, linear.shell.node_area
     load = np.zeros((linear.shell.nodes, 6))
     pressed = np.zeros(linear.shell.nodes, dtype=bool)
-    for pose in held.poses:
+    for pose in grasp.poses:
         local = pose.to_pad(mesh.outer)
         under = (np.abs(local[:, 0]) <= 0.5 * length) & (np.abs(local[:, 1]) <= 0.5 * width)
         under &= mesh.D @ pose.rotation[:, 2] < 0
@@ -69,7 +69,7 @@ def estimated_indentation(
         if not depth.sum() > 0:
             raise CheckError("a pad stands beside the wall of the object: move the candidate onto its wall")
         # Of a pad that a plane of symmetry cuts in half only half of the force counts.
-        part = force * (0.5 if held.mirrors[1] else 1.0)
+        part = force * (0.5 if grasp.mirrors[1] else 1.0)
         load[:, :3] += (part * depth / depth.sum())[:, None] * pose.rotation[:, 2]
         pressed |= depth > 0
     load[:, 3:] = load[:, :3]
@@ -89,7 +89,7 @@ def _indentations(shell: Shell, q: FloatArray) -> FloatArray:
     return -np.einsum("ki,ki->k", v - drift, normal)
 
 
-def wall_values(held: Grasp, state: Pressed, shell: Shell) -> dict[str, Any]:
+def wall_values(grasp: Grasp, state: Pressed, shell: Shell) -> dict[str, Any]:
     """What the wall bears in one case, keyed as in ``study.quantities``."""
     q = state.wall.q.reshape(-1, 6)
     both = faces(shell, state.wall.q)
@@ -98,21 +98,21 @@ def wall_values(held: Grasp, state: Pressed, shell: Shell) -> dict[str, Any]:
         "maps/wall_stress": max(float(f.von_mises.max()) for f in both),
         "maps/wall_strain": max(float(np.abs(f.principal_strain).max()) for f in both),
         "maps/support_force": float(np.linalg.norm(state.wall.reaction)),
-        "wall/place": _places(held, shell, q),
+        "wall/place": _places(grasp, shell, q),
     }
 
 
 def wall_flags(scene: Scene, state: Pressed, values: dict[str, Any]) -> Flag:
     """Flags of a case that its wall adds."""
-    found = Flag.SNAPPED * state.wall.snapped
-    found |= Flag.DENTED * (not surely_below(values["maps/indentation"], DEEP * 0.5 * values["maps/opening"]))
+    flags = Flag.SNAPPED * state.wall.snapped
+    flags |= Flag.DENTED * (not surely_below(values["maps/indentation"], DEEP * 0.5 * values["maps/opening"]))
     friction = 2.0 * scene.friction.mu * state.force
-    found |= Flag.SLIDES_OUT * (values["maps/support_force"] > friction + MARGIN * state.force)
+    flags |= Flag.SLIDES_OUT * (values["maps/support_force"] > friction + MARGIN * state.force)
     strength = thin_body(scene.object).material.yield_strength
-    return found | Flag.YIELDS * (strength is not None and not surely_below(values["maps/wall_stress"], strength))
+    return flags | Flag.YIELDS * (strength is not None and not surely_below(values["maps/wall_stress"], strength))
 
 
-def _places(held: Grasp, shell: Shell, q: FloatArray) -> FloatArray:
+def _places(grasp: Grasp, shell: Shell, q: FloatArray) -> FloatArray:
     """Deformed outer face ``(AROUND * ALONG, 3)`` of the whole object in its own frame [m].
 
     The angles begin at finger 1, so that images of a grasp are stored alike but for their turn.
@@ -123,11 +123,11 @@ def _places(held: Grasp, shell: Shell, q: FloatArray) -> FloatArray:
     )
     # to the side that is meshed
     x, y = np.cos(theta), np.sin(theta)
-    side = np.stack([np.where((x < 0) & held.mirrors[0], -1.0, 1.0), np.where((y < 0) & held.mirrors[1], -1.0, 1.0)])
-    own = np.arctan2(side[1] * y, side[0] * x).ravel()
-    nodes, N, _ = mesh.locate(own, s.ravel())
+    side = np.stack([np.where((x < 0) & grasp.mirrors[0], -1.0, 1.0), np.where((y < 0) & grasp.mirrors[1], -1.0, 1.0)])
+    angle = np.arctan2(side[1] * y, side[0] * x).ravel()
+    nodes, N, _ = mesh.locate(angle, s.ravel())
     moved = np.einsum("na,nai->ni", N, (q[:, :3] + q[:, 3:])[nodes])
-    place = mesh.surface.jets(own, s.ravel())[:, 0] + moved
+    place = mesh.surface.jets(angle, s.ravel())[:, 0] + moved
     place[:, :2] *= side.reshape(2, -1).T
-    c, t = np.cos(held.angle), np.sin(held.angle)
+    c, t = np.cos(grasp.angle), np.sin(grasp.angle)
     return place @ np.array([[c, t, 0.0], [-t, c, 0.0], [0.0, 0.0, 1.0]])
