@@ -71,7 +71,7 @@ COARSE = ("accuracy.wall_element_mm=4",
           "gripper.elements=[10, 6, 4]", 'accuracy.contact="weighted"')  # fmt: skip
 SHELL, SHELLS, COUPLING = "object: rigid or shell", "object: linear or nonlinear shell", "friction acting back"
 PANELS = {  # of an effect: indicator up to which it is skipped without a measurement, and what the axis says
-    SHELL: (effects.STIFF, "indentation / closing displacement"),
+    SHELL: (effects.STIFF_WALL, "indentation / closing displacement"),
     SHELLS: (effects.SMALL_INDENTATION, "indentation / wall thickness"),
     "sheet": (effects.STIFF_PLATE, "compliance over that of the pad"),
     COUPLING: (effects.SMALL_TRACTION, "traction left out / pressure"),

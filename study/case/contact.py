@@ -21,14 +21,14 @@ from softjaw.friction.torque import pure_torque
 from softjaw.friction.wrench import FrictionLimits, friction_limits
 from softjaw.lsfit.ellipsoid import Ellipsoid, three_motion_ellipsoid
 from softjaw.scoring.contact import SoftContact
+from softjaw.study.case.result import MARGIN
 from softjaw.study.flags import Flag, raised
 from softjaw.study.quantities import MODELS
 
 FloatArray = NDArray[np.float64]
 X_OF_PAD = np.array([1.0, 0.0, 0.0])  # the contact frame's x axis follows the pad's long side
-ANTIPODAL = np.radians(5.0)  # beyond this misalignment a flag says so
-ALIKE = 1e-6  # rad, a slope, or of a length: what is nearer to a limit is undecided
 LOADED = 1e-9  # of the largest pressure, below which a face carries no load
+ANTIPODAL = np.radians(5.0)  # beyond this misalignment a flag says so
 
 
 class Contact:
@@ -157,14 +157,14 @@ def angles(first: Contact, second: Contact) -> tuple[float, float]:
 def slips(lean: float, mu: float) -> bool:
     """Whether the line of the contacts, which leans by so much [rad], leaves a friction cone."""
     # Just below a right angle, beyond which the tangent would change its sign.
-    return bool(np.tan(min(lean, 1.57)) > mu + ALIKE)
+    return bool(np.tan(min(lean, 1.57)) > mu + MARGIN)
 
 
 def pose_flags(contacts: Sequence[Contact]) -> Flag:
     """Flags of how two contacts stand, and of their frames."""
     first, second = contacts
     normals, line = angles(first, second)
-    flags = Flag.NOT_ANTIPODAL * (max(normals, line) > ANTIPODAL - ALIKE)
+    flags = Flag.NOT_ANTIPODAL * (max(normals, line) > ANTIPODAL - MARGIN)
     flags |= Flag.SLIPS * slips(line, first.mu)
     for c in contacts:
         flags |= raised(c.frame.flag)

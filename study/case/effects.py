@@ -47,7 +47,7 @@ SMALL_TRACTION = E_N_TARGET / 0.5
 # Indentation over closing displacement up to which the e_n of a rigid wall was good to 0.5 % (54 cases), and over its
 # thickness up to which that of a linear shell was good to 0.3 %. Above, nothing is measured: indentation and stress are
 # wanted, too, which a rigid wall has not and e_n does not tell.
-STIFF, SMALL_INDENTATION = 0.02, 0.6
+STIFF_WALL, SMALL_INDENTATION = 0.02, 0.6
 SURFACES = {
     "three_motions": "ellipsoid from three motions",
     "axis_aligned": "fitted ellipsoid",
@@ -233,7 +233,7 @@ ROWS: dict[str, Row] = {
     "sheet": Row((Step("rigid", "elastic", _plate, STIFF_PLATE, SOFT_PLATE),)),
     "object": Row(
         (
-            Step("rigid", "linear_shell", lambda c, _: c.indentation[0], STIFF, 0.0),
+            Step("rigid", "linear_shell", lambda c, _: c.indentation[0], STIFF_WALL, 0.0),
             Step("linear_shell", "nonlinear_shell", lambda c, _: c.indentation[1], SMALL_INDENTATION, 0.0),
         ),
     ),

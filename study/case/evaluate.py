@@ -32,7 +32,7 @@ from softjaw.study.units import in_si
 
 FloatArray = NDArray[np.float64]
 FACING = math.radians(0.5)  # misalignment up to which the closed form is off by less than 1e-4
-NEAR = 1e-2  # relative gap between the bounds of epsilon
+EPSILON_GAP = 1e-2  # relative gap between the bounds of epsilon
 LIMITS = (("f_x", "f_x_max"), ("f_y", "f_y_max"), ("tau_z", "tau_z_max"))  # attribute, quantity
 ECCENTRICITIES = ("e_n", "e_n_ratio", "e_n_projected")  # attributes and quantities alike
 PLANAR = (
@@ -301,4 +301,4 @@ def exact_score(pair: Sequence[SoftContact], arms: float, torques: float) -> dic
 def _epsilon(contacts: Sequence[Contact], bodies: Sequence[Any], settings: EvaluationSettings) -> float:
     """Radius of the largest ball in the grasp wrench space about the midpoint of the contacts, in any pose."""
     middle = 0.5 * (contacts[0].origin + contacts[1].origin)
-    return epsilon(soft(contacts, bodies), settings.arms, settings.torques, middle, tolerance=NEAR).upper
+    return epsilon(soft(contacts, bodies), settings.arms, settings.torques, middle, tolerance=EPSILON_GAP).upper

@@ -45,7 +45,7 @@ class SurfaceFit(NamedTuple):
 
     ``wrench (samples, 6)`` are the wrenches of the fitted motions for mu = 1 [N, N m]; ``errors_fitted`` is the fit
     error on those motions, ``fit_error`` and ``ellipsoid_fit_error`` are those of the surface and of the ellipsoid from
-    three motions on others, ``overclaim`` and ``ellipsoid_overclaim`` the largest shares by which they claim too much there.
+    three motions on others, ``overclaim`` and ``ellipsoid_overclaim`` the largest shares by which they claim too much.
     """
 
     rho: float

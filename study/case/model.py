@@ -21,17 +21,16 @@ from softjaw.fem.pad.shape import BackingPlate, TiltingMount
 from softjaw.fem.petsc import PETSc, unknown_options
 from softjaw.study.case.build import build_object, pad_shape
 from softjaw.study.case.candidates import candidates
+from softjaw.study.case.poses import ROUNDING
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.scene import Scene
 from softjaw.study.scene.sections import Gripper
 
 FloatArray = NDArray[np.float64]
 MOST_TRIED, MOST_NAMED = 1000, 5  # pads brought to the object beforehand (the others fail as cases), and sentences
-BACK = (0.1, 0.4, 1.6)  # of the pad's thickness: where it stands before it is brought to the smooth surface
-OFF = 1e-9  # gap at first touch [m]
-GLUE = 1e4  # stiffness of the glue on a tilting mount over that of the pad: rigid to that share
+STEPS_BACK = (0.1, 0.4, 1.6)  # of the pad's thickness: where it stands before it is brought to the smooth surface
 PLATE_POISSON = 0.3  # of the backing plate; the modulus is what a scene gives
-DEEP = 0.9  # of the pad's thickness: how far round the undeformed contact face the object must be known
+KNOWN_DEPTH = 0.9  # of the pad's thickness: how far round the undeformed contact face the object must be known
 
 
 def pad_material(gripper: Gripper) -> Material:
@@ -48,7 +47,8 @@ def tilting_mount(gripper: Gripper) -> TiltingMount | None:
     """Mount of each pad that lets it tilt, or None; its glue is stiff beside the foam."""
     if gripper.tilt_stiffness_nm_per_rad is None:
         return None
-    glue = GLUE * pad_material(gripper).young_modulus / gripper.pad_thickness
+    # 1e4 times as stiff as the foam is rigid to 1e-4
+    glue = 1e4 * pad_material(gripper).young_modulus / gripper.pad_thickness
     return TiltingMount(gripper.tilt_stiffness_nm_per_rad, glue)
 
 
@@ -104,19 +104,19 @@ def approach(obj: GapObject, pose: Pose, gripper: Gripper) -> Finger:
     """
     size = gripper.pad_size
     touch = touching(obj, pose, size)
-    box = np.array([0.6 * size[0], 0.6 * size[1], DEEP * size[2]])
+    box = np.array([0.6 * size[0], 0.6 * size[1], KNOWN_DEPTH * size[2]])
     element = min(side / n for side, n in zip(size[:2], gripper.elements, strict=False))
     surface = obj.near(touch, box * [-1, -1, -0.5], box, element if gripper.element == "hex8" else 0.5 * element)
     face = _contact_face(size)
-    if abs(surface.gap(touch.to_object(face))[0].min()) > OFF:  # smoothed: met earlier or later
+    if abs(surface.gap(touch.to_object(face))[0].min()) > ROUNDING:  # smoothed: met earlier or later
         # A smoothed surface may stand before the old touch, so the pad steps back before it looks again.
-        for step in BACK:
+        for step in STEPS_BACK:
             back = Pose(touch.rotation, touch.origin - step * size[2] * touch.rotation[:, 2])
             if surface.gap(back.to_object(face))[0].min() > 0.0:
                 break
         distance = first_touch(surface, back, face, 2 * step * size[2])
         touch = Pose(touch.rotation, back.origin + distance * touch.rotation[:, 2])
-    hole_share = obj.hole_share(touch, face, DEEP * size[2]) if isinstance(obj, MeshObject) else 0.0
+    hole_share = obj.hole_share(touch, face, KNOWN_DEPTH * size[2]) if isinstance(obj, MeshObject) else 0.0
     return Finger(touch, surface, hole_share)
 
 
@@ -142,7 +142,7 @@ def mirror_planes(gap: Gap, size: tuple[float, float, float]) -> tuple[bool, boo
     """Whether the object, as far as the pad sees it, is its own mirror image in the planes ``x = 0`` and ``y = 0``."""
     # Off the planes, where both sides are the same point, and a little beyond the rim.
     u = np.linspace(0.03, 0.55, 12)
-    x, y, z = np.meshgrid(u * size[0], u * size[1], np.linspace(-0.3, DEEP, 7) * size[2], indexing="ij")
+    x, y, z = np.meshgrid(u * size[0], u * size[1], np.linspace(-0.3, KNOWN_DEPTH, 7) * size[2], indexing="ij")
     points = np.column_stack([x.ravel(), y.ravel(), z.ravel()])
     quadrants = {(i, j): gap(points * [i, j, 1.0])[0] for i in (1, -1) for j in (1, -1)}
     tolerance = 1e-9 * size[0]

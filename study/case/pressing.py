@@ -18,21 +18,22 @@ from softjaw.fem.shell.wall_problem import WallProblem
 from softjaw.friction.patch import ContactPatch
 from softjaw.friction.wrench import FrictionLimits
 from softjaw.study.case.build import has_wall, pad_shape
-from softjaw.study.case.contact import ALIKE, Contact
+from softjaw.study.case.contact import Contact
 from softjaw.study.case.model import Finger, contact_rules, pad_of, press_of, settings
 from softjaw.study.case.poses import turn_of_pose
+from softjaw.study.case.result import MARGIN
 from softjaw.study.case.wall import thin_body, wall_values
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import MODELS
 from softjaw.study.scene import Scene
 
-EXCESS = 0.05  # of the commanded force: beyond it the force along the contact normal is another one
+OBLIQUE_EXCESS = 0.05  # of the commanded force: beyond it the force along the contact normal is another one
 OVERLAP = 0.1  # of the closing displacement, beyond which the mesh is coarse for the contact
-FEW_ELEMENTS, NARROW = 6, 2  # loaded ones in all, and along length or width, below which it is coarse too
+FEW_ELEMENTS = 6  # loaded ones, below which the mesh is coarse too
 BENT = np.radians(120.0)  # between the object's normals at neighbouring loaded faces, beyond which it is coarse too
 MESH_HOLE = 0.01  # of a pad's face before a hole of the mesh, beyond which that is flagged
 LOCKING = 0.45  # Poisson's ratio above which trilinear elements are too stiff
-STEEPEST = np.radians(60.0)  # of an approach against the planes across a thin-walled object's axis
+MAX_SLOPE = np.radians(60.0)  # of an approach against the planes across a thin-walled object's axis
 UPRIGHT, HALF_TURN = (1.0, 1.0, 1.0), (-1.0, -1.0, 1.0)  # signs of the axes of a pad's frame
 
 
@@ -133,7 +134,7 @@ class PressedContact(Contact):
         widths = [np.count_nonzero(loaded.any(axes)) for axes in ((1, 2, 3), (0, 1, 3))]
         # a single line of nodes loads the elements on both sides of it
         shared = self.state.pad.contact == "nodal"
-        few = self.on_few_elements or min(widths) - shared < NARROW
+        few = self.on_few_elements or min(widths) - shared < 2
         normals = self.patch.normal.reshape(n * k, m * k, 3)
         # a blade thinner than an element is met on its flanks alone, or not on them, as the faces happen to lie
         pairs = zip(_neighbours(normals), _neighbours(loaded.reshape(n * k, m * k)), strict=True)
@@ -157,10 +158,10 @@ def state_flags(contacts: Sequence[PressedContact]) -> int:
     """Flags of the solved states of both fingers."""
     first, second = contacts
     between_faces = float((second.finger.pose.origin - first.finger.pose.origin) @ first.finger.pose.rotation[:, 2])
-    flags = Flag.COLLISION * (first.free_face + second.free_face > between_faces * (1.0 - ALIKE))
+    flags = Flag.COLLISION * (first.free_face + second.free_face > between_faces * (1.0 - MARGIN))
     flags |= Flag.UNSTABLE * (min(c.state.checks.ellipticity for c in contacts) <= 0)
     flags |= Flag.JUMPED * any(c.state.path_dependent for c in contacts)
-    flags |= Flag.OBLIQUE * (max(abs(c.force_excess) for c in contacts) > EXCESS - ALIKE)
+    flags |= Flag.OBLIQUE * (max(abs(c.force_excess) for c in contacts) > OBLIQUE_EXCESS - MARGIN)
     flags |= Flag.MESH_HOLE * (max(c.finger.hole_share for c in contacts) > MESH_HOLE)
     for c in contacts:
         flags |= Flag.NODAL * c.nodal_instead | Flag.COARSE * c.coarse
@@ -241,11 +242,11 @@ def pressing(
 def refuse_along_axis(fingers: Sequence[Finger]) -> None:
     """Lids, bottoms and rims of a thin-walled object are not pressed."""
     steepest = max(abs(float(f.pose.rotation[2, 2])) for f in fingers)
-    if steepest > np.sin(STEEPEST):
+    if steepest > np.sin(MAX_SLOPE):
         raise CheckError(
             f"a finger approaches a thin-walled object at {np.degrees(np.arcsin(min(steepest, 1.0))):.0f} degrees to "
-            f"the planes across its axis; its wall is simulated up to {np.degrees(STEEPEST):.0f} degrees: turn the "
-            "approach, or remove wall_mm"
+            f"the planes across its axis; its wall is simulated up to {np.degrees(MAX_SLOPE):.0f} degrees: turn "
+            "the approach, or remove wall_mm"
         )
 
 

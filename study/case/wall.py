@@ -22,7 +22,7 @@ from softjaw.study.scene import Scene
 from softjaw.study.scene.objects import Walled
 
 FloatArray = NDArray[np.float64]
-DEEP = 0.2  # of the object's half width between the fingers, beyond which an indentation is told by a flag
+DENTED_SHARE = 0.2  # of the object's half width between the fingers, beyond which an indentation is told by a flag
 ESTIMATE = WallMesh(0.004, 0.006, 0.012)  # mesh of the estimate that the level is chosen by
 
 
@@ -105,7 +105,7 @@ def wall_values(grasp: Grasp, state: Pressed, shell: Shell) -> dict[str, Any]:
 def wall_flags(scene: Scene, state: Pressed, values: dict[str, Any]) -> Flag:
     """Flags of a case that its wall adds."""
     flags = Flag.SNAPPED * state.wall.snapped
-    flags |= Flag.DENTED * (not surely_below(values["maps/indentation"], DEEP * 0.5 * values["maps/opening"]))
+    flags |= Flag.DENTED * (not surely_below(values["maps/indentation"], DENTED_SHARE * 0.5 * values["maps/opening"]))
     friction = 2.0 * scene.friction.mu * state.force
     flags |= Flag.SLIDES_OUT * (values["maps/support_force"] > friction + MARGIN * state.force)
     strength = thin_body(scene.object).material.yield_strength

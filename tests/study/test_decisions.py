@@ -156,7 +156,7 @@ def facing(turn, lean, mu, distance=0.06, free=0.0, excess=0.0):
 def test_flags_of_a_pair_do_not_hang_on_its_rotation(seed):
     """Contacts that face each other without friction, and some that lean by just the angle that is too much."""
     from softjaw.study.case.contact import ANTIPODAL, pose_flags
-    from softjaw.study.case.pressing import EXCESS, state_flags
+    from softjaw.study.case.pressing import OBLIQUE_EXCESS, state_flags
     from softjaw.study.flags import Flag
 
     turn = Rotation.random(random_state=seed)
@@ -164,8 +164,8 @@ def test_flags_of_a_pair_do_not_hang_on_its_rotation(seed):
     assert pose_flags(facing(turn, ANTIPODAL, 1.0)) == Flag.NOT_ANTIPODAL
     assert state_flags(facing(turn, 0.0, 1.0, 0.06, 0.03)) == Flag.COLLISION
     assert state_flags(facing(turn, 0.0, 1.0, 0.06, 0.0299)) == 0
-    assert state_flags(facing(turn, 0.0, 1.0, excess=moved([-EXCESS], seed)[0])) == Flag.OBLIQUE
-    assert state_flags(facing(turn, 0.0, 1.0, excess=0.9999 * EXCESS)) == 0
+    assert state_flags(facing(turn, 0.0, 1.0, excess=moved([-OBLIQUE_EXCESS], seed)[0])) == Flag.OBLIQUE
+    assert state_flags(facing(turn, 0.0, 1.0, excess=0.9999 * OBLIQUE_EXCESS)) == 0
 
 
 @tries

@@ -100,7 +100,7 @@ def test_check_reports_the_wall_and_the_numbers_its_level_is_chosen_by(solved):
     text = scene_text(solved[0], "can.toml")
     assert all(part in text for part in ("0.3 mm PP", "1.3 GPa", "31000 kPa", "1.5 mm"))
     assert RULE in text
-    assert re.findall(r"[\d.]+", RULE) == [f"{100 * effects.STIFF:g}", f"{effects.SMALL_INDENTATION:g}"]
+    assert re.findall(r"[\d.]+", RULE) == [f"{100 * effects.STIFF_WALL:g}", f"{effects.SMALL_INDENTATION:g}"]
     forced = solved[0].with_values({"effects.object": "rigid"})
     assert RULE not in scene_text(forced, "can.toml")
 
