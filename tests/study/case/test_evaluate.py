@@ -175,7 +175,7 @@ def test_the_centre_of_mass_is_that_of_the_volume_in_its_own_frame():
     """Of a tetrahedron the mean of its corners; that of its surface or of the box round it lies elsewhere."""
     corners = np.array([[0, 0, 0], [3, 0, 0], [0, 2, 0], [0, 0, 5]]) * 0.01 + [0.1, 0.2, 0.3]
     faces = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
-    body = SimpleNamespace(points=corners, triangles=faces, bounds=np.array([corners.min(axis=0), corners.max(axis=0)]))
+    body = SimpleNamespace(surface=lambda: (corners, faces))
     assert centre_of_volume(body) == pytest.approx(corners.mean(axis=0), rel=1e-12)
     ball = build_object(SphereShape(shape="sphere", radius_mm=30))
     assert centre_of_volume(ball) == pytest.approx([0, 0, 0], abs=1e-15)
