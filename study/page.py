@@ -76,7 +76,9 @@ def block_of(found: Table, first: bool = False) -> Block:
     """The columns for people of a table, as a block; what is wrapped in a text is text here."""
     columns = [c for c in found.columns if c.people]
     heads = [with_unit(c.label or c.name, shown_unit(c.unit)) for c in columns]
-    rows = [[found.cell(row, c) for c in columns] for row in found.rows]
+    # A number stays in one line with its error.
+    cells = ([(c, found.cell(row, c)) for c in columns] for row in found.rows)
+    rows = [[text if c.wrap else text.replace(" ", "\N{NO-BREAK SPACE}") for c, text in row] for row in cells]
     texts = [i for i, c in enumerate(columns) if c.wrap]
     return table(found.title, heads, rows, texts[:-1], texts[-1:], first)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -196,11 +195,6 @@ def as_record(patches: Sequence[EvaluatedPatch], grasp: dict[str, Any] | None) -
     }
 
 
-def as_json(record: dict[str, Any]) -> str:
-    """The record as one JSON object."""
-    return json.dumps(_plain(record), indent=2, allow_nan=False)
-
-
 def _patch_record(evaluated: EvaluatedPatch) -> dict[str, Any]:
     patch, contact, frame = evaluated.read.patch, evaluated.contact, evaluated.contact.frame
     names = ("origin", "axes", "centre_of_pressure", "flag", "overhang_count", "overhang_share")
@@ -274,14 +268,3 @@ def _patch_notes(evaluated: EvaluatedPatch) -> list[str]:
         notes.append(f"the loads that friction can carry fill {space} only (rank {evaluated.rank}): the limit surface "
                      "has no volume and no fit is judged")  # fmt: skip
     return notes
-
-
-def _plain(value: Any) -> Any:
-    """Numbers, lists and texts that JSON knows."""
-    if isinstance(value, dict):
-        return {key: _plain(v) for key, v in value.items()}
-    if isinstance(value, np.ndarray | np.generic):
-        return _plain(value.tolist())
-    if isinstance(value, list):
-        return [_plain(v) for v in value]
-    return None if isinstance(value, float) and not np.isfinite(value) else value

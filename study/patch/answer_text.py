@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from argparse import Namespace
 from collections.abc import Sequence
 from pathlib import Path
@@ -19,17 +20,19 @@ from softjaw.study.patch.answer import (
     SURFACES,
     UNITS,
     EvaluatedPatch,
-    as_json,
     as_record,
     evaluate_patch,
     grasp_record,
 )
-from softjaw.study.patch.patch_reader import Reading, read_patch
+from softjaw.study.patch.contacts import read_patch
+from softjaw.study.patch.patch_reader import Reading
 from softjaw.study.quantities import MODELS
 from softjaw.study.scene import Scene, SceneError, load_scene
+from softjaw.study.table import Column, Row, Table, as_text, number, plain, with_unit
 from softjaw.study.units import shown, shown_unit
 
 PICTURES = (".png", ".svg")
+LINE = 110  # characters
 FRICTION_COEFFICIENT, ALONG_PAD = 0.8, np.array([1.0, 0.0, 0.0])
 AXES = ("f_x / S", "f_y / S", "tau_z / S [mm]")
 PLANES = ((0, 1), (0, 2), (1, 2))
@@ -77,7 +80,7 @@ def patch(options: Namespace) -> str:
     if options.picture:
         write_picture(patches, options.surface, Path(options.picture))
     record = as_record(patches, grasp)
-    return as_json(record) if options.json else as_text(record)
+    return json.dumps(plain(record), indent=2, allow_nan=False) if options.json else record_text(record)
 
 
 def _scene_of(options: Namespace) -> Scene:
@@ -95,7 +98,7 @@ def _scene_of(options: Namespace) -> Scene:
         raise StudyError(USAGE, str(error)) from error
 
 
-def as_text(record: dict[str, Any]) -> str:
+def record_text(record: dict[str, Any]) -> str:
     """A block for each patch, one for the grasp, notes and definitions."""
     grasp = record["grasp"]
     blocks = [_patch_block(patch, record["mu"]) for patch in record["patches"]]
@@ -119,46 +122,44 @@ def _patch_block(patch: dict[str, Any], mu: float) -> list[str]:
     ]  # fmt: skip
     faces = f"{patch['faces']} face{'s' * (patch['faces'] > 1)}"
     head = f"{patch['file']}: {faces}, {patch['loaded_faces']} under pressure, mu = {mu:g}"
-    return [head, *(f"  {name:<8} {text}" for name, text in rows), "", *_friction_table(patch), "",
-            *_surface_table(patch["limit_surface"]["ccm"])]  # fmt: skip
+    return [head, *(f"  {name:<8} {text}" for name, text in rows), "", as_text(_friction_table(patch), LINE), "",
+            as_text(_surface_table(patch["limit_surface"]["ccm"]), LINE)]  # fmt: skip
 
 
-def _friction_table(patch: dict[str, Any]) -> list[str]:
-    rows = [["friction", *MODELS]]
+def _friction_table(patch: dict[str, Any]) -> Table:
+    columns = [Column("friction", wrap=40), *map(Column, MODELS)]
+    rows = []
     for name in FRICTION:
-        values = [shown(patch["friction"][model][name], UNITS[name]) for model in MODELS]
-        rows.append([f"{name} [{shown_unit(UNITS[name])}]", *map(_number, values)])
-    return _aligned(rows)
+        values = {model: float(shown(patch["friction"][model][name], UNITS[name])) for model in MODELS}
+        rows.append({"friction": with_unit(name, shown_unit(UNITS[name])), **values})
+    return Table("", columns, rows)
 
 
-def _surface_table(surfaces: dict[str, Any]) -> list[str]:
+def _surface_table(surfaces: dict[str, Any]) -> Table:
     exact = surfaces["exact"]["volume"]
-    rows = [["limit surface (ccm)", "volume / exact", "E_rad [%]", "E_dir [deg]"]]
+    columns = [Column("kind", label="limit surface (ccm)", wrap=40), Column("volume", label="volume / exact"),
+               Column("E_rad", label="E_rad [%]", digits=3), Column("E_dir", "rad", digits=3)]  # fmt: skip
+    rows = []
     for kind, title in SURFACES.items():
         found = surfaces[kind]
-        errors = [("E_rad", 100.0), ("E_dir", np.degrees(1.0))]
-        volume = "-" if not exact else f"{found['volume'] / exact:.4f}"
-        rows.append([title, volume, *("-" if found[key] is None else f"{f * found[key]:.3g}" for key, f in errors)])
-    return _aligned(rows)
+        error = None if found["E_rad"] is None else 100 * found["E_rad"]
+        volume = found["volume"] / exact if exact else None
+        rows.append({"kind": title, "volume": volume, "E_rad": error, "E_dir": found["E_dir"]})
+    return Table("", columns, rows)
 
 
 def _grasp_block(grasp: dict[str, Any]) -> list[str]:
-    apart, whole, own = (f"{1e3 * grasp[key]:.4g} mm" for key in ("distance", "object_length", "contact_length"))
-    scores = [grasp["score"][model] for model in MODELS]
-    rows = [[f"grasp ({SURFACES[grasp['surface']]})", *MODELS],
-            ["quality", *(_number(score["quality"]) for score in scores)],
-            ["epsilon", *(_between(*score["epsilon"]) for score in scores)]]  # fmt: skip
-    return [*_aligned(rows), f"  contacts {apart} apart, torques over object length {whole} and contact length {own}"]
-
-
-def _aligned(rows: Sequence[Sequence[str]]) -> list[str]:
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return ["  ".join([row[0].ljust(widths[0]), *(c.rjust(w) for c, w in zip(row[1:], widths[1:], strict=True))])
-            for row in rows]  # fmt: skip
+    apart, arms, torques = (f"{1e3 * grasp[key]:.4g} mm" for key in ("distance", "object_length", "contact_length"))
+    columns = [Column("score", label=f"grasp ({SURFACES[grasp['surface']]})", wrap=60), *map(Column, MODELS)]
+    scores = {model: grasp["score"][model] for model in MODELS}
+    rows: list[Row] = [{"score": "quality"} | {model: float(score["quality"]) for model, score in scores.items()}]
+    rows.append({"score": "epsilon"} | {model: _between(*score["epsilon"]) for model, score in scores.items()})
+    lengths = f"  contacts {apart} apart, torques over object length {arms} and contact length {torques}"
+    return [as_text(Table("", columns, rows), LINE), lengths]
 
 
 def _wrapped(text: str) -> list[str]:
-    return wrap(text, 110, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
+    return wrap(text, LINE, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
 
 
 def _vector(v: FloatArray) -> str:
@@ -166,11 +167,7 @@ def _vector(v: FloatArray) -> str:
 
 
 def _between(lower: float, upper: float) -> str:
-    return _number(lower) if upper <= 1.001 * lower + 1e-9 else f"{lower:.3g} to {upper:.3g}"
-
-
-def _number(value: float) -> str:
-    return "-" if not np.isfinite(value) else f"{value:.4g}"
+    return number(lower, 4) if upper <= 1.001 * lower + 1e-9 else f"{lower:.3g} to {upper:.3g}"
 
 
 # --- picture ----------------------------------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""Contacts of patches from anywhere: each in its contact frame, two of them that face each other, the exact surface."""
+"""Contacts of patches from files: read, each in its contact frame, two that face each other, the exact surface."""
 
 from __future__ import annotations
 
@@ -13,10 +13,34 @@ from softjaw.friction.patch import ContactPatch
 from softjaw.friction.wrench import checked_mu, friction_wrench
 from softjaw.lsfit.body import ExactSurface
 from softjaw.study.case.contact import Contact
+from softjaw.study.messages import OTHER_FILE, StudyError
+from softjaw.study.patch.faces import ReadPatch, checked
+from softjaw.study.patch.patch_reader import ENDINGS, Reading, checked_file, read_table
 
 EXACT = 2000  # motions whose hull gives the volume of the limit surface itself, to some 1e-4
 EQUAL = 1e-6  # difference of cosines that decides nothing
 HALF_TURN = np.diag([1.0, -1.0, -1.0])  # about x: how the second of two equal fingers stands
+
+
+def read_patch(file: str, reading: Reading) -> ReadPatch:
+    """The patch in a file, in the file's coordinates.
+
+    Raises
+    ------
+    StudyError
+        With code 3 if the file cannot be read as what its ending says, 2 if what it holds is no patch.
+    """
+    path = checked_file(file, ENDINGS)
+    ending = path.suffix.lower()
+    if ending == ".csv":
+        return checked(read_table(path, reading), reading.flip_normals)
+    # slow to import (VTK, HDF5), and not needed for tables
+    from softjaw.study.patch.trial import trouble
+    from softjaw.study.patch.vtk_faces import read_vtk
+
+    if why := trouble(lambda: read_vtk(path, reading)):  # VTK may not survive the file
+        raise StudyError(OTHER_FILE, f"{path}: damaged ({why}); write it again")
+    return checked(read_vtk(path, reading), reading.flip_normals)
 
 
 def contact_of(patch: ContactPatch, mu: float, x_axis: ArrayLike | None = None) -> Contact:

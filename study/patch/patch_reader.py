@@ -1,4 +1,4 @@
-"""Faces of a contact patch from a table (CSV) or a VTK file (VTU, VTP): read, brought to SI units and checked."""
+"""Faces of a contact patch from a table (CSV), brought to SI units; what the headers of all kinds of files mean."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy as np
 
 from softjaw.friction.patch import FloatArray
 from softjaw.study.messages import OTHER_FILE, USAGE, Problem, StudyError, shortened, shown
-from softjaw.study.patch.faces import Faces, ReadPatch, checked, corner_geometry, refuse
+from softjaw.study.patch.faces import Faces, corner_geometry, refuse
 
 ENDINGS = (".csv", ".vtu", ".vtp")
 LARGEST_FILE = 100 * 2**20  # bytes
@@ -60,27 +60,6 @@ class Reading:
         """Unit of a bare ``length``, ``area``, ``pressure`` or ``number``."""
         area = f"{self.unit}2" if self.unit else None
         return {"length": self.unit, "area": area, "pressure": self.pressure_unit, "number": "-"}[kind]
-
-
-def read_patch(file: str, reading: Reading) -> ReadPatch:
-    """The patch in a file, in the file's coordinates.
-
-    Raises
-    ------
-    StudyError
-        With code 3 if the file cannot be read as what its ending says, 2 if what it holds is no patch.
-    """
-    path = checked_file(file, ENDINGS)
-    ending = path.suffix.lower()
-    if ending == ".csv":
-        return checked(_read_table(path, reading), reading.flip_normals)
-    # slow to import (VTK, HDF5), and not needed for tables
-    from softjaw.study.patch.trial import trouble
-    from softjaw.study.patch.vtk_faces import read_vtk
-
-    if why := trouble(lambda: read_vtk(path, reading)):  # VTK may not survive the file
-        raise StudyError(OTHER_FILE, f"{path}: damaged ({why}); write it again")
-    return checked(read_vtk(path, reading), reading.flip_normals)
 
 
 def checked_file(file: str, endings: Sequence[str]) -> Path:
@@ -151,7 +130,7 @@ def split_header(header: str, pressure_name: str | None = None) -> tuple[str, st
 # --- table ------------------------------------------------------------------------------------------------------------
 
 
-def _read_table(path: Path, reading: Reading) -> Faces:
+def read_table(path: Path, reading: Reading) -> Faces:
     """Faces of a CSV file with one face per line: centre, area and normal of each, or its corners."""
     numbers, (headers, *cells) = table_rows(path)
     headers = [header.strip() for header in headers]

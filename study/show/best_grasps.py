@@ -133,7 +133,7 @@ def _map_columns(ds: xr.Dataset, maps: Collection[str]) -> list[Column]:
         columns += [Column(error, ds[error].units, people=False)] if error else []
         if name == "e_n":
             columns.append(Column(f"e_n_{ds.attrs['planar']}", q.unit, drop=len(maps)))
-    extra = [name for name in ("misalignment", "pad_elements") if name in ds and name not in maps]
+    extra = [name for name in ("misalignment", "pad_elements") if name in ds and maps is MAIN]
     return [*columns, *(Column(name, ds[name].units, drop=99) for name in extra)]
 
 

@@ -96,7 +96,8 @@ def _scene(path):
 
 
 def _patch(path):
-    from softjaw.study.patch.patch_reader import Reading, read_patch
+    from softjaw.study.patch.contacts import read_patch
+    from softjaw.study.patch.patch_reader import Reading
 
     return read_patch(str(path), Reading("mm", "kpa"))
 

@@ -17,7 +17,8 @@ from softjaw.fem.objects.mesh_file import read_triangles
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.study.cli import main
 from softjaw.study.messages import OTHER_FILE, UNPRINTABLE, USAGE, StudyError
-from softjaw.study.patch.patch_reader import Reading, read_patch
+from softjaw.study.patch.contacts import read_patch
+from softjaw.study.patch.patch_reader import Reading
 from softjaw.study.patch.trial import trouble
 from softjaw.study.result.store import open_result
 from softjaw.study.scene import SceneError, load_scene, parse_scene

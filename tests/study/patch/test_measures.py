@@ -10,7 +10,8 @@ from scipy.spatial.transform import Rotation
 
 import softjaw as sj
 from softjaw.study.patch.answer import as_record, evaluate_patch, grasp_record
-from softjaw.study.patch.patch_reader import Reading, read_patch
+from softjaw.study.patch.contacts import read_patch
+from softjaw.study.patch.patch_reader import Reading
 from tests.study.launching import ROOT
 
 EXAMPLE = ROOT / "jobs" / "cylinder-pressure.csv"

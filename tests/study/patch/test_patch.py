@@ -18,9 +18,9 @@ from softjaw.friction.patch import ContactPatch
 from softjaw.study.cli import main
 from softjaw.study.patch.answer import SURFACES, evaluate_patch
 from softjaw.study.patch.answer_text import PLANES, section
-from softjaw.study.patch.contacts import check_facing
+from softjaw.study.patch.contacts import check_facing, read_patch
 from softjaw.study.patch.faces import corner_geometry
-from softjaw.study.patch.patch_reader import Reading, read_patch
+from softjaw.study.patch.patch_reader import Reading
 from tests.friction.closed_forms import cylinder_torque
 from tests.generators import cylinder_grid, points_patch
 from tests.study.launching import ROOT

@@ -65,7 +65,7 @@ def whole(tmp_path_factory):
                 writer.count_attempt(rows[k])
                 writer.write(rows[k], record(plan.layout, pipeline.image(result, unit, c)))
     finalise(writer, scene)
-    writer.write_report(plain_report(dataset(writer.result()), scene.friction.mu))
+    writer.write_report(plain_report(dataset(writer.result())))
     writer.update_session(stop="2024-01-01T00:01:00+00:00", reason="complete", done=4)
     writer.close()
     return path

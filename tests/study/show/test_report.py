@@ -253,7 +253,7 @@ def test_values_have_their_error_where_the_file_has_it(tmp_path):
     assert pairs["e_n"] == "10.00 ± 0.04 mm"
     block = folded["blocks"][0]
     assert len(block["rows"]) == 24
-    assert all("±" in row[block["head"].index("e_n [mm]")] for row in block["rows"])
+    assert all("\N{NO-BREAK SPACE}±" in row[block["head"].index("e_n [mm]")] for row in block["rows"])
     assert not any("±" in row[block["head"].index("quality")] for row in block["rows"])
 
 
