@@ -56,17 +56,17 @@ def chosen(scene: Scene, units: Sequence[Unit]) -> list[Unit]:
     Each point of a sweep chooses for itself; images of one grasp count once.
     """
     where = scene.candidates
-    if where.solve_best is None and not where.skip_hopeless and len(units) > MOST_JUDGED:
+    if where.solve_best is None and len(units) > MOST_JUDGED:
         return list(units)
     known: list[tuple[Unit, float]] = []
     for unit in units:
         if unit.state == MISSING:
             surface = surface_triangles(unit.scene.object)
-            unit, quality = _seen(unit, promise(surface, unit), where.skip_hopeless)
+            unit, quality = _seen(unit, promise(surface, unit), where.solve_best == "holding")
         else:
             quality = -math.inf
         known.append((unit, quality))
-    return _best(known, where.solve_best)
+    return _best(known, where.solve_best if isinstance(where.solve_best, int) else None)
 
 
 def _seen(unit: Unit, found: Promise | None, skip: bool) -> tuple[Unit, float]:

@@ -81,7 +81,7 @@ def make_plan(
     axes = tuple(grasps.axes(scene))
     placed = own_frame(scene.object)
     units: Sequence[Any] = decided(grasps.units(scene, lambda point: point.axis_symmetry))
-    if ordered or scene.candidates.solve_best is not None or scene.candidates.skip_hopeless:
+    if ordered or scene.candidates.solve_best is not None:
         from softjaw.study.case.promise import chosen  # compiled loops, which most scenes are planned without
 
         units = chosen(scene, units)

@@ -43,7 +43,7 @@ def refined(scene: Scene, rounds: Rounds) -> Scene:
     numbers = _Renumbered(given, stations, len(where.angles_deg))
     fixed: dict[str, Any] = {"stations": None, "stations_mm": stations, "refine": None}
     # What was left out as not among the best stays so in the file; the added stations are all solved.
-    fixed["solve_best"] = None
+    fixed["solve_best"] = "holding" if where.solve_best == "holding" else None
     parts: dict[str, Any] = {"candidates": where.model_copy(update=fixed)}
     if not isinstance(names := scene.limit_surface.wrench_samples, str):
         samples = numbers(where.numbers(names))
@@ -55,7 +55,7 @@ def _with_poses(scene: Scene, rounds: Rounds) -> Scene:
     where = scene.candidates
     poses = with_places(where.poses, rounds)
     # What was left out as not among the best stays so in the file; the added poses are all solved.
-    fixed = {"poses": poses, "refine": None, "solve_best": None}
+    fixed = {"poses": poses, "refine": None, "solve_best": "holding" if where.solve_best == "holding" else None}
     return scene.model_copy(update={"candidates": where.model_copy(update=fixed)})
 
 

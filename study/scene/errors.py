@@ -39,6 +39,7 @@ MOVED = {  # keys of the last version, and what stands for them
     "object.base": "write `object.open_ends = \"both\"` for a tube",
     "object.springs_n_per_mm": "leave it out: it is 1 N/mm",
     "candidates.station_range_mm": "write `candidates.stations_mm`, with the number of stations in `stations`",
+    "candidates.skip_hopeless": "write `candidates.solve_best = \"holding\"`",
     "candidates.sampler": "write `candidates.sampled`, the number of grasps",
     "candidates.count": "write `candidates.sampled`, the number of grasps",
     "candidates.seed": "leave it out",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field
 
@@ -21,7 +21,7 @@ EXAMPLE = "for example `stations = 35` with `stations_mm = [25, 175]`"
 BUDGET = 120  # cases of a refinement
 NARROW = 0.01  # stations within this share of the object are all but one; in metres they would spread over it
 # keys that stations, poses and a sampler share
-OF_EVERY_KIND = ("roll_deg", "shift_mm", "refine", "refine_within", "solve_best", "skip_hopeless")
+OF_EVERY_KIND = ("roll_deg", "shift_mm", "refine", "refine_within", "solve_best")
 ALONG = 0.996  # cosine between approach and long side from which they are parallel
 
 
@@ -119,10 +119,9 @@ class Candidates(SceneSection):
         description="refining stops when no station is expected to beat the best by more than this share, or when a"
         " finer step between poses gained less",
     )
-    solve_best: int | None = Field(
-        None, ge=1, le=100_000, description="solve only so many candidates, the best on a bed of springs"
+    solve_best: Annotated[int, Field(ge=1, le=100_000)] | Literal["holding"] | None = Field(
+        None, description="solve only so many candidates, the best on a bed of springs, or those that do not slip on it"
     )
-    skip_hopeless: bool = Field(False, description="do not solve candidates that slip on a bed of springs")
     angles, roll, station_values = si("angles_deg"), si("roll_deg"), si("station_values_mm")
     shift: ClassVar[Any] = si("shift_mm")
 

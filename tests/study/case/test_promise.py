@@ -52,5 +52,5 @@ def test_a_contact_that_slips_comes_last_or_is_skipped(mu, held):
     assert [u.state for u in last] == [MISSING] * 2
     assert shares(last, np.full(100, MISSING), 1)[-1].unit.index == 0 or held
     assert last[0].hopeless or held
-    skipped = units(f"skip_hopeless = true\n{poses}", mu)
+    skipped = units(f"solve_best = 'holding'\n{poses}", mu)
     assert [u.state for u in skipped] == [MISSING if held else SLIPS, MISSING]
