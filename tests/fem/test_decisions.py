@@ -31,11 +31,10 @@ from softjaw.fem.objects.traced_outline import Rays, _centre_line, cast, centroi
 from softjaw.fem.objects.traced_surface import _symmetric
 from softjaw.fem.objects.triangles import cleaned
 from softjaw.fem.pad.backing_plate import _plate
-from softjaw.fem.pad.mesh import _as_grid, _lines
 from softjaw.fem.pad.shape import BackingPlate
 from softjaw.fem.shell.facing import FAR, Wall, face
-from softjaw.fem.shell.thin_walled import ThinWalled, _clamped, grasp
-from softjaw.fem.shell.wall_mesh import MeshSize, _planes, _steps, _wall, along, divided
+from softjaw.fem.shell.thin_walled import ThinWalled, grasp
+from softjaw.fem.shell.wall_mesh import MeshSize, along, divided
 from tests.turns import TURNS
 
 EPS = np.finfo(float).eps
@@ -372,22 +371,6 @@ def test_a_point_is_closed_where_it_bears_something(seed):
 
 
 @tries
-@given(seeds, st.integers(2, 9), st.integers(2, 9))
-def test_nodes_of_a_face_are_a_grid(seed, columns, rows):
-    """Nodes inside elements are off their line by rounding, and no number of lines makes one of two."""
-    rng, size = np.random.default_rng(seed), 0.05
-    x, y = np.cumsum(rng.uniform(1e-4, 1e-2, columns)) - 0.02, np.cumsum(rng.uniform(1e-4, 1e-2, rows)) - 0.02
-    order = rng.permutation(columns * rows)
-    nodes = np.stack([*np.meshgrid(x, y, indexing="ij"), np.zeros((columns, rows))], -1).reshape(-1, 3)
-    shuffled = np.empty_like(nodes)
-    shuffled[order] = nodes
-    assert _lines(moved(shuffled[:, 0], seed), 1e-9 * size).max() == columns - 1
-    number, shape = _as_grid(moved(shuffled, seed), np.arange(len(nodes)), 1e-9 * size)
-    assert shape == (columns, rows)
-    assert number.tolist() == order.tolist()
-
-
-@tries
 @given(seeds)
 def test_nodes_on_the_rim_of_the_support_are_held(seed):
     x, y = np.linspace(-0.025, 0.025, 11), np.linspace(-0.011, 0.011, 5)
@@ -426,24 +409,6 @@ def test_a_slope_of_the_thickness_at_an_end_adds_no_line(seed):
     """Places within rounding of the ends of the mesh, or of the edge of a flat lid's own line."""
     marks = moved([*BODY.surface.wall, BODY.surface.wall[0]], seed)
     assert len(along(BODY.surface, COARSE, True, True, marks)) == len(LINES)
-
-
-@tries
-@given(seeds)
-def test_a_table_of_thickness_that_ends_with_the_wall_has_no_step_there(seed):
-    table = [(0.0, 1e-3), *((z, 5e-4) for z in moved([0.05, 0.1], seed))]
-    assert len(_steps(BODY.surface, table)) == 1
-
-
-@tries
-@given(seeds)
-def test_numbers_on_planes_of_symmetry_are_fixed(seed):
-    n = 4 * np.random.default_rng(seed).integers(1, 6)
-    number = np.arange(3 * (n + 1)).reshape(n + 1, 3)
-    quarter = moved(np.linspace(0.0, 0.5 * np.pi, n + 1), seed)
-    assert _planes((True, True), quarter, number, number.size).sum() == 2 * 2 * 3
-    half = moved(np.linspace(0.0, np.pi, n + 1), seed)
-    assert _planes((False, True), half, number, number.size).sum() == 2 * 2 * 3
 
 
 # --- profiles ---------------------------------------------------------------------------------------------------------
@@ -574,33 +539,6 @@ def test_semi_axes_that_are_equal_up_to_rounding_make_a_circle(seed):
 
 
 # --- walls ------------------------------------------------------------------------------------------------------------
-
-
-@tries
-@given(seeds)
-def test_a_wall_as_thick_as_its_outline_is_bent_is_refused(seed):
-    t = np.random.default_rng(seed).uniform(1e-4, 1e-2)
-
-    def bent(by):
-        curve = SimpleNamespace(
-            derivative=lambda s: np.stack([s, 0 * s + 0.03], 1), curvature=lambda s: moved(0 * s + by / t, seed)
-        )
-        return outcome(_wall, SimpleNamespace(curve=curve), t, None, np.linspace(0.0, 0.1, 5))
-
-    assert bent(1.0) is ValueError
-    assert bent(1.0 - 1e-5) == pytest.approx(t)
-
-
-@tries
-@given(seeds)
-def test_the_lines_of_the_flat_bottom_are_clamped(seed):
-    """With the line on its edge, which the mesh and the outline know to rounding."""
-    scale = np.random.default_rng(seed).uniform(0.3, 3.0)
-    s = scale * np.linspace(0.0, 0.1, 11)
-    number, held = np.arange(44).reshape(4, 11), np.zeros((44, 6), dtype=bool)
-    flat = moved([s[3], s[-1]], seed)
-    _clamped(SimpleNamespace(s=moved(s, seed), surface=SimpleNamespace(flat=flat), number=number), held)
-    assert np.unique(np.flatnonzero(held.any(axis=1)) % 11).tolist() == [0, 1, 2, 3]
 
 
 def cylinder(ends, seed=None):

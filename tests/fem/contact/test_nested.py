@@ -1,6 +1,7 @@
 """One force by itself, from the state of a coarser mesh: the state of the load path, whatever was solved before."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -26,16 +27,25 @@ def pair(element, symmetry=(True, True), grading=(1.0, 1.0, 1.0)):
     )
 
 
+@cache
+def coarse_states(gap=OVAL, element="hex8", forces=tuple(FORCES)):
+    """Of the coarser pad, solved once."""
+    return list(Press(pair(element)[1], gap).load_path(forces))
+
+
+@cache
+def fine_state(gap, force):
+    """Of the pad by itself, solved once."""
+    [state] = Press(pair("hex8")[0], gap).load_path([force])
+    return state
+
+
 @pytest.mark.parametrize("gap", [OVAL, BALL], ids=["cylinder", "sphere"])
 @pytest.mark.parametrize("element", ["hex8", "hex27"])
 def test_every_force_by_itself_leads_to_the_state_of_the_load_path(gap, element):
-    pad, coarse = pair(element)
-    press, starts, ladder = (
-        Press(pad, gap),
-        list(Press(coarse, gap).load_path(FORCES)),
-        Press(pad, gap).load_path(FORCES),
-    )
-    for start, expected in zip(starts, ladder, strict=True):
+    pad, _ = pair(element)
+    press = Press(pad, gap)
+    for start, expected in zip(coarse_states(gap, element), Press(pad, gap).load_path(FORCES), strict=True):
         found = press.at(start.force, [start])
         assert (found.steps, found.halvings, found.notes) == (1, 0, ())
         assert found.iterations <= 7
@@ -45,8 +55,7 @@ def test_every_force_by_itself_leads_to_the_state_of_the_load_path(gap, element)
 
 
 def test_not_a_bit_depends_on_what_was_solved_before():
-    pad, coarse = pair("hex8")
-    starts = list(Press(coarse, OVAL).load_path(FORCES))
+    (pad, _), starts = pair("hex8"), coarse_states()
     press = Press(pad, OVAL)
     upward = [press.at(s.force, [s]).unknowns.tobytes() for s in starts]
     downward = [press.at(s.force, [s]).unknowns.tobytes() for s in reversed(starts)]
@@ -56,13 +65,13 @@ def test_not_a_bit_depends_on_what_was_solved_before():
 @pytest.mark.parametrize("start", ["none", "jumped", "far off", "broken"])
 def test_a_start_that_does_not_serve_is_replaced_by_a_walk_from_first_contact(start):
     pad, coarse = pair("hex8")
-    [good] = Press(coarse, BALL).load_path([3.0])
+    [good] = coarse_states(BALL, forces=(3.0,))
     far = replace(good, unknowns=good.unknowns + np.eye(coarse.size)[coarse.closing_dof] * 4e-3)
     given = {
         "none": [], "jumped": [replace(good, path_dependent=True)], "far off": [far],
         "broken": [replace(good, unknowns=np.full(coarse.size, np.nan))],
     }  # fmt: skip
-    [expected] = Press(pad, BALL).load_path([3.0])
+    expected = fine_state(BALL, 3.0)
     found = Press(pad, BALL).at(3.0, given[start])
     assert found.steps > 1
     assert relative(found.unknowns, expected.unknowns) < 1e-9
@@ -71,9 +80,7 @@ def test_a_start_that_does_not_serve_is_replaced_by_a_walk_from_first_contact(st
 
 def test_a_start_at_a_lower_force_is_gone_on_from():
     """Where the coarse mesh has no state at the force itself, or has jumped before it."""
-    pad, coarse = pair("hex8")
-    one, other = Press(coarse, BALL).load_path([1.0, 10.0])
-    [expected] = Press(pad, BALL).load_path([10.0])
+    (pad, _), (one, other), expected = pair("hex8"), coarse_states(BALL, forces=(1.0, 10.0)), fine_state(BALL, 10.0)
     for starts in ([one], [replace(other, path_dependent=True), one]):
         found = Press(pad, BALL).at(10.0, starts)
         assert relative(found.unknowns, expected.unknowns) < 1e-9
@@ -95,8 +102,7 @@ def test_a_force_without_a_state_fails_alone_and_within_its_iterations():
 
 
 def test_bounds_on_the_pressures_start_from_the_coarser_mesh_alike():
-    pad, coarse = pair("hex8")
-    [start] = Press(coarse, OVAL).load_path([3.0])
+    (pad, _), [start] = pair("hex8"), coarse_states(forces=(3.0,))
     one, other = (Press(pad, OVAL, options).at(3.0, [start]) for options in ({}, VI))
     assert other.steps == 1
     assert relative(one.unknowns, other.unknowns) < 3e-9
