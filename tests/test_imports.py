@@ -40,7 +40,6 @@ DOORS = {
         "study/result/skeleton.py",
         "study/result/write.py",
         "study/result/hdf5.py",
-        "study/accuracy/cost_study.py",
     },
     "pyvista": PICTURES | {"study/patch/vtk_faces.py"},
     "vtkmodules": PICTURES | {"study/patch/vtk_faces.py"},

@@ -1,75 +1,186 @@
-"""``softjaw cost``: the study from scene to page."""
+"""``softjaw cost``: what accuracy costs in time, by an ordinary sweep over meshes; its table and its picture."""
 
 from __future__ import annotations
 
-import os
-from argparse import Namespace
-from functools import partial
-from pathlib import Path
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
-from softjaw.study.accuracy.convergence import error_tables
-from softjaw.study.accuracy.cost_page import cost_page, sentences
-from softjaw.study.accuracy.cost_study import Costs, CostStudy, costs, load, new_study
-from softjaw.study.accuracy.measure import Measuring
-from softjaw.study.case.build import check_object
-from softjaw.study.case.probes import probes
-from softjaw.study.messages import OTHER_FILE, STOPPED, USAGE, StudyError, write_file
-from softjaw.study.scene.text import differences
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
 
-SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_NTASKS")
+from softjaw.study import pictures
+from softjaw.study.case.build import has_wall
+from softjaw.study.quantities import BY_KEY
+from softjaw.study.result.read import axes_of, values_of
+from softjaw.study.scene import Scene, parse_scene
 
-
-def run(options: Namespace, scene: Any) -> None:
-    """Measure what is missing and write the page."""
-    refuse_ranks()
-    path = Path(options.output or f"results/{Path(options.scene).stem}-cost.hdf")
-    if path.suffix != ".hdf":
-        raise StudyError(USAGE, f"-o: found '{path}', expected a file ending in .hdf; write -o {path}.hdf")
-    check_object(scene)
-    found, parameters = probes(scene, options.candidates), costs(scene)
-    title = getattr(scene.object, "name", None) or Path(options.scene).stem
-    study = new_study(scene, found, title, options.scene)
-    if path.exists():
-        study = _resumed(path, study)
-    print(f"probes: {'; '.join(study.candidates)}", flush=True)
-    try:
-        Measuring(study, found, parameters, path, partial(print, flush=True)).run(options.time_limit)
-    except KeyboardInterrupt as stop:
-        raise StudyError(STOPPED, f"stopped; run the same command again to measure what {path} lacks") from stop
-    _conclude(study, parameters, path)
+FloatArray = NDArray[np.float64]
+FINENESS = (0.5, 0.7, 1.0, 1.4)  # elements per direction over those of the scene
+WALL_SIZES = (2.0, 1.0, 0.7)  # of a wall's elements, over those of the scene
+FEW = 3  # candidates, and forces, that stand for all
+# Keys whose smallest value is the most accurate one; of all others the last value is taken for it.
+SMALLEST = ("accuracy.wall_element_mm", "accuracy.residual_tolerance", "accuracy.min_step_fraction")
+JUDGED = ("payload", "quality", "e_n")
+LOOKS = (("#12436d", "o"), ("#c05a00", "s"), ("#2a8c82", "^"), ("#801650", "D"))
 
 
-def _resumed(path: Path, new: CostStudy) -> CostStudy:
-    """The study that a file holds, if it is of the same scene and candidates."""
-    old = load(path)
-    remedy = "choose another file with -o, or move this one away"
-    if old.digest != new.digest:
-        text = f"{path}: made from another scene ({differences(old.scene, new.scene)}); {remedy}"
-        raise StudyError(OTHER_FILE, text)
-    if old.candidates != new.candidates:
-        raise StudyError(OTHER_FILE, f"{path}: has the candidates {'; '.join(old.candidates)}; {remedy}")
-    print(f"{path}: resumed with {len(old.measured)} measurements", flush=True)
-    return old
+def cost_scene(scene: Scene) -> Scene:
+    """The scene whose results tell the cost: a few of its cases, with its own sweep or one over meshes."""
+    plain: dict[str, Any] = dict.fromkeys(("accuracy.target", "candidates.refine", "candidates.solve_best"))
+    plain |= {"uncertainty.spread": {}, "limit_surface.wrench_samples": "none", "run.patches": "none"}
+    plain |= {"load.normal_force_n": _few(scene.load.normal_force_n)}
+    few = scene.with_values(plain | _few_candidates(scene))
+    return Scene.of_tables({**few.effective(), "sweep": dict(scene.sweep) or mesh_sweep(scene)})
 
 
-def _conclude(study: CostStudy, parameters: Costs, path: Path) -> None:
-    """Write page and picture, print the answer."""
-    if all(m.message for m in study.of(study.base)):
-        text = f"no probe could be solved with the scene as it is: {study.of(study.base)[0].message}"
-        raise StudyError(OTHER_FILE, text)
-    tables = error_tables(parameters, study)
-    html, png = cost_page(study, tables)
-    for place, data in ((path.with_suffix(".html"), html.encode()), (path.with_suffix(".png"), png)):
-        write_file(place, data)
-    skipped = [f"levels not measured: {len(study.skipped)}; the page gives the reasons"] if study.skipped else []
-    print("\n".join(["", *sentences(study, tables), *skipped]))
-    print(f"written: {path}, {path.with_suffix('.html')}, {path.with_suffix('.png')}")
+def _few(values: Sequence[Any]) -> list[Any]:
+    """The first, the last and one in the middle."""
+    last = len(values) - 1
+    return [values[i] for i in dict.fromkeys((0, last // 2, last))]
 
 
-def refuse_ranks() -> None:
-    """Measurements of several ranks would disturb each other's times."""
-    ranks = next((int(os.environ[name]) for name in SIZES if os.environ.get(name, "").isdigit()), 1)
-    if ranks > 1:
-        text = f"cost: found {ranks} ranks, expected one: ranks that share a machine disturb each other's times"
-        raise StudyError(USAGE, f"{text}; start it without mpirun")
+def _few_candidates(scene: Scene) -> dict[str, Any]:
+    """Candidates at the middles of equal parts of all, each at the first angle."""
+    where = scene.candidates
+    poses = scene.effective()["candidates"].get("poses", ())
+    places = list(poses or where.station_values_mm)
+    count = min(FEW, len(places))
+    chosen = [places[int((i + 0.5) / count * len(places))] for i in range(count)]
+    if poses:
+        return {"candidates.poses": chosen}
+    given = {"stations": None, "station_range_mm": None, "stations_mm": chosen, "angles_deg": where.angles_deg[:1]}
+    return {f"candidates.{key}": value for key, value in given.items()}
+
+
+def mesh_sweep(scene: Scene) -> dict[str, Any]:
+    """Meshes of the pads with both kinds of elements, or with meshes of a wall that may be simulated."""
+    length, width, thickness = scene.gripper.elements
+    # even along length and width, so that symmetric halves can be meshed
+    meshes = [(_even(f * length), _even(f * width), max(2, round(f * thickness))) for f in FINENESS]
+    meshes[FINENESS.index(1.0)] = scene.gripper.elements
+    sweep: dict[str, Any] = {"gripper.elements": list(dict.fromkeys(meshes))}
+    if has_wall(scene.object) and scene.effects.object != "rigid":
+        return sweep | {"accuracy.wall_element_mm": [f * scene.accuracy.wall_element_mm for f in WALL_SIZES]}
+    return sweep | {"gripper.element": ["hex8", "hex27"]}
+
+
+def _even(count: float) -> int:
+    return max(2, 2 * round(count / 2))
+
+
+# --- what a file says -------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One point of the sweep.
+
+    Attributes
+    ----------
+    values : dict of str
+        Value of each swept key, in words.
+    seconds : float
+        Time of a case on one core, mean over those that are solved [s].
+    worst, median : dict of float
+        For each of `JUDGED` the largest and the median relative distance from the reference; NaN where none is known.
+    failed : int
+        Cases without a result.
+    given, reference : bool
+        Whether it is what the scene has without the sweep, and whether it is the most accurate point.
+    """
+
+    values: dict[str, str]
+    seconds: float
+    worst: dict[str, float]
+    median: dict[str, float]
+    failed: int
+    given: bool
+    reference: bool
+
+
+def settings_in(ds: xr.Dataset) -> list[Setting]:
+    """Every point of the sweep of a file, in its order."""
+    scene, swept = parse_scene(ds.attrs["scene"], check_files=False), axes_of(ds)[:-3]
+    shape = ds.status.shape[: len(swept)]
+    seconds = _by_point(values_of(ds, BY_KEY["work/seconds_total"].variable), shape)
+    maps = {name: _by_point(values_of(ds, name), shape) for name in JUDGED if name in ds}
+    best = tuple(0 if axis.long_name in SMALLEST else length - 1 for axis, length in zip(swept, shape, strict=True))
+    last = int(np.ravel_multi_index(best, shape))
+    errors = {name: np.abs(values - values[last]) / np.abs(values[last]) for name, values in maps.items()}
+    own = scene.with_values({}).effective()
+    found = []
+    for i, index in enumerate(np.ndindex(shape)):
+        values = {axis.long_name: scene.sweep[axis.long_name][j] for axis, j in zip(swept, index, strict=True)}
+        given = all(_same(own[key.partition(".")[0]].get(key.partition(".")[2]), v) for key, v in values.items())
+        known = {name: error[i][np.isfinite(error[i])] for name, error in errors.items()}
+        worst, median = ({n: float(f(e)) if e.size else np.nan for n, e in known.items()} for f in (np.max, np.median))
+        solved = np.isfinite(seconds[i])
+        mean = float(seconds[i][solved].mean()) if solved.any() else np.nan
+        words = {key: _words(value) for key, value in values.items()}
+        found.append(Setting(words, mean, worst, median, int((~solved).sum()), given, i == last))
+    return found
+
+
+def _by_point(values: FloatArray, shape: Sequence[int]) -> FloatArray:
+    """Values over the cases ``(points, cases)``."""
+    return values.reshape(int(np.prod(shape)), -1)
+
+
+def _same(one: Any, other: Any) -> bool:
+    return bool(np.array_equal(one, other))
+
+
+def _words(value: Any) -> str:
+    if isinstance(value, str):
+        return value
+    return " x ".join(f"{v:g}" for v in value) if isinstance(value, list | tuple) else f"{value:g}"
+
+
+def percent(error: float) -> str:
+    """A relative error in two digits.
+
+    >>> percent(0.0213), percent(3e-8), percent(float("nan"))
+    ('2.1 %', '< 0.0001 %', '-')
+    """
+    if not np.isfinite(error):
+        return "-"
+    return f"{100 * error:.2g} %" if error >= 1e-6 else "< 0.0001 %"
+
+
+def cost_text(ds: xr.Dataset) -> str:
+    """The settings, the cheapest first, with time and errors; one line for each."""
+    settings = settings_in(ds)
+    names, reference = list(settings[0].worst), next(s for s in settings if s.reference)
+    head = (*settings[0].values, "time per case", *(f"error of {name}" for name in names), "")
+    rows = [
+        (*s.values.values(), f"{s.seconds:.2g} s", *(f"{percent(s.worst[n])} ({percent(s.median[n])})" for n in names),
+         ", ".join([*["as in the scene"] * s.given, *[f"{s.failed} failed"] * bool(s.failed)]))
+        for s in sorted(settings, key=lambda s: s.seconds)
+        if not s.reference
+    ]  # fmt: skip
+    widths = [max(map(len, column)) for column in zip(head, *rows, strict=True)]
+    lines = ["  ".join(map(str.ljust, row, widths)).rstrip() for row in (head, *rows)]
+    last = ", ".join(f"{key} = {value}" for key, value in reference.values.items())
+    about = f"largest error of {ds.status.size // len(settings)} cases (in brackets the median), against {last}"
+    return "\n".join([*lines, f"{about}, which takes {reference.seconds:.2g} s"])
+
+
+def cost_picture(ds: xr.Dataset) -> bytes:
+    """Largest errors over the time of a case, a line for each value of the last axis; the scene's own is ringed."""
+    settings = [s for s in settings_in(ds) if not s.reference]
+    names, last = list(settings[0].worst), list(settings[0].values)[-1]
+    with pictures.style():
+        drawn, axes = pictures.figure(3.4 * len(names), 3.2, 1, len(names))
+        for plot, name in zip(axes[0], names, strict=True):
+            for k, value in enumerate(dict.fromkeys(s.values[last] for s in settings)):
+                line = [(s.seconds, s.worst[name]) for s in settings if s.values[last] == value and s.worst[name] > 0]
+                colour, marker = LOOKS[k % len(LOOKS)]
+                plot.plot(*np.transpose(line or [(np.nan, np.nan)]), color=colour, marker=marker, label=value)
+            own = [(s.seconds, s.worst[name]) for s in settings if s.given and s.worst[name] > 0]
+            if own:
+                plot.plot(*np.transpose(own), "o", ms=11, mfc="none", color="black", label="as in the scene")
+            plot.set(xscale="log", yscale="log", xlabel="time per case [s]", title=f"largest error of {name}")
+        axes[0][-1].legend(title=last)
+        return pictures.as_png(drawn)

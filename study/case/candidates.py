@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,7 @@ from softjaw.study.case.build import check_object, forces_apart, middle_of, own_
 from softjaw.study.case.fit import doubt, fit_of, jaws_of
 from softjaw.study.case.poses import ROUNDING, axis_poses, explicit_poses, moved, turn_of_pose
 from softjaw.study.quantities import MISSING, REALISATION
-from softjaw.study.scene import Option, Scene
+from softjaw.study.scene import Scene
 from softjaw.study.units import UNITS, in_si, split_unit
 
 FloatArray = NDArray[np.float64]
@@ -198,7 +199,7 @@ def _realisation_axis(scene: Scene) -> list[Axis]:
     return [Axis(REALISATION, numbers, "", "sample of the uncertain inputs", ("as given", *texts))]
 
 
-def _sweep_axes(sweep: Mapping[str, Sequence[Option]]) -> list[Axis]:
+def _sweep_axes(sweep: Mapping[str, Sequence[Any]]) -> list[Axis]:
     """One axis per key, named by the key without section and unit where that is unambiguous."""
     stems = [split_unit(key.partition(".")[2]) for key in sweep]
     known = ["station", "angle", "normal_force", *(stem for stem, _ in stems)]
@@ -206,8 +207,9 @@ def _sweep_axes(sweep: Mapping[str, Sequence[Option]]) -> list[Axis]:
     for (key, values), (stem, unit) in zip(sweep.items(), stems, strict=True):
         # Keys of two sections with one stem keep their section in the name.
         name = stem if known.count(stem) == 1 else split_unit(key.replace(".", "_"))[0]
-        if any(isinstance(v, str) for v in values):
-            made.append(Axis(name, np.arange(len(values), dtype=float), "", key, tuple(map(str, values))))
+        if isinstance(values[0], str | tuple):
+            texts = tuple(v if isinstance(v, str) else " x ".join(f"{x:g}" for x in v) for v in values)
+            made.append(Axis(name, np.arange(len(values), dtype=float), "", key, texts))
         else:
             units = UNITS[unit].si if unit else ""
             made.append(Axis(name, np.array([in_si(key, v) for v in values], dtype=float), units, key))

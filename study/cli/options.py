@@ -42,7 +42,7 @@ COMMANDS = {  # by what they are for, in the order of use: name, what it does, a
         ("check", "find every error of a scene, or say what would be run", "check jobs/bottle-rigid.toml", "cli.quick"),
         ("plan", "cases, units, disk, memory and time, before anything is spent", "plan jobs/bottle-rigid.toml -n 16",
          "cli.quick"),
-        ("cost", "what accuracy costs in time: errors and seconds of every setting",
+        ("cost", "what accuracy costs in time: errors and seconds on several meshes",
          "cost jobs/bottle-rigid.toml -o results/bottle-rigid-cost.hdf", "cli.running"),
     ),
     "solve": (
@@ -151,7 +151,7 @@ def program() -> Program:
             epilog=f"example:\n  {ranks}softjaw {example}", formatter_class=argparse.RawDescriptionHelpFormatter,
         )  # fmt: skip
         made[name].set_defaults(command=name, module=module)
-    for name, add_options in (("init", _add_init_options), ("cost", _add_cost_options), ("watch", _add_watch_options),
+    for name, add_options in (("init", _add_init_options), ("watch", _add_watch_options),
                               ("view", _add_view_options),
                               ("patch", _add_patch_options)):  # fmt: skip
         add_options(made[name])
@@ -193,8 +193,9 @@ def _add_scene_options(made: dict[str, Any]) -> None:
     add("-n", type=values.counts, default=(1,), metavar="RANKS", dest="ranks", help="ranks (default 1); several, as in "
         "16,64,256, replay the times of a finished study on each")  # fmt: skip
     add("--repeat", type=values.whole(1), default=1, metavar="K", help="replay a study of K times as many candidates")
-    for parser in (made["plan"], made["run"]):
-        parser.add_argument("-o", metavar="FILE", dest="output", help="result file (default: results/<scene>.hdf)")
+    for parser in (made["plan"], made["cost"], made["run"]):
+        parser.add_argument("-o", metavar="FILE", dest="output", help="result file (default: results/<scene>.hdf, "
+                            "of cost results/<scene>-cost.hdf)")  # fmt: skip
     made["run"].add_argument("--retry-failed", action="store_true", help="solve failed cases again")
 
 
@@ -252,16 +253,6 @@ def _add_export_options(parser: argparse.ArgumentParser) -> None:
         "the object's frame (default gripper,object)")  # fmt: skip
     listed = "\n".join(f"  {name:<12} {text}" for name, text in FORMATS.items())
     parser.epilog = f"{parser.epilog}\n\nformats:\n{listed}"
-
-
-def _add_cost_options(parser: argparse.ArgumentParser) -> None:
-    add = parser.add_argument
-    add("-o", metavar="FILE", dest="output", help="file of the study (default: results/<scene>-cost.hdf); the page is "
-        "written beside it")  # fmt: skip
-    add("--candidate", metavar="NAME", action="append", default=[], dest="candidates", help="candidate to measure, by "
-        "number or label; repeatable (default: three of them)")  # fmt: skip
-    add("--time-limit", metavar="SECONDS", type=values.positive, default=300.0, help="CPU seconds of the whole study; "
-        "finer levels are left out (default 300)")  # fmt: skip
 
 
 def _add_patch_options(parser: argparse.ArgumentParser) -> None:

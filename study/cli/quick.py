@@ -81,10 +81,10 @@ def scene_of(options: Namespace) -> Scene:
         raise StudyError(USAGE, str(error)) from error
 
 
-def target(options: Namespace) -> Path:
-    """The result file of a run; refuse names that no viewer of results would open."""
+def target(options: Namespace, ending: str = "") -> Path:
+    """The result file of a run, by default the scene's name and ``ending`` in results/; refuse names that no viewer of results would open."""
     if options.output is None:
-        return Path("results") / f"{Path(options.scene).stem}.hdf"
+        return Path("results") / f"{Path(options.scene).stem}{ending}.hdf"
     path = Path(options.output)
     if path.suffix != ".hdf":
         better = path / f"{Path(options.scene).stem}.hdf" if path.is_dir() else path.with_name(path.name + ".hdf")

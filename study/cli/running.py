@@ -10,6 +10,8 @@ from mpi4py import MPI
 from softjaw.study.case.candidates import with_sampled_grasps
 from softjaw.study.cli.quick import petsc_overrides, target
 from softjaw.study.launch import solve_scene
+from softjaw.study.messages import DONE, SOME_FAILED, write_file
+from softjaw.study.result.read import open as open_dataset
 from softjaw.study.run.progress import Unbreakable
 
 
@@ -25,8 +27,16 @@ def run(options: Namespace) -> int:
     )  # fmt: skip
 
 
-def cost(options: Namespace) -> None:
-    """Measure what accuracy costs in time."""
-    from softjaw.study.accuracy import cost as costing  # loads matplotlib, which every rank of a run would wait for
+def cost(options: Namespace) -> int:
+    """Solve a few cases of a scene on several meshes, and say what their accuracy costs in time."""
+    from softjaw.study.accuracy.cost import cost_picture, cost_scene, cost_text  # matplotlib
 
-    costing.run(options, with_sampled_grasps(options.scene_read))
+    sys.stdout = Unbreakable(sys.stdout)
+    path, comm = target(options, "-cost"), MPI.COMM_WORLD
+    scene = cost_scene(with_sampled_grasps(options.scene_read))
+    code = solve_scene(scene, path, comm, scene_file=options.scene, overrides=options.overrides)
+    if comm.rank == 0 and code in (DONE, SOME_FAILED):
+        ds = open_dataset(path)
+        write_file(path.with_suffix(".png"), cost_picture(ds))
+        print(f"{cost_text(ds)}\nwritten: {path}, {path.with_suffix('.png')}", flush=True)
+    return code

@@ -37,6 +37,7 @@ from softjaw.study.scene.sections import (
 from softjaw.study.scene.text import flat, parse_toml, read_text, toml_text
 
 Option = str | int | float | bool
+Numbers = Annotated[tuple[int | float, ...], Field(strict=False)]  # one value of a key that takes a list
 WATCHING = ("monitor", "view", "converged_reason")  # PETSc options that only print
 ALTERNATIVES = {  # what an override of a way of giving candidates replaces
     "stations": ("poses", "sampled"),
@@ -56,6 +57,7 @@ NOT_SWEPT = {
     "limit_surface.samples": "it changes the size of the results",
     "limit_surface.wrench_samples": "it changes the size of the results",
 }
+OF_FACES = ("gripper.element", "gripper.elements")  # keys that the number of stored faces depends on
 NO_RESULT = ("run", "uncertainty")  # sections that change no result of a case
 MOST_GRID_POINTS, MOST_CASES = 10_000, 1_000_000
 OVERRIDE = "section.key=value with a value as in TOML, as in gripper.pad_width_mm=20 or object.name='\"cup\"'"
@@ -91,7 +93,7 @@ class Scene(SceneSection):
     task: TaskKeys = Field(default_factory=TaskKeys)
     run: Run = Field(default_factory=Run)
     petsc: dict[str, Option] = Field(default_factory=dict, description="options of the contact solver, contact_...")
-    sweep: dict[str, Annotated[tuple[str | int | float, ...], Field(strict=False, min_length=1)]] = Field(
+    sweep: dict[str, Annotated[tuple[str | int | float | Numbers, ...], Field(strict=False, min_length=1)]] = Field(
         default_factory=dict,
         description='lists of values by dotted key, as in "object.semi_axis_b_mm" = [10, 20]',
         json_schema_extra={"additionalProperties": True},  # the dotted keys may stand without quotes
@@ -113,7 +115,7 @@ class Scene(SceneSection):
         refuse(axis_rules(sweep, info.data))
         if len(info.data) == list(cls.model_fields).index("sweep"):  # every section is valid
             refuse(_point_rules(sweep, info.data))
-        return {k: v if isinstance(v[0], str) else tuple(sorted(map(float, v))) for k, v in sweep.items()}
+        return {k: v if isinstance(v[0], str | tuple) else tuple(sorted(map(float, v))) for k, v in sweep.items()}
 
     def rules(self) -> Errors:
         """Not more cases than a file can hold."""
@@ -476,10 +478,14 @@ def axis_rules(sweep: Mapping[str, Sequence[Any]], sections: Mapping[str, Any]) 
             yield wrong(key, f"a key with a single value, as `{near or 'gripper.pad_width_mm'}`", key)
         elif key in NOT_SWEPT or section in NO_RESULT:
             yield wrong(values, f"a key that can be swept; {NOT_SWEPT.get(key, 'it changes no result')}", key)
-        elif key == "gripper.element" and "run" in sections and sections["run"].patches == "all":
+        elif key in OF_FACES and "run" in sections and sections["run"].patches == "all":
             yield wrong(values, 'run.patches = "none" beside it, for faces that differ from case to case', key)
-        elif len(set(values)) < len(values) or len({isinstance(v, str) for v in values}) > 1:
-            yield wrong(values, "a list of numbers or a list of texts, each once", key)
+        elif len(set(values)) < len(values) or len({_kind(v) for v in values}) > 1:
+            yield wrong(values, "numbers, texts or lists, each once", key)
+
+
+def _kind(value: Any) -> type:
+    return type(value) if isinstance(value, str | tuple) else float
 
 
 def _point_rules(sweep: Mapping[str, Sequence[Any]], sections: Mapping[str, Any]) -> Errors:

@@ -121,12 +121,6 @@ def _result(path):
         return as_csv(ds), as_json(best(ds, None, 3)), status_text(result, 80)
 
 
-def _cost(path):
-    from softjaw.study.accuracy.cost_study import load
-
-    return load(path)
-
-
 QUICK = {
     "scene": Reader("scene.toml", SCENE, TEXTUAL, _scene, (SceneError,)),
     "table": Reader("patch.csv", TABLE, TEXTUAL, _patch),
@@ -141,18 +135,13 @@ QUICK = {
 
 def slow_readers(folder: Path) -> dict[str, Reader]:
     """Readers whose libraries have to be kept apart, with files that take a while to make."""
-    from softjaw.study.accuracy.cost_study import CostStudy, Measured, save
     from tests.study.formula_results import make
     from tests.study.patch_files import cylinder_mesh, vtk
 
     points, cells = cylinder_mesh()
     grids = [vtk(folder / f"seed.{end}", points, cells, [("pressure", np.ones(len(cells)))]) for end in ("vtu", "vtp")]
-    cost = CostStudy(SCENE.decode(), "d" * 64, "t", "s.toml", "base", ["0 mm"], 0.2, "m")
-    cost.add(Measured("base", "as it is", "0 mm", np.array([1.0]), np.ones((1, 4)), 1.0, 0.0, 1, ""))
-    save(folder / "cost.hdf", cost)
     return {
         "VTU": Reader("patch.vtu", grids[0].read_bytes(), TEXTUAL, _patch),
         "VTP": Reader("patch.vtp", grids[1].read_bytes(), TEXTUAL, _patch),
         "result": Reader("result.hdf", make(folder / "seed.hdf").read_bytes(), BINARY, _result),
-        "cost": Reader("cost.hdf", (folder / "cost.hdf").read_bytes(), BINARY, _cost),
     }

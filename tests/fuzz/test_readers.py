@@ -18,7 +18,7 @@ from tests.fuzz.readers import QUICK, slow_readers
 
 SECONDS, ROOM = 20, 3 * 2**29  # of CPU, and bytes beyond what the tests have already
 CHECKS = {"deadline": None, "database": None, "suppress_health_check": list(HealthCheck)}
-SLOW = ("VTU", "VTP", "result", "cost")
+SLOW = ("VTU", "VTP", "result")
 
 
 def complaint(reader, path):

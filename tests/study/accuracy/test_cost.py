@@ -1,0 +1,155 @@
+"""What accuracy costs: the sweep that tells it, errors and times that its file gives, and the command."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import softjaw
+from softjaw.study.accuracy.cost import cost_picture, cost_scene, cost_text, mesh_sweep, settings_in
+from softjaw.study.case.candidates import axes, units
+from softjaw.study.cli import main
+from softjaw.study.messages import DONE
+from softjaw.study.scene import Scene, parse_scene
+from softjaw.study.scene.errors import SceneError
+
+JOBS = Path(__file__).parents[3] / "jobs"
+BALL = """
+[object]
+shape = "sphere"
+radius_mm = 30
+[gripper]
+elements = [8, 4, 2]
+[candidates]
+stations_mm = [-10, -5, 0, 5, 10]
+angles_deg = [0, 90]
+[load]
+normal_force_n = [1, 2, 3, 4, 5]
+[effects]
+friction_pressure_coupling = "none"
+sheet = "rigid"
+"""
+SHORT = ["candidates.stations_mm=[0, 10]", "load.normal_force_n=[2]", "gripper.elements=[6, 4, 2]"]
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    """Of the command itself."""
+    folder = tmp_path_factory.mktemp("cost")
+    (folder / "ball.toml").write_text(BALL)
+    words = [word for change in SHORT for word in ("--set", change)]
+    assert main(["cost", str(folder / "ball.toml"), "-o", str(folder / "c.hdf"), *words]) == DONE
+    return folder / "c.hdf"
+
+
+# --- the sweep --------------------------------------------------------------------------------------------------------
+
+
+def test_a_few_cases_are_solved_on_coarser_and_finer_meshes_of_both_kinds():
+    scene = cost_scene(parse_scene(BALL))
+    assert scene.sweep == {
+        "gripper.elements": ((4, 2, 2), (6, 2, 2), (8, 4, 2), (12, 6, 3)), "gripper.element": ("hex8", "hex27"),
+    }  # fmt: skip
+    assert scene.candidates.station_values_mm == (-10, 0, 10)
+    assert scene.candidates.angles_deg == (0,)
+    assert scene.load.normal_force_n == (1, 3, 5)
+    assert (scene.run.patches, scene.cases) == ("none", 8 * 9)
+    made = units(scene, lambda point: point.axis_symmetry)
+    assert {(u.scene.gripper.elements, u.scene.gripper.element) for u in made} == {
+        (n, kind) for n in scene.sweep["gripper.elements"] for kind in scene.sweep["gripper.element"]
+    }
+    assert parse_scene(scene.effective_toml()) == scene
+
+
+def test_a_wall_that_may_be_simulated_has_meshes_too():
+    bottle = Scene.from_file(JOBS / "bottle.toml")
+    assert mesh_sweep(bottle)["accuracy.wall_element_mm"] == pytest.approx([3, 1.5, 1.05])
+    assert "gripper.element" in mesh_sweep(bottle.with_values({"effects.object": "rigid"}))
+    assert cost_scene(bottle).cases == 4 * 3 * 9
+
+
+def test_what_makes_a_study_long_is_left_out_and_poses_are_spread():
+    scene = Scene.from_file(JOBS / "box-poses.toml", ["accuracy.target=0.01", "candidates.refine=true"])
+    cost = cost_scene(scene)
+    assert (cost.accuracy.target, cost.candidates.refine) == (None, None)
+    assert 1 < len(cost.candidates.poses) <= 3
+    assert set(cost.candidates.poses) <= set(scene.candidates.poses)
+
+
+def test_the_scene_s_own_sweep_stays():
+    scene = cost_scene(parse_scene(BALL, "x.toml", ["sweep.accuracy.contact=['weighted', 'nodal']"]))
+    assert scene.sweep == {"accuracy.contact": ("weighted", "nodal")}
+
+
+@pytest.mark.parametrize(
+    "value", ["[[8, 4, 2], 3]", "[[8, 4, 2], [8, 4, 2]]", "[[8, 4], [6, 4, 2]]", "[[8, 4, 2], [0, 4, 2]]"]
+)
+def test_lists_are_swept_where_each_is_one_that_the_key_takes(value):
+    with pytest.raises(SceneError, match=r"gripper\.elements"):
+        parse_scene(BALL, "x.toml", ['run.patches="none"', f"sweep.gripper.elements={value}"])
+
+
+def test_meshes_are_swept_only_where_no_faces_are_stored():
+    both = ["sweep.gripper.elements=[[4, 2, 2], [8, 4, 2]]"]
+    with pytest.raises(SceneError, match="patches"):
+        parse_scene(BALL, "x.toml", both)
+    scene = parse_scene(BALL, "x.toml", [*both, 'run.patches="none"'])
+    assert axes(scene)[0].options == ("4 x 2 x 2", "8 x 4 x 2")
+
+
+# --- what its file says -----------------------------------------------------------------------------------------------
+
+
+def test_errors_are_distances_from_the_last_point(file):
+    ds = softjaw.open(file)
+    settings = settings_in(ds)
+    assert [(s.values["gripper.elements"], s.values["gripper.element"]) for s in settings] == [
+        (n, kind) for n in ("4 x 2 x 2", "6 x 4 x 2", "8 x 6 x 3") for kind in ("hex8", "hex27")
+    ]
+    assert [s.given for s in settings] == [i == 2 for i in range(6)]
+    assert [s.reference for s in settings] == [i == 5 for i in range(6)]
+    assert settings[-1].worst == dict.fromkeys(("payload", "quality", "e_n"), 0.0)
+    e_n = ds.e_n.sel(model="ccm")
+    error = np.abs(e_n / e_n.isel(elements=-1, element=-1) - 1).isel(elements=1, element=0).values
+    assert (settings[2].worst["e_n"], settings[2].median["e_n"]) == pytest.approx((error.max(), np.median(error)))
+    seconds = ds.work_seconds_total.isel(elements=1, element=0).values
+    assert settings[2].seconds == pytest.approx(seconds.mean())
+    # of triquadratic elements the finer mesh is nearer to the finest
+    assert settings[1].worst["e_n"] > settings[3].worst["e_n"] > 0
+
+
+def test_of_some_keys_the_smallest_value_is_the_reference(file):
+    ds = softjaw.open(file).isel(element=slice(0, 1))
+    ds.elements.attrs |= {"long_name": "accuracy.wall_element_mm", "options": ()}
+    text = ds.attrs["scene"].replace('"gripper.elements"', '"accuracy.wall_element_mm"')
+    start = text.index('"accuracy.wall_element_mm"')
+    end = text.index('"gripper.element"', start)
+    scene = text[:start] + '"accuracy.wall_element_mm" = [1.0, 1.5, 2.0]\n' + text[end:]
+    found = settings_in(ds.assign_attrs(scene=scene.replace('["hex8", "hex27"]', '["hex8"]')))
+    assert [s.reference for s in found] == [True, False, False]
+    assert [s.given for s in found] == [False, True, False]
+
+
+def test_failed_cases_count_and_leave_the_others(file):
+    ds = softjaw.open(file).copy(deep=True)
+    for name in ("e_n", "payload", "quality", "work_seconds_total"):
+        ds[name].values[0, 0, 0, 0, 0] = np.nan
+    failed, *others = settings_in(ds)
+    assert failed.failed == 1
+    assert np.isfinite([*failed.worst.values(), failed.seconds]).all()
+    assert not any(s.failed for s in others)
+    ds.e_n.values[1, 1] = np.nan
+    assert np.isnan(settings_in(ds)[3].worst["e_n"])
+
+
+def test_the_table_has_a_line_for_each_setting_and_the_picture_is_one(file):
+    ds = softjaw.open(file)
+    head, *lines, _ = cost_text(ds).splitlines()
+    seconds = [s.seconds for s in settings_in(ds)[:-1]]
+    column = head.index("time per case")
+    assert [line[column:].split()[0] for line in lines] == [f"{s:.2g}" for s in sorted(seconds)]
+    assert sum(line.endswith("as in the scene") for line in lines) == 1
+    assert cost_picture(ds).startswith(b"\x89PNG")
+    assert file.with_suffix(".png").read_bytes().startswith(b"\x89PNG")
