@@ -82,7 +82,7 @@ def scene_of(options: Namespace) -> Scene:
 
 
 def target(options: Namespace, ending: str = "") -> Path:
-    """The result file of a run, by default the scene's name and ``ending`` in results/; refuse names that no viewer of results would open."""
+    """The result file of a run; refuse names that no viewer would open. By default the scene's name and ``ending``."""
     if options.output is None:
         return Path("results") / f"{Path(options.scene).stem}{ending}.hdf"
     path = Path(options.output)
