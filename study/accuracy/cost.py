@@ -20,8 +20,7 @@ FloatArray = NDArray[np.float64]
 FINENESS = (0.5, 0.7, 1.0, 1.4)  # elements per direction over those of the scene
 WALL_SIZES = (2.0, 1.0, 0.7)  # of a wall's elements, over those of the scene
 FEW = 3  # candidates, and forces, that stand for all
-# Keys whose smallest value is the most accurate one; of all others the last value is taken for it.
-SMALLEST = ("accuracy.wall_element_mm", "accuracy.residual_tolerance", "accuracy.min_step_fraction")
+SMALLEST = ("accuracy.wall_element_mm",)  # keys whose smallest value is the most accurate one; of others it is the last
 JUDGED = ("payload", "quality", "e_n")
 LOOKS = (("#12436d", "o"), ("#c05a00", "s"), ("#2a8c82", "^"), ("#801650", "D"))
 
@@ -50,7 +49,7 @@ def _few_candidates(scene: Scene) -> dict[str, Any]:
     chosen = [places[int((i + 0.5) / count * len(places))] for i in range(count)]
     if poses:
         return {"candidates.poses": chosen}
-    given = {"stations": None, "station_range_mm": None, "stations_mm": chosen, "angles_deg": where.angles_deg[:1]}
+    given = {"stations": None, "stations_mm": chosen, "angles_deg": where.angles_deg[:1]}
     return {f"candidates.{key}": value for key, value in given.items()}
 
 
