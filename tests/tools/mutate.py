@@ -28,6 +28,7 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -88,16 +89,24 @@ def parts(node: ast.AST) -> Iterator[ast.AST]:
                     yield from parts(child)
 
 
+def segment(lines: list[bytes], node: Any) -> str:
+    """Source of a node; ``ast.get_source_segment`` would split the file again for each."""
+    first, last = node.lineno - 1, node.end_lineno - 1
+    if first == last:
+        return lines[first][node.col_offset : node.end_col_offset].decode()
+    parts = [lines[first][node.col_offset :], *lines[first + 1 : last], lines[last][: node.end_col_offset]]
+    return b"".join(parts).decode()
+
+
 def mutations(file: Path, root: Path = ROOT) -> list[Mutation]:
     """All mutations of one file."""
-    source = file.read_text()
-    sites = []
-    for node in parts(ast.parse(source)):
-        for kind, place, new in changes(node):
-            if old := ast.get_source_segment(source, place):
-                name = str(file.relative_to(root))
-                sites.append(Mutation(name, place.lineno, place.col_offset, kind, old, new))
-    return sites
+    source, name = file.read_bytes(), str(file.relative_to(root))
+    lines = source.splitlines(keepends=True)
+    return [
+        Mutation(name, place.lineno, place.col_offset, kind, segment(lines, place), new)
+        for node in parts(ast.parse(source))
+        for kind, place, new in changes(node)
+    ]
 
 
 def sample(count: int, seed: int, root: Path = ROOT) -> list[Mutation]:
