@@ -8,24 +8,26 @@ need no closed mesh and no normals, and inner walls or thin parts behind do not 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+from scipy.spatial import QhullError
 
-from softjaw.friction.patch import NoContactError
-from softjaw.study.case.contact import angle
+from softjaw.fem.objects.gap import Pose
+from softjaw.friction.patch import ContactPatch, NoContactError
+from softjaw.study.case.contact import Contact, angle
 from softjaw.study.case.fit import Jaws, bed_closing
+from softjaw.study.case.task import Task, payload_alone
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 GRID = (25, 11)  # points of a pad's face along length and width
 STEEPEST = 3.0  # slope of a height field that still counts as touched: further out it is the object's flank
-WORST = math.radians(30.0)  # misalignment of the normals that leaves nothing of a grasp
-MIDDLE = 2e-3  # reach of the weights round the centre of pressure [m]: about a cell, or a face of a pad's usual mesh
 CRUSHED = 0.25  # strain of the bed at its highest pressure that leaves half of a grasp
-BRIDGED = 0.25  # what is left of a grasp whose pad bears on its ends, with nothing under the centre of pressure
+MOTIONS = 50  # slip motions whose wrenches bound what a contact on springs carries
 BESIDE = 0.6  # of a pad's sides, from its middle: a solve looks so far at the surface
 
 
@@ -90,54 +92,19 @@ class Side:
         mean = (self.pressure[..., None] * self.slope).sum(axis=(0, 1)) / self.pressure.sum()
         return _direction(mean)
 
-    @cached_property
-    def _middle(self) -> FloatArray:
-        """Weights ``(m, n)`` of the loaded cells round the centre of pressure, or next to it where it is free."""
-        away = (self.x - self.centre[0]) ** 2 + (self.y - self.centre[1]) ** 2
-        loaded = self.pressure > 0.0
-        weight = np.where(loaded, np.exp(-0.5 * (away - away[loaded].min()) / MIDDLE**2), 0.0)
-        return weight / weight.sum()
-
-    @property
-    def facing(self) -> FloatArray:
-        """Normal as `normal`, but of the surface round the centre of pressure, where a contact frame has its origin."""
-        return _direction((self._middle[..., None] * self.slope).sum(axis=(0, 1)))
-
-    @property
-    def arm(self) -> float:
-        """Mean distance of the pressure from its centre: e_n of a planar contact [m]."""
-        cx, cy = self.centre
-        return float((self.pressure * np.hypot(self.x - cx, self.y - cy)).sum() / self.pressure.sum())
-
-    @property
-    def kept(self) -> float:
-        """Share of the pressure sum that acts along the approach: what curvature leaves of the normal force."""
-        cosine = 1.0 / np.sqrt(1.0 + (self.slope**2).sum(axis=-1))
-        return float((self.pressure * cosine).sum() / self.pressure.sum())
-
-    @property
-    def bridging(self) -> float:
-        """What bearing on the ends, or on several places, leaves of the arm: 1 where the centre of pressure bears too.
-
-        Such a pad has a large arm, but a concave object leaves it only corners and edges.
-        """
-        away = np.hypot(self.x - self.centre[0], self.y - self.centre[1])
-        near = self.pressure[away <= max(1.5 * MIDDLE, float(away.min()))].mean()
-        mean = self.pressure.sum() / np.count_nonzero(self.pressure)
-        return float(BRIDGED + (1.0 - BRIDGED) * min(1.0, near / mean))
-
     @property
     def peak(self) -> float:
         """What the highest pressure leaves: foam that is crushed somewhere carries little there, and solves badly."""
         strain = float(self.pressure.max()) / (self.jaws.stiffness * self.jaws.pad[2])
         return 1.0 / (1.0 + (strain / CRUSHED) ** 2)
 
-    @property
-    def worth(self) -> float:
-        """Torque arm, no longer than on a whole flat face, less what curvature, peaks and bridging take [m]."""
-        full = float(np.hypot(self.x, self.y).mean())
-        # curvature takes of the torque, and once more of the forces that quality multiplies it with
-        return min(self.arm, full) * self.kept**2 * self.peak * self.bridging
+    def contact(self, pose: Pose) -> Contact:
+        """The loaded cells as a contact, in the frame of a pad that stands at ``pose`` in the object's frame."""
+        on = self.pressure > 0.0
+        normal = np.column_stack([-self.slope[on], np.ones(np.count_nonzero(on))])
+        centroid = np.column_stack([self.x[on], self.y[on], self.height[on]])
+        patch = ContactPatch(centroid, np.full(len(normal), self.cell), normal, self.pressure[on])
+        return Contact(patch, self.jaws.mu, pose)
 
 
 def _slopes(height: FloatArray, dx: float, dy: float) -> FloatArray:
@@ -197,19 +164,19 @@ class JawsOnSurface:
         return self._angles(self.sides[0].normal, self.sides[1].normal)
 
     @property
-    def frames_misalignment(self) -> tuple[float, float]:
-        """The same with the normals where the contact frames of a solved contact will be."""
-        return self._angles(self.sides[0].facing, self.sides[1].facing)
+    def contacts(self) -> list[Contact]:
+        """Both contacts where they lie on the object."""
+        turns = np.eye(3), np.diag([1.0, -1.0, -1.0])
+        frames = [self.axes @ turn for turn in turns]
+        return [
+            side.contact(Pose(axes, self.point + side.touch * axes[:, 2]))
+            for side, axes in zip(self.sides, frames, strict=True)
+        ]
 
     @property
-    def quality(self) -> float:
-        """Estimate of grasp quality, for ranking [m]: as that, it grows with the square of the contacts' distance.
-
-        Less what misalignment takes.
-        """
-        normals, line = np.maximum(self.misalignment, self.frames_misalignment)
-        aligned = max(0.0, 1.0 - normals / WORST) * max(0.0, 1.0 - math.tan(min(line, 1.5)) / self.jaws.mu)
-        return min(side.worth for side in self.sides) * (self.opening / self.jaws.pad[0]) ** 2 * aligned
+    def peak(self) -> float:
+        """What the highest pressure leaves on the finger where that is less."""
+        return min(side.peak for side in self.sides)
 
     def over(self, lids: FloatArray) -> bool:
         """Whether a pad lies over a hole, given by the corners ``(n, 3, 3)`` of the triangles that close it [m]."""
@@ -226,3 +193,11 @@ class JawsOnSurface:
         (x, y), (u, v) = self.sides[0].centre, self.sides[1].centre
         line = np.array([u - x, -v - y, self.opening])
         return angle(one, -two), max(angle(one, line), angle(-two, line))
+
+
+def held(contacts: Sequence[Contact], task: Task) -> float:
+    """Payload of contacts on a bed of springs [kg]; 0 where they bear no torque at all."""
+    try:
+        return payload_alone(contacts, MOTIONS, task)["maps/payload"]
+    except (ArithmeticError, QhullError, RuntimeError, ValueError):
+        return 0.0

@@ -10,16 +10,17 @@ from typing import Any
 import numpy as np
 
 from softjaw.friction.patch import NoContactError
-from softjaw.study.case.bed import JawsOnSurface
-from softjaw.study.case.build import surface_triangles
+from softjaw.study.case.bed import JawsOnSurface, held
+from softjaw.study.case.build import build_object, surface_triangles
 from softjaw.study.case.candidates import Unit
 from softjaw.study.case.contact import slips
 from softjaw.study.case.fit import jaws_of
 from softjaw.study.case.poses import STANDOFF
+from softjaw.study.case.task import Task, task_of
 from softjaw.study.quantities import MISSING, SLIPS, WORSE
 from softjaw.study.scene import Scene
 
-DIGIT = 1e-9  # [m], to which promises are rounded before they are ranked: ties go to the first unit
+DIGITS = 3  # of a payload over the best one, by which units are ranked: ties go to the first
 SURELY = 1.1  # of the friction coefficient, beyond which a bed of springs is believed that a grasp slips
 RIM = 0.4  # of a pad's side, from its middle: where pressure centred further out bears on the rim alone
 MOST_JUDGED = 2000  # units whose order of work is looked at where the scene does not ask for it
@@ -27,25 +28,26 @@ MOST_JUDGED = 2000  # units whose order of work is looked at where the scene doe
 
 @dataclass(frozen=True)
 class Promise:
-    """What a bed of springs says of a grasp: `bed.JawsOnSurface.quality` [m], lean of the contacts' line [rad].
+    """What a bed of springs says of a grasp: its payload [kg], less where foam is crushed, and lean of its line [rad].
 
     ``rim`` tells whether a pad bears on its rim alone.
     """
 
-    quality: float
+    payload: float
     lean: float
     rim: bool
 
 
-def promise(surface: Any, unit: Unit) -> Promise | None:
-    """None where a pad passes the object."""
+def promise(surface: Any, unit: Unit, task: Task | None) -> Promise | None:
+    """What a unit's grasp of a surface promises, with its payload if there is a task; None where a pad passes."""
     pose, jaws = unit.candidate.poses[0], jaws_of(unit.scene)
     point = pose.origin + STANDOFF * pose.rotation[:, 2]
     try:
         grip = JawsOnSurface(surface, point, pose.rotation, jaws)
         _, lean = grip.misalignment
         centres = np.abs([side.centre for side in grip.sides]) / jaws.pad[:2]
-        return Promise(grip.quality, lean, bool((centres > RIM).any()))
+        payload = grip.peak * held(grip.contacts, task) if task else 0.0
+        return Promise(payload, lean, bool((centres > RIM).any()))
     except NoContactError:
         return None
 
@@ -61,11 +63,14 @@ def chosen(scene: Scene, units: Sequence[Unit]) -> list[Unit]:
     known: list[tuple[Unit, float]] = []
     for unit in units:
         if unit.state == MISSING:
-            surface = surface_triangles(unit.scene.object)
-            unit, quality = _seen(unit, promise(surface, unit), where.solve_best == "holding")
+            shape = unit.scene.object
+            task = task_of(unit.scene, build_object(shape)) if isinstance(where.solve_best, int) else None
+            unit, payload = _seen(
+                unit, promise(surface_triangles(shape), unit, task), where.solve_best == "holding"
+            )
         else:
-            quality = -math.inf
-        known.append((unit, quality))
+            payload = -math.inf
+        known.append((unit, payload))
     return _best(known, where.solve_best if isinstance(where.solve_best, int) else None)
 
 
@@ -74,14 +79,14 @@ def _seen(unit: Unit, found: Promise | None, skip: bool) -> tuple[Unit, float]:
         return unit, -math.inf
     mu = unit.scene.friction.mu
     if not slips(found.lean, SURELY * mu):
-        return replace(unit, hopeless=found.rim), found.quality
+        return replace(unit, hopeless=found.rim), found.payload
     text = (
         f"the line that joins the contacts leans by {math.degrees(found.lean):.0f} degrees on a bed of springs,"
         f" friction holds up to {math.degrees(math.atan(mu)):.0f}"
     )
     if not skip:
-        return replace(unit, hopeless=True), found.quality
-    return replace(unit, hopeless=True, state=SLIPS, reason=text), found.quality
+        return replace(unit, hopeless=True), found.payload
+    return replace(unit, hopeless=True, state=SLIPS, reason=text), found.payload
 
 
 def _best(known: Sequence[tuple[Unit, float]], count: int | None) -> list[Unit]:
@@ -94,12 +99,10 @@ def _best(known: Sequence[tuple[Unit, float]], count: int | None) -> list[Unit]:
             points.setdefault(id(unit.scene), []).append(i)
     made = [unit for unit, _ in known]
     for members in points.values():
-        ranks = sorted(members, key=lambda i: (made[i].hopeless, -_rounded(known[i][1]), i))
+        best = max((known[i][1] for i in members), default=0.0)
+        share = [max(payload, 0.0) / best if best > 0 else 0.0 for _, payload in known]
+        ranks = sorted(members, key=lambda i: (made[i].hopeless, -round(share[i], DIGITS), i))
         for place, i in enumerate(ranks[count:], start=count + 1):
             text = f"place {place} of {len(ranks)} on a bed of springs, candidates.solve_best is {count}"
             made[i] = replace(made[i], state=WORSE, reason=text)
     return made
-
-
-def _rounded(quality: float) -> float:
-    return round(quality / DIGIT) if math.isfinite(quality) else quality

@@ -1,8 +1,8 @@
 """Antipodal grasps of any triangle surface: sampled, set straight, ranked on a spring foundation, thinned.
 
 From points of the surface the gripper is turned and shifted until both pads meet the object squarely and in their
-middles. A bed of springs gives the pressures that rank them; nothing is solved. What is wider than the opening, runs
-into the fingers or slips comes with that state.
+middles. A bed of springs gives the pressures, and these the payload that ranks the grasps; nothing is solved. What is
+wider than the opening, runs into the fingers or slips comes with that state.
 """
 
 from __future__ import annotations
@@ -18,11 +18,12 @@ from numpy.typing import NDArray
 from softjaw.fem.objects.gap import Pose
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.friction.patch import NoContactError
-from softjaw.study.case.bed import JawsOnSurface, Side
+from softjaw.study.case.bed import JawsOnSurface, Side, held
 from softjaw.study.case.build import build_object, own_frame, surface_triangles
 from softjaw.study.case.contact import slips
 from softjaw.study.case.fit import Jaws, fit_of, jaws_of
 from softjaw.study.case.poses import across, pad_axes
+from softjaw.study.case.task import Task, task_of
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.quantities import MISSING, SLIPS, STATES
 from softjaw.study.scene import Scene
@@ -36,9 +37,10 @@ TURNS = 4  # rounds of setting a grasp straight; most end after two
 STRAIGHT = math.radians(0.5)  # tilt between two rounds that ends them
 CENTRED = 5e-4  # shift between two rounds that ends them [m]
 FLATTEST = 0.05  # relative difference of principal curvatures below which the long side follows the object's own axes
-APART = 0.25  # of the pad's length: grasps that are nearer, and alike in direction, are one
+APART, NEAR = 0.5, 0.25  # of the pad's length: grasps that are nearer are at one place; and one, if directions agree
+DIGITS = 3  # of a payload over the best one, by which grasps are ranked
 ALIKE, ROLLED = math.radians(20.0), math.radians(30.0)  # the same for approach and roll
-LEAST = 0.02  # of the best grasp's quality, below which a grasp is not proposed
+LEAST = 0.02  # of the best payload, below which a grasp is not proposed
 
 
 @dataclass(frozen=True)
@@ -53,8 +55,8 @@ class SampledGrasp:
         Finger 1's approach and the pads' long side.
     opening : float
         Distance of the pads' faces at first touch [m].
-    quality : float
-        `bed.JawsOnSurface.quality`, for ranking [m].
+    payload : float
+        What it holds on a bed of springs, less where foam is crushed, for ranking [kg].
     state : int
         Why it is not worth a solve, `WIDE`, `COLLIDES` or `SLIPS`; else `MISSING`, not computed.
     """
@@ -63,7 +65,7 @@ class SampledGrasp:
     approach: FloatArray
     long_side: FloatArray
     opening: float
-    quality: float
+    payload: float
     state: int = MISSING
 
 
@@ -101,7 +103,7 @@ def straightened(
 
 def same_place(one: JawsOnSurface, other: JawsOnSurface) -> bool:
     """Whether two grips are so near that both would lead to the same grasps."""
-    near = np.linalg.norm(one.point - other.point) < 0.5 * APART * one.jaws.pad[0]
+    near = np.linalg.norm(one.point - other.point) < 0.5 * NEAR * one.jaws.pad[0]
     return bool(near and abs(one.axes[:, 2] @ other.axes[:, 2]) > math.cos(0.5 * ALIKE))
 
 
@@ -135,6 +137,7 @@ def _curvature(side: Side, flip: float) -> FloatArray:
 def antipodal_grasps(
     surface: tuple[FloatArray, IntArray],
     jaws: Jaws,
+    task: Task,
     count: int,
     seed: int = 0,
     samples: int = SAMPLES,
@@ -147,6 +150,8 @@ def antipodal_grasps(
     surface : (k, 3) array, (m, 3) int array
         Points [m] and triangles.
     jaws : Jaws
+    task : Task
+        What they have to hold.
     count : int
         Grasps that can be solved.
     seed : int
@@ -172,7 +177,7 @@ def antipodal_grasps(
                 axes = axes_of(start.axes[:, 2], along)
                 grip = straightened((points, triangles), start.point, axes, jaws)
                 if lids is None or not grip.over(lids):
-                    seen.append(judged(grip))
+                    seen.append(judged(grip, task))
         except NoContactError:
             continue
     return thinned(seen, count, jaws.pad[0])
@@ -203,35 +208,35 @@ def longest_axis(corners: FloatArray, area: FloatArray) -> FloatArray:
     return axis * (1.0 if axis[np.argmax(np.abs(axis))] > 0 else -1.0)
 
 
-def judged(grip: JawsOnSurface) -> SampledGrasp:
-    """State of a grasp on a bed of springs, with its quality there."""
+def judged(grip: JawsOnSurface, task: Task) -> SampledGrasp:
+    """State of a grasp on a bed of springs, with its payload there."""
     _, line = grip.misalignment
     state = fit_of(grip.local, grip.triangles, grip.jaws).state
     if not state and slips(line, grip.jaws.mu):
         state = SLIPS
-    return SampledGrasp(grip.point, grip.axes[:, 2], grip.axes[:, 0], grip.opening, grip.quality, state)
+    worth = 0.0 if state else grip.peak * held(grip.contacts, task)
+    return SampledGrasp(grip.point, grip.axes[:, 2], grip.axes[:, 0], grip.opening, worth, state)
 
 
 def thinned(seen: Sequence[SampledGrasp], count: int, length: float) -> list[SampledGrasp]:
-    """The best ``count`` distinct grasps, worth a solve first; of those that are not, as many at most.
+    """At most ``count`` distinct grasps that are worth a solve, then as many that are not; by payload each.
 
-    Each grasp that is kept makes others at its place count for less, so that one place does not take all.
+    The best one of every place comes before any place gets a second one; places are half a pad's ``length`` apart.
     """
-    best = max((g.quality for g in seen if not g.state), default=0.0)
     kept: list[SampledGrasp] = []
     for good in (True, False):
-        left = [g for g in seen if (not g.state) is good and (g.state or g.quality >= LEAST * best)]
-        left = [g for g in left if not any(same_grasp(g, other, length) for other in kept)]
+        some = [g for g in seen if (not g.state) is good]
+        best = max((g.payload for g in some), default=0.0)
+        # rounded, so that those that are equal but for rounding come in the order in which they were found
+        ranked = sorted(some, key=lambda g: -round(g.payload / best, DIGITS) if best > 0 else 0.0)
         chosen: list[SampledGrasp] = []
-        crowd = np.zeros(len(left))
-        while left and len(chosen) < count:
-            i = int(np.argmax([g.quality / (1.0 + n) for g, n in zip(left, crowd, strict=True)]))
-            grasp = left[i]
-            chosen.append(grasp)
-            apart = np.array([not same_grasp(g, grasp, length) for g in left])
-            left, crowd = [g for g, far in zip(left, apart, strict=True) if far], crowd[apart]
-            crowd += [same_point(g, grasp, length) for g in left]
-        kept += sorted(chosen, key=lambda g: -g.quality)
+        for alike in (same_point, same_grasp):
+            for grasp in ranked:
+                if len(chosen) == count or grasp.payload < LEAST * best:
+                    break
+                if not any(alike(grasp, other, length) for other in chosen):
+                    chosen.append(grasp)
+        kept += sorted(chosen, key=lambda g: -g.payload)
     return kept
 
 
@@ -243,7 +248,7 @@ def same_point(one: SampledGrasp, other: SampledGrasp, length: float) -> bool:
 def same_grasp(one: SampledGrasp, other: SampledGrasp, length: float) -> bool:
     """Whether two grasps are alike in place, approach and roll; the fingers may change places."""
     return (
-        same_point(one, other, length)
+        float(np.linalg.norm(one.point - other.point)) < NEAR * length
         and abs(float(one.approach @ other.approach)) > math.cos(ALIKE)
         and abs(float(one.long_side @ other.long_side)) > math.cos(ROLLED)
     )
@@ -262,8 +267,9 @@ def with_sampled_grasps(scene: Scene) -> Scene:
     StudyError
         Where no grasp fits between the pads.
     """
-    given, surface, lids = scene.candidates, surface_triangles(scene.object), lids_of(build_object(scene.object))
-    found = antipodal_grasps(surface, jaws_of(scene), given.sampled or 1, lids=lids)
+    given, surface, obj = scene.candidates, surface_triangles(scene.object), build_object(scene.object)
+    task = task_of(scene, obj)
+    found = antipodal_grasps(surface, jaws_of(scene), task, given.sampled or 1, lids=lids_of(obj))
     placed = own_frame(scene.object)
     poses = tuple(_as_pose(grasp, placed) for grasp in found if not grasp.state)
     if not poses:

@@ -20,6 +20,7 @@ from softjaw.study.case.build import build_object, own_frame, shapes_of, surface
 from softjaw.study.case.fit import jaws_of
 from softjaw.study.case.poses import STANDOFF, explicit_poses
 from softjaw.study.case.result import MARGIN
+from softjaw.study.case.task import task_of
 from softjaw.study.quantities import NO_GRASP
 from softjaw.study.ranking import largest
 from softjaw.study.scene.grasps import GraspPose
@@ -35,7 +36,7 @@ ROLL, TILT = math.radians(15.0), math.radians(5.0)  # first steps of a turn abou
 FINEST_STEP_SHARE = 1 / 8  # of the first step: 1.6 mm along a pad of 50 mm, 0.6 degrees of tilt
 SAME_POSE_STEPS = 0.5  # of a step, within which two poses are one
 POSES_PER_ROUND = 4  # poses of a round: few, so that the next ones start from the better of them
-MIN_BED_QUALITY_M = 1e-9  # [m], below which the quality on a bed of springs is none
+MIN_BED_PAYLOAD_KG = 1e-9  # below which a payload on a bed of springs is none
 
 
 def with_places(poses: Sequence[GraspPose], rounds: Sequence[Sequence[Place]]) -> tuple[GraspPose, ...]:
@@ -95,15 +96,20 @@ def next_poses(result: Any, values: FloatArray, scene: Scene, each: int) -> tupl
 
 def _neighbours(scene: Scene, rounds: Any, values: FloatArray, share: float) -> list[Place]:
     """Neighbours of the best grasps that are not known yet, those first that a bed of springs finds the better."""
-    from softjaw.study.case.bed import JawsOnSurface  # compiled loops, which a plan is made without
+    from softjaw.study.case.bed import JawsOnSurface, held  # compiled loops, which a plan is made without
     from softjaw.study.case.sampler import lids_of
 
     shape, jaws = shapes_of(scene)[0], jaws_of(scene)
-    placed, surface, lids = own_frame(shape), surface_triangles(shape), lids_of(build_object(shape))
+    placed, surface, obj = own_frame(shape), surface_triangles(shape), build_object(shape)
+    lids, task = lids_of(obj), task_of(scene, obj)
+
+    def promise(grip: JawsOnSurface) -> float:
+        return grip.peak * held(grip.contacts, task)
+
     known = [_frame(pose, placed) for pose in with_places(scene.candidates.poses, rounds)]
     poses: list[tuple[float, Place]] = []
     for best in best_places(values):
-        quality = max(JawsOnSurface(surface, *known[best], jaws).quality, MIN_BED_QUALITY_M)
+        reference = max(promise(JawsOnSurface(surface, *known[best], jaws)), MIN_BED_PAYLOAD_KG)
         for point, axes in _moved(known[best], share, jaws.pad):
             if any(apart((point, axes), other, jaws.pad) < SAME_POSE_STEPS * share for other in known):
                 continue
@@ -116,7 +122,7 @@ def _neighbours(scene: Scene, rounds: Any, values: FloatArray, share: float) -> 
             # In the middle between both contacts, where the next tilt turns about.
             point = point + 0.5 * (grip.sides[0].touch - grip.sides[1].touch) * axes[:, 2]
             known.append((point, axes))
-            poses.append((round(grip.quality / quality, 6), (share, *_in_file(point, axes, placed))))
+            poses.append((round(promise(grip) / reference, 3), (share, *_in_file(point, axes, placed))))
     return [place for _, place in sorted(poses, key=lambda pair: -pair[0])]
 
 

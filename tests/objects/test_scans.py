@@ -7,6 +7,7 @@ import pytest
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.study.case.fit import Jaws
 from softjaw.study.case.sampler import antipodal_grasps
+from softjaw.study.case.task import Task
 from tests.objects.bodies import SCANS, hollow_bottle, hollow_bowl, mug, punctured, scan, spoiled
 
 JAWS = Jaws((0.05, 0.022, 0.015), stiffness=8e6, mu=0.8, force=5.0, max_opening=0.085)
@@ -25,7 +26,7 @@ def test_it_loads_and_can_be_grasped(name, tmp_path):
     path = tmp_path / "body.stl"
     MADE[name]().export(path)
     obj = MeshObject.from_file(str(path), "m")
-    grasps = [g for g in antipodal_grasps(obj.surface(), JAWS, 6, samples=80) if not g.state]
+    grasps = [g for g in antipodal_grasps(obj.surface(), JAWS, Task(obj.centroid[0]), 6, samples=80) if not g.state]
     assert len(grasps) >= 3
     assert all(g.opening <= JAWS.max_opening for g in grasps)
     lower, upper = obj.bounds
