@@ -232,7 +232,7 @@ def _attributes(result: Result) -> dict[str, Any]:
         "overrides": tuple(filter(None, str(scene.get("overrides", "")).split("\n"))),
         "petsc_options": scene.get("petsc_options", ""), "definitions": result.definitions, "report": result.report,
         "provenance": result.sessions, "planar": layout.planar, "has": layout.has, "meshes": layout.meshes,
-        "patches": layout.patches, "poses": not result.axes[-3].units,
+        "patches": "patch/pressure" in {c.key for c in layout.columns}, "poses": not result.axes[-3].units,
         "derived": tuple(d.name for d in layout.derived),
         "object_rotation": np.asarray(scene.get("object_rotation", np.eye(3))),
         "object_origin": np.asarray(scene.get("object_origin", np.zeros(3))),
