@@ -29,8 +29,6 @@ from tests.study.launching import ROOT
 from tests.study.patch_files import cylinder_mesh, vtk
 from tests.study.sealing import sealed
 
-pytestmark = pytest.mark.usefixtures("every_rank_speaks")
-
 BALL = '[object]\nshape = "sphere"\nradius_mm = 30\n[candidates]\nstations_mm = [0]\n[load]\nnormal_force_n = [2]\n'
 MESH = BALL.replace('shape = "sphere"\nradius_mm = 30', 'shape = "mesh"\nmesh = "FILE"\nunit = "mm"')
 FAST = ("external link",)

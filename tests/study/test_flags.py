@@ -154,7 +154,6 @@ def test_a_stored_message_tells_every_flag_to_its_end(all_flags):
         assert result.messages.item() == flag_sentences(OF_FILE)
 
 
-@pytest.mark.usefixtures("every_rank_speaks")
 def test_every_reader_tells_every_flag(all_flags, capsys, monkeypatch):
     def said(*words):
         assert main([*words]) == 0

@@ -188,8 +188,8 @@ def test_scenes_of_poses_and_samplers_can_be_refined():
 
 @pytest.mark.long
 @pytest.mark.ranks
-def test_refined_poses_have_the_same_bits_on_any_number_of_ranks_and_after_a_kill(once, shared_path):
-    scene = shared_path / "box.toml"
+def test_refined_poses_have_the_same_bits_on_any_number_of_ranks_and_after_a_kill(tmp_path):
+    scene = tmp_path / "box.toml"
 
     def added(path):
         if not path.exists():
@@ -203,7 +203,7 @@ def test_refined_poses_have_the_same_bits_on_any_number_of_ranks_and_after_a_kil
         assert len(added(alone)) >= 2
         expected = contents(alone)
         same_bits(scene, expected, 4)
-        killed = shared_path / "killed.hdf"
+        killed = tmp_path / "killed.hdf"
         process = subprocess.Popen(
             command(0, "-m", "softjaw", "run", scene, "-o", killed), env=launch_environment(), cwd=ROOT,
             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, stdin=subprocess.DEVNULL,
@@ -215,4 +215,4 @@ def test_refined_poses_have_the_same_bits_on_any_number_of_ranks_and_after_a_kil
         refined(scene, "killed.hdf", 2)
         assert differing(killed, expected) == []
 
-    once(compare)
+    compare()

@@ -78,24 +78,20 @@ sys.exit(main())
 
 
 @pytest.fixture(scope="module")
-def scene(tmp_path_factory, comm):
-    path = None
-    if comm.rank == 0:
-        path = tmp_path_factory.mktemp("scene") / "box.toml"
-        path.write_text(SCENE)
-        path.with_name("cup.toml").write_text(SCENE.replace(BOX, CUP))
-    return comm.bcast(path)
+def scene(tmp_path_factory):
+    path = tmp_path_factory.mktemp("scene") / "box.toml"
+    path.write_text(SCENE)
+    path.with_name("cup.toml").write_text(SCENE.replace(BOX, CUP))
+    return path
 
 
 @pytest.fixture(scope="module")
-def alone(tmp_path_factory, scene, comm):
+def alone(tmp_path_factory, scene):
     """What one process writes without mpirun."""
-    path = None
-    if comm.rank == 0:
-        path = tmp_path_factory.mktemp("alone") / "alone.hdf"
-        code, output, errors = run(0, scene, path)
-        assert (code, errors) == (0, ""), output
-    return comm.bcast(path)
+    path = tmp_path_factory.mktemp("alone") / "alone.hdf"
+    code, output, errors = run(0, scene, path)
+    assert (code, errors) == (0, ""), output
+    return path
 
 
 def run(ranks, scene, path, *words):
@@ -117,28 +113,28 @@ def test_two_ranks_divide_the_forces_of_a_candidate():
 @pytest.mark.long
 @pytest.mark.parametrize("ranks", [2, 3, 4])
 @pytest.mark.parametrize("name", ["box", "cup"])
-def test_one_candidate_of_many_forces_is_divided_to_the_same_bits(once, shared_path, scene, ranks, name):
+def test_one_candidate_of_many_forces_is_divided_to_the_same_bits(tmp_path, scene, ranks, name):
     changes = ("candidates.stations_mm=[30]", "candidates.angles_deg=[5]", "load.normal_force_n=[0.5, 1, 2, 3, 4, 6]",
                "limit_surface.wrench_samples='none'", "effects.friction_pressure_coupling='auto'")  # fmt: skip
     if name == "cup":
         changes += ("accuracy.wall_element_mm=4",
                     "gripper.pad_length_mm=30")  # fmt: skip
     place = [word for change in changes for word in ("--set", change)]
-    whole, path = shared_path / "whole.hdf", shared_path / "divided.hdf"
+    whole, path = tmp_path / "whole.hdf", tmp_path / "divided.hdf"
     for where, count in ((whole, 0), (path, ranks)):
-        code, _, errors = once(run, count, scene.with_stem(name), where, *place)
+        code, _, errors = run(count, scene.with_stem(name), where, *place)
         assert code == 0, errors
-    assert once(differing, path, once(contents, whole)) == []
+    assert differing(path, contents(whole)) == []
 
 
 @pytest.mark.parametrize("ranks", [pytest.param(1, marks=pytest.mark.long), 2, pytest.param(3, marks=pytest.mark.long)])
-def test_any_number_of_ranks_writes_the_same_bits(once, shared_path, scene, alone, ranks):
-    path = shared_path / "ranks.hdf"
-    code, _, errors = once(run, ranks, scene, path)
+def test_any_number_of_ranks_writes_the_same_bits(tmp_path, scene, alone, ranks):
+    path = tmp_path / "ranks.hdf"
+    code, _, errors = run(ranks, scene, path)
     assert code == 0, errors
-    assert not list(shared_path.glob("*.lock"))
-    assert not list(shared_path.glob("*.part"))
-    expected = once(contents, alone)
+    assert not list(tmp_path.glob("*.lock"))
+    assert not list(tmp_path.glob("*.part"))
+    expected = contents(alone)
     # all that is compared: maps of every model, both fingers, the checks and every face
     for name in ("e_n/ccm", "quality/pcm", "checks/ellipticity", "patch/pressure",
                  "checksums/rows/study/patch/pressure", "quality_fitted/pcm", "limit_surface/coefficients",
@@ -148,7 +144,7 @@ def test_any_number_of_ranks_writes_the_same_bits(once, shared_path, scene, alon
         elements = result.read("pad_elements/pad_elements")
     # the scene's mesh is 8 x 4 x 2, further ones are 12 x 6 x 3 and 16 x 8 x 4
     assert elements.max() > 8 * 4 * 2
-    assert once(differing, path, expected) == []
+    assert differing(path, expected) == []
 
 
 @pytest.mark.parametrize(
@@ -159,10 +155,8 @@ def test_any_number_of_ranks_writes_the_same_bits(once, shared_path, scene, alon
         pytest.param("SIGKILL", 3, marks=pytest.mark.long),
     ],
 )
-def test_a_run_that_is_stopped_or_killed_goes_on_with_other_ranks_to_the_same_bits(
-    once, shared_path, scene, alone, how, ranks
-):
-    path = shared_path / f"{how}.hdf"
+def test_a_run_that_is_stopped_or_killed_goes_on_with_other_ranks_to_the_same_bits(tmp_path, scene, alone, how, ranks):
+    path = tmp_path / f"{how}.hdf"
 
     def interrupt():
         process = subprocess.Popen(
@@ -174,20 +168,20 @@ def test_a_run_that_is_stopped_or_killed_goes_on_with_other_ranks_to_the_same_bi
         process.communicate(timeout=60)
         return process.returncode, done(path)
 
-    code, before = once(interrupt)
+    code, before = interrupt()
     assert code == (75 if how == "SIGUSR1" else -signal.SIGKILL)
     assert 2 <= before < CASES
-    code, _, errors = once(run, ranks, scene, path)
+    code, _, errors = run(ranks, scene, path)
     assert code == 0, errors
-    assert once(differing, path, once(contents, alone)) == []
+    assert differing(path, contents(alone)) == []
 
 
-def test_a_solver_from_the_command_line_finds_the_same_contact(once, shared_path, scene, alone):
+def test_a_solver_from_the_command_line_finds_the_same_contact(tmp_path, scene, alone):
     """Bounds on the pressures instead of the active set: another algorithm, the same answer at one of the places."""
-    path = shared_path / "bounds.hdf"
+    path = tmp_path / "bounds.hdf"
     changes = ("candidates.stations_mm=[30]", "candidates.angles_deg=[5]", "limit_surface.wrench_samples='none'")
     place = [word for change in changes for word in ("--set", change)]
-    code, _, errors = once(run, 0, scene, path, *place, "--", "-contact_snes_type", "vinewtonrsls")
+    code, _, errors = run(0, scene, path, *place, "--", "-contact_snes_type", "vinewtonrsls")
     assert code == 0, errors
     with open_result(path) as found, open_result(alone) as expected:
         assert 'contact_snes_type = "vinewtonrsls"' in found.scene

@@ -166,8 +166,8 @@ def same_bits(scene, expected, own):
 
 @pytest.mark.long
 @pytest.mark.ranks
-def test_a_refined_study_has_the_same_bits_on_any_number_of_ranks(once, shared_path):
-    scene = shared_path / "vase.toml"
+def test_a_refined_study_has_the_same_bits_on_any_number_of_ranks(tmp_path):
+    scene = tmp_path / "vase.toml"
 
     def compare():
         scene.write_text(SCENE)
@@ -179,4 +179,4 @@ def test_a_refined_study_has_the_same_bits_on_any_number_of_ranks(once, shared_p
         same_bits(scene, contents(alone), 20)
         assert "0 of 44 cases to solve" in refined(scene, "alone.hdf", 2)[1]
 
-    once(compare)
+    compare()

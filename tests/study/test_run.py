@@ -30,13 +30,11 @@ def begun(path):
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory, comm):
+def whole(tmp_path_factory):
     """A file that one rank wrote without being disturbed; tests that spoil it work on a copy."""
-    path = None
-    if comm.rank == 0:
-        path = tmp_path_factory.mktemp("whole") / "whole.hdf"
-        assert study(0, path)[0] == 0
-    return comm.bcast(path)
+    path = tmp_path_factory.mktemp("whole") / "whole.hdf"
+    assert study(0, path)[0] == 0
+    return path
 
 
 @pytest.fixture(scope="module")
@@ -47,33 +45,33 @@ def uninterrupted(whole):
 
 @pytest.mark.long
 @pytest.mark.parametrize("ranks", [1, 2, 3])
-def test_the_file_does_not_depend_on_the_number_of_ranks(once, shared_path, uninterrupted, ranks):
-    path = shared_path / "ranks.hdf"
-    code, _, errors = once(study, ranks, path)
+def test_the_file_does_not_depend_on_the_number_of_ranks(tmp_path, uninterrupted, ranks):
+    path = tmp_path / "ranks.hdf"
+    code, _, errors = study(ranks, path)
     assert code == 0, errors
-    assert once(differing, path, uninterrupted) == []
-    assert not list(shared_path.glob("*.lock"))
-    assert not list(shared_path.glob("*.part"))
+    assert differing(path, uninterrupted) == []
+    assert not list(tmp_path.glob("*.lock"))
+    assert not list(tmp_path.glob("*.part"))
 
 
-def test_a_rank_that_is_killed_loses_nothing_and_another_number_of_ranks_goes_on(once, shared_path, uninterrupted):
-    path = shared_path / "killed.hdf"
-    code, _, _ = once(study, 2, path, "--kill", 20)
+def test_a_rank_that_is_killed_loses_nothing_and_another_number_of_ranks_goes_on(tmp_path, uninterrupted):
+    path = tmp_path / "killed.hdf"
+    code, _, _ = study(2, path, "--kill", 20)
     assert code not in (0, 6, 75)
-    before = once(contents, path)
-    done = once(states, path) == DONE
+    before = contents(path)
+    done = states(path) == DONE
     assert 0 < done.sum() < 36
-    code, _, errors = once(study, 0, path)
+    code, _, errors = study(0, path)
     assert code == 0, errors
     assert before != uninterrupted
-    assert once(differing, path, uninterrupted) == []
-    assert not list(shared_path.glob("*.lock"))
-    assert not list(shared_path.glob("*.part"))
+    assert differing(path, uninterrupted) == []
+    assert not list(tmp_path.glob("*.lock"))
+    assert not list(tmp_path.glob("*.part"))
 
 
 @pytest.mark.long
-def test_orphans_of_a_killed_mpirun_keep_a_resume_away_until_they_are_gone(once, shared_path, uninterrupted):
-    path = shared_path / "orphans.hdf"
+def test_orphans_of_a_killed_mpirun_keep_a_resume_away_until_they_are_gone(tmp_path, uninterrupted):
+    path = tmp_path / "orphans.hdf"
 
     def kill_mpirun():
         process = start(2, path, "--delay", 0.3)
@@ -87,24 +85,24 @@ def test_orphans_of_a_killed_mpirun_keep_a_resume_away_until_they_are_gone(once,
             time.sleep(0.2)
         return codes
 
-    codes = once(kill_mpirun)
+    codes = kill_mpirun()
     assert codes[-1] == 0
     assert set(codes[:-1]) <= {4}
-    assert once(differing, path, uninterrupted) == []
+    assert differing(path, uninterrupted) == []
 
 
-def test_what_is_no_grasp_is_never_solved_and_no_failure(once, shared_path):
+def test_what_is_no_grasp_is_never_solved_and_no_failure(tmp_path):
     """A unit of two candidates: alike on any number of ranks, when it is resumed, and when failures are tried again."""
-    path = shared_path / "wide.hdf"
-    code, _, errors = once(study, 2, path, "--wide", 3)
+    path = tmp_path / "wide.hdf"
+    code, _, errors = study(2, path, "--wide", 3)
     assert code == 0, errors
-    wide = [i for i, s in enumerate(once(states, path)) if s == WIDE]
+    wide = [i for i, s in enumerate(states(path)) if s == WIDE]
     assert len(wide) == 6
-    alone = shared_path / "wide-alone.hdf"
-    assert once(study, 0, alone, "--wide", 3)[0] == 0
-    assert once(differing, path, once(contents, alone)) == []
-    assert once(study, 0, path, "--wide", 3, "--retry-failed")[0] == 0
-    assert [i for i, s in enumerate(once(states, path)) if s != DONE] == wide
+    alone = tmp_path / "wide-alone.hdf"
+    assert study(0, alone, "--wide", 3)[0] == 0
+    assert differing(path, contents(alone)) == []
+    assert study(0, path, "--wide", 3, "--retry-failed")[0] == 0
+    assert [i for i, s in enumerate(states(path)) if s != DONE] == wide
     with open_result(path) as result:
         assert set(result.messages.ravel()[wide]) == {"needs more"}
         assert not torn_rows(path, result.layout)
@@ -114,40 +112,40 @@ def test_what_is_no_grasp_is_never_solved_and_no_failure(once, shared_path):
 
 @pytest.mark.long
 @pytest.mark.parametrize(("apart", "lost"), [((), [13, 14, 16, 17]), (("--apart",), [13, 16])])
-def test_a_case_that_kills_the_process_twice_is_given_up(once, shared_path, uninterrupted, apart, lost):
-    path = shared_path / "deadly.hdf"
-    assert once(study, 0, path, "--kill", 13, *apart)[0] == -signal.SIGKILL
-    assert once(study, 0, path, "--kill", 13, *apart)[0] == -signal.SIGKILL
-    code, _, _ = once(study, 0, path, "--kill", 13, *apart)
+def test_a_case_that_kills_the_process_twice_is_given_up(tmp_path, uninterrupted, apart, lost):
+    path = tmp_path / "deadly.hdf"
+    assert study(0, path, "--kill", 13, *apart)[0] == -signal.SIGKILL
+    assert study(0, path, "--kill", 13, *apart)[0] == -signal.SIGKILL
+    code, _, _ = study(0, path, "--kill", 13, *apart)
     assert code == 6
     # Row 13 and the force above it that depends on it, for both candidates of the unit; everything else is solved.
-    assert [i for i, s in enumerate(once(states, path)) if s == FAILED] == lost
-    assert once(study, 0, path, "--retry-failed")[0] == 0
-    assert once(differing, path, uninterrupted) == []
+    assert [i for i, s in enumerate(states(path)) if s == FAILED] == lost
+    assert study(0, path, "--retry-failed")[0] == 0
+    assert differing(path, uninterrupted) == []
 
 
-def test_a_failed_case_has_its_reason_and_stops_nobody(once, shared_path, uninterrupted):
-    path = shared_path / "failed.hdf"
-    code, _, errors = once(study, 2, path, "--fail", 9, "--raises", 25)
+def test_a_failed_case_has_its_reason_and_stops_nobody(tmp_path, uninterrupted):
+    path = tmp_path / "failed.hdf"
+    code, _, errors = study(2, path, "--fail", 9, "--raises", 25)
     assert code == 6, errors
     # The exception ends the load path: its row and the one above, for both candidates.
-    assert (once(states, path) == FAILED).sum() == 5
+    assert (states(path) == FAILED).sum() == 5
     with open_result(path) as result:
         assert result.messages.ravel()[9] == "no contact at this force"
         assert np.isnan(result.read("e_n/ccm").ravel()[[9, 25, 26]]).all()
         assert result.read("e_n/ccm").ravel()[10] > 0
-    assert once(study, 0, path)[0] == 6
-    assert once(study, 0, path, "--retry-failed")[0] == 0
-    assert once(differing, path, uninterrupted) == []
+    assert study(0, path)[0] == 6
+    assert study(0, path, "--retry-failed")[0] == 0
+    assert differing(path, uninterrupted) == []
 
 
-def test_forces_that_are_apart_fail_alone(once, shared_path):
+def test_forces_that_are_apart_fail_alone(tmp_path):
     """Divided among ranks; the exception is that of one force, for both candidates of its unit."""
-    path = shared_path / "apart.hdf"
-    code, _, errors = once(study, 2, path, "--apart", "--fail", 9, "--raises", 25)
+    path = tmp_path / "apart.hdf"
+    code, _, errors = study(2, path, "--apart", "--fail", 9, "--raises", 25)
     assert code == 6, errors
-    assert [i for i, s in enumerate(once(states, path)) if s == FAILED] == [9, 25, 28]
-    assert (once(states, path) == DONE).sum() == 33
+    assert [i for i, s in enumerate(states(path)) if s == FAILED] == [9, 25, 28]
+    assert (states(path) == DONE).sum() == 33
 
 
 @pytest.mark.parametrize(
@@ -158,8 +156,8 @@ def test_forces_that_are_apart_fail_alone(once, shared_path):
         pytest.param("SIGINT", 0, marks=pytest.mark.long),
     ],
 )
-def test_a_signal_stops_in_order_and_the_same_command_goes_on(once, shared_path, uninterrupted, name, ranks):
-    path = shared_path / f"{name}.hdf"
+def test_a_signal_stops_in_order_and_the_same_command_goes_on(tmp_path, uninterrupted, name, ranks):
+    path = tmp_path / f"{name}.hdf"
 
     def stop():
         process = start(ranks, path, "--delay", 0.15)
@@ -168,19 +166,19 @@ def test_a_signal_stops_in_order_and_the_same_command_goes_on(once, shared_path,
         output, _ = process.communicate(timeout=60)
         return process.returncode, output
 
-    code, _ = once(stop)
+    code, _ = stop()
     assert code == 75
-    left = (once(states, path) == MISSING).sum()
+    left = (states(path) == MISSING).sum()
     assert left > 0
     with open_result(path) as result:
         assert result.sessions[0]["reason"].startswith(f"stopped by {name}")
         assert not result.read("status/attempts")[result.status == MISSING].any()
-    assert once(study, 0, path)[0] == 0
-    assert once(differing, path, uninterrupted) == []
+    assert study(0, path)[0] == 0
+    assert differing(path, uninterrupted) == []
 
 
-def test_a_case_that_takes_too_long_is_abandoned_when_there_is_no_time(once, shared_path):
-    path = shared_path / "hangs.hdf"
+def test_a_case_that_takes_too_long_is_abandoned_when_there_is_no_time(tmp_path):
+    path = tmp_path / "hangs.hdf"
 
     def stop():
         process = start(0, path, "--hang", 14)
@@ -190,7 +188,7 @@ def test_a_case_that_takes_too_long_is_abandoned_when_there_is_no_time(once, sha
         process.communicate(timeout=60)
         return process.returncode, time.monotonic() - began
 
-    code, seconds = once(stop)
+    code, seconds = stop()
     assert code == 75
     assert seconds < 10  # the case would take a minute
     with open_result(path) as result:
@@ -198,18 +196,18 @@ def test_a_case_that_takes_too_long_is_abandoned_when_there_is_no_time(once, sha
         assert result.read("status/attempts").ravel()[14] == 0
 
 
-def test_another_scene_is_refused(once, shared_path, whole, uninterrupted):
-    path = shared_path / "scene.hdf"
-    once(shutil.copy, whole, path)
-    code, _, errors = once(study, 0, path, "--digest", "other")
+def test_another_scene_is_refused(tmp_path, whole, uninterrupted):
+    path = tmp_path / "scene.hdf"
+    shutil.copy(whole, path)
+    code, _, errors = study(0, path, "--digest", "other")
     assert code == 3
     assert errors.count("error: ") == 1
-    assert once(differing, path, uninterrupted) == []
+    assert differing(path, uninterrupted) == []
 
 
 @pytest.mark.parametrize(("what", "ranks"), [pytest.param("text", 0, marks=pytest.mark.long), ("truncated", 0)])
-def test_a_file_that_is_no_result_is_refused(once, shared_path, whole, what, ranks):
-    path = shared_path / f"{what}.hdf"
+def test_a_file_that_is_no_result_is_refused(tmp_path, whole, what, ranks):
+    path = tmp_path / f"{what}.hdf"
 
     def spoil():
         if what == "truncated":
@@ -220,15 +218,15 @@ def test_a_file_that_is_no_result_is_refused(once, shared_path, whole, what, ran
         size = path.stat().st_size
         return *study(ranks, path), size == path.stat().st_size
 
-    code, _, errors, same = once(spoil)
+    code, _, errors, same = spoil()
     assert code == 3
     assert errors.count("error: ") == 1
     assert same
 
 
 @pytest.mark.parametrize("ranks", [0, pytest.param(2, marks=pytest.mark.long)])
-def test_a_second_run_at_the_same_time_is_refused_and_status_can_be_asked(once, shared_path, ranks):
-    path = shared_path / "busy.hdf"
+def test_a_second_run_at_the_same_time_is_refused_and_status_can_be_asked(tmp_path, ranks):
+    path = tmp_path / "busy.hdf"
 
     def second():
         process = start(ranks, path, "--delay", 1.0)
@@ -241,7 +239,7 @@ def test_a_second_run_at_the_same_time_is_refused_and_status_can_be_asked(once, 
         process.communicate(timeout=60)
         return told, answer, process.returncode
 
-    told, (code, _, _), first = once(second)
+    told, (code, _, _), first = second()
     assert told.returncode == 0
     assert code == 4
     assert first == 75
@@ -255,40 +253,40 @@ def test_a_second_run_at_the_same_time_is_refused_and_status_can_be_asked(once, 
         pytest.param("", 0, marks=pytest.mark.long),
     ],
 )
-def test_a_place_that_cannot_be_written_is_told_once_on_all_ranks(once, shared_path, place, ranks):
-    once((shared_path / "a_file").write_text, "")
-    code, _, errors = once(study, ranks, shared_path / place)
+def test_a_place_that_cannot_be_written_is_told_once_on_all_ranks(tmp_path, place, ranks):
+    (tmp_path / "a_file").write_text("")
+    code, _, errors = study(ranks, tmp_path / place)
     assert code == 5, errors
     assert errors.count("error: ") == 1
 
 
 @pytest.mark.parametrize("how", [pytest.param("full", marks=pytest.mark.long), "limit"])
-def test_too_little_space_is_noticed_before_anything_is_solved(once, shared_path, how):
+def test_too_little_space_is_noticed_before_anything_is_solved(tmp_path, how):
     def squeeze():
         if how == "limit":
-            return study(0, shared_path / "x.hdf", "--file-limit", 300_000)
-        mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=400k", "tmpfs", shared_path], capture_output=True)
+            return study(0, tmp_path / "x.hdf", "--file-limit", 300_000)
+        mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=400k", "tmpfs", tmp_path], capture_output=True)
         if mounted.returncode:
             pytest.skip("no right to mount a small file system")
         try:
-            return study(2, shared_path / "x.hdf")
+            return study(2, tmp_path / "x.hdf")
         finally:
-            subprocess.run(["umount", shared_path], check=True)
+            subprocess.run(["umount", tmp_path], check=True)
 
     try:
-        code, _, errors = once(squeeze)
+        code, _, errors = squeeze()
     except pytest.skip.Exception:
         pytest.skip("no right to mount a small file system")
     assert code == 5, errors
     assert errors.count("error: ") == 1
-    assert not (shared_path / "x.hdf.part").exists()
+    assert not (tmp_path / "x.hdf.part").exists()
 
 
 @pytest.mark.parametrize("ranks", [0, pytest.param(2, marks=pytest.mark.long)])
-def test_a_torn_row_is_solved_again(once, shared_path, whole, uninterrupted, ranks):
+def test_a_torn_row_is_solved_again(tmp_path, whole, uninterrupted, ranks):
     import h5py
 
-    path = shared_path / "torn.hdf"
+    path = tmp_path / "torn.hdf"
 
     def tear():
         shutil.copy(whole, path)
@@ -297,26 +295,26 @@ def test_a_torn_row_is_solved_again(once, shared_path, whole, uninterrupted, ran
             file["study/patch/normal"][5, 0, 0, 0, 3, 1] = 0.0
         return study(ranks, path)
 
-    code, _, _ = once(tear)
+    code, _, _ = tear()
     assert code == 0
-    assert once(differing, path, uninterrupted) == []
+    assert differing(path, uninterrupted) == []
 
 
-def test_a_bug_outside_a_case_ends_all_ranks_and_keeps_what_is_done(once, shared_path, uninterrupted):
-    path = shared_path / "bug.hdf"
-    code, _, errors = once(study, 2, path, "--bug", 2)
+def test_a_bug_outside_a_case_ends_all_ranks_and_keeps_what_is_done(tmp_path, uninterrupted):
+    path = tmp_path / "bug.hdf"
+    code, _, errors = study(2, path, "--bug", 2)
     assert code == 70
     assert "ZeroDivisionError" in errors
-    assert once(study, 0, path)[0] == 0
-    assert once(differing, path, uninterrupted) == []
+    assert study(0, path)[0] == 0
+    assert differing(path, uninterrupted) == []
 
 
-def test_a_finished_file_is_left_as_it_is(once, shared_path, whole, uninterrupted):
-    path = shared_path / "twice.hdf"
-    once(shutil.copy, whole, path)
-    code, _, _ = once(study, 0, path, "--fail", 3)
+def test_a_finished_file_is_left_as_it_is(tmp_path, whole, uninterrupted):
+    path = tmp_path / "twice.hdf"
+    shutil.copy(whole, path)
+    code, _, _ = study(0, path, "--fail", 3)
     assert code == 0
-    assert once(differing, path, uninterrupted) == []
+    assert differing(path, uninterrupted) == []
     with open_result(path) as result:
         assert [s["reason"] for s in result.sessions] == ["complete", "complete"]
         assert [s["ranks"] for s in result.sessions] == [1, 1]

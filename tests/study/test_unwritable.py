@@ -17,8 +17,6 @@ from softjaw.study.show.report import writing as report
 from tests.study.launching import ROOT
 from tests.study.view_files import make
 
-pytestmark = pytest.mark.usefixtures("every_rank_speaks")
-
 PRESSURE, SMOKE = (str(ROOT / "jobs" / name) for name in ("cylinder-pressure.csv", "smoke.toml"))
 COMMANDS = {
     "report": ("report", "FILE", "-o", "PLACE/x.html"),

@@ -25,8 +25,6 @@ from softjaw.study.scene import parse_scene
 from softjaw.study.show.report.verdict import plain_report
 from tests.study.formula_results import OBJECT
 
-pytestmark = pytest.mark.usefixtures("every_rank_speaks")
-
 SCENE = (
     OBJECT
     + """mass_g = 50

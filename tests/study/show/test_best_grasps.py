@@ -82,7 +82,6 @@ def test_messages_that_differ_in_numbers_are_one_kind_and_failures_come_first():
 
 
 @pytest.mark.parametrize("force", ["-3", "0", "nan", "inf", "ten"])
-@pytest.mark.usefixtures("every_rank_speaks")
 def test_a_force_that_is_none_is_bad_usage(force, capsys):
     assert main(["show", "any.hdf", "--force", force]) == 2
     assert "--force" in capsys.readouterr().err
