@@ -1,7 +1,4 @@
-"""No decision about a patch hangs on rounding: rotations and changes of a few units in the last place change none.
-
-``docs/decisions.md`` lists what is decided, with which margin, and which of these tests shows it.
-"""
+"""No decision about a patch hangs on rounding: rotations and changes of a few units in the last place change none."""
 
 from __future__ import annotations
 
