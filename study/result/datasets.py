@@ -51,7 +51,8 @@ def columns_of(layout: Any) -> Iterator[Column]:
     for q in layout.asked:
         shape = tuple(layout.lengths[dim] for dim in q.dims)
         # Integers have no NaN: codes use -1 for none.
-        dtype, fill = ("i1", -1) if q.meanings else ("<f8", np.nan)
+        # faces are known to the error of the mesh, which single precision does not touch
+        dtype, fill = ("i1", -1) if q.meanings else ("<f4" if q.group == "patch" else "<f8", np.nan)
         if q.group == "maps" and q.by_model:
             for model in MODELS:
                 yield Column(f"{q.key}/{model}", f"{ROOT}/{q.name}/{model}", (), np.dtype(dtype), fill)

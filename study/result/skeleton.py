@@ -42,7 +42,8 @@ from softjaw.study.units import shown_text
 HDF5_VERSIONS = ("earliest", "v110")  # programs that bring an older HDF5 of their own can read it
 TEXT = h5py.string_dtype("utf-8")
 EVEN_STEPS = 1e-6  # relative difference of steps that makes an axis uneven
-SESSION_ROWS = f"{ROOT}/provenance/sessions"
+SESSION_ROWS, REPORT = f"{ROOT}/provenance/sessions", f"{ROOT}/report"
+MIN_PACKED_BYTES, CHUNK_BYTES, DEFLATE_LEVEL = 4096, 2**20, 4
 # What a grown file has of its own, or what is filled again once nothing is missing.
 NOT_COPIED = (f"{ROOT}/derived/", CLOSING_SUMS, f"{ROOT}/wrenches/motion", f"{ROOT}/wrenches/candidate")
 TEXTS = {
@@ -55,20 +56,23 @@ CUT = " ..."  # at the end of a text that was too long
 UNFINISHED = "Not all cases of this study are solved yet; this text is written at its end."
 
 
-def create(path: Path, layout: Layout, header: Header) -> None:
-    """Write the skeleton beside ``path`` and rename it into place; raise `StudyError` if there is no room for it."""
-    # Space first: a study must not find out after hours that the disk is full.
-    _reserve(path, layout.nbytes)
+def create(path: Path, layout: Layout, header: Header, *, packed: bool = False) -> None:
+    """Write the skeleton beside ``path`` and rename it into place; raise `StudyError` if there is no room for it.
+
+    What is ``packed`` is for reading: ranks cannot write to it independently of each other.
+    """
+    if not packed:  # space first: a study must not find out after hours that the disk is full
+        _reserve(path, layout.nbytes)
     part = path.with_name(path.name + ".part")
     try:
         with h5py.File(part, "w", libver=HDF5_VERSIONS) as file:
-            _write_skeleton(file, layout, header)
+            _write_skeleton(file, layout, header, packed)
         # Opened anew: the sums are of what a reader will find in the file.
         with h5py.File(part, "r+", libver=HDF5_VERSIONS) as file:
             _write_checksums(file, StoredFile(part, file), layout)
         with part.open("r+b") as handle:
-            # Blocks that exist now cannot be missing when a rank writes.
-            os.posix_fallocate(handle.fileno(), 0, part.stat().st_size)
+            if not packed:  # blocks that exist now cannot be missing when a rank writes
+                os.posix_fallocate(handle.fileno(), 0, part.stat().st_size)
             # On disk before it has its name: a power cut leaves no file or a whole one.
             os.fsync(handle.fileno())
     except (OSError, ValueError, RuntimeError) as error:  # h5py has all three for a write that failed
@@ -80,29 +84,32 @@ def create(path: Path, layout: Layout, header: Header) -> None:
     put_in_place(part, path)
 
 
-def grow(path: Path, layout: Layout, header: Header) -> None:
+def rewrite(path: Path, layout: Layout, header: Header, *, packed: bool = False) -> None:
     """Replace a file by one with the stations of ``layout``, among which are all of its own; by one process.
 
     The old file has its name until the new one is whole and on disk, so that a kill at any time leaves one of them.
-    Rows are copied with their checksums: a torn one stays torn, and is solved again.
+    Rows are copied with their checksums: a torn one stays torn, and is solved again. What is filled once nothing is
+    missing is copied where no station is added.
     """
-    grown = path.with_name(path.name + ".grown")
-    create(grown, layout, header)
+    new = path.with_name(path.name + ".new")
+    create(new, layout, header, packed=packed)
     try:
-        with open_result(path, unchecked=True) as old, h5py.File(grown, "r+", libver=HDF5_VERSIONS) as file:
+        with open_result(path, unchecked=True) as old, h5py.File(new, "r+", libver=HDF5_VERSIONS) as file:
             places = _places(old.layout, layout)
+            left_out = () if old.layout.shape == layout.shape else NOT_COPIED
             known = {d.path for d in old.layout.datasets}
-            for dataset in (d for d in layout.datasets if d.path in known and not d.path.startswith(NOT_COPIED)):
+            for dataset in (d for d in layout.datasets if d.path in known and not d.path.startswith(left_out)):
                 values = old.file.values(old.file.plain(dataset.path))
                 target = file[dataset.path]
                 target[...] = _spread(values, dataset, places).astype(target.dtype)  # texts with their encoding
-            file[SESSION_ROWS][...] = old.file.values(old.file.plain(SESSION_ROWS))
-        with grown.open("r+b") as handle:
+            for name in (SESSION_ROWS, *([] if left_out else [REPORT])):
+                file[name][...] = old.file.values(old.file.plain(name))
+        with new.open("r+b") as handle:
             os.fsync(handle.fileno())
     except (OSError, RuntimeError) as error:
-        remove(grown)
-        raise StudyError(CANNOT_WRITE, f"{path}: cannot be given more stations: {reason(error)}") from error
-    put_in_place(grown, path)
+        remove(new)
+        raise StudyError(CANNOT_WRITE, f"{path}: cannot be written again: {reason(error)}") from error
+    put_in_place(new, path)
 
 
 def _places(old: Layout, new: Layout) -> dict[str, Any]:
@@ -155,7 +162,7 @@ def _reserve(path: Path, need: int) -> None:
         remove(trial)
 
 
-def _write_skeleton(file: h5py.File, layout: Layout, header: Header) -> None:
+def _write_skeleton(file: h5py.File, layout: Layout, header: Header, packed: bool) -> None:
     file.attrs.update(NX_class="NXroot", default=ROOT[1:], program=PROGRAM, layout_version=VERSION)
     study = file.create_group(ROOT)
     study.attrs.update(NX_class="NXentry", default="map", options=layout.options(), title=header.title)
@@ -177,9 +184,9 @@ def _write_skeleton(file: h5py.File, layout: Layout, header: Header) -> None:
         count.attrs.update(units="", long_name=f"number of the {name.removesuffix('_2').replace('_', ' ')}")
         count.make_scale(name)
     for dataset in layout.datasets:
-        _create_dataset(file, dataset)
+        _create_dataset(file, dataset, packed)
     _link_maps(study, layout)
-    _write_texts(study, layout, header)
+    _write_texts(study, layout, header, packed)
 
 
 def _write_checksums(file: h5py.File, stored: StoredFile, layout: Layout) -> None:
@@ -189,7 +196,7 @@ def _write_checksums(file: h5py.File, stored: StoredFile, layout: Layout) -> Non
         file[CLOSING_SUMS][i] = checksums.of_array(file[f"{ROOT}/{name}"][()])
 
 
-def _write_texts(study: h5py.Group, layout: Layout, header: Header) -> None:
+def _write_texts(study: h5py.Group, layout: Layout, header: Header, packed: bool) -> None:
     texts = {"title": header.title, "scene": header.scene, "definitions": layout.definitions()}
     for name, text in texts.items():
         # HDF5 has no fixed-length strings of length 0.
@@ -204,7 +211,8 @@ def _write_texts(study: h5py.Group, layout: Layout, header: Header) -> None:
     if header.placed is not None:
         study["scene"].attrs.update(object_rotation=header.placed.rotation, object_origin=header.placed.origin)
     study["scene"].attrs["overrides"] = "\n".join(header.overrides)
-    sessions = study["provenance"].create_dataset("sessions", data=np.zeros(MOST_SESSIONS, SESSION))
+    how = {"compression": DEFLATE_LEVEL} if packed else {}
+    sessions = study["provenance"].create_dataset("sessions", data=np.zeros(MOST_SESSIONS, SESSION), **how)
     sessions.attrs["long_name"] = "one row for each time the study was started: program, machine, start, end"
     _attach_scales(sessions, ["session"])
     labels = np.zeros(int(np.prod(layout.shape[-3:-1])), h5py.string_dtype("utf-8", LABEL_BYTES))
@@ -236,11 +244,17 @@ def report_bytes(text: str) -> np.ndarray:
     return np.array(data.ljust(REPORT_BYTES), h5py.string_dtype("utf-8", REPORT_BYTES))
 
 
-def _create_dataset(file: h5py.File, dataset: Dataset) -> None:
+def _create_dataset(file: h5py.File, dataset: Dataset, packed: bool) -> None:
     plist = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
-    # Contiguous and allocated at once: only so can ranks write independently of each other.
-    plist.set_layout(h5py.h5d.CONTIGUOUS)
-    plist.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
+    nbytes = int(np.prod(dataset.shape)) * dataset.dtype.itemsize
+    if packed and nbytes >= MIN_PACKED_BYTES:
+        plist.set_chunk(_chunk(dataset))
+        plist.set_shuffle()
+        plist.set_deflate(DEFLATE_LEVEL)
+    else:
+        # Contiguous and allocated at once: only so can ranks write independently of each other.
+        plist.set_layout(h5py.h5d.CONTIGUOUS)
+        plist.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
     # Filled now: a case that is never written reads as not computed, not as what the disk held.
     plist.set_fill_time(h5py.h5d.FILL_TIME_ALLOC)
     strings = dataset.dtype.kind == "S"
@@ -253,6 +267,17 @@ def _create_dataset(file: h5py.File, dataset: Dataset) -> None:
     for key, value in dataset.attributes.items():
         _write_attribute(made, key, value)
     _attach_scales(made, dataset.scales)
+
+
+def _chunk(dataset: Dataset) -> tuple[int, ...]:
+    """Shape of the blocks in which a dataset is packed: whole along the last dimensions."""
+    chunk = list(dataset.shape)
+    for axis in range(len(chunk)):
+        rest = int(np.prod(chunk[axis + 1 :])) * dataset.dtype.itemsize
+        chunk[axis] = min(chunk[axis], max(CHUNK_BYTES // rest, 1))
+        if chunk[axis] > 1:
+            break
+    return tuple(chunk)
 
 
 def _link_maps(study: h5py.Group, layout: Layout) -> None:

@@ -203,8 +203,8 @@ def _flattened(layout: Layout, result: CaseResult) -> dict[str, Any]:
     return given
 
 
-def verify(path: Path, layout: Layout, header: Header) -> None:
-    """Raise `StudyError` unless ``path`` can be written and was made from this scene with this layout."""
+def verify(path: Path, layout: Layout, header: Header) -> bool:
+    """Whether ``path`` is packed; `StudyError` unless it can be written and was made from this scene and layout."""
     # Tried, not asked: mode bits know nothing of read-only mounts.
     os.close(os.open(path, os.O_RDWR))
     with open_result(path) as result:
@@ -217,13 +217,12 @@ def verify(path: Path, layout: Layout, header: Header) -> None:
         if result.layout.shape != layout.shape or result.layout.options() != layout.options():
             text = f"{path}: made by a version that stored other values; it can be read, but not resumed"
             raise StudyError(OTHER_FILE, f"{text}: choose another file with -o")
-        for dataset in result.layout.datasets:
-            if result.file.checked(dataset.path, dataset.shape, dataset.dtype).chunks is not None:
-                text = f"{path}: was repacked and cannot be written in parallel any more; choose another file with -o"
-                raise StudyError(OTHER_FILE, text)
+        datasets = [result.file.checked(d.path, d.shape, d.dtype) for d in result.layout.datasets]
+        packed = any(dataset.chunks is not None for dataset in datasets)
         codes = result.codes.ravel()
         wrong = checksums.broken_states(result.file, layout, codes, result.killed)
         # Solving them again would write over results that may be right.
         if lost := int(np.sum(codes[wrong] == MISSING)):
             text = f"{path}: damaged (the states of {lost} cases are lost, but not their results)"
             raise StudyError(OTHER_FILE, f"{text}; restore it from a copy, or choose another file with -o")
+    return packed

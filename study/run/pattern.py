@@ -20,7 +20,6 @@ from softjaw.study.case.build import build_object, own_frame, shapes_of, surface
 from softjaw.study.case.fit import jaws_of
 from softjaw.study.case.poses import STANDOFF, explicit_poses
 from softjaw.study.case.result import MARGIN
-from softjaw.study.case.task import task_of
 from softjaw.study.quantities import NO_GRASP
 from softjaw.study.ranking import largest
 from softjaw.study.scene.grasps import GraspPose
@@ -98,6 +97,7 @@ def _neighbours(scene: Scene, rounds: Any, values: FloatArray, share: float) -> 
     """Neighbours of the best grasps that are not known yet, those first that a bed of springs finds the better."""
     from softjaw.study.case.bed import JawsOnSurface, held  # compiled loops, which a plan is made without
     from softjaw.study.case.sampler import lids_of
+    from softjaw.study.case.task import task_of
 
     shape, jaws = shapes_of(scene)[0], jaws_of(scene)
     placed, surface, obj = own_frame(shape), surface_triangles(shape), build_object(shape)

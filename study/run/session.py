@@ -12,6 +12,7 @@ import sys
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -23,7 +24,7 @@ from softjaw.study.quantities import DONE as CASE_DONE
 from softjaw.study.result import provenance
 from softjaw.study.result.layout import FAILED, MISSING
 from softjaw.study.result.lock import Lock, OpenedFile
-from softjaw.study.result.skeleton import create, grow
+from softjaw.study.result.skeleton import create, rewrite
 from softjaw.study.result.store import Result, open_result, torn_rows
 from softjaw.study.result.write import ResultWriter, verify
 from softjaw.study.run.limits import GRACE, Stopper, limited_memory
@@ -127,8 +128,10 @@ def run_study(
         code = _solve(plan, work, path, comm, retry_failed)
         while growth and code != STOPPED and (added := on_rank0(comm, _next_round, path, growth)):
             plan, work = growth.study((*plan.layout.added, added))
-            on_rank0(comm, grow, path, plan.layout, plan.header)
+            on_rank0(comm, rewrite, path, plan.layout, plan.header)
             code = _solve(plan, work, path, comm, retry_failed=False)
+        if code != STOPPED:
+            on_rank0(comm, partial(rewrite, packed=True), path, plan.layout, plan.header)
         if comm.rank == 0:
             print_summary(work, path)
             # Removed while it is held: without it another run could take a file that is about to vanish.
@@ -183,7 +186,8 @@ def _prepare(path: Path, plan: Plan) -> tuple[bool, list[int]]:
         # By one process: ranks that make datasets together would have to do it in step.
         create(path, plan.layout, plan.header)
         return True, []
-    verify(path, plan.layout, plan.header)
+    if verify(path, plan.layout, plan.header):
+        rewrite(path, plan.layout, plan.header)
     return False, torn_rows(path, plan.layout)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from softjaw.study.result.layout import DONE, MISSING
-from softjaw.study.result.skeleton import grow
+from softjaw.study.result.skeleton import rewrite
 from softjaw.study.result.store import open_result, torn_rows
 from softjaw.study.run.plan import make_plan, measured_seconds
 from softjaw.study.run.refine import FINEST_SPACING_SHARE, chances, next_stations
@@ -112,7 +112,7 @@ def test_a_grown_file_keeps_every_row(tmp_path):
         labels = before.labels
     with h5py.File(path, "r+") as file:
         file["study/e_n/ccm"][1, 0, 0] = 7.0  # torn
-    grow(path, big.layout, big.header)
+    rewrite(path, big.layout, big.header)
     own = [0, 2, 4, 6, 7]
     with open_result(path, unchecked=True) as after:
         assert after.layout.added == ((50.0,), (33.0, 42.0))

@@ -64,7 +64,7 @@ def test_what_was_written_is_read(path):
         assert read.read("S/S")[1, 1, 1] == result.values["maps/S"]
         assert np.array_equal(read.read("fingers/f_x_max")[1, 1, 1], result.values["fingers/f_x_max"])
         assert np.array_equal(read.read("checks/adhesion")[1, 1, 1], result.values["checks/adhesion"])
-        assert np.array_equal(read.patch(10)["normal"], patch["normal"])
+        assert np.array_equal(read.patch(10)["normal"], np.asarray(patch["normal"], np.float32))
         assert np.isnan(read.patch(10)["centroid"]).all()
         assert [read.read(f"effects/sheet_{part}")[1, 1, 1] for part in ("level", "indicator", "reason")] == [1, 0.5, 1]
         assert read.messages[1, 1, 1] == "grüße"
