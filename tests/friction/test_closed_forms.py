@@ -6,8 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from softjaw.friction.motion import SLIDE_X, SLIDE_Y
-from softjaw.friction.wrench import friction_limits, friction_wrench
+from softjaw.friction.wrench import friction_limits
 from tests.friction.closed_forms import ALPHA, FORMS, mean_distance
 from tests.generators import arc_lengths, cylinder_grid, ellcyl_grid
 
@@ -65,15 +64,6 @@ def test_unrolled_arms_are_the_longest():
     ]
     assert e_n[2] == pytest.approx(mean_distance(2, 2 * ALPHA), rel=3e-4)
     np.testing.assert_allclose(e_n, [0.6930, 0.7453, 0.7834], atol=2e-4)
-
-
-@pytest.mark.parametrize("half_angle", [0.1, 0.7, 1.4])
-def test_curvature_costs_friction_across_the_arch_and_none_along_it(half_angle):
-    """Across: mu p L 2 R sin(t).  Along: mu p L 2 R t.  Their ratio is sin(t) / t."""
-    patch = cylinder_grid(0.03, half_angle, 0.01, 400, 1)
-    along, across = np.abs(friction_wrench(patch, np.stack([SLIDE_X, SLIDE_Y]), 0.8))
-    assert along[0] == pytest.approx(0.8 * patch.load.sum(), rel=1e-12)
-    assert across[1] / along[0] == pytest.approx(np.sin(half_angle) / half_angle, rel=1e-5)
 
 
 @pytest.mark.parametrize(

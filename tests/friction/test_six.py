@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from softjaw.friction.motion import SLIDE_Y, cor_twists
+from softjaw.friction.motion import SLIDE_Y
 from softjaw.friction.wrench import friction_support, friction_wrench
 from tests.generators import cap_polar, cylinder_grid, disc_polar, lcg_patch, moved, rect_grid, screw_twist, wedge
 
@@ -85,18 +85,3 @@ def test_what_three_dimensions_leave_out_of_a_cylinder():
     roof = wedge(0.8, 1, 2, 8, 16)
     lift = friction_support(roof, np.eye(6)[2], 1.0)[0] / roof.load.sum()
     assert lift == pytest.approx(math.sin(0.8), rel=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("patch", "distance", "error", "digits"),
-    [
-        (rect_grid(2, 1, 80, 40), 5, 4.2e-4, 0.05e-4),
-        (CYLINDER, 5, 2.6e-3, 0.05e-3),
-        (rect_grid(2, 1, 80, 40), 1000, 1.0e-8, 0.05e-8),
-    ],
-)
-def test_a_far_centre_of_rotation_is_no_translation(patch, distance, error, digits):
-    """What the paper's square of side 10 a leaves off max f_y at its edge, and a far larger one; a = 2 here."""
-    exact = friction_wrench(patch, SLIDE_Y, 1.0)[0, 1]
-    found = friction_wrench(patch, cor_twists([[-2.0 * distance, 0]]), 1.0)[0, 1]
-    assert 1 - found / exact == pytest.approx(error, abs=digits)

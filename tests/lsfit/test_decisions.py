@@ -11,8 +11,9 @@ from scipy.spatial.transform import Rotation
 
 from softjaw.friction.motion import fibonacci_twists
 from softjaw.friction.wrench import friction_limits, friction_wrench
-from softjaw.lsfit.body import ExactSurface, hull_volume
+from softjaw.lsfit.body import hull_volume
 from softjaw.lsfit.ellipsoid import (
+    MAX_REACH_RATIO,
     Ellipsoid,
     TiltedEllipsoid,
     axis_aligned_ellipsoid,
@@ -26,10 +27,8 @@ from softjaw.lsfit.lowest import Closed, closed
 from softjaw.lsfit.quartic import Quartic
 from softjaw.lsfit.quartic_fit import convex_quartic
 from softjaw.lsfit.samples import normalised_samples, sample_rank, six_samples, sphere_motions
-from softjaw.lsfit.span import span_samples
-from softjaw.lsfit.surface import FitError, FitFlag, Image, OpenBodyError, UndecidedError
-from softjaw.lsfit.zhou import zhou_quartic
-from tests.generators import cylinder_grid, disc_polar, lcg_patch, points_patch, rect_grid
+from softjaw.lsfit.surface import FitError, FitFlag, Image
+from tests.generators import cylinder_grid, disc_polar, lcg_patch, points_patch
 from tests.oracles import least_squares_quartic
 from tests.turns import TURNS
 
@@ -111,31 +110,14 @@ def test_whether_a_level_set_is_closed(name):
     assert outcomes(decide, TURNS if d < 5 else 10) == {expected: TURNS if d < 5 else 10}
 
 
-@pytest.mark.parametrize(("name", "outcome"), [
-    ("31 times as long as wide", float), ("cylinder", UndecidedError), ("hyperboloid", OpenBodyError),
-])  # fmt: skip
-@pytest.mark.parametrize("measure", ["volume", "shadow_area", "semi_axes"])
-def test_a_body_has_a_measure_in_every_position_or_in_none(name, outcome, measure):
-    form, E = FORMS[name][0], exponents(3, 4)
-
-    def decide(rng):
-        return type(getattr(Quartic(shaken(rng, substitute(form, E, turn(rng))), E), measure))
-
-    expected = np.ndarray if outcome is float and measure == "semi_axes" else outcome
-    assert outcomes(decide, TURNS // 2) == {expected: TURNS // 2}
-
-
-@pytest.mark.parametrize(("smallest", "outcome"), [(0.0, "undecided"), (1e-17, "undecided"), (1e-6, 3), (-1e-6, "no")])
-def test_whether_a_matrix_is_that_of_an_ellipsoid(smallest, outcome):
+@pytest.mark.parametrize(("least", "outcome"), [(0, ValueError), (1e-17, ValueError), (1e-6, 3), (-1e-6, ValueError)])
+def test_whether_a_matrix_is_that_of_an_ellipsoid(least, outcome):
     """Margin 1e-12 of the smallest eigenvalue once the diagonal is 1."""
 
     def decide(rng):
         R = turn(rng)
-        A = shaken(rng, R @ np.diag([1, 1, smallest]) @ R.T)
-        try:
-            return TiltedEllipsoid((A + A.T) / 2).rank
-        except ValueError as error:
-            return "undecided" if "undecided" in str(error) else "no"
+        A = shaken(rng, R @ np.diag([1, 1, least]) @ R.T)
+        return TiltedEllipsoid((A + A.T) / 2).rank
 
     assert outcomes(decide) == {outcome: TURNS}
 
@@ -184,9 +166,12 @@ def test_an_ellipsoid_that_the_samples_leave_open_is_flagged(data):
     """The margin is that of the bound: samples of a cylinder would have the coefficient 0 along it, exactly."""
     assert outcomes(lambda rng: full_ellipsoid(turned(rng, data)[0]).flag) == {FitFlag.BOUNDED: TURNS}
     assert outcomes(lambda rng: axis_aligned_ellipsoid(shaken(rng, data)).flag) == {FitFlag.BOUNDED: TURNS}
-    assert outcomes(lambda rng: convex_quartic(turned(rng, data)[0], gamma=0).flag & FitFlag.BOUNDED, 20) == {
-        FitFlag.BOUNDED: 20
+    assert outcomes(lambda rng: convex_quartic(turned(rng, data)[0], gamma=0).flag & FitFlag.BOUNDED, 3) == {
+        FitFlag.BOUNDED: 3
     }
+    for surface in (full_ellipsoid(data), axis_aligned_ellipsoid(data)):
+        assert MAX_REACH_RATIO * 0.5 * 0.99 < surface.semi_axes[2] < MAX_REACH_RATIO * 2
+    assert convex_quartic(data, gamma=0).surface.semi_axes[2] < 2 * MAX_REACH_RATIO
 
 
 def test_an_axis_that_no_load_reaches_is_zero():
@@ -202,18 +187,6 @@ def test_an_axis_that_no_load_reaches_is_zero():
     assert set(outcomes(decide)) == {1, 2}
     assert outcomes(lambda rng: three_motion_ellipsoid(1.0, shaken(rng, 6e-17), 1e-18, 0.01).rank) == {1: TURNS}
     assert outcomes(lambda rng: three_motion_ellipsoid(1.0, shaken(rng, 1e-9), 1e-9, 0.01).rank) == {3: TURNS}
-
-
-def test_six_components_of_a_plane_patch_have_rank_three():
-    def decide(rng):
-        patch = rect_grid(2, 1, 6, 6)
-        twist = sphere_motions(60) / [1, 1, 1, 2, 2, 2]
-        W, T = six_samples(friction_wrench(patch, twist, 0.5), twist, 0.5 * patch.load.sum(), 2.0)
-        R = np.kron(np.eye(2), turn(rng))
-        inside = span_samples(shaken(rng, W @ R.T), unit(T @ R.T), bool(rng.integers(2)))
-        return inside.rank, inside.flag
-
-    assert outcomes(decide) == {(3, FLAT): TURNS}
 
 
 def six(K):
@@ -238,16 +211,6 @@ def test_a_quartic_of_fewer_samples_than_coefficients_is_one_and_flagged(K):
     assert outcomes(decide, 20) == {first.flag: 20}
     size = np.abs(first.coefficients).max()
     assert max(np.abs(s.coefficients - first.coefficients).max() for s in found) < 1e-7 * size
-
-
-def test_more_samples_than_coefficients_determine_them():
-    W, T = six(400)
-    assert outcomes(lambda rng: least_squares_quartic(shaken(rng, W), gamma=0).flag, 10) == {CLEAN: 10}
-    assert outcomes(lambda rng: convex_quartic(shaken(rng, W), T).surface.flag, 2) == {CLEAN: 2}
-
-
-def test_sums_of_lengths_have_one_outcome():
-    assert outcomes(lambda rng: zhou_quartic(*turned(rng, *TWO)).surface.flag, 10) == {CLEAN: 10}
 
 
 # Bodies -------------------------------------------------------------------------------------------------------------
@@ -282,22 +245,6 @@ def test_a_full_body_has_no_outside_across():
         B = turn(rng) * [1.0, 1.0, 1e-9] @ turn(rng)
         body = Image(Quartic(FORMS["ball"][0], exponents(3, 4)), B)
         assert np.isfinite(body.value(directions(3, 50) @ B.T)).all()
-
-
-def test_the_exact_surface_of_one_face_is_flat_and_that_of_two_is_not():
-    def decide(rng, count):
-        phi = rng.uniform(0, 2 * np.pi)
-        at = np.array([[0, 0], [np.cos(phi), np.sin(phi)]])[:count]
-        patch = points_patch(shaken(rng, at), shaken(rng, np.ones(count)))
-
-        def wrench(t):
-            return friction_wrench(patch, t, 1.0)[:, [0, 1, 5]]
-
-        body = ExactSurface(wrench, count=64)
-        return body.rank, bool(body.volume > 0), bool(body.holds([[0.1, 0.2, 0.0]])[0])
-
-    assert outcomes(lambda rng: decide(rng, 1)) == {(2, False, True): TURNS}
-    assert outcomes(lambda rng: decide(rng, 2)) == {(3, True, True): TURNS}
 
 
 def test_a_wrench_that_is_the_rounding_of_none_is_left_out():

@@ -5,11 +5,13 @@ import math
 import numpy as np
 import pytest
 
+from softjaw.friction.motion import fibonacci_twists
 from softjaw.lsfit.ellipsoid import Ellipsoid, TiltedEllipsoid
-from softjaw.lsfit.fit_error import fit_error
+from softjaw.lsfit.fit_error import fit_error, overclaim
 from softjaw.lsfit.form import exponents, monomials
 from softjaw.lsfit.geometry import directions, quartic_volume, sphere_rule
 from softjaw.lsfit.quartic import Quartic
+from softjaw.lsfit.samples import normalised_samples, sample_rank
 from softjaw.lsfit.surface import FitFlag, Image, OpenBodyError, UndecidedError, shadow_area, supported_shadow
 
 AXES = np.array([1.0, 0.7, 0.1])
@@ -232,6 +234,10 @@ def test_how_thin_a_body_may_be_is_judged_in_its_units(measure):
         (lambda: Quartic(np.ones(14), E), "expected 15 finite numbers"),
         (lambda: Quartic(np.ones(6), exponents(3, 2)), "sum 4"),
         (lambda: Quartic(np.full(15, np.nan), E), "finite"),
+        (lambda: Ellipsoid([1, 1]), "semi_axes is"),
+        (lambda: Ellipsoid([1, 1, -1]), "semi_axes is"),
+        (lambda: Ellipsoid([1, np.nan, 1]), "semi_axes is"),
+        (lambda: Ellipsoid([1, 1, np.inf]), "semi_axes is"),
         (lambda: TiltedEllipsoid(np.diag([1.0, 1.0, -1.0])), "positive"),
         (lambda: TiltedEllipsoid([[1.0, 2.0], [2.0, 1.0]]), "all positive"),
         (lambda: TiltedEllipsoid([[1.0, 0.5], [0.0, 1.0]]), "not symmetric"),
@@ -259,3 +265,46 @@ def test_flags_closing_with_the_surface():
         Image(fourth_powers(), np.eye(3), FitFlag.BOUNDED),
     ):
         assert surface.scaled([1.0, 1.0, 2.0]).flag == FitFlag.BOUNDED
+
+
+# Errors of fits, and samples
+
+
+def on_the_ellipsoid(K=200):
+    """Wrenches of the ellipsoid with the semi-axes `AXES` and the unit normals there."""
+    t = fibonacci_twists(K, 1.0)
+    return t * AXES**2 / np.linalg.norm(t * AXES, axis=1, keepdims=True), t
+
+
+def test_an_ellipsoid_fits_itself():
+    W, T = on_the_ellipsoid()
+    ellipsoid = Ellipsoid(AXES)
+    np.testing.assert_allclose(ellipsoid.value(W), 1, rtol=1e-14)
+    np.testing.assert_allclose(fit_error(ellipsoid, W, T), 0, atol=1e-13)
+    np.testing.assert_allclose(ellipsoid.support(T), (W * T).sum(axis=1), rtol=1e-14)
+    assert all(ellipsoid.holds(w) for w in W * (1 - 1e-9))
+    assert not any(ellipsoid.holds(w) for w in W * (1 + 1e-9))
+
+
+def test_errors_of_a_swollen_ellipsoid():
+    """Radii too large by 10 %: P = 1 / 1.21 on the true surface, and P^(-1/2) = 1.1."""
+    W, T = on_the_ellipsoid()
+    errors = fit_error(Ellipsoid(1.1 * AXES), W, T)
+    np.testing.assert_allclose(errors, [1 - 1 / 1.21, 0.1, 0], atol=1e-12)
+
+
+def test_only_what_is_claimed_too_much_is_an_overclaim():
+    W, _ = on_the_ellipsoid()
+    assert overclaim(Ellipsoid(1.1 * AXES), W) == pytest.approx(0.1, rel=1e-9)
+    assert overclaim(Ellipsoid(0.9 * AXES), W) == 0.0
+    assert overclaim(Ellipsoid(AXES * [1.0, 1.0, 1.2]), [[0, 0, AXES[2]], [AXES[0], 0, 0]]) == pytest.approx(0.2)
+
+
+def test_rank_of_samples_and_bad_scales():
+    assert sample_rank(on_the_ellipsoid()[0]) == 3
+    assert sample_rank(on_the_ellipsoid()[0] * [1, 0, 1]) == 2
+    assert sample_rank(np.zeros((4, 3))) == 0
+    with pytest.raises(ValueError, match="positive force and length"):
+        normalised_samples(np.eye(3), np.eye(3), 0.0, 1.0)
+    with pytest.raises(ValueError, match=r"twist\[1\] is zero"):
+        normalised_samples(np.eye(3)[:2], [[1, 0, 0], [0, 0, 0]], 1.0, 1.0)

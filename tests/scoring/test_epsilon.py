@@ -10,7 +10,7 @@ from softjaw.lsfit.ellipsoid import Ellipsoid
 from softjaw.scoring.bodies import PolytopeBody, ellipsoid_inside, fibonacci_vertices, is_ellipsoid, joined
 from softjaw.scoring.closed_form import epsilon_l1, epsilon_linf
 from softjaw.scoring.contact import SoftContact, contact_axes
-from softjaw.scoring.epsilon import epsilon, separating_wrench
+from softjaw.scoring.epsilon import epsilon
 from softjaw.scoring.gauge import contact_support, gauge
 from softjaw.scoring.reach import reach
 
@@ -119,13 +119,6 @@ def test_contacts_that_cannot_resist_some_wrench_have_exactly_nothing():
         for kind in ("linf", "l1"):
             assert epsilon(contacts, 1.0, 1.0, kind=kind)[:2] == (0, 0)
     assert epsilon(facing(none, A), 1.0, 1.0).lower > 0
-
-
-def test_a_wrench_is_named_that_separates():
-    c, D = maps(facing(A, A, 1.0, 0.7), 1.0, 1.0)
-    u = separating_wrench(c, D)
-    assert (u @ c.T + np.linalg.norm(D @ u, axis=1) < 0).all()
-    assert separating_wrench(*maps(facing(A, A), 1.0, 1.0)) is None
 
 
 def test_epsilon_depends_on_the_centre_of_mass_and_the_lengths_but_not_on_the_frame():

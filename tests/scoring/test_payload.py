@@ -79,7 +79,7 @@ def test_a_squeeze_that_is_not_borne_holds_nothing():
         assert (found.force, found.upper, found.borne) == (0.0, 0.0, False)
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(6))
 def test_a_squeeze_is_borne_or_not(seed):
     """Margin 1e-7 of the forces: positions and rounding decide nothing 1e-6 away from the limit."""
     turn = Rotation.random(random_state=seed).as_matrix()
@@ -142,7 +142,7 @@ def test_a_direction_is_a_linear_programme_over_all_points(kind):
         assert found.upper == pytest.approx(found.force, rel=1e-5)
 
 
-@pytest.mark.parametrize(("seed", "directions"), [(2, 2000), pytest.param(3, 100_000, marks=pytest.mark.long)])
+@pytest.mark.parametrize(("seed", "directions"), [(2, 400), pytest.param(3, 100_000, marks=pytest.mark.long)])
 def test_no_direction_of_many_is_worse(seed, directions):
     contacts, com, rng = lumpy(seed)
     found = held(contacts, com)
