@@ -173,11 +173,3 @@ def test_only_study_talks_to_the_session_it_runs_in():
 )
 def test_a_forbidden_import_is_noticed(path, source, name):
     assert forbidden_imports(path, source) == {name}
-
-
-def test_the_doors_are_open():
-    assert forbidden_imports("study/result/write.py", "import h5py, numpy as np\nfrom mpi4py import MPI") == set()
-
-
-def test_printing_and_reading_the_environment_are_noticed():
-    assert outside_world("import os\nprint(os.environ['HOME'])") == {"print", "os.environ"}

@@ -26,7 +26,7 @@ from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.pad.shape import PadShape
 from softjaw.study.case.model import Finger, touching
 from softjaw.study.doctor import launch_environment, mpirun
-from tests.benchmark import factors, kernels, other_code
+from tests.benchmark import kernels, other_code
 from tests.benchmark.table import fastest, line, title
 
 ROOT = Path(__file__).parents[2]
@@ -79,7 +79,7 @@ def contact_solve() -> None:
 
 
 def whole_map(scene: Path) -> None:
-    """A whole map on one rank and on two, and what writing costs."""
+    """A whole map on one rank and on two."""
     title(f"Map of {scene.stem}")
     folder = Path(tempfile.mkdtemp())
     try:
@@ -104,40 +104,6 @@ def _whole_map(scene: Path, folder: Path) -> None:
         seconds[ranks] = time.perf_counter() - start
         line(f"{scene.stem} on {ranks} rank{'s' * (ranks > 1)}", f"{seconds[ranks]:.1f} s")
     line("time on 2 ranks over time on 1", f"{seconds[2] / seconds[1]:.3f}", "at most 0.55")
-    line("writing", f"{100 * writing_share(scene, folder):.2f} %", "at most 2 % of a run")
-
-
-def writing_share(scene: Path, folder: Path) -> float:
-    """Share of a one-rank run that goes into creating and writing the file."""
-    from mpi4py import MPI
-
-    from softjaw.study import pipeline
-    from softjaw.study.result import write
-    from softjaw.study.run import session as run
-    from softjaw.study.run.plan import make_plan
-    from softjaw.study.scene import load_scene
-
-    spent = [0.0]
-
-    def timed(work):
-        def wrapped(*arguments, **options):
-            start = time.perf_counter()
-            try:
-                return work(*arguments, **options)
-            finally:
-                spent[0] += time.perf_counter() - start
-
-        return wrapped
-
-    original = write.ResultWriter._store, write.ResultWriter.count_attempt, run.create
-    write.ResultWriter._store, write.ResultWriter.count_attempt, run.create = map(timed, original)
-    try:
-        loaded, start = load_scene(scene), time.perf_counter()
-        work = run.Work(pipeline.solve_unit, pipeline.image)
-        run.run_study(make_plan(loaded, str(scene)), work, folder / "writing.hdf", MPI.COMM_SELF)
-        return spent[0] / (time.perf_counter() - start)
-    finally:
-        write.ResultWriter._store, write.ResultWriter.count_attempt, run.create = original
 
 
 def main() -> None:
@@ -147,7 +113,6 @@ def main() -> None:
         "linearised": lambda: kernels.linearised(options.points),
         "element": element_routine,
         "contact": contact_solve,
-        "factors": lambda: factors.kept_factors(ROOT / "jobs"),
         "getfem": other_code.compare,
         "map": lambda: whole_map(options.scene),
     }

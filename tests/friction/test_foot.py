@@ -58,8 +58,8 @@ def test_the_frame_over_a_hole_is_continuous_where_that_of_loaded_faces_jumps():
         places = np.array([np.concatenate([f.origin, f.axes[2]]) for f in found])
         return np.abs(np.diff(places, axis=0)).max() * count
 
-    coarse, fine = (np.linspace(0.2, 0.8, count + 1) for count in (25, 100))
-    assert largest(frames(fine), 100) == pytest.approx(largest(frames(coarse), 25), rel=0.35)
+    coarse, fine = (np.linspace(0.35, 0.65, count + 1) for count in (20, 80))
+    assert largest(frames(fine), 80) == pytest.approx(largest(frames(coarse), 20), rel=0.35)
     jumps = [largest([contact_frame(bridge(share), X) for share in s], len(s) - 1) for s in (coarse, fine)]
     assert jumps[1] > 2 * jumps[0]
 

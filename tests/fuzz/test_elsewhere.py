@@ -12,20 +12,16 @@ import numpy as np
 import pytest
 
 from softjaw.fem.errors import MeshError
-from softjaw.fem.objects import mesh_file
 from softjaw.fem.objects.mesh_file import read_triangles
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.study.cli import main
 from softjaw.study.messages import OTHER_FILE, UNPRINTABLE, USAGE, StudyError
-from softjaw.study.patch.contacts import read_patch
-from softjaw.study.patch.patch_reader import Reading
 from softjaw.study.patch.trial import trouble
 from softjaw.study.result.store import open_result
 from softjaw.study.scene import SceneError, load_scene, parse_scene
 from tests.fuzz.lies import LIES
-from tests.fuzz.readers import QUICK, SCENE, obj, ply, stl
+from tests.fuzz.readers import QUICK, obj, ply, stl
 from tests.study.formula_results import make
-from tests.study.launching import ROOT
 from tests.study.patch_files import cylinder_mesh, vtk
 from tests.study.sealing import sealed
 
@@ -221,37 +217,8 @@ def test_a_file_that_hdf5_breaks_on_is_refused(tmp_path):
         open_result(path)
 
 
-def test_limits_are_stated_where_users_look():
-    from softjaw.study.patch import patch_reader
-    from softjaw.study.scene import text
-
-    told = (ROOT / "docs" / "files-from-elsewhere.md").read_text()
-    limits = [mesh_file.MOST_FACES, mesh_file.MOST_POINTS, patch_reader.MOST_FACES]
-    sizes = [
-        f"{mesh_file.LARGEST_FILE >> 20} MiB",
-        f"{patch_reader.LARGEST_FILE >> 20} MiB",
-        f"{text.LARGEST // 10**6} MB",
-    ]
-    for value in (*sizes, *(f"{n:,}" for n in limits)):
-        assert value in told
-
-
-def test_the_seed_of_these_tests_is_a_scene(tmp_path):
-    (tmp_path / "scene.toml").write_bytes(SCENE)
-    assert load_scene(tmp_path / "scene.toml").cases == 4
-
-
 def test_a_ply_file_of_empty_lines_is_refused(tmp_path):
     path = tmp_path / "empty.ply"
     path.write_bytes(b"\n\nend_header\n")
     with pytest.raises(MeshError, match=r"empty\.ply"):
         read_triangles(path)
-
-
-def test_names_of_columns_are_told_without_control_characters(tmp_path):
-    path = tmp_path / "patch.csv"
-    path.write_text("\x00x_mm, y_mm, z_mm, area_mm2, nx, ny, nz, pressure_kpa\n1,2,3,4,0,0,1,5\n")
-    with pytest.raises((StudyError, SceneError)) as told:
-        read_patch(str(path), Reading("mm", "kpa"))
-    assert "\\u0000x_mm" in str(told.value)
-    assert not UNPRINTABLE.search(str(told.value))

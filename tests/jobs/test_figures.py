@@ -20,7 +20,6 @@ from softjaw.study.result.read import dataset, open
 from softjaw.study.result.store import open_result
 from softjaw.study.show.grasps import field, judge
 from softjaw.study.show.stored_surface import StoredSurface
-from softjaw.study.show.view import solids
 from tests.generators import cylinder_grid
 from tests.study.formula_results import grid_axes, make
 from tests.study.launching import ROOT, launch
@@ -112,13 +111,6 @@ def test_errors_on_the_paper_s_grid_are_those_of_the_reference():
     assert found["fit_error_ellipsoid"] == pytest.approx(0.003113307368265586, rel=1e-6)
     # the reference's quartic is fitted to the wrenches alone, ours to the motions, too
     assert 0.7 < found["fit_error"] / 0.0003705396009936843 < 1.0
-
-
-def test_images_lose_their_empty_margins_and_keep_a_little():
-    image = np.full((60, 80, 3), 255, np.uint8)
-    assert solids.trimmed(image).shape == image.shape
-    image[20:30, 40:42] = 0
-    assert solids.trimmed(image).shape == (10 + 2 * solids.MARGIN, 2 + 2 * solids.MARGIN, 3)
 
 
 # --- the scenes themselves, on coarse meshes ---------------------------------------------------------------------

@@ -15,7 +15,7 @@ from softjaw.study.cli.exporting import PLANNERS, SIMULATORS, TABLES
 from softjaw.study.cli.options import APPROACHES, FORMATS
 from softjaw.study.export import selection as module
 from softjaw.study.export.planners import CLOSING
-from softjaw.study.export.selection import GripperFrame, Selection, grasps, quaternion
+from softjaw.study.export.selection import GripperFrame, Selection, grasps
 from softjaw.study.export.yaml import yaml_text
 from softjaw.study.flags import Flag
 from softjaw.study.messages import CANNOT_WRITE, USAGE
@@ -131,13 +131,6 @@ def test_the_gripper_stands_over_its_pads(path, closing):
         assert np.linalg.det(grasp.rotation) == pytest.approx(1)
         assert turned(*grasp.quaternion) == pytest.approx(grasp.rotation, abs=1e-12)
         assert grasp.name.endswith(approach.replace("-", "_"))
-
-
-@pytest.mark.parametrize("half_turn", [np.diag([1.0, -1, -1]), np.diag([-1.0, 1, -1]), np.diag([-1.0, -1, 1])])
-def test_half_turns_have_one_quaternion(half_turn):
-    found = quaternion(half_turn)
-    assert turned(*found) == pytest.approx(half_turn)
-    assert found[np.argmax(np.abs(found))] == 1.0
 
 
 def test_isaac_grasp_has_the_fields_of_its_documentation(said):

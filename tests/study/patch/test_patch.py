@@ -22,7 +22,7 @@ from softjaw.study.patch.contacts import check_facing, read_patch
 from softjaw.study.patch.faces import corner_geometry
 from softjaw.study.patch.patch_reader import Reading
 from tests.friction.closed_forms import cylinder_torque
-from tests.generators import cylinder_grid, points_patch
+from tests.generators import cylinder_grid
 from tests.study.launching import ROOT
 from tests.study.patch_files import centres, corners, cylinder_mesh, vtk
 
@@ -210,15 +210,6 @@ def test_the_grasp_of_equal_ellipsoids_has_its_closed_form(told):
     assert grasp["misalignment"] == pytest.approx(0.0, abs=1e-9)
 
 
-def test_the_default_lengths_are_the_distance_and_the_contact(told):
-    answer = told(EXAMPLE, "--distance", 60)
-    assert answer["grasp"]["object_length"] == pytest.approx(0.06)
-    assert answer["grasp"]["contact_length"] == answer["patches"][0]["rho"]
-    assert answer["grasp"]["surface"] == "quartic"
-    lower, upper = answer["grasp"]["score"]["ccm"]["epsilon"]
-    assert 0.5 * upper < lower <= upper
-
-
 def test_the_picture_shows_sections_through_the_largest_loads(tmp_path, told):
     picture = tmp_path / "sections.svg"
     limits = told(EXAMPLE, "-o", picture)["patches"][0]["friction"]["ccm"]
@@ -260,19 +251,6 @@ def test_a_grasp_that_slips_is_told(tmp_path, told):
     assert answer["grasp"]["slips"]
     assert any("slips" in text for text in answer["notes"])
     assert any("from antipodal" in text for text in answer["notes"])
-
-
-def test_a_single_face_carries_no_torque_and_scores_nothing(tmp_path, told):
-    file = centres(tmp_path / "point.csv", points_patch([[0.0, 0.0]], [3.0]))
-    answer = told(file, "--distance", 50, "--contact-length", 20)
-    patch = answer["patches"][0]
-    assert patch["rank"] == 2
-    assert any("rank 2" in text for text in answer["notes"])
-    for model in patch["friction"].values():
-        assert model["f_x_max"] == pytest.approx(MU * 3.0)
-        assert model["tau_z_max"] == model["tau_pure"] == model["e_n"] == 0.0
-    assert patch["limit_surface"]["ccm"]["quartic"]["E_rad"] is None
-    assert {score["quality"] for score in answer["grasp"]["score"].values()} == {0.0}
 
 
 def test_overhanging_faces_are_counted(tmp_path, told):
@@ -375,30 +353,6 @@ def test_the_json_keeps_its_names(told):
     assert keys(answer) == {"mu": None, "patches": [patch], "grasp": grasp, "notes": None}
     numbers = {*limits, "S", "F_N", "rho", "distance", "object_length", "contact_length", "misalignment", "E_dir"}
     assert numbers <= answer["units"].keys()
-
-
-def test_the_text_says_the_same_as_the_json(told, capsys):
-    patch = told(EXAMPLE)["patches"][0]
-    assert main(["patch", str(EXAMPLE), "--mu", str(MU), "--distance", "60", "--surface", "full"]) == 0
-    lines = capsys.readouterr().out.splitlines()
-
-    def row(name):
-        return next(line.split() for line in lines if line.startswith(name))
-
-    assert lines[0] == f"{EXAMPLE}: 240 faces, 240 under pressure, mu = {MU:g}"
-    assert row("f_x_max [N]")[2:] == [f"{m['f_x_max']:.4g}" for m in patch["friction"].values()]
-    assert row("e_n [mm]")[2:] == [f"{1e3 * m['e_n']:.4g}" for m in patch["friction"].values()]
-    for word in ("quality", "epsilon", "convex quartic", "e_n: tau_z_max / (mu S)", "note: x follows"):
-        assert any(line.startswith(word) for line in lines), word
-    assert max(map(len, lines)) <= 120
-
-
-def test_the_example_shows_what_its_closed_form_says(told):
-    """Along a cylinder friction is mu S, across it mu F_N, whatever the pressure."""
-    patch = told(EXAMPLE)["patches"][0]
-    curved = patch["friction"]["ccm"]
-    assert curved["f_x_max"] == pytest.approx(MU * patch["S"], rel=1e-9)
-    assert curved["f_y_max"] == pytest.approx(MU * patch["F_N"], rel=1e-6)
 
 
 def test_a_table_is_read_without_mpi_petsc_or_vtk():

@@ -12,7 +12,7 @@ from softjaw.study.cli import main
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import MODELS, quantities
 from softjaw.study.result.layout import DONE, FAILED
-from softjaw.study.show.best_grasps import answer, best, best_text, safe_range
+from softjaw.study.show.best_grasps import best, safe_range
 from softjaw.study.show.status import grouped
 from softjaw.study.table import as_csv, as_json, as_text
 
@@ -158,17 +158,6 @@ def test_without_a_mass_the_force_is_the_largest_that_most_share_and_with_one_th
     assert best(rising(0.3)).facts["force"] == 5.0
     assert best(rising(0.1)).facts["force"] == 1.0
     assert best(rising(3.0)).facts["force"] == 5.0  # none holds it
-
-
-def test_the_answer_has_the_force_to_use_and_what_is_held():
-    told = best(rising(0.3)).facts["answer"]
-    assert "3.000 ± 0.030 N" in told
-    assert "2 times" in told
-    assert "300 g" in told
-    assert "500 g" in best(rising()).facts["answer"]
-    assert best(rising()).facts["answer"] == answer(rising(), (0, 0, 1))
-    assert json.loads(as_json(best(rising())))["answer"] == best(rising()).facts["answer"]
-    assert best_text(rising(), 200).splitlines()[0] == best(rising()).facts["answer"]
 
 
 def test_the_payload_is_shown_in_grams_and_stored_in_kilograms():

@@ -17,7 +17,6 @@ pytestmark = [
     pytest.mark.skipif(PROGRAM is None, reason="no Chromium on this machine"),
 ]
 REASON = "</script> convergence <b>lost</b>"
-DRAWN = "document.querySelectorAll('.plot .main-svg, .plot canvas').length"
 
 
 @pytest.fixture(scope="module")

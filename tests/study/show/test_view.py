@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 from softjaw.fem.objects.shapes import EllipticCylinder
-from softjaw.study.case.build import build_object
 from softjaw.study.cli import main
 from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, USAGE, StudyError
 from softjaw.study.quantities import ALONG, AROUND
@@ -23,7 +22,7 @@ from softjaw.study.show.object_surface import NOBODY, Cells, Wall, areas, betwee
 from softjaw.study.show.view import command
 from softjaw.study.show.view.model import quantity_of, view_of
 from softjaw.study.show.view.object3d import object_block, payload, view_page
-from softjaw.study.show.view.pads import corners_of, pads_of
+from softjaw.study.show.view.pads import pads_of
 from tests.study.chromium import PROGRAM, Browser
 from tests.study.view_files import CLOSING, FAILED, PRESSURE, SCENE, SIZE, make, quality
 
@@ -57,14 +56,6 @@ def test_cutting_keeps_the_area_and_leaves_no_triangle_on_both_sides():
         d = corners @ normal - offset
         assert not ((d.min(axis=1) < -1e-9) & (d.max(axis=1) > 1e-9)).any()
     assert areas(corners).sum() == pytest.approx(whole, rel=1e-12)
-
-
-def test_a_cut_through_a_corner_makes_two_triangles():
-    corners = np.zeros((1, 3, 3))
-    corners[0, :, :2] = (0, 0), (1, 1), (1, -1)
-    pieces = cut(corners, np.array([0, 1.0, 0]), 0.0)
-    assert len(pieces) == 2
-    assert areas(pieces) == pytest.approx(0.5)
 
 
 def test_each_candidate_owns_its_interval_under_both_fingers():
@@ -101,13 +92,6 @@ def test_a_lone_angle_claims_what_its_pads_cover_unless_all_angles_are_alike():
     assert (Cells(np.array([0.0]), np.array([0.0]), 0, 0.05, 0.02).at(x) == 0).all()
 
 
-def test_a_point_on_the_border_of_two_cells_is_there_for_each(shown):
-    view, _ = shown
-    points, triangles, candidate = view.surface
-    assert (view.owner[triangles] == candidate[:, None]).all()
-    assert areas(points[triangles]).sum() == pytest.approx(areas(corners_on(build_object(view.scene.object))).sum())
-
-
 # --- the wall --------------------------------------------------------------------------------------------------------
 
 
@@ -129,13 +113,6 @@ def test_a_wall_moves_with_the_grid_that_begins_at_finger_one():
 
 
 # --- pads ------------------------------------------------------------------------------------------------------------
-
-
-def test_corners_of_a_straight_grid_are_those_of_its_faces():
-    x, y = np.meshgrid(np.arange(4) + 0.5, 2 * np.arange(3) + 1.0, indexing="ij")
-    corners = corners_of(np.stack([x, y], axis=-1))
-    assert corners[..., 0] == pytest.approx(np.broadcast_to(np.arange(5.0)[:, None], (5, 4)))
-    assert corners[..., 1] == pytest.approx(np.broadcast_to(2.0 * np.arange(4), (5, 4)))
 
 
 def test_pads_stand_where_the_file_says(shown):
@@ -201,15 +178,6 @@ def test_a_case_is_chosen_by_number_place_or_score(shown):
     assert refused.value.code == USAGE
     with pytest.raises(StudyError, match=r"expected one of quality, e_n"):
         quantity_of(data, "beauty")
-
-
-def test_the_words_name_the_case_and_say_why_it_failed(shown):
-    view, index = shown
-    lines = view.summary(index, "quality")
-    assert lines[0] == "candidate 2: station\u00a00\u00a0mm, angle\u00a00°, 5\u00a0N"
-    assert f"grasp quality: {quality(index):.3g}" in lines
-    assert view.summary(FAILED, "quality")[-1] == "failed: no </script> convergence"
-    assert view.summary((0, 0, 1), "quality")[-1] == "not computed yet"
 
 
 def test_a_missing_mesh_is_told_and_nothing_is_drawn_instead(tmp_path):
