@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from textwrap import shorten
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from tests.objects.found import SOLVED, TRIED, Found
 from tests.objects.reasons import reason_of
 
 SECONDS, SHARE = 60.0, 0.98  # goals: CPU time to the first map, share of tried candidates that end solved
-LONGEST = 100  # characters of a message
+LONGEST = 80  # characters of a message
 HEAD = ("object", "CPU s", "candidates", "solved", "best pose: quality")
 INTRODUCTION = """# Objects that users bring
 
@@ -77,7 +78,7 @@ def reason_rows(found: Sequence[Found]) -> list[list[object]]:
     counts = Counter(reason.name for reason, *_ in lost)
     lost.sort(key=lambda row: (row[0].by, -counts[row[0].name], row[0].name))
     return [
-        [reason.name, reason.by, f"{f.name}, {where}", " ".join(message.split())[:LONGEST]]
+        [reason.name, reason.by, f"{f.name}, {where}", shorten(message, LONGEST, placeholder=" ...")]
         for reason, f, where, message in lost
     ]
 
