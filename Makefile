@@ -10,7 +10,7 @@ PAGE    = $(RESULT:.hdf=.html)
 PICTURE = $(RESULT:.hdf=.png)
 FIGURES = results/figures
 BIN     = .venv/bin
-# Of the benchmark: any of kernels linearised element contact getfem map; all if empty.
+# Of the benchmark: any of kernels element contact getfem map; all if empty.
 PARTS   =
 # Of the random scenes and bodies of `make objects`: the page of 0 is kept in docs, those of others beside their results.
 SEED    = 0

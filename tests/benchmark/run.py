@@ -109,8 +109,7 @@ def _whole_map(scene: Path, folder: Path) -> None:
 def main() -> None:
     """Run all, or the parts named on the command line."""
     parts = {
-        "kernels": lambda: [part() for part in (kernels.friction, kernels.limit_surfaces, kernels.scores)],
-        "linearised": lambda: kernels.linearised(options.points),
+        "kernels": kernels.every_kernel,
         "element": element_routine,
         "contact": contact_solve,
         "getfem": other_code.compare,
@@ -119,9 +118,6 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("part", nargs="*", choices=[*parts, []], help="default: all")
     parser.add_argument("--scene", type=Path, default=ROOT / "jobs" / "bottle-rigid.toml", help="scene of the map")
-    parser.add_argument(
-        "--points", type=int, nargs="+", default=[20, 50, 100], help="per linearised contact; 100 take a minute"
-    )
     options = parser.parse_args()
     for name, part in parts.items():
         if not options.part or name in options.part:

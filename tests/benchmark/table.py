@@ -17,15 +17,15 @@ def fastest(work: Callable[[], object], seconds: float = 1.0) -> float:
     return min(times)
 
 
-def line(what: str, figure: str, goal: str = "", accuracy: str = "") -> None:
-    """One line ``kernel | time | goal | accuracy``."""
-    print(f"{what:<62} | {figure:>16} | {goal:<24} | {accuracy}".rstrip(" |"), flush=True)
+def line(what: str, figure: str, goal: str = "") -> None:
+    """One line ``what | figure | goal``."""
+    print(f"{what:<62} | {figure:>16} | {goal}".rstrip(" |"), flush=True)
 
 
 def title(text: str) -> None:
     """Heading of a part."""
     print(f"\n{text}", flush=True)
-    line("kernel", "time", "goal", "accuracy")
+    line("what", "figure", "goal")
 
 
 def span(seconds: float) -> str:
