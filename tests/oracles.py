@@ -1,15 +1,24 @@
-"""What tests compare fits with: volumes from hulls, quartics of plain least squares, the smallest curvature."""
+"""What tests of fits share: samples, volumes from hulls, quartics of plain least squares, the smallest curvature."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from softjaw.friction.motion import fibonacci_twists
+from softjaw.friction.wrench import friction_limits, friction_wrench
 from softjaw.lsfit.body import hull_volume
 from softjaw.lsfit.ellipsoid import nearest_solution
 from softjaw.lsfit.form import hessian_tensor
 from softjaw.lsfit.lowest import lowest_eigenvalues
 from softjaw.lsfit.quartic_fit import normal_equations, placed, round_samples
+from softjaw.lsfit.samples import normalised_samples
 from softjaw.lsfit.sos import ball_coefficients
+
+
+def samples(patch, K=500, rho=2.0, twist=None):
+    """Wrenches of evenly spread motions, or of those given, over the load, and the unit motions."""
+    twist = fibonacci_twists(K, rho) if twist is None else twist
+    return normalised_samples(friction_wrench(patch, twist, 1.0), twist, friction_limits(patch, 1.0).S, rho)
 
 
 def body_volume(coarse, fine):

@@ -9,13 +9,13 @@ import pytest
 from scipy.spatial import ConvexHull, QhullError
 
 from softjaw.friction.frame import FrameFlag, contact_frame, in_frame
-from softjaw.friction.motion import SLIDE_Y, cor_twists, fibonacci_twists
+from softjaw.friction.motion import SLIDE_Y, cor_twists
 from softjaw.friction.patch import ContactPatch
 from softjaw.friction.wrench import friction_limits, friction_wrench
 from softjaw.lsfit.body import hull_volume
 from softjaw.lsfit.ellipsoid import axis_aligned_ellipsoid, full_ellipsoid
 from softjaw.lsfit.quartic_fit import convex_quartic
-from softjaw.lsfit.samples import normalised_samples, sample_rank
+from softjaw.lsfit.samples import sample_rank
 from softjaw.scoring.bodies import fibonacci_vertices, polytope_volume
 from tests.generators import (
     cap_polar,
@@ -24,18 +24,13 @@ from tests.generators import (
     points_patch,
     rect_grid,
 )
-from tests.oracles import least_squares_quartic
+from tests.oracles import least_squares_quartic, samples
 
 X = [1.0, 0.0, 0.0]
 
 
 def values(limits):
     return [limits.f_x, limits.f_y, limits.tau_z]
-
-
-def samples(patch, rho, twist=None):
-    twist = fibonacci_twists(100, rho) if twist is None else twist
-    return normalised_samples(friction_wrench(patch, twist, 1.0), twist, patch.load.sum(), rho)
 
 
 def all_fits(W, T):
@@ -57,7 +52,7 @@ def test_single_tilted_element():
 def test_all_pressure_on_a_line():
     line = rect_grid(2.0, 1e-9, 200, 1)
     assert friction_limits(line, 1.0).e_n == pytest.approx(2 / 4, rel=1e-12)
-    W, T = samples(line, 2.0)
+    W, T = samples(line, 100)
     assert np.isfinite(W).all()
     assert sample_rank(W) == 3
     assert hull_volume(W) > 0.5
@@ -91,7 +86,7 @@ def test_duplicated_elements():
     half = replace(patch, area=patch.area / 2)
     double = stacked(half, half)
     np.testing.assert_allclose(values(friction_limits(double, 1.0)), values(friction_limits(patch, 1.0)), rtol=1e-14)
-    W, T = samples(patch, 2.0)
+    W, T = samples(patch, 100)
     twice = np.vstack([W, W]), np.vstack([T, T])
     for one, two in zip(all_fits(W, T), all_fits(*twice), strict=True):
         np.testing.assert_allclose(two.value(W), one.value(W), rtol=1e-6)

@@ -1,5 +1,12 @@
-"""In how many random positions a decision is tried; ``make test-long`` asks for more by the variable TURNS."""
+"""Decisions that must not hang on rounding are tried in random positions with numbers a little off."""
 
 import os
 
-TURNS = int(os.environ.get("TURNS", 20))
+import numpy as np
+
+TURNS = int(os.environ.get("TURNS", 20))  # positions; ``make test-long`` asks for more
+
+
+def shaken(rng, x):
+    """Every number up to four units in the last place away."""
+    return np.asarray(x) * (1 + np.finfo(float).eps * rng.integers(-4, 5, size=np.shape(x)))

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from softjaw.friction.motion import fibonacci_twists
 from softjaw.friction.wrench import friction_limits, friction_wrench
 from softjaw.lsfit.body import hull_volume
 from softjaw.lsfit.ellipsoid import (
@@ -26,22 +25,15 @@ from softjaw.lsfit.geometry import directions
 from softjaw.lsfit.lowest import Closed, closed
 from softjaw.lsfit.quartic import Quartic
 from softjaw.lsfit.quartic_fit import convex_quartic
-from softjaw.lsfit.samples import normalised_samples, sample_rank, six_samples, sphere_motions
+from softjaw.lsfit.samples import sample_rank, six_samples, sphere_motions
 from softjaw.lsfit.surface import FitError, FitFlag, Image
 from tests.generators import cylinder_grid, disc_polar, lcg_patch, points_patch
-from tests.oracles import least_squares_quartic
-from tests.turns import TURNS
-
-ULP = np.finfo(float).eps
+from tests.oracles import least_squares_quartic, samples
+from tests.turns import TURNS, shaken
 
 
 def turn(rng, d=3):
     return Rotation.random(random_state=rng).as_matrix() if d == 3 else np.linalg.qr(rng.normal(size=(d, d)))[0]
-
-
-def shaken(rng, x):
-    """Every number up to four units in the last place away."""
-    return x * (1 + ULP * rng.integers(-4, 5, size=np.shape(x)))
 
 
 def unit(T):
@@ -62,11 +54,6 @@ def outcomes(decide, times=TURNS):
         except (FitError, ValueError) as error:
             found[type(error)] += 1
     return found
-
-
-def samples(patch, K=100, rho=2.0):
-    twist = fibonacci_twists(K, rho)
-    return normalised_samples(friction_wrench(patch, twist, 1.0), twist, friction_limits(patch, 1.0).S, rho)
 
 
 # Closed bodies ------------------------------------------------------------------------------------------------------
@@ -124,8 +111,8 @@ def test_whether_a_matrix_is_that_of_an_ellipsoid(least, outcome):
 
 # Ranks and flags of fits --------------------------------------------------------------------------------------------
 
-LCG, DISC = samples(lcg_patch(3, 50)), samples(disc_polar(1, 20, 48))
-ONE, TWO = samples(points_patch([[0, 0]], [2.0])), samples(points_patch([[-1, 0], [1, 0]], [1, 1]))
+LCG, DISC = samples(lcg_patch(3, 50), 100), samples(disc_polar(1, 20, 48), 100)
+ONE, TWO = (samples(points_patch(*points), 100) for points in (([[0, 0]], [2.0]), ([[-1, 0], [1, 0]], [1, 1])))
 FIVE, TEN = ((x[:: 100 // n][:n] for x in LCG) for n in (5, 10))
 FIVE, TEN = tuple(FIVE), tuple(TEN)
 HYPERBOLOID = np.array(

@@ -8,7 +8,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
-from softjaw.friction.motion import fibonacci_twists
 from softjaw.friction.wrench import friction_limits, friction_wrench
 from softjaw.lsfit.body import ExactSurface
 from softjaw.lsfit.ellipsoid import Ellipsoid, axis_aligned_ellipsoid, full_ellipsoid
@@ -37,7 +36,7 @@ from tests.generators import (
     points_patch,
     rect_grid,
 )
-from tests.oracles import body_volume, least_squares_quartic, smallest_curvature
+from tests.oracles import body_volume, least_squares_quartic, samples, smallest_curvature
 
 HERTZ = {"gen": "disc_polar", "args": {"R": 1.0, "nr": 40, "nt": 96}, "pressure": {"kind": "hertz", "a": 1.0}}
 GAUSS = {
@@ -72,11 +71,6 @@ PATCHES = {
                "1.124/1.034/1.003"),
     "Gauss": (build(GAUSS), 2, ".0093/.0048/7.88 .0076/.0038/6.70 .0044/.0011/2.68", 4.0, "1.085/1.020/1.001"),
 }  # fmt: skip
-
-
-def samples(patch, K=500, rho=2.0, twist=None):
-    twist = fibonacci_twists(K, rho) if twist is None else twist
-    return normalised_samples(friction_wrench(patch, twist, 1.0), twist, friction_limits(patch, 1.0).S, rho)
 
 
 def noisy(patch, K, amplitude, seed):

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from softjaw.friction.motion import SLIDE_X, SLIDE_Y, fibonacci_twists
+from softjaw.friction.motion import SLIDE_X, SLIDE_Y
 from softjaw.friction.wrench import friction_wrench
 from softjaw.lsfit.ellipsoid import TiltedEllipsoid
 from softjaw.lsfit.fit_error import fit_error
@@ -13,14 +13,10 @@ from softjaw.lsfit.samples import normalised_samples, six_samples, sphere_motion
 from softjaw.lsfit.surface import FitFlag
 from softjaw.lsfit.zhou import CollapsedFitError, zhou_ellipsoid, zhou_quartic
 from tests.generators import cylinder_grid, disc_polar, lcg_patch, points_patch, rect_grid
+from tests.oracles import samples
 
 DISC = disc_polar(1, 40, 96)
 FITS = pytest.mark.parametrize("fit", [zhou_ellipsoid, zhou_quartic])
-
-
-def samples(patch, K, rho=2.0):
-    twist = fibonacci_twists(K, rho)
-    return normalised_samples(friction_wrench(patch, twist, 1.0), twist, patch.load.sum(), rho)
 
 
 def objective(surface, rates, W, T, weights):

@@ -12,19 +12,13 @@ from softjaw.scoring.contact import SoftContact, contact_axes
 from softjaw.scoring.epsilon import epsilon, separating_wrench
 from softjaw.scoring.pose import pose_volume
 from softjaw.scoring.quality import ScoreFlag, contact_flag, grasp_score, score
-from tests.turns import TURNS
+from tests.turns import TURNS, shaken
 
-ULP = np.finfo(float).eps
 LENGTHS = 0.2, 0.05
 A, FLAT, SLIPPERY = (0.8, 0.6, 0.015), (0.8, 0.6, 0.0), (0.0, 0.6, 0.015)
 BOX = np.stack(np.meshgrid([-0.8, 0, 0.8], [-0.6, 0, 0.6], [-0.015, 0, 0.015]), axis=-1).reshape(-1, 3)
 POINTS = fibonacci_vertices(A, 20)
 CLEAN, NO_TORQUE, NO_FORCE = ScoreFlag.CLEAN, ScoreFlag.NO_TORQUE, ScoreFlag.NO_FORCE
-
-
-def shaken(rng, x):
-    """Every number up to four units in the last place away."""
-    return np.asarray(x) * (1 + ULP * rng.integers(-4, 5, size=np.shape(x)))
 
 
 def pair(one, two, tilt=0.0, apart=0.06):

@@ -203,12 +203,3 @@ def test_mujoco_turns_an_object_between_both_fingers_at_twice_the_torque(path, s
         if abs(data.qvel[3:6]).max() > 1e-2:
             break
     assert at == pytest.approx(1.0, rel=0.01)
-
-
-def test_between_two_solved_forces_the_friction_lies_between_theirs(path):
-    """Poses and axes are those of both; the ratios, which do not depend on the force here, stay."""
-    for i, grasp in enumerate(all_grasps(path, 9.0)):
-        contact = cell(grasp).contacts[0]
-        assert contact.F_N == pytest.approx(9.0)
-        assert [contact.mu_x, contact.mu_y] == pytest.approx([MU_X[i], MU_Y[i]])
-        assert contact.rotation.T @ contact.rotation == pytest.approx(np.eye(3), abs=ONE)

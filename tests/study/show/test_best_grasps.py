@@ -207,13 +207,6 @@ def test_the_largest_error_is_found_with_its_place_and_how_many_have_none():
     assert "none of 7" in best(known).facts["largest_error"]
 
 
-def test_a_pose_is_shown_by_number_and_label_alone():
-    table = best(study([[2.0], [1.0]], labels=["near", "far"]))
-    assert [c.label or c.name for c in table.columns if c.people][:4] == ["rank", "pose", "label", "quality"]
-    assert cells(table, "label") == ["near", "far"]
-    assert {"station", "angle"} <= table.rows[0].keys()
-
-
 @pytest.mark.parametrize(
     ("low", "high", "text"),
     [(0.8, 2.5, "0.8..2.5"), (0.8, 5.0, "0.8..5+"), (3.0, 2.5, "none"), (np.nan, np.nan, "-"), (None, 2.5, "..2.5")],

@@ -22,7 +22,7 @@ from softjaw.study.result.read import dataset
 from softjaw.study.result.store import StoredAxis, open_result
 from softjaw.study.result.write import ResultWriter, record
 from softjaw.study.show.best_grasps import best
-from softjaw.study.show.grasps import at, compared, grouped, images, judge, note, order
+from softjaw.study.show.grasps import at, compared, judge, order
 from softjaw.study.show.report import curves, tables, verdict
 from softjaw.study.show.report.writing import build, picture, write_report
 from softjaw.study.show.view.model import read_scene
@@ -267,18 +267,6 @@ def test_a_chosen_candidate_stands_beside_the_best_one(tmp_path):
             build(dataset(result), 12)
 
 
-def test_failures_that_differ_in_numbers_alone_are_one_kind(ordinary):
-    path, _, page = ordinary
-    with open_result(path) as result:
-        failed, noted = grouped(judge(dataset(result)))
-    assert (failed.state, len(failed.cases)) == (2, 6)
-    assert "ConvergenceError" in failed.message
-    assert len(noted.cases) == 17
-    assert page.text.count("ConvergenceError: residual") == 1 + 6  # once as a kind, and in the table of all cases
-    with open_result(path) as result:
-        assert "residual 2.5e-03" in note(judge(dataset(result)), (3, 2, 0))
-
-
 SMALL = axes(stations=(0.01,), angles=(0.0,), forces=(3.0,))
 POSES = axes(stations=(0, 1), angles=(0.0,), forces=(1.0, 2.0), station_units="")
 TEXTS = (axis("material", (0, 1), "", "gripper.material")._replace(options=("blatz_ko", "neo_hookean")),)
@@ -332,14 +320,6 @@ def test_the_same_file_gives_the_same_bytes(tmp_path):
     path = make(tmp_path / "small.hdf", Layout(SMALL, 24))
     one, two = (write_report(path, tmp_path / name) for name in ("one.html", "two.html"))
     assert [p.read_bytes() for p in one] == [p.read_bytes() for p in two]
-
-
-def test_images_of_a_grasp_are_not_listed_twice(tmp_path):
-    path = make(tmp_path / "f.hdf", Layout(axes(angles=(0.0, 1.0, 2.0)), 0, patches=False))
-    with open_result(path) as result:
-        data = judge(dataset(result))
-        assert images(data, (2, 0, 1)) == [(0, 1, 1), (2, 2, 1)]  # 1 / (1 + 2) in all of them
-        assert compared(data) == ((0, 2, 1), "the last in the ranking")
 
 
 def test_differences_are_drawn_over_the_ratio_of_the_axes_and_the_curvature(tmp_path):

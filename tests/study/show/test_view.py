@@ -24,7 +24,7 @@ from softjaw.study.show.view.model import quantity_of, view_of
 from softjaw.study.show.view.object3d import object_block, payload, view_page
 from softjaw.study.show.view.pads import pads_of
 from tests.study.chromium import PROGRAM, Browser
-from tests.study.view_files import CLOSING, FAILED, PRESSURE, SCENE, SIZE, make, quality
+from tests.study.view_files import CLOSING, FAILED, PRESSURE, SIZE, make, quality
 
 
 @pytest.fixture(scope="module")
@@ -178,16 +178,6 @@ def test_a_case_is_chosen_by_number_place_or_score(shown):
     assert refused.value.code == USAGE
     with pytest.raises(StudyError, match=r"expected one of quality, e_n"):
         quantity_of(data, "beauty")
-
-
-def test_a_missing_mesh_is_told_and_nothing_is_drawn_instead(tmp_path):
-    scene = re.sub(
-        r"shape = .*?length_mm = 100", 'shape = "mesh"\nmesh = "/nowhere/thing.stl"\nunit = "mm"', SCENE, flags=re.S
-    )
-    with open_result(make(tmp_path / "m.hdf", scene=scene)) as result:
-        view, _ = view_of(judge(dataset(result)), None, (None, None), None)
-        assert not len(view.surface.points)
-        assert "thing.stl" in view.note
 
 
 # --- the page --------------------------------------------------------------------------------------------------------
