@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from softjaw.fem.contact.load_stepping import Settings
 from softjaw.fem.contact.press import Press
-from softjaw.fem.contact.problem import Gap
 from softjaw.fem.materials import Material, material
 from softjaw.fem.objects.gap import GapFunction, GapObject, NoContactError, Pose, first_touch
 from softjaw.fem.objects.mesh_object import MeshObject
@@ -27,6 +26,7 @@ from softjaw.study.scene import Scene
 from softjaw.study.scene.sections import Gripper
 
 FloatArray = NDArray[np.float64]
+MIRRORED = 2e-5  # of the pad's length, to which images agree: files are of single precision, e_n moves by less
 MOST_TRIED, MOST_NAMED = 1000, 5  # pads brought to the object beforehand (the others fail as cases), and sentences
 STEPS_BACK = (0.1, 0.4, 1.6)  # of the pad's thickness: where it stands before it is brought to the smooth surface
 PLATE_POISSON = 0.3  # of the backing plate; the modulus is what a scene gives
@@ -138,22 +138,32 @@ def _contact_face(size: tuple[float, float, float]) -> FloatArray:
     return np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
 
 
-def mirror_planes(gap: Gap, size: tuple[float, float, float]) -> tuple[bool, bool]:
-    """Whether the object, as far as the pad sees it, is its own mirror image in the planes ``x = 0`` and ``y = 0``."""
+@lru_cache(maxsize=8)
+def quadrants(finger: Finger, size: tuple[float, float, float]) -> dict[tuple[int, int], FloatArray]:
+    """Gap before a pad of this ``size`` at places of a quarter and their images ``(i x, j y, z)``, by ``(i, j)``."""
     # Off the planes, where both sides are the same point, and a little beyond the rim.
     u = np.linspace(0.03, 0.55, 12)
     x, y, z = np.meshgrid(u * size[0], u * size[1], np.linspace(-0.3, KNOWN_DEPTH, 7) * size[2], indexing="ij")
     points = np.column_stack([x.ravel(), y.ravel(), z.ravel()])
-    quadrants = {(i, j): gap(points * [i, j, 1.0])[0] for i in (1, -1) for j in (1, -1)}
-    tolerance = 1e-9 * size[0]
+    return {(i, j): finger.gap(points * [i, j, 1.0])[0] for i in (1, -1) for j in (1, -1)}
 
-    def same(pairs) -> bool:
-        return all(np.abs(quadrants[a] - quadrants[b]).max() <= tolerance for a, b in pairs)
 
-    return (
-        same([((1, 1), (-1, 1)), ((1, -1), (-1, -1))]),
-        same([((1, 1), (1, -1)), ((-1, 1), (-1, -1))]),
-    )
+def image_signs(first: Finger, other: Finger, size: tuple[float, float, float]) -> tuple[int, int] | None:
+    """Signs of x and y in the pad's frame with which the object before one finger is that before the other one."""
+    one, two = quadrants(first, size), quadrants(other, size)
+    for a, b in one:
+        if all(np.abs(two[i, j] - one[i * a, j * b]).max() <= MIRRORED * size[0] for i, j in one):
+            return a, b
+    return None
+
+
+def mirror_planes(finger: Finger, size: tuple[float, float, float]) -> tuple[bool, bool]:
+    """Whether the object, as far as the pad sees it, is its own mirror image in the planes ``x = 0`` and ``y = 0``."""
+    gap = quadrants(finger, size)
+    x, y = (max(np.abs(gap[p] - gap[q]).max() for p, q in pairs) <= MIRRORED * size[0] for pairs in (
+        [((1, 1), (-1, 1)), ((1, -1), (-1, -1))], [((1, 1), (1, -1)), ((-1, 1), (-1, -1))]
+    ))  # fmt: skip
+    return x, y
 
 
 def usable_symmetry(scene: Scene, finger: Finger, elements: tuple[int, int, int]) -> tuple[bool, bool]:
@@ -167,7 +177,7 @@ def usable_symmetry(scene: Scene, finger: Finger, elements: tuple[int, int, int]
     wanted = scene.effects.model_size
     if wanted == "full":
         return False, False
-    planes = mirror_planes(finger.gap, scene.gripper.pad_size)
+    planes = mirror_planes(finger, scene.gripper.pad_size)
     usable = planes[0] and elements[0] % 2 == 0, planes[1] and elements[1] % 2 == 0
     # a coarser mesh for error estimates takes what it can use
     need = {"auto": 0, "half": 1, "quarter": 2}[wanted] if elements == scene.gripper.elements else 0

@@ -19,7 +19,7 @@ from softjaw.friction.patch import ContactPatch
 from softjaw.friction.wrench import FrictionLimits
 from softjaw.study.case.build import has_wall, pad_shape
 from softjaw.study.case.contact import Contact
-from softjaw.study.case.model import Finger, contact_rules, pad_of, press_of, settings
+from softjaw.study.case.model import Finger, contact_rules, image_signs, pad_of, press_of, settings
 from softjaw.study.case.poses import turn_of_pose
 from softjaw.study.case.result import MARGIN
 from softjaw.study.case.wall import thin_body, wall_values
@@ -182,15 +182,23 @@ class OnRigid:
     def __init__(self, scene: Scene, fingers: Sequence[Finger], poses: Sequence[Any], coarser: bool) -> None:
         self.scene, self.fingers = scene, fingers
         first, second = poses
-        self.images = turn_of_pose(first, second, scene.object.axis_symmetry) is not None
-        self.parts = [press_of(scene, finger, coarser) for finger in (fingers[:1] if self.images else fingers)]
+        if turn_of_pose(first, second, scene.object.axis_symmetry) is not None:
+            self.image: tuple[int, int] | None = (1, 1)
+        else:
+            self.image = image_signs(fingers[0], fingers[1], scene.gripper.pad_size)
+        self.parts = [press_of(scene, finger, coarser) for finger in (fingers[:1] if self.image else fingers)]
         self.fingers_solved, self.planes = 2, min(sum(part.pad.symmetry) for part in self.parts)
 
     def contacts(self, states: Sequence[Any]) -> list[PressedContact]:
         """Contacts of both fingers from the states of the parts."""
         # Of two fingers that are images only the first has a state, so the lengths differ.
         contacts = [PressedContact(self.scene, f, state) for f, state in zip(self.fingers, states, strict=False)]
-        return [*contacts, contacts[0].of(self.fingers[1])] if self.images else contacts
+        if self.image == (1, 1):
+            contacts.append(contacts[0].of(self.fingers[1]))
+        elif self.image:
+            i, j = self.image
+            contacts.append(PressedContact(self.scene, self.fingers[1], states[0], (float(i), float(j), 1.0)))
+        return contacts
 
     def wall_values(self, states: Sequence[Any]) -> dict[str, Any]:
         """What the wall bears, keyed as in ``study.quantities``; a rigid object has none."""
