@@ -180,12 +180,12 @@ ROWS = (
              "Volume of the grasp wrench space spanned by both contacts with unit normal forces. The arms of forces are"
              " divided by the object's extents along x, y and z of its own frame, as in the paper, torques about the "
              "normals by the contact's length, unless [score] says otherwise. The limit surfaces are the ellipsoids "
-             "from three motions, as in the paper.", rank=1, error="relative"),
+             "from three motions, as in the paper.", rank=2, error="relative"),
     Quantity("payload", M, "kg", "mass that is held",
              "Largest mass whose weight at the centre of mass both contacts hold with the normal force of this case, in"
              " whichever direction it pulls, or in that of [task]. The squeeze itself is borne first; 0 where friction"
              " cannot. As [task] says how the normal forces answer a load: by default the drive keeps their sum. The"
-             " limit surfaces are hulls of the sampled wrenches, on the safe side.", rank=3, error="relative"),
+             " limit surfaces are hulls of the sampled wrenches, on the safe side.", rank=1, error="relative"),
     Quantity("safety_factor", M, "", "mass that is held over mass of the object", "payload over object.mass_g.",
              symbol="safety", needs=("mass",), rank=13, error="relative"),
     Quantity("quality_fitted", M, "", "grasp quality, fitted limit surface",
@@ -203,7 +203,7 @@ ROWS = (
              "As overclaim, of the ellipsoid that quality is computed from."),
     Quantity("e_n", M, "m", "eccentricity parameter e_n",
              "max tau_z / (mu S), Eq. (12) with the paper's F_N read as S, the sum of pressure times area over the "
-             "patch; of the weaker finger.", rank=2, error="relative"),
+             "patch; of the weaker finger.", rank=3, error="relative"),
     Quantity("e_n_ratio", M, "m", "eccentricity parameter, torque over force",
              "max tau_z / max f_t, Eq. (11), with the largest friction force in the contact plane over all motions, in"
              " whichever direction. In the planar models it is e_n, or e_n_projected; in the curved one it is no "
@@ -420,8 +420,9 @@ ROWS = (
 )  # fmt: skip
 TABLE = tuple(row for q in ROWS for row in ((q, q.of_error) if q.error else (q,)))
 MAIN = tuple(q.name for q in sorted((q for q in TABLE if q.rank), key=lambda q: q.rank))
-FIRST = MAIN[:2]  # maps that viewers open at
-RANKED_BY = ("payload", "quality", "e_n", "epsilon")  # what grasps can be ranked by
+FIRST = ("quality", "e_n")  # maps that viewers of the file open at
+LEAST_FORCE = "force"  # that holds object.mass_g
+RANKED_BY = ("payload", "quality", "e_n", "epsilon", LEAST_FORCE)  # what grasps can be ranked by
 FORCE_RANGE = ("force_low", "force_high")  # derived bounds of the forces that hold the object and that it bears
 BY_KEY = {q.key: q for q in TABLE}
 

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Collection
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from softjaw.study.case.result import TIE
 from softjaw.study.flags import BORNE, LOST, Flag, flags_in
-from softjaw.study.quantities import DONE
+from softjaw.study.quantities import DONE, LEAST_FORCE, REALISATION
 from softjaw.study.result.between import at_force
+from softjaw.study.result.intervals import half_width
+from softjaw.study.result.read import mesh_error, values_of
 
+FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 LARGEST = "the largest that was solved"
 NOTHING = 1e-12  # of the largest value, below which a difference is none
@@ -104,40 +108,104 @@ def passed_over(score: np.ndarray, flags: np.ndarray) -> tuple[list[int], str]:
     return better, " or ".join(flag.word for flag in flags_in(marks))
 
 
-def asked_score(has: Collection[str]) -> str:
-    """The map that grasps are ranked by unless another is named, from what the scene asks for (`quantities.NEEDS`)."""
-    return "payload" if "task" in has else "quality"
+@dataclass(frozen=True)
+class Sure:
+    """Values of some grasps and how far off they may be.
 
-
-def score_of(ds: Any, by: str | None = None) -> str:
-    """The map that grasps are ranked by: the one that is named, the payload where the scene has a task, else quality.
-
-    A file without a value of it is ranked by quality or e_n.
+    Attributes
+    ----------
+    value, error : (n,) arrays
+        ``error`` is that of the mesh; NaN where it is not known.
+    samples : (n, m) array
+        Values with samples of the uncertain inputs, the same for all grasps; none where no input is uncertain.
     """
-    first = by or asked_score(ds.attrs.get("has", ()))
-    known = [n for n in (first, "quality", "e_n") if n in ds and np.isfinite(ds[n].values).any()]
+
+    value: FloatArray
+    error: FloatArray
+    samples: FloatArray
+
+    @property
+    def half_width(self) -> FloatArray:
+        """All of it together, ``(n,)``."""
+        return np.hypot(self.error, _half_width(self.samples))
+
+    def apart(self, i: int, j: int) -> bool | None:
+        """Whether grasp ``i`` is better than ``j`` beyond the errors of their difference; None where not known.
+
+        Inputs move all grasps at once, so it is the difference that has an interval. A difference within `TIE` of the
+        values is none, also where nothing is said to be in error.
+        """
+        error = np.hypot(np.hypot(self.error[i], self.error[j]), _half_width(self.samples[i] - self.samples[j]))
+        least = TIE * max(abs(self.value[i]), abs(self.value[j]))
+        return None if np.isnan(error) else bool(self.value[i] - self.value[j] > error + least)
+
+
+def _half_width(samples: FloatArray) -> FloatArray:
+    if not samples.shape[-1]:
+        return np.zeros(samples.shape[:-1])
+    return half_width(xr.DataArray(samples, dims=[*(f"dim_{i}" for i in range(samples.ndim - 1)), REALISATION])).values
+
+
+def sure(ds: xr.Dataset, name: str, k: int) -> Sure | None:
+    """A map (CCM) of all candidates at a force level; None where a file knows no error of it."""
+    if name not in ds:
+        return None
+    values, error, samples = values_of(ds, name)[..., k].ravel(), mesh_error(ds, name), ds.get(f"{name}_samples")
+    if error is None and samples is None:
+        return None
+    of_mesh = np.zeros(values.shape) if error is None else error[..., k].ravel()
+    inputs = np.empty((len(values), 0)) if samples is None else samples.values[..., k, :].reshape(len(values), -1)
+    return Sure(values, of_mesh, inputs)
+
+
+def score_of(ds: xr.Dataset, by: str | None = None) -> str:
+    """What grasps are ranked by: what is named, else payload; quality or e_n where a file has no value of it.
+
+    Raises
+    ------
+    ValueError
+        For the least force where the scene names no mass.
+    """
+    if by == LEAST_FORCE:
+        if "force_low" not in ds:
+            raise ValueError("--by force: the scene names no object.mass_g to hold; expected it, or another order")
+        return by
+    known = [n for n in (by or "payload", "quality", "e_n") if n in ds and np.isfinite(ds[n].values).any()]
     return known[0] if known else "e_n"
 
 
-def rank_values(ds: Any, name: str, k: int, each: bool) -> np.ndarray:
+def rank_values(ds: xr.Dataset, name: str, k: int) -> np.ndarray:
     """What grasps are ranked by at a force level, the largest first; flat over the candidates.
 
-    It is a map (curved model). Only where each grasp is to have its own force (``each``), the object's mass is known
-    and the map is the payload, the smaller force to use is the better; grasps that have none come after, by payload.
+    It is a map (curved model), or the inverse of the least force; grasps that have none come after, by payload.
     """
-    found = ds[name].sel(model="ccm") if "model" in ds[name].dims else ds[name]
-    values = np.asarray(found.values, float)[..., k].ravel()
-    if not (each and name == "payload" and "force_low" in ds):
-        return values
-    force, most = ds["force_low"].values.ravel(), values[np.isfinite(values)].max(initial=0.0)
-    return np.where(np.isfinite(force), 1.0 / force, values - most - 1.0)
+    if name != LEAST_FORCE:
+        return values_of(ds, name)[..., k].ravel()
+    force, held = ds["force_low"].values.ravel(), values_of(ds, "payload")[..., k].ravel()
+    return np.where(np.isfinite(force), 1.0 / force, held - held[np.isfinite(held)].max(initial=0.0) - 1.0)
 
 
-def ranked(ds: Any, k: int, by: str | None = None, each: bool = False) -> IntArray:
-    """The candidates solved at a force level, flat, the best first; see `score_of`, `rank_values` and `ranking`."""
+def ranked(ds: xr.Dataset, k: int, by: str | None = None) -> IntArray:
+    """The candidates solved at a force level, flat, the best first; see `score_of` and `ranking`.
+
+    Of grasps that their errors cannot tell from the best of them the simpler ones come first: antipodal, without a
+    flag, at a smaller opening.
+    """
     done = np.flatnonzero(ds["status"].values[..., k].ravel() == DONE)
-    score = rank_values(ds, score_of(ds, by), k, each)[done]
-    return done[ranking(score, judged(ds)[..., k].ravel()[done])]
+    name = score_of(ds, by)
+    score, flags = rank_values(ds, name, k), judged(ds)[..., k].ravel()
+    order, errors = done[ranking(score[done], flags[done])], sure(ds, name, k)
+    if not len(order):
+        return order
+    places, group, head = _places(score), np.zeros(len(order), np.int64), 0
+    for n, i in enumerate(order):
+        first, lost = order[head], flags[[order[head], i]] & LOST > 0
+        alike = places[i] == places[first] or (errors is not None and errors.apart(first, i) is False)
+        head = head if alike and lost[0] == lost[1] else n
+        group[n] = head
+    width = values_of(ds, "opening")[..., k].ravel() if "opening" in ds else np.zeros(len(score))
+    marks, wide = flags[order], _places(-width)[order]
+    return order[np.lexsort((wide, marks != 0, marks & Flag.NOT_ANTIPODAL, group))]
 
 
 def at_level(ds: Any, force: float | None = None) -> tuple[Any, int, str]:

@@ -215,8 +215,8 @@ def _add_result_options(made: dict[str, Any]) -> None:
         made[name].add_argument("--force", type=values.positive, metavar="N", help="normal force [N], solved or "
                                 "between two solved ones (default: the lowest that holds the object, else the largest)"
                                 )  # fmt: skip
-        made[name].add_argument("--by", choices=RANKED_BY, help="what grasps are ranked by (default: payload where "
-                                "the scene has a mass or the direction of a weight, else quality)")  # fmt: skip
+        made[name].add_argument("--by", choices=RANKED_BY, default="payload", help="what grasps are ranked by, "
+                                "force: the least that holds object.mass_g (default payload)")  # fmt: skip
     made["compare"].add_argument("--quantity", default="e_n", metavar="NAME", help="map that is listed by case "
                                  "(default e_n)")  # fmt: skip
     for name, listed in (("show", "how many grasps"), ("compare", "largest differences")):
@@ -295,7 +295,7 @@ def _add_view_options(parser: argparse.ArgumentParser) -> None:
     add("file", metavar="FILE", help="result file (.hdf)")
     _add_choice(parser)
     add("--force", type=values.finite, metavar="N", help="force level nearest to N [N]")
-    add("--quantity", metavar="NAME", help="map on the object (default: quality)")
+    add("--quantity", metavar="NAME", help="map on the object (default: payload)")
     add("--motion", choices=("x", "y", "turn"), default="x",
         help="slip that the friction is drawn for (default: along x of the contact)")  # fmt: skip
     add("--screenshot", metavar="PNG", help="write a picture; needs no screen")

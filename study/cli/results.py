@@ -31,7 +31,7 @@ def show(options: Namespace) -> str:
             return best_text(ds, terminal_width(), options.force, options.top, options.by)
         return FORMS[options.form](best(ds, options.force, options.top, by=options.by))
     except ValueError as error:
-        raise StudyError(USAGE, f"{options.file}: --force: {error}") from error
+        raise StudyError(USAGE, f"{options.file}: {error}") from error
 
 
 def compare(options: Namespace) -> str:

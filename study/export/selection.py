@@ -25,7 +25,7 @@ from scipy.spatial.transform import Rotation
 from softjaw.study.export.cases import cases
 from softjaw.study.flags import LOST, flag_words, flags_in
 from softjaw.study.messages import USAGE, StudyError
-from softjaw.study.quantities import FORCE_RANGE, MAIN
+from softjaw.study.quantities import FORCE_RANGE, LEAST_FORCE, MAIN
 from softjaw.study.ranking import at_level, judged, ranked, score_of, task_keys
 from softjaw.study.result.read import axes_of, maps_in
 from softjaw.study.result.store import place_text
@@ -167,7 +167,7 @@ def chosen(ds: xr.Dataset, choice: Selection) -> tuple[list[dict[str, Any]], lis
     if unknown := [name for name in choice.least if name not in units]:
         raise StudyError(USAGE, f"--min: found '{unknown[0]}', expected one of {', '.join(units)}")
     at = at.assign(flags=(at.status.dims, judged(at), at["flags"].attrs))
-    shape, order = at.status.shape[:-1], ranked(at, k, choice.by, each=choice.force is None)
+    shape, order = at.status.shape[:-1], ranked(at, k, choice.by)
     which = [(*(int(i) for i in np.unravel_index(c, shape)), k) for c in order]
     least = {name: value / shown(1.0, units[name]) for name, value in choice.least.items()}
     # NaN is not at least anything, so a grasp without the value is left out.
@@ -182,7 +182,8 @@ def chosen(ds: xr.Dataset, choice: Selection) -> tuple[list[dict[str, Any]], lis
 def grasps(ds: xr.Dataset, choice: Selection, gripper: GripperFrame) -> list[RankedGrasp]:
     """The chosen grasps with the gripper's pose, one for each direction of approach."""
     found, places, by = chosen(ds, choice)
-    score = np.nan_to_num([max(float(case["maps"][by]), 0.0) for case in found])
+    values = [case["maps"][by] if by != LEAST_FORCE else 1.0 / case["maps"]["force_low"] for case in found]
+    score = np.nan_to_num([max(float(value), 0.0) for value in values])
     best, mass = max(score, default=0.0), in_si("mass_g", task_keys(ds, "object").get("mass_g"))
     mass, units = np.nan if mass is None else mass, maps_in(ds)
     made = []

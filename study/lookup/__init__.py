@@ -135,8 +135,7 @@ class GraspMap:
         n : int
             How many; fewer where fewer are solved.
         by : str, optional
-            "payload", "quality", "e_n" or "epsilon"; by default payload where the scene has a mass or the direction of
-            a weight, else quality.
+            "payload" (default), "quality", "e_n", "epsilon", or "force": the least that holds the object's mass.
         force : float, optional
             Solved force [N] at which they are ranked, and which the points have. By default that of ``softjaw show``;
             where the object's mass is known each point then has its own force to use.
@@ -146,7 +145,7 @@ class GraspMap:
         k, _ = shown_level(ds, flags) if force is None else (int(np.abs(forces - force).argmin()), "")
         if force is not None and not np.isclose(forces[k], force):
             raise ValueError(f"force is {force:g}: solved are {', '.join(f'{f:g}' for f in forces)} N")
-        order = ranked(ds, k, by, each=force is None)[:n]
+        order = ranked(ds, k, by)[:n]
         each = force is None and "force_low" in ds
         low = ds["force_low"].values.ravel() if each else np.full(self.source.status[..., k].size, np.nan)
         points = []

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from softjaw.study.case.result import MARGIN
 from softjaw.study.flags import LOST
 from softjaw.study.quantities import DONE, MISSING
-from softjaw.study.ranking import asked_score
 from softjaw.study.run.pattern import gained, next_poses, with_places
 
 if TYPE_CHECKING:
@@ -116,8 +115,8 @@ def chances_in(result: Any) -> FloatArray:
 
 
 def _scores(result: Any) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """The map that grasps are ranked by, CCM, NaN where nothing is solved; and whether a grasp can be used."""
-    values = _cases(result, result.read(f"{asked_score(result.layout.has)}/ccm"))
+    """The payload, by which grasps are ranked, CCM, NaN where nothing is solved; and whether a grasp can be used."""
+    values = _cases(result, result.read("payload/ccm"))
     flags = np.nan_to_num(_cases(result, result.read("flags/flags"))).astype(np.int64)
     values = np.where(_cases(result, result.status) == DONE, values, np.nan)
     return values, np.isfinite(values) & (flags & LOST == 0)

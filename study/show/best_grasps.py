@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from softjaw.study.case.result import TIE
 from softjaw.study.flags import LOST, OF_FILE, flags_in
 from softjaw.study.quantities import BY_KEY, FORCE_RANGE, MAIN, STATES, map_row
-from softjaw.study.ranking import at_level, judged, passed_over, ranked, score_of, task_keys
+from softjaw.study.ranking import Sure, at_level, judged, passed_over, rank_values, ranked, score_of, sure, task_keys
 from softjaw.study.result.layout import DONE, MISSING
 from softjaw.study.result.read import axes_of, dataset, values_of
 from softjaw.study.show.grasps import Index, at, forces, note, place, unravelled
 from softjaw.study.show.status import RESUME, aim, counts, largest_error, no_grasps, reasons, time_split
-from softjaw.study.show.tables.certainty import sure, verdict
 from softjaw.study.table import Column, Row, Table, as_text, number, terminal_width, with_error, wrapped
 from softjaw.study.units import in_si, shown, shown_text, shown_unit
 
@@ -48,19 +48,18 @@ def best(
     ds, k, why = at_level(ds, force)
     flags, shape = judged(ds), ds.status.shape[:-1]
     ds = ds.assign(flags=(ds.status.dims, flags, ds["flags"].attrs))
-    order, score = [int(i) for i in ranked(ds, k, by, each=force is None)], score_of(ds, by)
+    order, score = [int(i) for i in ranked(ds, k, by)], score_of(ds, by)
     listed = order[: top * (ds.sizes["angle"] if lines else 1) or None]
     table = case_table(ds, [(*unravelled(i, shape), k) for i in listed], True, maps)
     table = table.merged("rank", "angle").first(top) if lines else table
-    by = "force to use" if force is None and score == "payload" and "force_low" in ds else score
     what = f"best {len(table.rows) if not lines else min(len(listed), _count(table))} of {len(order)} solved"
     meaning = f" (±: {text})" if (text := meaning_of_errors(table)) else ""
-    title = f"{what} candidates by {by} at {forces(ds)[k]:g} N{why}{meaning}"
+    title = f"{what} candidates by {score} at {forces(ds)[k]:g} N{why}{meaning}"
     if not order:
         return Table(f"no candidate is solved at {forces(ds)[k]:g} N{why}{_solved_elsewhere(ds)}", table.columns, ())
     first = (*unravelled(order[0], shape), k)
     notes = [*certainties(ds, order, score, k), *_legend(flags, listed, k), *[error] * bool(error)]
-    facts = {"answer": answer(ds, first), "force": float(forces(ds)[k]), "ranked_by": by, "largest_error": error}
+    facts = {"answer": answer(ds, first), "force": float(forces(ds)[k]), "ranked_by": score, "largest_error": error}
     return Table(title, table.columns, table.rows, notes, facts, "grasps")
 
 
@@ -161,19 +160,64 @@ def safe_range(ds: xr.Dataset, index: Index) -> str:
 def certainties(ds: xr.Dataset, order: Sequence[int], score: str, k: int) -> list[str]:
     """Whether the best grasp is better than the others beyond the errors, and which ones are none or cannot be used."""
     flags, shape = ds["flags"].values[..., k].ravel()[order], ds.status.shape[:-1]
-    values = values_of(ds, score)[..., k].ravel()[order]
+    values = rank_values(ds, score, k)[order]
+    units = ds[score].attrs.get("units", "") if score in ds else ""
     holding = [i for i, flag, value in zip(order, flags, values, strict=True) if not flag & LOST and np.isfinite(value)]
     same = [tuple(np.delete(index, -1)) for index in np.ndindex(shape)]
-    notes = [verdict(sure(ds, score, k), holding, same, ds[score].attrs.get("units", "")).replace("+-", "±")]
+    notes = [verdict(sure(ds, score, k), holding, same, units).replace("+-", "±")]
     better, why = passed_over(values, flags)
-    if better:
-        top = shown_text(values[better[0]], ds[score].attrs.get("units", ""), 3)
+    if better and score in ds:
+        top = shown_text(values[better[0]], units, 3)
         count = "one grasp scores" if len(better) == 1 else f"{len(better)} grasps score"
         where = place(ds, (*unravelled(order[better[0]], shape), k))
         notes.append(f"{count} higher (up to {top}, {where}) but cannot be used and stand last: {why}")
     if none := no_grasps(ds.status.values[..., k]):
         notes.append(f"not solved: {', '.join(none)}; 'softjaw status' says why")
     return [note for note in notes if note]
+
+
+def verdict(found: Sure | None, order: Sequence[int], place: Sequence[tuple[int, ...]], units: str = "") -> str:
+    """One sentence on the best grasp against those that follow; empty where nothing is known of errors.
+
+    Parameters
+    ----------
+    found : Sure or None
+    order : sequence of int
+        The grasps from the best one downward; those that fail in the hand left out.
+    place : sequence of tuples of int
+        Of every grasp, what images by symmetry have in common.
+    units : str
+        Of the values, in SI.
+    """
+    if found is None:
+        return ""
+    grasps = _without_images(found.value, order, place)
+    if len(grasps) < 2:
+        return ""
+    judged = [found.apart(grasps[0], other) for other in grasps[1:]]
+    if not np.isfinite(found.half_width[grasps]).any():
+        return "errors are not known: not all cases are solved yet, or not with all samples of the uncertain inputs"
+    if judged[0] is None:
+        return "whether the best grasp is better than the second is not known: one of them has no error"
+    alike = max((i for i, apart in enumerate(judged, start=1) if apart is False), default=0)
+    one, other = (_text(found, i, units) for i in (grasps[0], grasps[alike or 1]))
+    if not alike:
+        return f"the best grasp is better than the second beyond the errors ({one} against {other})"
+    between = "" if all(apart is False for apart in judged[:alike]) else ", though some between them can"
+    return f"the first {alike + 1} grasps cannot be distinguished ({one} to {other}){between}"
+
+
+def _without_images(value: np.ndarray, order: Sequence[int], place: Sequence[tuple[int, ...]]) -> list[int]:
+    kept: list[int] = []
+    for i in order:
+        if not any(place[i] == place[j] and abs(value[i] - value[j]) <= TIE * abs(value[j]) for j in kept[-4:]):
+            kept.append(i)
+    return kept
+
+
+def _text(found: Sure, i: int, units: str) -> str:
+    value = f"{shown(found.value[i], units):#.4g}".rstrip(".")
+    return f"{value} +- {shown_text(found.half_width[i], units, 2)}"
 
 
 def _legend(flags: np.ndarray, listed: Sequence[int], k: int) -> list[str]:

@@ -148,7 +148,7 @@ def unravelled(position: int, shape: tuple[int, ...]) -> Index:
 def order(ds: xr.Dataset, k: int) -> list[Index]:
     """Indices of the solved cases at a force level, the best first."""
     shape = ds.status.shape[:-1]
-    found = ranked(ds, k, ds.attrs["score"], each=k == ds.attrs["level"])
+    found = ranked(ds, k, ds.attrs["score"])
     return [(*unravelled(int(c), shape), k) for c in found]
 
 

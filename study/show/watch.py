@@ -18,7 +18,7 @@ from rich.text import Text
 
 from softjaw.study.messages import DONE as ENDED
 from softjaw.study.messages import SOME_FAILED, STOPPED
-from softjaw.study.quantities import DONE, FAILED, FIRST, MISSING, STATES
+from softjaw.study.quantities import DONE, FAILED, MAIN, MISSING, STATES
 from softjaw.study.result.lock import holder
 from softjaw.study.result.read import dataset
 from softjaw.study.result.store import open_result
@@ -158,5 +158,6 @@ def best_so_far(result: Any, codes: np.ndarray) -> str:
     row, poses = table.rows[0], ds.attrs["poses"]
     where = [f'"{row["label"]}"'] * poses
     where += [f"{axis.name} {shown_text(row[axis.name], axis.units, 5)}" for axis in result.axes[: -3 if poses else -1]]
-    cells = [f"{c.name} {table.cell(row, c)} {shown_unit(c.unit)}".rstrip() for c in table.columns if c.name in FIRST]
+    first = (c for c in table.columns if c.name in MAIN[:2])
+    cells = [f"{c.name} {table.cell(row, c)} {shown_unit(c.unit)}".rstrip() for c in first]
     return f"best so far at {table.facts['force']:g} N: {', '.join(cells)}, at {', '.join(where)}"

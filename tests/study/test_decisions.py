@@ -79,7 +79,7 @@ def test_of_two_equally_near_forces_the_lower_is_taken(low, step, seed):
 @tries
 @given(scores, seeds)
 def test_rounding_is_no_difference_of_two_grasps(values, seed):
-    from softjaw.study.show.tables.certainty import Sure
+    from softjaw.study.ranking import Sure
 
     one, other = values[0], moved(values, seed)[0]
     pair = Sure(np.array([one, other]), np.zeros(2), np.empty((2, 0)))

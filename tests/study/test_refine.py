@@ -25,18 +25,17 @@ def tent(x, peak, width):
     return 0.05 + 0.15 * np.maximum(1 - np.abs(x - peak) / width, 0.0)
 
 
-def rounds_until_known(formula, budget=30, has=()):
+def rounds_until_known(formula, budget=30):
     """Stations that are added before nothing is expected to be better, by the rule of a study."""
-    score = "payload/ccm" if has else "quality/ccm"
     asked = SimpleNamespace(refine=budget, refine_within=BEST_WITHIN)
     scene = SimpleNamespace(candidates=asked)
     asked.station_values_mm = GIVEN.tolist()
     added = []
     while True:
         stations = np.array(sorted([*GIVEN, *(s for some in added for s in some)]))
-        values = {score: formula(stations)[:, None, None], "flags/flags": np.zeros((len(stations), 1, 1))}
+        values = {"payload/ccm": formula(stations)[:, None, None], "flags/flags": np.zeros((len(stations), 1, 1))}
         result = SimpleNamespace(
-            layout=SimpleNamespace(added=tuple(added), shape=(len(stations), 1, 1), has=has), read=values.get,
+            layout=SimpleNamespace(added=tuple(added), shape=(len(stations), 1, 1)), read=values.get,
             axes=[SimpleNamespace(values=1e-3 * stations), None, None], status=np.full((len(stations), 1, 1), DONE),
         )  # fmt: skip
         more = next_stations(result, scene, 1)
@@ -53,10 +52,6 @@ def test_the_best_of_a_steep_peak_is_found(peak, width):
     assert best > 0.2 * (1 - BEST_WITHIN)
     assert 1 <= len(added) <= 20
     assert np.abs(np.array(added) - peak).max() < 12 + width
-
-
-def test_a_scene_with_a_task_is_refined_by_its_payload():
-    assert rounds_until_known(lambda x: tent(x, 67.6, 6.0), has=("task",))[1] > 0.2 * (1 - BEST_WITHIN)
 
 
 def test_nothing_is_added_where_nothing_can_be_gained():

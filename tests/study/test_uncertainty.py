@@ -11,6 +11,7 @@ import softjaw
 from softjaw.study.case.candidates import axes, candidates
 from softjaw.study.case.poses import axis_poses, moved
 from softjaw.study.lookup import GraspMap
+from softjaw.study.ranking import Sure
 from softjaw.study.result.intervals import half_width
 from softjaw.study.result.read import read_patch
 from softjaw.study.run.plan import make_plan
@@ -18,7 +19,6 @@ from softjaw.study.scene import parse_scene
 from softjaw.study.scene.errors import SceneError
 from softjaw.study.scene.samples import latin_hypercube
 from softjaw.study.show.best_grasps import best
-from softjaw.study.show.tables.certainty import Sure
 
 BALL = """
 [object]

@@ -129,25 +129,39 @@ def test_between_forces_a_case_needs_both_and_carries_the_flags_of_both():
     assert not best(ds, force=2.0).rows
 
 
-def test_grasps_are_ranked_by_what_is_named_and_by_payload_where_there_is_a_task():
-    assert stations(best(rising())) == [0.0, 1.0]
-    assert stations(best(rising(), by="payload")) == [1.0, 0.0]
+def test_grasps_are_ranked_by_payload_or_by_what_is_named():
+    assert stations(best(rising())) == [1.0, 0.0]
+    assert stations(best(rising(), by="quality")) == [0.0, 1.0]
     assert stations(best(rising(0.3))) == [1.0, 0.0]
     assert stations(best(rising(0.3), by="quality", force=5.0)) == [1.0, 0.0]  # the other is too weak there
     assert stations(best(rising(0.1), by="quality")) == [1.0, 0.0]
     assert stations(best(rising(0.1), by="quality", force=5.0)) == [0.0, 1.0]
 
 
-def test_the_smallest_force_that_holds_the_object_is_the_best_and_at_a_given_force_the_largest_payload():
+def test_grasps_are_ranked_by_the_least_force_where_a_mass_is_named():
     """At 5 N the second holds more, but the first needs less force to hold 150 g twice over."""
     ds = rising(0.15)
     ds.payload.values[0, 0], ds.payload.values[1, 0] = [[0.12], [0.45]], [[0.11], [0.9]]
     ds["force_low"].values[:] = [[3.2], [3.5]]
     ds["safety_factor"] = ds.payload / 0.15
-    assert stations(best(ds)) == [0.0, 1.0]
-    assert stations(best(ds, force=5.0)) == [1.0, 0.0]
-    ds["force_low"].values[0] = np.nan
     assert stations(best(ds)) == [1.0, 0.0]
+    assert stations(best(ds, by="force")) == [0.0, 1.0]
+    ds["force_low"].values[0] = np.nan
+    assert stations(best(ds, by="force")) == [1.0, 0.0]
+    with pytest.raises(ValueError, match="mass_g"):
+        best(rising(), by="force")
+
+
+def test_of_grasps_that_errors_cannot_tell_apart_the_simpler_comes_first():
+    """Payloads 1.00, 0.99, 0.98 with 2 % each cannot be told apart, 0.9 can."""
+    ds = study([[1.0], [0.99], [0.98], [0.9]], flags=[float(Flag.NOT_ANTIPODAL), float(Flag.COARSE), 0.0, 0.0])
+    assert stations(best(ds)) == [0.0, 1.0, 2.0, 3.0]
+    ds["payload_error"] = (ds.status.dims, np.full(ds.status.shape, 0.02), {"units": ""})
+    assert stations(best(ds)) == [2.0, 1.0, 0.0, 3.0]
+    ds["flags"].values[:] = 0
+    assert stations(best(ds)) == [2.0, 1.0, 0.0, 3.0]  # by their opening, which is the number of the payload here
+    ds["opening"] = (ds.status.dims, np.repeat([0.01, 0.02, 0.03, 0.001], 2).reshape(ds.status.shape), {"units": "m"})
+    assert stations(best(ds)) == [0.0, 1.0, 2.0, 3.0]
 
 
 def test_without_a_mass_the_force_is_the_largest_that_most_share_and_with_one_the_lowest_that_holds():

@@ -122,14 +122,14 @@ def test_show_has_indentations_stress_and_the_window_of_forces(can):
     assert [row["flags"] & (Flag.TOO_WEAK | Flag.TOO_STRONG) for row in strong.rows] == [0, 0]  # as in the file
 
 
-@pytest.mark.parametrize("flag", [Flag.SLIDES_OUT, Flag.YIELDS, Flag.SNAPPED])
+@pytest.mark.parametrize("flag", [Flag.SLIDES_OUT, Flag.YIELDS])
 def test_grasps_that_slide_out_or_yield_come_last(tmp_path, can, flag):
     with open_result(can) as result:
         first = best(dataset(result), force=1.0).rows[0]["station"]
         index = (int(np.abs(result.axes[0].values - first).argmin()), 0, 0)
     with open_result(changed(can, tmp_path, "flags/flags", int(flag), index)) as result:
         table = best(dataset(result), force=1.0)
-    assert (table.rows[0]["station"] == first) == (flag == Flag.SNAPPED)
+    assert table.rows[0]["station"] != first
     assert any(flag.word in row["notes"] for row in table.rows)
 
 
