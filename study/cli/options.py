@@ -215,7 +215,7 @@ def _add_result_options(made: dict[str, Any]) -> None:
         made[name].add_argument("--force", type=values.positive, metavar="N", help="normal force [N], solved or "
                                 "between two solved ones (default: the lowest that holds the object, else the largest)"
                                 )  # fmt: skip
-        made[name].add_argument("--by", choices=RANKED_BY, default="payload", help="what grasps are ranked by, "
+        made[name].add_argument("--by", choices=RANKED_BY, help="what grasps are ranked by, "
                                 "force: the least that holds object.mass_g (default payload)")  # fmt: skip
     made["compare"].add_argument("--quantity", default="e_n", metavar="NAME", help="map that is listed by case "
                                  "(default e_n)")  # fmt: skip
