@@ -21,16 +21,15 @@ from softjaw.fem.contact.problem import bearing, borne
 from softjaw.fem.errors import CheckError, MeshError
 from softjaw.fem.objects.gap import NoContactError, Pose, first_touch
 from softjaw.fem.objects.mesh_object import MeshObject
-from softjaw.fem.objects.outer_surface import Section, Turned, _by_height, of_sections
-from softjaw.fem.objects.profile import _corner, straight_runs
-from softjaw.fem.objects.revolution import Revolution, _check_line
+from softjaw.fem.objects.outer_surface import Section, Turned, of_sections
+from softjaw.fem.objects.profile import straight_runs
+from softjaw.fem.objects.revolution import Revolution
 from softjaw.fem.objects.shapes import Box, EllipticCylinder, Sphere
 from softjaw.fem.objects.spline_surface import spline_surface
-from softjaw.fem.objects.stacked import Stacked, wall_surface
-from softjaw.fem.objects.traced_outline import Rays, _centre_line, cast, centroids, folded
-from softjaw.fem.objects.traced_surface import _symmetric
+from softjaw.fem.objects.stacked import Stacked
+from softjaw.fem.objects.traced_outline import Rays, cast, centroids, folded
 from softjaw.fem.objects.triangles import cleaned
-from softjaw.fem.pad.backing_plate import _plate
+from softjaw.fem.pad.backing_plate import back_stiffness
 from softjaw.fem.pad.shape import BackingPlate
 from softjaw.fem.shell.facing import FAR, Wall, face
 from softjaw.fem.shell.thin_walled import ThinWalled, grasp
@@ -109,7 +108,7 @@ def volume(points, triangles):
 # --- meshes -----------------------------------------------------------------------------------------------------------
 
 TWO_TURNED = CUBE[0], np.concatenate([CUBE[1][:2, ::-1], CUBE[1][2:]])
-ACCEPTED = {  # mesh, and its volume
+MESHES = {  # and their volumes, 0 for what is no closed surface
     "closed": (CUBE, 1.0),
     "two turned": (TWO_TURNED, 1.0),
     "inside out": ((CUBE[0], CUBE[1][:, ::-1]), 1.0),
@@ -120,30 +119,23 @@ ACCEPTED = {  # mesh, and its volume
     "touching along an edge": (union(CUBE, shifted(CUBE, 0.5, [0.75, 0.75, 0.0])), 1.125),
     "crossing": (union(CUBE, shifted(CUBE, 1.0, [0.5, 0.3, 0.2])), 2.0),
     "thin": ((CUBE[0] * [1, 1, 1e-4], CUBE[1]), 1e-4),
-}
-OPEN = {  # what is no closed surface
-    "open": (CUBE[0], CUBE[1][1:]),
-    "flat": FLAT_PIECE,
-    "flat beside another": union(CUBE, shifted(FLAT_PIECE, 0.3, [1, 1, 1])),
-    "face on a face": union(CUBE, shifted(CUBE, 1.0, [0.0, 0.0, 1.0])),
+    "open": ((CUBE[0], CUBE[1][1:]), 0.0),
+    "flat": (FLAT_PIECE, 0.0),
+    "flat beside another": (union(CUBE, shifted(FLAT_PIECE, 0.3, [1, 1, 1])), 0.0),
+    "face on a face": (union(CUBE, shifted(CUBE, 1.0, [0.0, 0.0, 1.0])), 0.0),
 }
 
 
-@pytest.mark.parametrize("name", list(ACCEPTED))
+@pytest.mark.parametrize("name", MESHES)
 @tries
 @given(seed=seeds)
-def test_a_mesh_is_sound_in_every_position(name, seed):
-    (points, triangles), expected = ACCEPTED[name]
+def test_a_mesh_is_the_same_in_every_position(name, seed):
+    (points, triangles), expected = MESHES[name]
     x, scale = turned(points, seed)
-    assert volume(*cleaned(x, triangles)[:2]) == pytest.approx(expected * scale**3, rel=1e-6)
-
-
-@pytest.mark.parametrize("name", list(ACCEPTED) + list(OPEN))
-@tries
-@given(seed=seeds)
-def test_whether_a_mesh_is_closed_does_not_depend_on_its_position(name, seed):
-    points, triangles = OPEN[name] if name in OPEN else ACCEPTED[name][0]
-    assert cleaned(turned(points, seed)[0], triangles).closed == (name in ACCEPTED)
+    mesh = cleaned(x, triangles)
+    assert mesh.closed == (expected > 0)
+    if mesh.closed:
+        assert volume(mesh.points, mesh.triangles) == pytest.approx(expected * scale**3, rel=1e-6)
 
 
 @tries
@@ -154,12 +146,12 @@ def test_corners_that_rounding_of_a_file_moved_apart_are_one(seed):
     rng = np.random.default_rng(seed)
     soup = x[CUBE[1]].reshape(-1, 3).astype(np.float32)
     soup = np.nextafter(soup, soup + rng.choice(np.float32([-1, 0, 1]), soup.shape)).astype(float)
-    own = np.arange(len(soup)).reshape(-1, 3)
-    points, triangles, *_ = cleaned(soup, own)
+    corners = np.arange(len(soup)).reshape(-1, 3)
+    points, triangles, *_ = cleaned(soup, corners)
     assert (len(points), len(triangles)) == (8, 12)
     assert volume(points, triangles) == pytest.approx(scale**3, rel=1e-4)
     soup[:3] += 1e-4 * scale  # a hole that is as large as a side
-    assert not cleaned(soup, own).closed
+    assert not cleaned(soup, corners).closed
 
 
 @pytest.mark.parametrize(("size", "beyond"), [(1e-3, 1 - 1e-5), (2.0, 1 + 1e-5)])
@@ -225,34 +217,6 @@ def test_a_fold_is_one_from_the_size_of_a_facet_on(seed):
     assert folded(Rays(outer, inner, np.ones((1, 4))), facet).tolist() == [[False, False, True, True]]
 
 
-@tries
-@given(seeds)
-def test_radii_have_the_symmetry_that_they_nearly_have(seed):
-    """Ovals and circles; one pressed in by more than the tolerance on one side."""
-    rng, theta = np.random.default_rng(seed), 2 * np.pi / 64 * np.arange(64)
-    scale, tolerance, there = rng.uniform(0.01, 0.1), 1e-7, np.array([True, True])
-    oval, egg = scale * (1 + 0.1 * np.cos(2 * theta)), scale * (1 + 0.1 * np.cos(theta) ** 3)
-    for r, expected in (
-        (np.full(64, scale), (True, True, True)),
-        (oval, (True, True, False)),
-        (egg, (False, True, False)),
-        (np.roll(oval, 3), (False, False, False)),
-    ):
-        R, found, is_round = _symmetric(moved(np.tile(r, (3, 1)), seed), there, tolerance)
-        assert (*found, is_round) == expected
-        assert not expected[1] or (R[:, 1:] == R[:, :0:-1]).all()
-
-
-@tries
-@given(seeds)
-def test_centres_near_the_axis_are_on_it(seed):
-    rng, z = np.random.default_rng(seed), np.linspace(0.0, 0.1, 40)
-    noise = rng.uniform(-1e-16, 1e-16, (40, 2))
-    line = _centre_line(z, noise + np.array([0.0, 1e-3]), (0.0, 0.1), 0.05, 1e-7)
-    assert line(z)[:, 0].tolist() == [0.0] * 40
-    assert line(z)[:, 1] == pytest.approx(1e-3, rel=1e-6)
-
-
 # --- touch ------------------------------------------------------------------------------------------------------------
 
 
@@ -276,10 +240,9 @@ def test_a_pad_that_passes_at_the_surface_itself_has_no_contact(seed):
         with pytest.raises(NoContactError):
             travel_past(ball, [0.0, -0.1, half + out], seed, 5.0)
     assert travel_past(ball, [0.0, -0.1, half - 1e-5], seed, 5.0) == pytest.approx(0.1 - np.sqrt(2e-5 * half), abs=1e-5)
-    with pytest.raises(NoContactError, match="grazes"):
-        travel_past(box, [0.0, -0.1, half], seed)
-    with pytest.raises(NoContactError, match="misses"):
-        travel_past(box, [0.0, -0.1, half + 1e-8], seed)
+    for out in (0.0, 1e-8):
+        with pytest.raises(NoContactError):
+            travel_past(box, [0.0, -0.1, half + out], seed)
     assert 0.1 - half < travel_past(box, [0.0, -0.1, half - 1e-8], seed) < 0.1 - 0.8 * half
 
 
@@ -296,7 +259,7 @@ def test_a_pad_that_starts_at_the_surface_touches_at_once(seed):
 
     assert closing(0.0) == pytest.approx(0.0, abs=2e-9)
     assert closing(1e-3) == pytest.approx(1e-3, abs=2e-12)
-    with pytest.raises(NoContactError, match="inside"):
+    with pytest.raises(NoContactError):
         closing(-1e-8)
 
 
@@ -354,9 +317,9 @@ def test_a_way_of_whole_steps_has_as_many_forces(seed, steps):
 @given(seeds)
 def test_a_closing_that_stays_is_no_fall(seed):
     closing = np.random.default_rng(seed).uniform(1e-4, 1e-2)
-    for after, kept in ((1.0, True), (0.96, True), (0.94, False)):
-        (one, other) = moved([closing, after * closing], seed)
-        assert (outcome(refuse_fall, (1.0, one), (2.0, other)) is None) is kept
+    for share, accepted in ((1.0, True), (0.96, True), (0.94, False)):
+        before, after = moved([closing, share * closing], seed)
+        assert (outcome(refuse_fall, (1.0, before), (2.0, after)) is None) is accepted
 
 
 @tries
@@ -377,13 +340,14 @@ def test_nodes_on_the_rim_of_the_support_are_held(seed):
     scale = np.random.default_rng(seed).uniform(0.3, 3.0)
     support = tuple(scale * np.array([0.020, 0.011]))
     sheet = BackingPlate(1e-3, 2e9, 0.35, tuple(moved(support, seed)))
-    half, whole = ((x[5:], y[2:], (True, True)), (x, y, (False, False)))
-    for lines, other, symmetry in (half, whole):
-        _, fixed, free = _plate(tuple(moved(scale * lines, seed)), tuple(moved(scale * other, seed)), symmetry, sheet)
-        held = ~free.any(axis=-1)
+    quarter, full = ((x[5:], y[2:], (True, True)), (x, y, (False, False)))
+    for lines, other, symmetry in (quarter, full):
+        back = back_stiffness(tuple(moved(scale * lines, seed)), tuple(moved(scale * other, seed)), symmetry, sheet)
+        held = ~back.free.any(axis=-1)
         assert held.sum() == (6 if all(symmetry) else 15)
-        assert fixed.sum() == (6 * 6 + 2 * (3 + 1) if all(symmetry) else 15 * 6)
-    assert outcome(_plate, x[:2], y, (False, False), BackingPlate(1e-3, 2e9, 0.35, (0.02, 0.011))) is ValueError
+        assert (~back.free).sum() == 3 * held.sum() + (4 if all(symmetry) else 0)  # of nodes on a plane of symmetry
+    nothing_held = BackingPlate(1e-3, 2e9, 0.35, (0.02, 0.011))
+    assert outcome(back_stiffness, tuple(x[:2]), tuple(y), (False, False), nothing_held) is ValueError
 
 
 @tries
@@ -415,7 +379,7 @@ def test_a_slope_of_the_thickness_at_an_end_adds_no_line(seed):
 
 EGG = np.array([[0.0, 0.0], [0.02, 0.02], [0.05, 0.03], [0.08, 0.02], [0.1, 0.0]])
 PIECES = len(Revolution(EGG).curve.coefficients)
-# back down beside the first run, as close as is wanted
+# back down onto the first run
 FOLDED = np.array([[0, 30], [100, 30], [100, 50], [40, 50], [40, 30], [-20, 30]]) / 1e3
 
 
@@ -434,27 +398,16 @@ def test_an_end_of_a_profile_is_on_the_axis_or_not(seed):
 @tries
 @given(seeds)
 def test_an_outline_that_runs_back_on_itself_touches_itself(seed):
-    """The last run lies on the first one, or 1e-6 of the size above it; and the same at its corner."""
+    """The last run lies on the first one; and the same at its corner."""
     scale = np.random.default_rng(seed).uniform(0.5, 3.0)
     for line in (FOLDED, FOLDED[:5]):
-        assert outcome(_check_line, moved(scale * line, seed)) is ValueError
-        apart = line + np.where(np.arange(len(line)) > 3, 1e-7, 0.0)[:, None] * [0.0, 1.0]
-        assert outcome(_check_line, moved(scale * apart, seed)) is None
-
-
-@tries
-@given(seeds)
-def test_an_outline_that_comes_down_to_the_axis_touches_it(seed):
-    scale = np.random.default_rng(seed).uniform(0.5, 3.0)
-    for low, found in ((0.0, ValueError), (1e-10, ValueError), (1e-7, None)):
-        line = np.array([[0.0, 0.0], [0.0, 0.03], [0.05, low], [0.1, 0.03], [0.1, 0.0]])
-        assert outcome(_check_line, moved(scale * line, seed)) is found
+        assert outcome(Revolution, moved(scale * line, seed)) is ValueError
 
 
 @tries
 @given(seeds)
 def test_points_of_a_line_are_a_straight_run(seed):
-    """Two lines at any angle that does not fold them; parts of one line have no corner between them."""
+    """Two lines at any angle that does not fold them."""
     rng = np.random.default_rng(seed)
     first, turn = rng.uniform(-1.0, 1.0), rng.choice([-1.5, -0.01, 0.01, 1.5])
     steps = rng.uniform(0.005, 0.03, 8)
@@ -462,8 +415,6 @@ def test_points_of_a_line_are_a_straight_run(seed):
     path = np.cumsum(np.concatenate([[[0.1, 0.5]], steps[:, None] * np.stack([np.cos(angles), np.sin(angles)], 1)]), 0)
     assert straight_runs(moved(path, seed)) == [(0, 4, True), (4, 8, True)]
     assert straight_runs(moved(path[:5], seed)) == [(0, 4, True)]
-    assert _corner(moved(path[:5], seed), (0, 2, True), (2, 4, True), 0.002) is None
-    assert _corner(moved(path, seed), (0, 4, True), (4, 8, True), 0.002) is not None
 
 
 HEIGHTS = -0.0437, 0.0811
@@ -490,13 +441,11 @@ def test_sections_are_round_up_to_rounding(seed):
     z = np.linspace(0.0, 0.1, n) * rng.uniform(0.5, 2.0)
     noise, rise = rng.choice(ULPS, n), np.abs(rng.choice(ULPS, n))
 
-    def order(off=0.0, exponent=0.0, symmetric=(True, True)):
-        curve = SimpleNamespace(derivative=lambda s: np.stack([s, 0.03 + 0 * s], axis=1))
-        ratio, n = _by_height(z, 1 + noise + off), _by_height(z, 2.0 + 2 * rise + exponent)
-        outer = SimpleNamespace(symmetric=symmetric, wall=z[[0, -1]], curve=curve, ratio=ratio, exponent=n)
-        return Stacked(outer).axis_symmetry
+    def order(off=0.0, exponent=0.0, shift=0.0):
+        sizes = zip(z, 0.03 * (1 + noise + off), 2.0 + 2 * rise + exponent, [shift, 0, 0, 0], strict=True)
+        return Stacked(of_sections([Section(h, 0.03, b, e, (s, 0.0)) for h, b, e, s in sizes])).axis_symmetry
 
-    assert (order(), order(off=1e-6), order(exponent=1e-6), order(symmetric=(False, True))) == (0, 2, 2, 1)
+    assert (order(), order(off=1e-6), order(exponent=1e-6), order(shift=1e-3)) == (0, 2, 2, 1)
 
 
 @tries
@@ -521,12 +470,12 @@ def test_a_grasp_of_a_round_body_has_both_planes_at_every_angle(seed):
         R = np.stack([[0.0, 0.0, along], np.cross(-out, [0.0, 0.0, along]), -out], axis=1)
         return Pose(moved(R, seed), moved(0.03 * out + off * side + [0.0, 0.0, z], seed))
 
-    one, two, off = pose(phi, up, 0.0), pose(phi + np.pi, up, 0.0), pose(phi + np.pi, up, 1e-6)
-    held = grasp(BODY, (one, two))
+    first, second, off = pose(phi, up, 0.0), pose(phi + np.pi, up, 0.0), pose(phi + np.pi, up, 1e-6)
+    held = grasp(BODY, (first, second))
     assert held.mirrors == (True, True)
     assert len(held.poses) == 1
-    assert held.flipped == (bool(one.rotation[:, 1] @ [-np.sin(phi), np.cos(phi), 0.0] < 0),)
-    assert grasp(BODY, (one, off)).mirrors == (False, False)
+    assert held.flipped == (bool(first.rotation[:, 1] @ [-np.sin(phi), np.cos(phi), 0.0] < 0),)
+    assert grasp(BODY, (first, off)).mirrors == (False, False)
 
 
 @tries
@@ -563,8 +512,8 @@ def test_a_point_at_the_end_of_a_wall_faces_it(seed):
     out, z = 1.0 + rng.uniform(0.0, 1e-3), np.array([0.0, 2.0, -2e-6, 2.0 + 2e-6, 1.0, 1.0, 1.0, 1.0])
     phi = np.array([1.0, 2.0, 1.0, 2.0, 0.0, np.pi, -1e-6, np.pi + 1e-6])
     x = moved(np.stack([out * np.cos(phi), out * np.sin(phi), z], axis=1), seed)
-    found = face(wall, x, wall.places(x), np.zeros((65, 3)), np.zeros((65, 3)))
-    assert (found.gap < FAR).tolist() == [True, True, False, False, True, True, False, False]
+    gap = face(wall, x, wall.places(x), np.zeros((65, 3)), np.zeros((65, 3))).gap
+    assert (gap < FAR).tolist() == [True, True, False, False, True, True, False, False]
 
 
 @tries
@@ -579,23 +528,6 @@ def test_a_surface_ends_where_it_began(seed):
     X[-1] = 1e-6
     X[1:-1] = 1.0
     assert outcome(spline_surface, np.arange(5.0), np.arange(5.0), X, True) is ValueError
-
-
-@tries
-@given(seeds)
-def test_lines_of_a_surface_that_rounding_doubles_are_one(seed):
-    """Ends of the wall that fall on breaks of its outline but for rounding."""
-    rng = np.random.default_rng(seed)
-    breaks = np.array([0.0, 0.01, 0.05, 0.09, 0.1]) * rng.uniform(0.5, 2.0)
-    outer = SimpleNamespace(
-        wall=(breaks[1], breaks[3]), curve=SimpleNamespace(breaks=moved(breaks, seed)),
-        jets=lambda T, S: np.stack([np.cos(T), np.sin(T), S], -1).reshape(-1, 1, 3),
-    )  # fmt: skip
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("softjaw.fem.objects.stacked.spline_surface", lambda theta, s, X, closed: s)
-        s = wall_surface(outer, *moved(breaks[[0, 4]], seed))
-    assert len(s) == 256 + 2 * 15 + 3
-    assert np.diff(s).min() > 1e-9
 
 
 # --- shapes -----------------------------------------------------------------------------------------------------------

@@ -11,7 +11,7 @@ from softjaw.fem.shell.wall_material import WallMaterial, wall_material
 from softjaw.fem.shell.wall_mesh import MeshSize, body_mesh, divided, limited
 from softjaw.fem.shell.wall_model import LinearShell
 from softjaw.fem.shell.wall_stress import faces
-from tests.fem.shell.shell_path import ShellProblem, load_steps
+from tests.fem.shell.shell_path import Loaded, load_steps
 
 FLASK = Revolution(
     np.array([[0, 30], [30, 30], [60, 30], [75, 29], [90, 22], [105, 14], [115, 12], [125, 12], [135, 12]]) / 1e3
@@ -159,7 +159,7 @@ def test_quarter_half_and_whole_are_the_same():
     found = []
     for symmetry in (WHOLE, HALF_Y, HALF_X, QUARTER):
         mesh, body, load, node = pinched(symmetry)
-        (state,) = load_steps(ShellProblem(*body, load), [1.0])
+        (state,) = load_steps(Loaded(*body, load), [1.0])
         worst = [v for f in faces(body[0], state.q) for v in (f.von_mises.max(), np.abs(f.principal_strain).max())]
         found.append([*body[0].displacement(state.q)[node], *worst])
         assert np.abs(reaction(body, state.q)).max() < 1e-7
@@ -171,7 +171,7 @@ def test_quarter_half_and_whole_are_the_same():
 
 def test_small_loads_agree_with_the_linear_shell():
     _, body, load, _ = pinched(QUARTER)
-    (state,) = load_steps(ShellProblem(*body, 1e-4 * load), [1.0])
+    (state,) = load_steps(Loaded(*body, 1e-4 * load), [1.0])
     linear = LinearShell(*body).solve(1e-4 * load)
     assert linear == pytest.approx(state.q, abs=1e-4 * np.abs(state.q).max())
 
