@@ -23,7 +23,9 @@ class NotReachedError(ConvergenceError):
 
 
 class CheckError(RuntimeError):
-    """A solve converged to a state that breaks a law of contact or of the material."""
+    """A solve converged to a state that breaks a law of contact or of the material; ``law`` is its key, where known."""
+
+    law = ""
 
 
 class MeshError(ValueError):

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 import trimesh
 
-from softjaw.fem.objects.facing_sheet import facing_sheet
 from softjaw.fem.objects.gap import Pose, grid_triangles
 from softjaw.fem.objects.mesh_holes import border_loops, filling
 from softjaw.fem.objects.mesh_object import MeshObject
@@ -60,10 +59,10 @@ def in_box(n=600, shrunk=0.999, seed=5):
     return np.random.default_rng(seed).uniform(shrunk * BOX[0], shrunk * BOX[1], (n, 3))
 
 
-@pytest.mark.parametrize("wall", [0.002, 0.005])
-@pytest.mark.parametrize(("shape", "place"), [
-    (bottle, (0.06, 0.03)), (bottle, (0.105, 0.0215)), (bottle, (0.14, 0.012)), (bowl, (0.025, 0.042)),
-    (bowl, (0.045, 0.05)),
+@pytest.mark.parametrize(("shape", "place", "wall"), [
+    (bottle, (0.105, 0.0215), 0.002), (bowl, (0.025, 0.042), 0.005),
+    *(pytest.param(shape, place, wall, marks=pytest.mark.long) for wall in (0.002, 0.005) for shape, place in (
+        (bottle, (0.06, 0.03)), (bottle, (0.14, 0.012)), (bowl, (0.045, 0.05)))),
 ])  # fmt: skip
 def test_an_inner_wall_changes_nothing(shape, place, wall):
     """The gap of a hollow body is that of its outer surface alone, up to half a wall inside it and behind."""
@@ -117,7 +116,7 @@ def test_edges_above_the_crease_angle_stay_and_neighbours_stay_joined():
     assert smooth_triangles(*octagon).bulge(np.arange(len(octagon[1]))).max() < 1e-15
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(4))
 def test_an_edge_that_turns_by_just_the_crease_angle_stays(seed):
     """A prism of twelve sides, moved by rounding; a little above the angle its edges are facets."""
     x, triangles = turned([[0, 0], [0, 0.02], [0.05, 0.02], [0.05, 0]], 12)
@@ -187,14 +186,13 @@ def punctured(mesh, place, size):
     return x, triangles[np.linalg.norm(x[triangles].mean(axis=1) - place, axis=1) > size]
 
 
-def test_a_small_hole_is_filled_without_moving_a_point_and_said():
+def test_a_small_hole_is_filled_without_moving_a_point():
     mesh = ball(100, 200)
     x, triangles = punctured(mesh, [0.03, 0, 0], 0.0007)
     assert len(border_loops(triangles)) == 2
     sound = cleaned(x, triangles)
     assert not len(sound.lids)
     assert len(sound.notes) == 1
-    assert "holes filled" in sound.notes[0]
     assert {tuple(p) for p in sound.points} <= {tuple(p) for p in mesh[0]}
     edges = np.sort(sound.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     assert (np.unique(edges, axis=0, return_counts=True)[1] == 2).all()
@@ -269,48 +267,6 @@ def test_closest_points_and_rays_of_the_tree_are_those_of_all_triangles():
         if hit >= 0:
             p, n = o + t * d, tree.face_normals[hit]
             assert abs((p - x[triangles[hit, 0]]) @ n) < 1e-12
-
-
-def test_every_force_on_a_hollow_bowl_is_solved(tmp_path):
-    """A station where the inner wall, 2 mm under the outer one, used to spoil the gap."""
-    from softjaw.study import pipeline
-    from softjaw.study.case.candidates import units
-    from softjaw.study.case.result import CaseResult
-    from softjaw.study.scene import load_scene
-
-    x, triangles = turned(bowl(0.002), 48)
-    facets = np.zeros(len(triangles), [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-    facets["corners"] = 1e3 * x[triangles]
-    (tmp_path / "bowl.stl").write_bytes(bytes(80) + np.uint32(len(facets)).tobytes() + facets.tobytes())
-    (tmp_path / "bowl.toml").write_text("""
-        [object]
-        shape = "mesh"
-        mesh = "bowl.stl"
-        unit = "mm"
-        [gripper]
-        pad_length_mm = 20
-        pad_width_mm = 14
-        pad_thickness_mm = 12
-        elements = [8, 6, 4]
-        [candidates]
-        stations_mm = [39]
-        angles_deg = [4]
-        [load]
-        normal_force_n = [1, 3]
-        [effects]
-        friction_pressure_coupling = "none"
-    """)
-    (unit,) = units(load_scene(tmp_path / "bowl.toml"), lambda _: 1)
-    found = [result for _, result in pipeline.solve_unit(unit)]
-    assert [type(result) for result in found] == [CaseResult, CaseResult]
-
-
-def test_nothing_is_seen_from_behind():
-    """Without a facing triangle in the box the whole mesh stands in."""
-    mesh = MeshObject(*ball())
-    pose = side(0.0, np.pi, -0.02)
-    sheet = facing_sheet(mesh._smooth, mesh._tree, True, pose, BOX + 0.001, 1e-3)
-    assert len(sheet.sheet.triangles)
 
 
 def test_the_twelve_edges_of_a_cylinder_in_single_precision_are_all_creases():

@@ -52,7 +52,7 @@ def test_two_straight_runs_of_one_direction_have_no_corner(outline):
     assert body.smallest_radius > 0.1
 
 
-@settings(max_examples=100, deadline=None, derandomize=True)
+@settings(max_examples=40, deadline=None, derandomize=True)
 @given(st.integers(3, 40), st.floats(20, 200), st.floats(5, 60), st.floats(5, 60))
 def test_every_frustum_rounded_to_a_micrometre_is_one(n, height, low, high):
     points = rounded_frustum(n, height, low, high)
@@ -75,16 +75,3 @@ def test_gentle_corners_between_straight_runs_are_smooth(turn):
     assert np.abs(g - np.maximum(0, np.sin(turn) * (x[:, 2] - 0.04))).max() < min(0.03 * turn, 1e-6) + 1e-15
     assert np.arctan2(normal[:, 2], normal[:, 0]) == pytest.approx(np.clip(turn, 0, turn) / 2, abs=0.51 * turn + 1e-9)
     assert np.abs(hessian[:, [0, 0, 2], [0, 2, 2]]).max() < 1e-3 + 1100 * turn / 1e-2
-
-
-def test_frusta_of_rounded_numbers_become_outlines():
-    """Runs that rounding to 0.001 mm gives one direction, or nearly one, are no corner that divides 0 by 0."""
-    rng = np.random.default_rng(1)
-    for _ in range(30):
-        low, radii = rng.uniform(0.0, 150.0), rng.uniform(3.0, 60.0, 2)
-        high = low + rng.uniform(5.0, 150.0)
-        t = np.unique(np.r_[0.0, rng.uniform(0.0, 1.0, 6), 1.0])
-        points = np.round(np.column_stack([low + t * (high - low), radii[0] + t * (radii[1] - radii[0])]), 3)
-        with np.errstate(all="raise"):
-            body = Revolution(1e-3 * np.unique(points, axis=0))
-        assert np.isfinite(body.gap(np.array([[0.1, 0.0, 1e-3 * low]]))[0]).all()

@@ -117,7 +117,8 @@ def with_holes(points, triangles):
 KINDS = {f.__name__: f for f in (flipped, soup, doubled, with_inner_wall, with_holes)}
 
 
-@pytest.mark.parametrize("kind", [*KINDS, "slabs"])
+@pytest.mark.parametrize("kind", ["soup", "with_inner_wall", *(pytest.param(kind, marks=pytest.mark.long)
+                                  for kind in ("flipped", "doubled", "with_holes", "slabs"))])  # fmt: skip
 def test_a_body_is_the_same_to_a_finger_however_its_triangles_are_given(kind):
     body = outline_body()
     mesh = slabs(5) if kind == "slabs" else KINDS[kind](np.array(body.vertices), np.array(body.faces))

@@ -198,19 +198,11 @@ def is_inverted(press, x):
     x[inner_dof(press.pad)] += 0.02
 
 
-@pytest.mark.parametrize(
-    ("tamper", "words"),
-    [
-        (pulls, "tension in the contact: lowest pressure -"),
-        (penetrates, "the pad penetrates the object by"),
-        (lifts, "pressure and gap are both positive"),
-        (is_unbalanced, "force balance is off by 1.0e-07"),
-        (is_inverted, "an element is inverted: det F = -"),
-        (is_unbalanced_inside, "a node is out of balance by"),
-    ],
-    ids=lambda value: getattr(value, "__name__", ""),
-)
-def test_wrong_states_are_refused_whatever_the_solver_says(tamper, words):
+@pytest.mark.parametrize(("tamper", "law"), [
+    (pulls, "adhesion"), (penetrates, "penetration"), (lifts, "complementarity"), (is_unbalanced, "force balance"),
+    (is_inverted, "inversion"), (is_unbalanced_inside, "nodal balance"),
+])  # fmt: skip
+def test_wrong_states_are_refused_whatever_the_solver_says(tamper, law):
     press = Press(pad_of(), reference.plane)
     solve = press.solver.solve
 
@@ -221,8 +213,9 @@ def test_wrong_states_are_refused_whatever_the_solver_says(tamper, words):
         return x, done
 
     press.solver.solve = wrong
-    with pytest.raises(CheckError, match=f"at 5 N converged but is wrong: .*{words}"):
+    with pytest.raises(CheckError) as error:
         list(press.load_path([5.0]))
+    assert error.value.law == law
 
 
 def test_checks_of_a_right_state_are_small():

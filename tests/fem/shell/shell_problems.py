@@ -111,8 +111,6 @@ def hinged_roof(thickness, n=16):
     return c
 
 
-
-
 def scordelis_lo(n):
     """Quarter of a roof under its weight of 90 per area, on rigid diaphragms; 0.3024 down at the middle of the side."""
     c, k = cylinder(25.0, 25.0, 0.25, np.radians(40), 4.32e8, 0.0, n, n)
