@@ -94,8 +94,6 @@ REASONS = {value: name for name, value in vars(PETSc.SNES.ConvergedReason).items
 OUT_OF_MEMORY = (-5, -7, -13)  # INFOG(1) of MUMPS
 WITHIN, FAST = 1e5, 0.05  # see NonlinearSolver
 STALLED = 5  # iterations without a fall to less than a part `FAST`: good ones need fewer
-DISSECTED = 2500  # unknowns from which on the analysis of a better ordering pays
-RESERVED = 5  # of the iterations that a solve may take: the last ones are always made with new factors
 PRINTING = re.compile("monitor|view|converged_reason")
 
 
@@ -230,7 +228,7 @@ class NonlinearSolver:
         if self._condensed:
             # entries of pads are of one size: to scale them takes time and gains no digit
             defaults |= {"pc_type": "cholesky", "mat_mumps_icntl_8": 0}
-            if self.problem.size > DISSECTED:
+            if self.problem.size > 2500:  # unknowns from which on the analysis of a better ordering pays
                 defaults["mat_mumps_icntl_7"] = 4  # PORD; METIS and SCOTCH are rarely built in
         mine = {self.prefix + key: value for key, value in defaults.items()}
         mine = {key: value for key, value in mine.items() if key not in given} | dict(self.options)
@@ -402,7 +400,8 @@ class NonlinearSolver:
         if len(norms) == 1:
             return self.is_at(x) and keep(x, True)
         # near the limit of iterations Newton's quadratic end is worth its factorisation
-        if not self.thrifty or len(norms) > self._limit - RESERVED:
+        # the last iterations that a solve may take are always made with new factors
+        if not self.thrifty or len(norms) > self._limit - 5:
             return False
         return norms[-1] <= min(FAST * norms[-2], WITHIN * self._goal) and keep(x, False)
 

@@ -9,11 +9,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from softjaw.friction.patch import CANCEL, ContactPatch, FloatArray, slivers
+from softjaw.friction.patch import CANCEL, NEGLIGIBLE, ContactPatch, FloatArray, slivers
 
-TOLERANCE = 1e-9  # of a face's size: a line through an edge belongs to both faces
 SAME = 1e-6  # of a usual face's size: corners no farther apart are one
-STEEP = 1e-9  # cosine between a line and a face's normal, below which the line runs along the face
 UNLOADED = 0.01  # weight of a face's own normal, in mean loads of all faces: the object's counts where there is load
 
 
@@ -37,7 +35,7 @@ def foot(faces: ContactPatch, start: FloatArray, N: FloatArray) -> Foot:
     away = np.linalg.norm(offset - along[:, None] * N, axis=1)
     slope = faces.normal @ N
     # a line along a face has no foot on its plane: the place beside the centre is taken
-    steep = np.abs(slope) < STEEP
+    steep = np.abs(slope) < NEGLIGIBLE
     s = np.where(steep, along, (offset * faces.normal).sum(axis=1) / np.where(steep, 1.0, slope))
     corners = faces.corners
     met = np.array([], dtype=int) if corners is None else _pierced(faces, corners, start, N, away, steep)
@@ -45,12 +43,12 @@ def foot(faces: ContactPatch, start: FloatArray, N: FloatArray) -> Foot:
         q = corners[met]
         # corners of a warped face lie off its plane, and so does the foot: places closer than that are equally near
         warp = np.abs(((q - faces.centroid[met, None]) * faces.normal[met, None]).sum(axis=-1)).max(axis=1)
-        margin = TOLERANCE * np.ptp(q, axis=1).max(axis=1) + warp
+        margin = NEGLIGIBLE * np.ptp(q, axis=1).max(axis=1) + warp
         nearest = met[_nearest(s[met], margin)]
         met = met[np.abs(s[met] - s[nearest]) <= margin]
         return Foot(start + s[nearest] * N, met, False)
     # all centres that are equally near count, or which one does would hang on rounding
-    met = np.flatnonzero(away <= away.min() + TOLERANCE * np.sqrt(faces.area.max()))
+    met = np.flatnonzero(away <= away.min() + NEGLIGIBLE * np.sqrt(faces.area.max()))
     return Foot(start + s[met].mean() * N, met, True)
 
 
@@ -73,7 +71,7 @@ def _pierced(
     q = (corners[near] - start) @ _across(N).T
     d = np.roll(q, -1, axis=1) - q
     side = d[..., 1] * q[..., 0] - d[..., 0] * q[..., 1]
-    slack = TOLERANCE * reach[near, None] * np.linalg.norm(d, axis=-1)
+    slack = NEGLIGIBLE * reach[near, None] * np.linalg.norm(d, axis=-1)
     return near[(side >= -slack).all(axis=1) | (side <= slack).all(axis=1)]
 
 
@@ -138,20 +136,20 @@ class ContactFace:
         """
         offset = self._middle - start
         along = offset @ N
-        near = np.flatnonzero((offset**2).sum(axis=1) - along**2 <= (1 + TOLERANCE) * self._reach**2)
+        near = np.flatnonzero((offset**2).sum(axis=1) - along**2 <= (1 + NEGLIGIBLE) * self._reach**2)
         across = _across(N).T
         q = (self.corners[near] - start) @ across
         uv = _reference(q)
         weights = _bilinear(*uv.T)
         left = np.linalg.norm(np.einsum("nk,nkc->nc", weights, q), axis=1)
         # Newton may end at the rim of the region it is kept in: only points that are on the line count
-        hit = (np.abs(uv) <= 1 + TOLERANCE).all(axis=1) & (left <= TOLERANCE * self._reach[near])
+        hit = (np.abs(uv) <= 1 + NEGLIGIBLE).all(axis=1) & (left <= NEGLIGIBLE * self._reach[near])
         near, weights = near[hit], weights[hit]
         missed = not len(near)
         if missed:
             near, weights = _beside((self.corners - start) @ across)
         s = np.einsum("nk,nkc->nc", weights, self.corners[near] - start) @ N
-        k = _nearest(s, TOLERANCE * np.ptp(self.corners[near], axis=1).max(axis=1))
+        k = _nearest(s, NEGLIGIBLE * np.ptp(self.corners[near], axis=1).max(axis=1))
         normal = weights[k] @ self.normal[near[k]]
         return start + s[k] * N, normal / np.linalg.norm(normal), missed
 
@@ -180,10 +178,10 @@ def _reference(q: FloatArray) -> FloatArray:
         dv = ((q[:, 3] - q[:, 0]) * (1 - u)[:, None] + (q[:, 2] - q[:, 1]) * (1 + u)[:, None]) / 4
         det = du[:, 0] * dv[:, 1] - du[:, 1] * dv[:, 0]
         # steps are cut at 3 half-widths: a face that the line misses need not converge, only stay outside
-        flat = np.abs(det) <= STEEP * np.linalg.norm(du, axis=1) * np.linalg.norm(dv, axis=1)
+        flat = np.abs(det) <= NEGLIGIBLE * np.linalg.norm(du, axis=1) * np.linalg.norm(dv, axis=1)
         step = np.stack([r[:, 1] * dv[:, 0] - r[:, 0] * dv[:, 1], r[:, 0] * du[:, 1] - r[:, 1] * du[:, 0]], axis=1)
         uv = np.clip(uv + np.where(flat[:, None], 3.0, step / np.where(flat, 1.0, det)[:, None]), -3.0, 3.0)
-        if (np.abs(step) <= TOLERANCE * np.abs(det)[:, None]).all():  # Newton squares it: rounding is reached
+        if (np.abs(step) <= NEGLIGIBLE * np.abs(det)[:, None]).all():  # Newton squares it: rounding is reached
             break
     return uv
 

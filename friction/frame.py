@@ -10,11 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
 from softjaw.friction.foot import ContactFace, foot
-from softjaw.friction.patch import CANCEL, ContactPatch, FloatArray, NoContactError, area_vectors, slivers
+from softjaw.friction.patch import CANCEL, NEGLIGIBLE, ContactPatch, FloatArray, NoContactError, area_vectors, slivers
 
 MAX_ITERATIONS = 100
 STILL = 1e-12  # change of the unit normal at which the iteration ends
-NEARLY = 1e-9  # change at which it may end too, after all passes: far from the file's origin rounding allows no less
 EQUAL = 1e-6  # relative difference of extents, and difference of components, that decide nothing
 HALVED = 20  # passes after which the steps on a whole face are halved, again and again
 
@@ -194,7 +193,7 @@ def _on_the_whole(face: ContactFace, cop: FloatArray, N: FloatArray) -> tuple[Fl
             break
         normals.append(new)
         N = _direction(N + 0.5 ** (iterations // HALVED) * step)
-    if np.linalg.norm(step) > NEARLY:  # still to and fro: the mean of the last normals
+    if np.linalg.norm(step) > NEGLIGIBLE:  # still to and fro: the mean of the last normals
         N = _direction(np.mean(normals[-HALVED:], axis=0))
         origin, _, missed = face.foot(cop, N)
         flag |= FrameFlag.CYCLE
@@ -213,8 +212,6 @@ def _axes(N: FloatArray, x_hint: ArrayLike) -> FloatArray:
 
 
 ANGLE = 1e-6  # of a cosine: files in single precision know their directions to some 1e-7
-OPPOSED = -0.5  # cosine between the normals of neighbours: a real overhang turns by less from face to face
-TIED = 1e-6  # of a distance: faces as far away as the last neighbour are neighbours too
 
 
 def behind(normal: FloatArray, N: FloatArray) -> NDArray[np.bool_]:
@@ -253,7 +250,9 @@ def opposing(faces: ContactPatch, turned: NDArray[np.bool_]) -> bool:
         return False
     tree, count = cKDTree(faces.centroid), min(5, len(turned))
     # all faces as far away as the last neighbour count, or which one does would hang on rounding
-    reach = tree.query(faces.centroid[turned], k=[count])[0][:, 0] * (1 + TIED)
+    # faces as far away as the last neighbour are neighbours too
+    reach = tree.query(faces.centroid[turned], k=[count])[0][:, 0] * (1 + 1e-6)
     near = tree.query_ball_point(faces.centroid[turned], reach)
     pairs = zip(faces.normal[turned], near, strict=True)
-    return any((faces.normal[some] @ n).min() < OPPOSED - ANGLE for n, some in pairs)
+    # cosine between the normals of neighbours: a real overhang turns by less from face to face
+    return any((faces.normal[some] @ n).min() < -0.5 - ANGLE for n, some in pairs)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 FloatArray = NDArray[np.float64]
-SLIVER = 1e-9  # area of a face over the square of its size, below which it has no side
+NEGLIGIBLE = 1e-9  # share of what there is, or difference [-, m, rad], that is only rounding; for decisions alone
 ROUNDING = 64 * np.finfo(float).eps  # of coordinates, which makes an area in proportion to a face's size
 CANCEL = 1e-6  # of what a sum of directions could reach: below it they cancel, and rounding could turn it by 1e-9
 
@@ -144,5 +144,5 @@ def area_vectors(q: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Twice the area of each face along its normal, by the order of its corners, and what of it is no area."""
     last = min(3, q.shape[1] - 1)
     size = 2 * np.linalg.norm(q - q.mean(axis=1, keepdims=True), axis=2).max(axis=1)
-    error = (SLIVER * size + ROUNDING * np.linalg.norm(q, axis=2).max(axis=1)) * size
+    error = (NEGLIGIBLE * size + ROUNDING * np.linalg.norm(q, axis=2).max(axis=1)) * size
     return np.cross(q[:, 2] - q[:, 0], q[:, last] - q[:, 1]), error

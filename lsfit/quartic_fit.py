@@ -29,7 +29,6 @@ from softjaw.lsfit.sos import (
 from softjaw.lsfit.surface import FitError, FitFlag, Image
 
 FloatArray = NDArray[np.float64]
-MAX_TILT = 50.0  # condition of a frame's directions; coefficients lose its fourth power times rounding
 
 
 class QuarticFit(NamedTuple):
@@ -177,7 +176,8 @@ def placed(v: FloatArray, samples: RoundSamples, flag: FitFlag) -> Quartic | Ima
     reach = np.linalg.norm(samples.B, axis=1)
     # rows of one length: what is left of the condition is tilt, which no choice of units undoes
     turn = samples.B / reach[:, None]
-    if np.linalg.cond(turn) > MAX_TILT:
+    # condition of a frame's directions; coefficients lose its fourth power times rounding
+    if np.linalg.cond(turn) > 50.0:
         return Image(Quartic(v, E), samples.B, flag)
     # turned first and stretched last, as a division by units costs a coefficient no digits
     coefficients = substitute(v, E, np.linalg.inv(turn)) / np.prod(reach**E, axis=1)

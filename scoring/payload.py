@@ -37,7 +37,6 @@ KINDS = ("shared", "up_to", "fixed")
 BOUND_GAP = 5e-4  # of the bounds, relative, at which the search ends
 ROUNDING_FORCE = 1e-7  # of the forces of the grasp, below which a force is rounding
 TORQUE_OFFSET = 1e-11  # torque at which K is taken, so that no two bases of the programme are alike
-PENALTY = 1e5  # of torques that no point takes, against forces
 
 
 @dataclass(frozen=True)
@@ -247,7 +246,7 @@ def _programme(C, V1, V2, kind, along, rows, basis):
         right[i] = TORQUE_OFFSET * np.sqrt(i + 2.0)
     for k in range(m):
         if basis[k, 7] > 0:
-            B[int(basis[k, 7]) - 1, k], cost[k] = basis[k, 6], -PENALTY
+            B[int(basis[k, 7]) - 1, k], cost[k] = basis[k, 6], -1e5  # a penalty on torques that no point takes
         else:
             B[: m - 1, k] = rows @ basis[k, :6]
             B[m - 1, k], cost[k] = 1.0, along @ basis[k, :6]

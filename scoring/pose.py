@@ -36,7 +36,6 @@ from softjaw.scoring.fibre import Fibre, Span, fibre_of
 FloatArray = NDArray[np.float64]
 
 
-MIN_RELATIVE_ERROR = 1e-13  # of a volume: what rounding leaves
 DELTA_TURN = 1e-9  # [rad] keeps a direction off sides parallel to it, where the share of least force is not unique
 
 
@@ -142,7 +141,7 @@ def cone_volume(
         coarse, before = fine, better
     # an extrapolation may undershoot a volume near 0
     linf, l1 = J * np.maximum(better, 0)
-    return PoseVolume(float(linf), float(l1), max(error, MIN_RELATIVE_ERROR))
+    return PoseVolume(float(linf), float(l1), max(error, 1e-13))  # rounding leaves this
 
 
 def _volumes(fibres: tuple[Fibre, Fibre], delta: FloatArray, level: int, with_l1: bool) -> FloatArray:

@@ -23,7 +23,6 @@ NO_GRASP = (WIDE, COLLIDES, SLIPS, WORSE)
 RIMS = (1, 2, 4, 8)  # bits of the rims of a pad that carry load: its ends at -x and +x, its sides at -y and +y
 REALISATION = "realisation"  # dimension of the samples of uncertain inputs; the first has the scene's own
 E_N_TARGET = 0.01  # relative error of e_n that is good enough where a scene names none
-ON_TARGET = 1e-6  # of the target: an error that is no further above it meets it
 BOTH_ENDS = RIMS[0] | RIMS[1]
 PARTS = ("assembly", "factorisation", "rest", "friction")  # of a case's time
 # What a quantity may need that not every scene asks for; the layout of a file knows of `HELD` by their sizes.
@@ -436,7 +435,8 @@ def checked_model(model: str) -> str:
 
 def misses(error: Any, target: float | None) -> Any:
     """Where relative errors of e_n are above the target of a scene, or `E_N_TARGET`; unknown ones are not."""
-    return error > (target or E_N_TARGET) * (1.0 + ON_TARGET)
+    # share of the target: an error that is no further above it meets it
+    return error > (target or E_N_TARGET) * (1.0 + 1e-6)
 
 
 def quantities(has: Collection[str] = ()) -> tuple[Quantity, ...]:

@@ -20,7 +20,6 @@ from softjaw.study.result.read import mesh_error, values_of
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 LARGEST = "the largest that was solved"
-NOTHING = 1e-12  # of the largest value, below which a difference is none
 
 
 def judged(ds: Any) -> IntArray:
@@ -76,7 +75,8 @@ def _places(values: np.ndarray) -> IntArray:
     known = np.nan_to_num(values, nan=-np.inf)
     order = np.argsort(-known, kind="stable")
     found = known[order]
-    same = TIE * np.abs(found[1:]) + NOTHING * np.abs(values[np.isfinite(values)]).max(initial=0.0)
+    # share of the largest value, below which a difference is none
+    same = TIE * np.abs(found[1:]) + 1e-12 * np.abs(values[np.isfinite(values)]).max(initial=0.0)
     with np.errstate(invalid="ignore"):  # from one that is not there to the next
         apart = found[:-1] - found[1:] > np.where(np.isfinite(same), same, 0.0)
     places = np.empty(len(order), np.int64)

@@ -16,8 +16,6 @@ BALANCE = 1e-8  # of the normal force
 CONTACT_LAWS = 1e-6
 ALTERNATING = 1e-4  # the same where the nodes in contact alternate for ever: still far below the error of any mesh
 BARELY_ELLIPTIC = 0.1  # eigenvalue of the acoustic tensor over the shear modulus at which foam gives way somewhere
-MOST_STRAIN = 0.7  # strain beyond which not the contact is what fails
-MOST_FALL = 0.05  # of the closing displacement from one force to the next: weighted and nodal gaps differ by less
 
 
 @dataclass(frozen=True)
@@ -127,7 +125,8 @@ def explained(error: ConvergenceError, foam: Foam, x: FloatArray, force: float) 
     """
     det, strain, ellipticity = foam.strains(x, DIRECTIONS)
     # the reason is looked for in the last state in equilibrium: what failed beyond it has no state to look at
-    if isinstance(error, NotReachedError) or (ellipticity > BARELY_ELLIPTIC and strain < MOST_STRAIN):
+    # strain beyond which not the contact is what fails
+    if isinstance(error, NotReachedError) or (ellipticity > BARELY_ELLIPTIC and strain < 0.7):
         return error
     # still elliptic, so it is the strain that is too much
     if ellipticity > BARELY_ELLIPTIC:
@@ -156,7 +155,8 @@ def refuse_fall(low: tuple[float, float], high: tuple[float, float]) -> None:
         If the force grew and the closing displacement fell.
     """
     # a fallback pad may follow one with other gaps, and their closings differ a little without any fault
-    if high[0] > low[0] and high[1] < (1.0 - MOST_FALL) * low[1]:
+    # share of the closing displacement from one force to the next: weighted and nodal gaps differ by less
+    if high[0] > low[0] and high[1] < (1.0 - 0.05) * low[1]:
         raise CheckError(
             f"the closing displacement falls from {1e3 * low[1]:.4g} mm at {low[0]:.4g} N to {1e3 * high[1]:.4g} mm at "
             f"{high[0]:.4g} N: one of the two states is off the load path; the contact is too small "

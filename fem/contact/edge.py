@@ -17,10 +17,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from softjaw.friction.patch import ContactPatch
+from softjaw.friction.patch import NEGLIGIBLE, ContactPatch
 
 FloatArray = NDArray[np.float64]
-LOADED = 1e-9  # of the largest load of a face, below which it carries none
 RESOLVED = 0.24  # node spacing over half length at which half of the fourth moment counts (Hertz's cylinder)
 FLATTEST, STEEPEST = 1.8, 2.4  # of <y^4> / <y^2>^2: an even pressure, and more than any contact has that ends smoothly
 EVEN, POINTED = 7.0 / 6.0, 14.0 / 9.0  # bounds of <s^2> / <s>^2 from a rim on: c_0 = 0, and c_1 = -c_0 / b
@@ -68,14 +67,14 @@ def largest_pressure(patch: ContactPatch, faces: tuple[int, int], per_side: int)
     mean = _four(load) / _four(area)
     i, j = divmod(int(mean.argmax()), mean.shape[1])
     near, inner = (_about(i, j, reach * per_side) for reach in (2, 1))
-    on = load[near] > LOADED * load.max()
+    on = load[near] > NEGLIGIBLE * load.max()
     middle, size = place[i : i + 2, j : j + 2].mean(axis=(0, 1)), np.ptp(place[near], axis=(0, 1))
     root = np.sqrt(area[near][on])
     terms = _terms((place[near][on] - middle) / size)
     # loads tell no coefficient below this part of the largest singular value
     fit, *_ = np.linalg.lstsq(terms * root[:, None], (load / area)[near][on] * root, rcond=1e-6)
     # far from the largest load, and where nothing bears, a quadratic says nothing
-    at = place[inner][load[inner] > LOADED * load.max()]
+    at = place[inner][load[inner] > NEGLIGIBLE * load.max()]
     return float((_terms((at - middle) / size) @ fit).max())
 
 
@@ -116,7 +115,7 @@ def _stretches(
     """
     steps = np.diff(place, axis=1, prepend=rims[:, :1], append=rims[:, 1:])
     from_rim = np.cumsum(np.linalg.norm(steps, axis=2), axis=1)
-    on = load > LOADED * load.max()
+    on = load > NEGLIGIBLE * load.max()
     beside = np.pad(on, ((0, 0), (1, 1)))
     first, last = on & ~beside[:, :-2], on & ~beside[:, 2:]
     low, high = np.nonzero(first)[1] == 0, np.nonzero(last)[1] == on.shape[1] - 1

@@ -28,8 +28,6 @@ STICK = 30.0
 # Of the force from step to step, and of the first force at the first step: steps of 1.2 from 0.01 move e_n by up to
 # 0.5 %, in a waist by 1 %. Growth by 2 moves it by up to 2 % there, a start at 0.1 by 0.3 %.
 GROWTH, START = 1.5, 0.02
-BACKWARDS = 0.5  # of the last step of Newton's method: what takes more of it back is halved
-MOST_DAMPED = 0.125  # of a step of Newton's method
 
 
 def load_steps(reached: float, force: float) -> list[float]:
@@ -119,8 +117,10 @@ class Damping:
             self._damping = 1.0
         else:
             before, now = self._step, step[self.moved]
-            back = before @ now < -BACKWARDS * (before @ before)
-            self._damping = max(0.5 * self._damping, MOST_DAMPED) if back else min(2.0 * self._damping, 1.0)
+            # a step that takes back more than half of the last one is halved
+            back = before @ now < -0.5 * (before @ before)
+            # at most eight times shorter
+            self._damping = max(0.5 * self._damping, 0.125) if back else min(2.0 * self._damping, 1.0)
         factor = min(factor, self._damping)
         self._step, self._reached = factor * step[self.moved], x - factor * step
         return factor

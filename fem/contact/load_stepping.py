@@ -40,10 +40,8 @@ FIRMLY, BARELY = 1e-3, 1e-6  # part of the wanted force that a first state shoul
 LONGEST = 0.2  # foretold closing displacement of one step
 STRAY = 0.1  # distance of a node or the backing plate from where it was foretold; good steps of practice keep to 0.06
 SHORTEST_FORETOLD = 0.025  # foretold closing displacement of a step that is not halved again
-GIVEN_UP = 0.01  # foretold closing displacement of a step that is given up where Newton's method does not converge
 FOLD = 0.25  # growth of the largest strain in one step; good steps of practice keep to 0.15
 FOLDING, FOLDS = 0.1, 3.0  # the same, and over the growth of the force's logarithm, where 0.2 is usual
-MOST_FROM_COARSE = 12  # Newton iterations from the state of a coarser mesh; good starts take 4 to 7
 ASTRAY = "the state at {force:.4g} N differs from the state on the coarser mesh"
 STRAINED = 0.5  # largest strain from which on a state is checked for stability
 
@@ -303,7 +301,8 @@ class Following(Stepping):
             except ConvergenceError:
                 cut *= 0.5
                 # `not >` instead of `<=`: NaN, where nothing is foretold, has to end the halving
-                if cut < self.settings.min_step and not self._foretold(here, 0.5 * (target - here.force)) > GIVEN_UP:
+                # foretold closing displacement of a step that is given up where Newton's method does not converge
+                if cut < self.settings.min_step and not self._foretold(here, 0.5 * (target - here.force)) > 0.01:
                     if not by_displacement:
                         raise
                     return self._past_limit(here, force, work)
@@ -328,7 +327,8 @@ class Following(Stepping):
 
     def from_near(self, start: FloatArray, force: float, work: Work) -> FloatArray:
         """As `Stepping.from_near`; refused where a path from first contact need not lead to the state."""
-        x = self.solve(start, Control(force=force), work, self.most or MOST_FROM_COARSE)
+        # Newton iterations from the state of a coarser mesh; good starts take 4 to 7
+        x = self.solve(start, Control(force=force), work, self.most or 12)
         folds = self.problem.largest_strain(x) - self.problem.largest_strain(start) > FOLD
         # with a part of the tangent alone nothing tells whether the state is stable
         here = None if self.problem.complementarity else self._place(x, force, None)

@@ -1,11 +1,11 @@
 """The state of a pad from its deformed contact face, as it was measured: pressures without knowledge of the object.
 
-The face is pressed into the shape that it had (see `fem.objects.measured_face`). Noise would load it where it was free:
-where the measured face lies deeper than the true one, foam is pressed that was not. So the solve is done twice. At a
-closing displacement that is less by `MARGIN` standard errors of the face only what surely bears still does. Farther
-from there than the contact grows on the rest of the way, the object is not where the face was measured but beyond, and
-is taken away by as much as the face may be wrong. What grows is told from a parabola, whose contact goes with the root
-of the closing displacement.
+The face is pressed into the shape that it had (see `fem.objects.measured_face`). Noise would load it where it was
+free: where the measured face lies deeper than the true one, foam is pressed that was not. So the solve is done twice.
+At a closing displacement that is less by `NOISE_MARGIN` standard errors of the face only what surely bears still does.
+Farther from there than the contact grows on the rest of the way, the object is not where the face was measured but
+beyond, and is taken away by as much as the face may be wrong. What grows is told from a parabola, whose contact goes
+with the root of the closing displacement.
 """
 
 from __future__ import annotations
@@ -26,8 +26,7 @@ from softjaw.fem.objects.gap import FloatArray, Gap, NoContactError
 from softjaw.fem.objects.measured_face import MeasuredFace
 from softjaw.fem.pad.mesh import Pad
 
-MARGIN = 2.0  # standard errors of the face that a contact has to stand
-DOUBTFUL = 0.5  # of the closing displacement: with a larger margin nothing tells contact from noise
+NOISE_MARGIN = 2.0  # standard errors of the face that a contact has to stand
 LIFT, RAMP = 3.0, 2.0  # standard errors by which the face is lifted where nothing surely bears; elements of the ramp
 LIFT_SAMPLES = 60  # of the lift along a side of the pad
 
@@ -41,7 +40,7 @@ class Measured:
     state : Pressed
         In the frame at first touch, from which the backing plate has moved on by the closing displacement.
     margin : float
-        What the closing displacement is uncertain by, `MARGIN` standard errors of the face [m].
+        What the closing displacement is uncertain by, `NOISE_MARGIN` standard errors of the face [m].
     judged : bool
         Whether contact could be told from noise.
     """
@@ -103,8 +102,9 @@ class MeasuredPress:
         depth = self._depth(face)
         if not depth > 1e-6 * self.pad.shape.size[2]:
             raise NoContactError("the face lies nowhere below the undeformed one, so it touches nothing")
-        touching, margin = face.lifted(depth), MARGIN * face.doubt
-        if margin >= DOUBTFUL * depth:
+        touching, margin = face.lifted(depth), NOISE_MARGIN * face.doubt
+        # share of the closing displacement: with a larger margin nothing tells contact from noise
+        if margin >= 0.5 * depth:
             return Measured(self._pressed(touching, depth), margin, False)
         sure = self._pressed(touching, depth - margin)
         return Measured(self._pressed(self._released(touching, sure, depth), depth), margin, True)

@@ -25,7 +25,6 @@ from softjaw.fem.errors import CheckError, ConvergenceError, NotReachedError, Sp
 from softjaw.fem.pad.mesh import Pad
 
 LONGEST_CLOSING, SHORTEST_CLOSING = 0.05, 1 / 64  # step to a given closing, of the thickness; of it, the shortest
-SAME_CLOSING = 0.1  # of the closing displacement: the other pad's path is not the same one where they differ by more
 
 
 class Press(LoadPath[RigidProblem]):
@@ -200,7 +199,8 @@ class Press(LoadPath[RigidProblem]):
             return self._step_to(None, force, work)
         closing = self.problem.closing(below.x)
         x = self._step_to(None, below.force, work)
-        differs = abs(self.problem.closing(x) - closing) > SAME_CLOSING * closing
+        # share of the closing displacement: the other pad's path is not the same one where they differ by more
+        differs = abs(self.problem.closing(x) - closing) > 0.1 * closing
         x = self._step_to(OnPath(x, below.force), force, work)
         self._stepping.jumped |= differs
         return x

@@ -31,26 +31,25 @@ from softjaw.fem.objects.gap import Pose
 from softjaw.fem.pad.foam import Foam
 from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.shell.facing import FAR
+from softjaw.friction.patch import NEGLIGIBLE
 
 FloatArray = NDArray[np.float64]
 Gap = Callable[[FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
-IDLE = 1e-9  # of the largest pressure: a node that bears less is taken as idle
-STIFF_VOLUME = 0.45  # Poisson's ratio above which shortened columns are a worse start than columns that only move
 IN_PLACE = Pose(np.eye(3), np.zeros(3))
 
 
 def borne(pressure: FloatArray, active: NDArray[np.bool_]) -> FloatArray:
     """Nodal pressures ``(n,)`` [Pa] without what is none: of idle nodes, and what rounding leaves of active ones.
 
-    Whether a node below `IDLE` of the largest pressure bears anything is not decided by the solve, whose tolerance is
-    about as large. Tension stays, for the checks to see.
+    Whether a node below `NEGLIGIBLE` of the largest pressure bears anything is not decided by the solve, whose
+    tolerance is about as large. Tension stays, for the checks to see.
     """
     return np.where(active & bearing(pressure), pressure, np.minimum(pressure, 0.0))
 
 
 def bearing(pressure: FloatArray) -> NDArray[np.bool_]:
     """Where pressures are more than rounding."""
-    return pressure > IDLE * pressure.max(initial=0.0)
+    return pressure > NEGLIGIBLE * pressure.max(initial=0.0)
 
 
 @dataclass
@@ -457,7 +456,8 @@ class SpringBed:
         u = np.zeros(pad.dofs.shape)
         u[:, 2] = closing
         # foam that hardly changes its volume would start with huge stresses
-        if pad.material.poisson_ratio <= STIFF_VOLUME:
+        # Poisson's ratio above which shortened columns are a worse start than columns that only move
+        if pad.material.poisson_ratio <= 0.45:
             u[:, 2] -= shortening[self._column] * (1.0 + pad.nodes[:, 2] / pad.shape.size[2])
         x = np.zeros(pad.size)
         x[pad.dofs[pad.dofs >= 0]] = u[pad.dofs >= 0]

@@ -21,9 +21,6 @@ from softjaw.fem.objects.traced_outline import sections, smooth_spline
 
 HEIGHTS = 161  # at which sections are cut
 FEWEST = 8  # of them that enclose an area
-END = 0.02  # of the height: nearer to the ends a section is the object's rounding, its middle is continued
-STRAIGHT = 3e-3  # of the line's height: one that stays so near to the axis z is the axis, but for noise of a scan
-ARM = 5e-3  # of the largest loop's area: what is smaller is noise of a mesh, not an arm
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +48,8 @@ class CentreLine:
     @property
     def straight(self) -> bool:
         """Whether it is the axis z itself, but for the noise of a scan."""
-        return bool(np.abs(self.middle).max() <= STRAIGHT * (self.z[-1] - self.z[0]))
+        # share of the line's height: one that stays so near to the axis z is the axis, but for noise of a scan
+        return bool(np.abs(self.middle).max() <= 3e-3 * (self.z[-1] - self.z[0]))
 
     def remark(self, z: float, half: float) -> str:
         """What is doubtful where a pad reaches ``half`` [m] to both sides of a height, if anything."""
@@ -106,7 +104,8 @@ def centre_line(points: FloatArray, triangles: IntArray, wavelength: float) -> C
         Where hardly any section encloses an area.
     """
     low, high = points[:, 2].min(), points[:, 2].max()
-    margin = END * (high - low)
+    # share of the height: nearer to the ends a section is the object's rounding, its middle is continued
+    margin = 0.02 * (high - low)
     z = np.linspace(low + margin, high - margin, HEIGHTS)
     middle, loops = largest_loops(points, triangles, z)
     known = np.isfinite(middle[:, 0])
@@ -127,7 +126,8 @@ def largest_loops(points: FloatArray, triangles: IntArray, z: FloatArray) -> tup
     for k in range(len(z)):
         areas, centroids = _loops(segments[cut == k])
         if len(areas) and areas.max() > 0.0:
-            middle[k], count[k] = centroids[areas.argmax()], np.count_nonzero(areas > ARM * areas.max())
+            # share of the largest loop's area: what is smaller is noise of a mesh, not an arm
+            middle[k], count[k] = centroids[areas.argmax()], np.count_nonzero(areas > 5e-3 * areas.max())
     return middle, count
 
 

@@ -26,15 +26,9 @@ from softjaw.fem.objects.spline_grid import coefficients, evaluate
 from softjaw.fem.objects.triangle_tree import DEPTH, TriangleTree, first_hit
 
 CONE = np.radians(30.0)
-GRAZING = 0.01  # a line at a smaller sine to a triangle runs along it and does not see it
-LIFT = 1e-7  # of the mesh's size: how far above a triangle a line of sight starts
-MARGIN = 0.5  # of the box's depth: triangles so far beside the box still count
-THIN = 1 / 3  # of the box's depth: a wall thinner than this has one side only
-MOST_SPOTS = 40  # places along one side of a triangle that are looked at
+BOX_MARGIN = 0.5  # of the box's depth: triangles so far beside the box still count
 COARSE = 4  # steps of the grid between samples that are taken far from the sheet
-EXACT = 5  # steps from the sheet within which every sample is taken
 STAIRS = 1.5  # steps of the grid over which shadow lines are smoothed
-FOLLOWED = 1 / 200  # of the grid's step: how well flat pieces follow the smooth triangles
 
 
 def lines_of_sight(pose: Pose) -> FloatArray:
@@ -61,7 +55,8 @@ def _seen(which, normals, sides, directions, spacing, rotation, origin, lower, u
         for k in range(3):
             longest = max(longest, ((p[(k + 1) % 3] - p[k]) ** 2).sum())
         # many spots on a large triangle: a part of it may be hidden by another piece
-        n = min(max(int(np.ceil(np.sqrt(longest) / spacing)), 1), MOST_SPOTS)
+        # places along one side of a triangle that are looked at
+        n = min(max(int(np.ceil(np.sqrt(longest) / spacing)), 1), 40)
         for i in range(n * n):
             b, c = (i // n + 1.0 / 3.0) / n, (i % n + 1.0 / 3.0) / n
             if abs(seen[m]) == 2 or b + c >= 1.0:
@@ -82,7 +77,8 @@ def _seen(which, normals, sides, directions, spacing, rotation, origin, lower, u
                     # seen on a slant already: only the straight line, which comes first, can tell more
                     if seen[m] != 0 and k > 0:
                         break
-                    if sign * (normal * directions[k]).sum() > -GRAZING:
+                    # a line at a smaller sine to a triangle runs along it and does not see it
+                    if sign * (normal * directions[k]).sum() > -0.01:
                         continue
                     hit = first_hit(spot, -directions[k], 0.0, which[m], True, corners, order, low, high, start, count,
                                     stack)[1]  # fmt: skip
@@ -160,7 +156,7 @@ class FacingSheet:
         places = np.stack(np.meshgrid(*(np.arange(n) / COARSE for n in x.shape[:3]), indexing="ij"), axis=-1)
         g = evaluate(coefficients(known), np.zeros(3), 1.0, places.reshape(-1, 3))[0].reshape(x.shape[:3])
         # contact is decided near the sheet, so no sample is interpolated there
-        near = np.abs(g) < EXACT * step
+        near = np.abs(g) < 5 * step  # steps from the sheet within which every sample is taken
         g[near] = self.signed(x[near])[0]
         return _with_shadows(g, step, STAIRS)
 
@@ -206,11 +202,12 @@ def facing_sheet(
         Step of the grid on which the distance is to be sampled [m].
     """
     depth = box[1, 2] - box[0, 2]
-    lower, upper = box[0] - MARGIN * depth, box[1] + MARGIN * depth
+    lower, upper = box[0] - BOX_MARGIN * depth, box[1] + BOX_MARGIN * depth
     y = pose.to_pad(whole.points)[whole.triangles]
     near = np.flatnonzero(((y.max(axis=1) >= lower) & (y.min(axis=1) <= upper)).all(axis=1))
     normals = whole.face_normals
-    lines, lift = lines_of_sight(pose), LIFT * float(np.ptp(whole.points, axis=0).max())
+    # share of the mesh's size: how far above a triangle a line of sight starts
+    lines, lift = lines_of_sight(pose), 1e-7 * float(np.ptp(whole.points, axis=0).max())
     R = np.ascontiguousarray(pose.rotation)
     how = _seen(
         near, normals, 1 if closed else 2, lines, 2 * step, R, pose.origin, lower, upper, lift, whole.nodes
@@ -222,12 +219,14 @@ def facing_sheet(
     slanted = near[np.abs(how) == 1]
     hit, far = _behind(slanted, side[slanted, None] * normals[slanted], lift, whole.nodes)
     # without a hit the index is -1, which does no harm: the distance is infinite then
-    slanted = slanted[~(straight[hit] & (far < THIN * depth))]
+    # share of the box's depth: a wall thinner than this has one side only
+    slanted = slanted[~(straight[hit] & (far < (1 / 3) * depth))]
     chosen = np.union1d(np.flatnonzero(straight), slanted)
     # nothing faces the finger here, and the whole mesh keeps the distance defined
     if not len(chosen):
         return FacingSheet(whole, whole, lines)
-    pieces = smooth.pieces_for(chosen, FOLLOWED * step)
+    # share of the grid's step: how well flat pieces follow the smooth triangles
+    pieces = smooth.pieces_for(chosen, (1 / 200) * step)
     x, small = smooth.refined(chosen, pieces)
     back = np.repeat(side[chosen] < 0, pieces**2)
     return FacingSheet(TriangleTree(x, np.where(back[:, None], small[:, ::-1], small)), whole, lines)

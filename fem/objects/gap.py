@@ -17,7 +17,6 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 Gap = tuple[FloatArray, FloatArray, FloatArray]
 Surface = tuple[FloatArray, IntArray]
-CREEP = 1e-4  # smallest step of a trace in units of the reach: a point that grazes the surface still gets past
 SHARPNESS = 1e-12  # how well the touch is located [m]
 GRAZE = 1e-9  # depth that a point has to reach to have met the object [m]: less is a pad that may as well pass it
 
@@ -173,7 +172,8 @@ def first_touch(obj: GapFunction, pose: Pose, points: FloatArray, reach: float) 
     closest, first, grazed = g.min(), np.inf, False
     while len(active):
         low = t
-        t = t + np.maximum(g, CREEP * reach)
+        # smallest step of a trace in units of the reach: a point that grazes the surface still gets past
+        t = t + np.maximum(g, 1e-4 * reach)
         g = gap(active, t)
         closest = min(closest, g.min())
         # a touch too shallow for a hit: told apart from a pad that passes well clear

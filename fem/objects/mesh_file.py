@@ -30,7 +30,6 @@ SCENES = (".glb", ".gltf", ".3mf")  # several bodies, each with a place of its o
 LARGEST_FILE = 250 * 2**20  # bytes
 MOST_FACES = 5_000_000
 MOST_POINTS = 3 * MOST_FACES  # as many as an STL file has, where every triangle has its own
-MOST_NODES = 10_000  # places of bodies in a scene
 NUMBERS = 8  # kinds of numbers at a point of a scene, at most: place, normal, colours, ...
 GLB_HEAD = 20  # bytes before the description of a binary glTF file
 STL_HEAD, STL_FACET = 84, 50  # bytes of a binary STL file
@@ -159,7 +158,8 @@ def _declared_in_scene(path: Path, kind: str, data: bytes) -> int:
         tree = json.loads(data[GLB_HEAD : GLB_HEAD + length] if kind == ".glb" else data)
         counts = [int(accessor["count"]) for accessor in tree.get("accessors", ())]
         parents = sum(len(node.get("children", ())) for node in tree.get("nodes", ()))
-        if min(counts, default=0) < 0 or parents >= max(len(tree.get("nodes", ())), 1) or parents > MOST_NODES:
+        # places of bodies in a scene
+        if min(counts, default=0) < 0 or parents >= max(len(tree.get("nodes", ())), 1) or parents > 10_000:
             raise ValueError("its nodes are no tree, or a count is negative")
         return sum(counts) // NUMBERS
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError, zipfile.BadZipFile) as problem:

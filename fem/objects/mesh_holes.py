@@ -13,8 +13,6 @@ from softjaw.fem.objects.gap import FloatArray, IntArray, edges_of
 SMALL_HOLE = 0.02  # of the object's diagonal: smaller holes are filled, others stay open
 FEW_SIDES, LARGEST_GAP = 4, 0.1  # a triangle or two that are missing are filled up to this share of the diagonal
 MOST_PLACES = 3  # of defects that one note names
-MOST_BORDER = 0.5  # sides of holes per triangle, above which they are no holes
-MOST_SIDES = 60  # of a loop that is filled without a new point: the effort grows with the cube
 
 
 def with_holes_filled(points: FloatArray, triangles: IntArray) -> tuple[IntArray, list[str]]:
@@ -23,7 +21,8 @@ def with_holes_filled(points: FloatArray, triangles: IntArray) -> tuple[IntArray
     Triangles that hardly hang together have no holes to speak of, and stay as they are.
     """
     loops, size = border_loops(triangles), float(np.linalg.norm(np.ptp(points, axis=0)))
-    if not loops or sum(map(len, loops)) > MOST_BORDER * len(triangles):
+    # sides of holes per triangle, above which they are no holes
+    if not loops or sum(map(len, loops)) > 0.5 * len(triangles):
         return triangles, []
     taken = set(map(tuple, np.sort(edges_of(triangles), axis=1).tolist()))
     present = set(map(tuple, np.sort(triangles, axis=1).tolist()))
@@ -94,7 +93,7 @@ def filling(points: FloatArray, loop: list[int], taken: set[tuple[int, int]]) ->
     ``taken`` are edges (smaller number first) that already have two triangles or would get a third.
     """
     n, x = len(loop), points[loop]
-    if n > MOST_SIDES:
+    if n > 60:  # sides of a loop that is filled without a new point: the effort grows with the cube
         return None
     best, cut = np.zeros((n, n)), np.zeros((n, n), np.int64)
     for length in range(2, n):

@@ -29,14 +29,8 @@ from softjaw.fem.objects.triangles import cleaned, decimated, pieces_of
 from softjaw.fem.objects.volume import centroid
 
 __all__ = ["MeshError", "MeshObject", "MeshRegion"]
-STEPS_PER_BOX = 80  # grid where no element size is given: steps along the longest side of the box
-STEPS_PER_ELEMENT = 4
-FEWEST_FACETS = 4  # a round surface has more edges of one kind than a scan has by chance
-MARGIN = 3  # least number of cells sampled beyond the box
+MARGIN_CELLS = 3  # least number of cells sampled beyond the box
 MOST_SAMPLES = 4_000_000
-MOST_CHOSEN = 1_000_000  # samples of a grid whose step is not the user's own
-HOLE_DEPTH = 0.1  # of the depth to which holes count: a wall so close behind closes one
-MOST_CENTRES = 4_000  # cells at whose centres the interpolation is compared with the distance itself
 TURNS = {"x": [1, 2, 0], "y": [2, 0, 1], "z": [0, 1, 2]}  # cyclic, so that no mesh is mirrored
 
 
@@ -138,7 +132,8 @@ class MeshObject:
         lids = TriangleTree(self.lids[near].reshape(-1, 3), np.arange(3 * near.sum()).reshape(-1, 3))
         start, approach = pose.to_object(points) - depth * pose.rotation[:, 2], pose.rotation[:, 2]
         hole, wall = lids.along(start, approach), self._tree.along(start, approach)
-        return float(np.mean((hole < wall - HOLE_DEPTH * depth) & (hole < 2 * depth)))
+        # share of the depth to which holes count: a wall so close behind closes one
+        return float(np.mean((hole < wall - 0.1 * depth) & (hole < 2 * depth)))
 
     def gap(self, x: FloatArray) -> Gap:
         """Signed distance ``(n,)`` [m] to the flat triangles, its unit gradient ``(n, 3)`` and a Hessian of zeros.
@@ -164,7 +159,7 @@ class MeshObject:
             raise ValueError(f"the box from {box[0].tolist()} to {box[1].tolist()} m is empty; swap its corners")
         step = self._step(size, element)
         # whole coarse cells, as `sampled` asks for; rounding of the quotient must not add one
-        cells = COARSE * np.ceil((size / step - 1e-9 + 2 * MARGIN) / COARSE)
+        cells = COARSE * np.ceil((size / step - 1e-9 + 2 * MARGIN_CELLS) / COARSE)
         if np.prod(cells + 1) > MOST_SAMPLES:
             raise ValueError(
                 f"a grid step of {step * 1e3:.3g} mm needs {np.prod(cells + 1):.3g} samples for one pad, "
@@ -181,9 +176,11 @@ class MeshObject:
         """Step of the grid over a box of this size [m]."""
         if self.grid_step:
             return self.grid_step
-        wanted = element / STEPS_PER_ELEMENT if element else float(size.max()) / STEPS_PER_BOX
+        # four steps of the grid per element, or 80 along the longest side of the box
+        wanted = element / 4 if element else float(size.max()) / 80
         # a large box with small elements gets a coarser grid rather than none
-        return max(wanted, float(np.cbrt(np.prod(size) / MOST_CHOSEN)))
+        # samples of a grid whose step is not the user's own
+        return max(wanted, float(np.cbrt(np.prod(size) / 1_000_000)))
 
     @property
     def bounds(self) -> FloatArray:
@@ -208,7 +205,7 @@ class MeshObject:
         """
         smooth = self._smooth
         edges, off = smooth.doubtful(width)
-        if len(edges) < FEWEST_FACETS:
+        if len(edges) < 4:  # a round surface has more edges of one kind than a scan has by chance
             return ""
         turn = np.degrees(smooth.turn[edges])
         return (
@@ -263,7 +260,8 @@ class MeshRegion:
         """Largest difference [m] to the distance itself at centres of cells within two steps of the surface."""
         near = np.argwhere(np.abs(self.samples[:-1, :-1, :-1]) < 2 * self.grid_step)
         # centres of cells are furthest from all samples, so the spline is at its worst there
-        y = self.first + self.grid_step * (near[:: 1 + len(near) // MOST_CENTRES] + 0.5)
+        # cells at whose centres the interpolation is compared with the distance itself
+        y = self.first + self.grid_step * (near[:: 1 + len(near) // 4_000] + 0.5)
         y = y[self._covers(y)]
         if not len(y):
             return np.nan

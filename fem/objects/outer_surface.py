@@ -23,10 +23,9 @@ from numpy.typing import ArrayLike
 from softjaw.fem.objects.gap import FloatArray
 from softjaw.fem.objects.profile import Curve, through
 from softjaw.fem.objects.revolution import Revolution
+from softjaw.friction.patch import NEGLIGIBLE
 
 TINY = 1e-100  # zero below a logarithm
-AT_LINE = 1e-12  # heights this close to a sample of the outline are at it [m]
-RIGHT_ANGLE = 1e-9  # how close to a multiple of 90 degrees keeps planes of symmetry [rad]
 
 
 class Jet:
@@ -170,7 +169,7 @@ class OuterSurface:
         s = np.linspace(*self.wall, 2001)
         off = self.curve.derivative(s)[:, 0] - z
         # a height at a sample is that sample: a search could end beside it by rounding
-        off[np.abs(off) < AT_LINE] = 0.0
+        off[np.abs(off) < 1e-12] = 0.0  # heights this close to a sample of the outline are at it [m]
         crossing = np.flatnonzero((off[:-1] <= 0) & (off[1:] >= 0))
         if not len(crossing):
             raise ValueError(
@@ -296,7 +295,7 @@ class Turned:
         if self.round:
             return True, True
         quarters = self.angle / (0.5 * np.pi)
-        if abs(quarters - round(quarters)) * 0.5 * np.pi > RIGHT_ANGLE:
+        if abs(quarters - round(quarters)) * 0.5 * np.pi > NEGLIGIBLE:
             return False, False
         x, y = self.original.symmetric
         # a quarter turn exchanges the two planes

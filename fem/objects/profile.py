@@ -14,11 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from softjaw.fem.objects.gap import FloatArray
+from softjaw.friction.patch import NEGLIGIBLE
 
 COLLINEAR = 1e-4  # points this close to a line, in units of their shortest step, are on it
 ARC_STEP = np.pi / 6  # a rounding is interpolated at least this finely
-ONE_WAY = 1e-9  # turn up to which two straight runs have one direction: there is no corner between them [rad]
-SHORTEST_CUT = 0.005  # of the rim: gentler corners are rounded by a larger radius, or rounding errors would bend them
 
 
 @dataclass(frozen=True)
@@ -246,11 +245,12 @@ def _corner(
     a, b = np.linalg.norm(q - p), np.linalg.norm(r - q)
     t, u = (q - p) / a, (r - q) / b
     turn = np.arctan2(abs(t[0] * u[1] - t[1] * u[0]), t @ u)
-    if turn <= ONE_WAY:
+    if turn <= NEGLIGIBLE:
         return None
     half = np.tan(turn / 2)
     # at most 0.3 of each run, so that roundings at both its ends leave a straight part
-    cut = min(max(half, SHORTEST_CUT) * rim, 0.3 * a, 0.3 * b)
+    # share of the rim: gentler corners are rounded by a larger radius, or rounding errors would bend them
+    cut = min(max(half, 0.005) * rim, 0.3 * a, 0.3 * b)
     return *rounding(q - cut * t, t, u, cut / half), t, u
 
 

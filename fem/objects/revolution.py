@@ -10,12 +10,11 @@ from numpy.typing import NDArray
 
 from softjaw.fem.objects.gap import Analytic, FloatArray, Gap, Surface, grid_triangles
 from softjaw.fem.objects.profile import Curve, straight_runs, through
+from softjaw.friction.patch import NEGLIGIBLE
 
 BLOCK = 8  # segments of the polyline that share one bounding circle
 TURN = np.radians(3.0)  # largest turn of the curve within one segment of the polyline
 CLOSEST_POINTS = 1e-6  # points of a profile closer than this are refused [m]
-ON_AXIS = 1e-9  # ends of a profile this close to the axis are on it, and a curve may not come as close on its way [m]
-TOUCH = 1e-9  # of the outline's extent: pieces of it this close to each other touch
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +113,7 @@ def _checked_points(profile: FloatArray) -> FloatArray:
     if not np.isfinite(points).all():
         raise ValueError(f"profile point {_first(~np.isfinite(points).all(axis=1))} is not a pair of finite numbers")
     ends = points[[0, -1], 1]
-    points[[0, -1], 1] = np.where(np.abs(ends) <= ON_AXIS, 0.0, ends)
+    points[[0, -1], 1] = np.where(np.abs(ends) <= NEGLIGIBLE, 0.0, ends)
     bad = points[:, 1] <= 0
     bad[[0, -1]] = points[[0, -1], 1] < 0
     if bad.any():
@@ -153,12 +152,12 @@ def _places(curve: Curve) -> FloatArray:
 
 def _check_line(line: FloatArray) -> None:
     """Refuse a curve that touches the axis on the way, or itself; ``line (m + 1, 2)`` is its polyline."""
-    if line[1:-1, 1].min() <= ON_AXIS:
+    if line[1:-1, 1].min() <= NEGLIGIBLE:
         z = line[1 + line[1:-1, 1].argmin(), 0]
         raise ValueError(f"the profile's curve swings to the axis near z = {z:g} m; add points there to hold it off")
     a, d = line[:-1], np.diff(line, axis=0)
     cross = lambda u, v: u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]  # noqa: E731
-    e, touch = d / np.linalg.norm(d, axis=1)[:, None], TOUCH * np.ptp(line, axis=0).max()
+    e, touch = d / np.linalg.norm(d, axis=1)[:, None], NEGLIGIBLE * np.ptp(line, axis=0).max()
     start = cross(e[:, None], a[None] - a[:, None])  # distances of all ends from all pieces' lines
     end = cross(e[:, None], line[None, 1:] - a[:, None])
     split = (start * end < 0) | (np.minimum(np.abs(start), np.abs(end)) <= touch)

@@ -22,10 +22,10 @@ from softjaw.fem.objects.gap import (
     radial,
 )
 from softjaw.fem.objects.revolution import Revolution
+from softjaw.friction.patch import NEGLIGIBLE
 
 __all__ = ["Box", "EllipticCylinder", "GapFunction", "GapObject", "Plane", "Revolution", "Sphere"]
 
-ROUND = 1e-9  # how far apart sides that count as equal may be, of their length
 SLAB_HALF_EXTENT = 0.1  # how far a slab is drawn along y and z [m]
 
 
@@ -177,7 +177,7 @@ class EllipticCylinder(Analytic):
     @property
     def axis_symmetry(self) -> int:
         """Half a turn; every angle if the cylinder is round."""
-        return 0 if abs(self.a - self.b) <= ROUND * self.a else 2
+        return 0 if abs(self.a - self.b) <= NEGLIGIBLE * self.a else 2
 
     def surface(self) -> Surface:
         """Points and triangles: ellipses along the wall, the curves parallel to them on the edges, and the caps."""
@@ -238,7 +238,7 @@ class Box(Analytic):
     @property
     def axis_symmetry(self) -> int:
         """Half a turn; a quarter turn if the cross-section is square."""
-        return 4 if abs(self.size[0] - self.size[1]) <= ROUND * self.size[0] else 2
+        return 4 if abs(self.size[0] - self.size[1]) <= NEGLIGIBLE * self.size[0] else 2
 
     def surface(self) -> Surface:
         """Points and triangles: the sides of the sharp box, drawn towards the smaller box by the radius."""

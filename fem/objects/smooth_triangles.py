@@ -22,11 +22,7 @@ from softjaw.fem.objects.triangles import neighbours
 
 CREASE_ANGLE = 30.0  # [deg]: edges that turn by less are taken for facets of a smooth surface
 STEEP = 0.7  # an edge that leaves its tangent plane by more (sine) is kept straight: its normal is no use
-AT_ANGLE = 1e-5  # of the cosine: files of single precision turn edges of one angle, as of 12 facets, by less
 SHARP = 60.0  # [deg]: edges that turn by less may still be facets of something round
-PARALLEL = 0.02  # sine of the angle below which two normals at a crease have no line in common
-FINEST = 8  # pieces of an edge
-MOST_PIECES = 250_000  # triangles of one refined sheet
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +78,8 @@ class SmoothTriangles:
         """Pieces of an edge with which flat triangles follow the smooth ones to ``tolerance`` [m], within limits."""
         # not the largest: a single bad triangle of a scan must not refine them all
         bulge = float(np.quantile(self.bulge(which), 0.99, method="higher"))
-        most = min(FINEST, int(np.sqrt(MOST_PIECES / len(which))))
+        # triangles of one refined sheet
+        most = min(8, int(np.sqrt(250_000 / len(which))))  # pieces of an edge
         return int(np.clip(np.ceil(np.sqrt(bulge / tolerance) - 1e-6), 1, max(most, 1)))
 
     def refined(self, which: IntArray, n: int) -> tuple[FloatArray, IntArray]:
@@ -152,7 +149,8 @@ def smooth_triangles(
     cosine = np.einsum("ed,ed->e", normal[halves[:, 0] // 3], normal[halves[:, 1] // 3])
     alike = pairs[halves[:, 0], 0] != pairs[halves[:, 1], 0]
     # an edge at the very angle is a crease, whatever rounding makes of it
-    crease = ~paired | ~alike | (cosine < np.cos(np.radians(crease_angle)) + AT_ANGLE)
+    # margin of the cosine: files of single precision turn edges of one angle, as of 12 facets, by less
+    crease = ~paired | ~alike | (cosine < np.cos(np.radians(crease_angle)) + 1e-5)
     turn = np.where(paired, np.arccos(np.clip(np.where(alike, cosine, -cosine), -1.0, 1.0)), np.pi)
     corner_normals = _corner_normals(points, triangles, area, normal, halves[~crease])
     inner = np.empty((len(ends), 2, 3))
@@ -198,6 +196,7 @@ def _tangent(chord: FloatArray, one: FloatArray, two: FloatArray) -> FloatArray:
     line /= np.maximum(sine, 1e-300)[:, None]
     plane = chord - np.einsum("ed,ed->e", chord, one)[:, None] * one
     common = np.einsum("ed,ed->e", chord, line)[:, None] * line
-    tangent = np.where((sine > PARALLEL)[:, None], common, plane)
+    # sine of the angle below which two normals at a crease have no line in common
+    tangent = np.where((sine > 0.02)[:, None], common, plane)
     flat = steep | (np.linalg.norm(tangent, axis=1)[:, None] < (1 - STEEP) * length)[:, 0]
     return np.where(flat[:, None], chord, tangent)

@@ -13,9 +13,8 @@ from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.fem.objects.outer_surface import OuterSurface
 from softjaw.fem.objects.spline_surface import SplineSurface, spline_surface
 from softjaw.fem.shell.facing import FAR, Wall, face
+from softjaw.friction.patch import NEGLIGIBLE
 
-ROUND = 1e-9  # how far ratios and exponents of round sections may be off
-NEAR = 0.004  # where the exact place on the wall is looked for [m]
 AROUND, ALONG = 192, 256  # samples of the surface that splines join
 RIM = 17  # samples of a rounded edge, which is short
 DRAWN_AROUND, DRAWN_ALONG = 72, 90
@@ -35,7 +34,7 @@ class Stacked:
         s = np.linspace(*self.outer.wall, 64)
         z = self.outer.curve.derivative(s)[:, 0]
         off = np.abs(np.stack([self.outer.ratio(z) - 1.0, self.outer.exponent(z) - 2.0])).max()
-        return 0 if off <= ROUND else 2
+        return 0 if off <= NEGLIGIBLE else 2
 
     @property
     def bounds(self) -> FloatArray:
@@ -49,7 +48,8 @@ class Stacked:
     def gap(self, x: FloatArray) -> Gap:
         """Signed distance ``(n,)`` [m], normal ``(n, 3)`` and Hessian ``(n, 3, 3)`` [1/m]."""
         x = np.asarray(x, dtype=float)
-        return self._gap(x, np.abs(self._triangles.distance(x)) < NEAR)
+        # where the exact place on the wall is looked for [m]
+        return self._gap(x, np.abs(self._triangles.distance(x)) < 0.004)
 
     def near(self, pose: Pose, lower: FloatArray, upper: FloatArray, element: float | None = None) -> GapFunction:
         """Gap function for use close to the wall, which need not ask the triangles first."""

@@ -21,15 +21,10 @@ from softjaw.fem.objects.gap import FloatArray, IntArray
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.fem.objects.profile import POLE, Curve, joint, line, rounding, spline
 
-NO_AREA = 1e-12  # of the mesh's width squared: cuts that enclose less are empty
-KNOTS = 4  # per wavelength
 LEVELS = 400  # heights of the first look at a mesh
 FEW = 64  # rays per height of that look
 STEEP = 1.0  # slope dr/dz from which a surface counts as bottom or top, not as wall
 STEEPEST = 4.0  # slope up to which the outline is followed by its length
-LEAST = 0.3  # of the height has to be wall
-END = 0.1  # of the height may be folded at either end, as a hollow bottom is, and count as bottom or top
-DOME = 0.9  # a rounding that reaches this far to the axis is drawn as a dome
 
 
 @dataclass(frozen=True)
@@ -92,7 +87,8 @@ def centroids(points: FloatArray, triangles: IntArray, z: FloatArray) -> FloatAr
     cross = p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]
     total = lambda weight: np.bincount(cut, weight, minlength=len(z))  # noqa: E731
     area = total(3.0 * cross)
-    area[np.abs(area) <= NO_AREA * np.ptp(points[:, :2], axis=0).max(initial=0.0) ** 2] = np.nan
+    # share of the mesh's width squared: cuts that enclose less are empty
+    area[np.abs(area) <= 1e-12 * np.ptp(points[:, :2], axis=0).max(initial=0.0) ** 2] = np.nan
     return np.stack([total(cross * (p + q)[:, axis]) / area for axis in (0, 1)], axis=1)
 
 
@@ -137,7 +133,7 @@ def smooth_spline(x: FloatArray, y: FloatArray, wavelength: float, ends: tuple[f
     It minimises ``sum (y - f)^2 + (wavelength / 2 pi)^6 integral f'''^2 dx / step``, so parabolas stay as they are and
     gaps in the samples are bridged; the third derivative is measured by differences of the coefficients (P-spline).
     """
-    pieces = max(4, int(np.ceil((ends[1] - ends[0]) * KNOTS / wavelength)))
+    pieces = max(4, int(np.ceil((ends[1] - ends[0]) * 4 / wavelength)))  # four knots per wavelength
     width = (ends[1] - ends[0]) / pieces
     knots = ends[0] + width * np.arange(-3, pieces + 4)
     # exactly, because rounding of the sum would leave the last samples outside
@@ -201,13 +197,15 @@ def find_wall(mesh: MeshObject, facet: float, rim: float, wanted: tuple[float, f
     centre = np.nan_to_num(centroids(mesh.points, mesh.triangles, z))
     rays = cast(mesh.points, mesh.triangles, z, centre, FEW)
     r = np.nan_to_num(rays.outer).mean(axis=1)
-    at_end = np.abs(z - 0.5 * (low + high)) > (0.5 - END) * (high - low)
+    # share of the height may be folded at either end, as a hollow bottom is, and count as bottom or top
+    at_end = np.abs(z - 0.5 * (low + high)) > 0.4 * (high - low)
     bad, slope = folded(rays, facet).any(axis=1) & at_end, np.gradient(r, z)
     first, last = _run(bad | (slope > STEEP)), len(z) - 1 - _run((bad | (slope < -STEEP))[::-1])
     found = max(z[min(first, len(z) - 1)], low + rim), min(z[max(last, 0)], high - rim)
     asked = wanted or (low, high)
     ends = max(found[0], asked[0]), min(found[1], asked[1])
-    if ends[1] - ends[0] < LEAST * (min(asked[1], high) - max(asked[0], low)) or ends[1] <= ends[0]:
+    # share of the height has to be wall
+    if ends[1] - ends[0] < 0.3 * (min(asked[1], high) - max(asked[0], low)) or ends[1] <= ends[0]:
         raise MeshError(
             f"the mesh has no upright wall: of z = {asked[0]:.4g} m to {asked[1]:.4g} m only {ends[0]:.4g} m to "
             f"{max(ends):.4g} m is neither bottom nor top; check the mesh's axis, or treat the object as rigid"
@@ -281,7 +279,8 @@ def lid(curve: Curve, height: float | None, rim: float, *, first: bool) -> list[
     t, inwards = (-d1 if first else d1) * mirror, np.array([0.0, -1.0])
     fall = 1.0 - t @ inwards
     radius = min(rim, 0.25 * p[1]) if height is None else abs(height - p[0]) / fall
-    if radius * np.sqrt(1.0 - (t @ inwards) ** 2) > DOME * p[1]:
+    # a rounding that reaches this far to the axis is drawn as a dome
+    if radius * np.sqrt(1.0 - (t @ inwards) ** 2) > 0.9 * p[1]:
         pole = np.array([p[0] + mirror[0] * radius * fall, 0.0])
         if first:
             return [spline(np.array([pole, p]), POLE, joint(d1, d2))]

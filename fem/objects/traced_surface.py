@@ -38,14 +38,8 @@ from softjaw.fem.objects.traced_outline import (
 )
 
 PER_WAVE = 16  # heights at which rays are cast
-RAYS = 2048  # at each height
 AROUND, MOST_ALONG = 256, 800
-FEWEST_WAVES = 8  # that are kept round any section
-FACETS = 3.0  # in the shortest wave that is kept
-LONGEST = 0.15  # of the wall's height, for that wave
-LINES = 2  # of the shape's splines per knot of the outline
 SYMMETRIC = 1e-6  # of the size: how exactly a symmetry has to be fulfilled ...
-UNSURE = 0.01  # ... or of the facets' sagitta, which says nothing about the body
 OFF = 0.03  # of the mean radius: a surface further from its mesh is refused
 LID = 24  # places along a lid, and angles, at which its distance to the mesh is looked up
 
@@ -105,9 +99,9 @@ def trace_radii(mesh: MeshObject, wall: Wall, facet: float, wavelength: float, t
     height = smooth_spline(s, z, wavelength, (0.0, s[-1]))
     s = np.linspace(0.0, s[-1], max(33, int(np.ceil(PER_WAVE * s[-1] / wavelength)) + 1))
     z = np.clip(height(s), *wall.ends)
-    rays = cast(mesh.points, mesh.triangles, z, wall.centre(z), RAYS)
+    rays = cast(mesh.points, mesh.triangles, z, wall.centre(z), 2048)  # rays at each height
     _refuse_folds(z, rays, facet)
-    waves = np.maximum(FEWEST_WAVES, 2 * np.pi * rays.outer.mean(axis=1) / wavelength)
+    waves = np.maximum(8, 2 * np.pi * rays.outer.mean(axis=1) / wavelength)  # waves round any section, at least
     R = smooth_rings(rays.outer, waves, AROUND)
     R, symmetric, is_round = _symmetric(R, ~wall.centre(z).any(axis=0), tolerance)
     return Radii(s, z, R, height, wavelength, symmetric, is_round)
@@ -234,8 +228,11 @@ def traced(
     """
     facet, size = facet_size(mesh), float(np.ptp(mesh.bounds, axis=0).max())
     wall = find_wall(mesh, facet, rim, heights, SYMMETRIC * size)
-    length = wavelength or min(FACETS * facet, LONGEST * (wall.ends[1] - wall.ends[0]))
-    tolerance = max(SYMMETRIC * size, UNSURE * facet**2 / (8 * wall.radius))
+    # the shortest wave has three facets,
+    # or a share of the wall's height
+    length = wavelength or min(3.0 * facet, 0.15 * (wall.ends[1] - wall.ends[0]))
+    # a share of the facets' sagitta, which says nothing about the body
+    tolerance = max(SYMMETRIC * size, 0.01 * facet**2 / (8 * wall.radius))
     radii = trace_radii(mesh, wall, facet, length, tolerance)
     surface = _surface(wall, radii, rim)
     report = _report(surface, mesh, wall, facet, radii.wavelength)
@@ -291,7 +288,7 @@ def _surface(wall: Wall, radii: Radii, rim: float) -> TracedSurface:
 def _shape(q: BSpline, around: int) -> SplineSurface:
     """Sections ``q(s) (around,)`` as splines round and along."""
     knots = q.t[3:-3]
-    s = np.linspace(knots[0], knots[-1], LINES * (len(knots) - 1) + 1)
+    s = np.linspace(knots[0], knots[-1], 2 * (len(knots) - 1) + 1)  # splines of the shape per knot of the outline
     theta = np.linspace(0.0, 2 * np.pi, around + 1)
     e = np.stack([np.cos(theta), np.sin(theta), 0 * theta], axis=1)
     values = q(s)

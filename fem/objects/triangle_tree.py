@@ -15,11 +15,10 @@ import numpy as np
 from numba import njit
 
 from softjaw.fem.objects.gap import FloatArray, IntArray, edges_of
+from softjaw.friction.patch import NEGLIGIBLE
 
 LEAF = 4  # triangles in the smallest boxes
 DEPTH = 128  # of the stack; a tree of 500 000 triangles is 18 deep
-THIN = 1e-20  # squared area over the fourth power of the size, below which a triangle is taken as its three edges
-INCLUSIVE = 1e-9  # barycentric margin on rays, so that none slips through between two triangles
 
 
 @njit(cache=True)
@@ -90,7 +89,8 @@ def _on_triangle(x, p, foot, other):
     nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
     area2 = nx * nx + ny * ny + nz * nz
     size2 = max(ux * ux + uy * uy + uz * uz, vx * vx + vy * vy + vz * vz)
-    if area2 > THIN * size2 * size2:
+    # squared area over the fourth power of the size, below which a triangle is taken as its three edges
+    if area2 > 1e-20 * size2 * size2:
         c = ((uy * wz - uz * wy) * nx + (uz * wx - ux * wz) * ny + (ux * wy - uy * wx) * nz) / area2
         b = ((wy * vz - wz * vy) * nx + (wz * vx - wx * vz) * ny + (wx * vy - wy * vx) * nz) / area2
         if b > 0.0 and c > 0.0 and b + c < 1.0:
@@ -154,11 +154,11 @@ def _hits(o, d, p):
         return np.inf
     wx, wy, wz = o[0] - p[0, 0], o[1] - p[0, 1], o[2] - p[0, 2]
     b = (wx * qx + wy * qy + wz * qz) / det
-    if b < -INCLUSIVE or b > 1.0 + INCLUSIVE:
+    if b < -NEGLIGIBLE or b > 1.0 + NEGLIGIBLE:
         return np.inf
     rx, ry, rz = wy * uz - wz * uy, wz * ux - wx * uz, wx * uy - wy * ux
     c = (d[0] * rx + d[1] * ry + d[2] * rz) / det
-    if c < -INCLUSIVE or b + c > 1.0 + INCLUSIVE:
+    if c < -NEGLIGIBLE or b + c > 1.0 + NEGLIGIBLE:
         return np.inf
     return (vx * rx + vy * ry + vz * rz) / det
 
@@ -179,7 +179,7 @@ def first_hit(o, d, least, own, anyone, corners, order, low, high, start, count,
         for k in range(3):
             if d[k] != 0.0:
                 s, t = (low[node, k] - o[k]) / d[k], (high[node, k] - o[k]) / d[k]
-                enter, leave = max(enter, min(s, t) - INCLUSIVE), min(leave, max(s, t) + INCLUSIVE)
+                enter, leave = max(enter, min(s, t) - NEGLIGIBLE), min(leave, max(s, t) + NEGLIGIBLE)
             elif o[k] < low[node, k] or o[k] > high[node, k]:
                 leave = -np.inf
         if enter > leave:

@@ -24,13 +24,7 @@ from softjaw.fem.objects.triangle_tree import TriangleTree
 
 SMALLEST, LARGEST = 1e-3, 2.0  # plausible largest extent of an object that a gripper holds [m]
 ROUNDED = 5e-7  # of the largest coordinate: corners this close are one; files hold numbers of single precision (6e-8)
-SPECK = 0.02  # of the object's diagonal: loose pieces below it are dropped ...
-SPECKS_AREA = 0.02  # ... unless they make up more than this share of the area
-FLAT = 1e-6  # volume of a piece over its area and size, below which it has no inside
-MOST_SHELLS = 50  # pieces that are compared with each other, to find those inside others
 MOST_TRIANGLES, DECIMATED_TO = 500_000, 200_000
-MOST_AT_EDGE = 8  # triangles at one edge, among which neighbours are looked for
-CORNERS_ASKED = 100  # of a piece, that are asked whether they lie in another
 UNITS = {name: times / over for name, (times, over) in LENGTHS.items()}
 
 
@@ -221,8 +215,9 @@ def _without_specks(points: FloatArray, triangles: IntArray) -> tuple[FloatArray
     """The mesh without loose specks, which scans leave beside the object and a pad would meet first."""
     piece = pieces_of(points, triangles)
     size, area = _sizes(points, triangles, piece), np.bincount(piece, _areas(points, triangles))
-    speck = size < SPECK * size.max()
-    if not speck.any() or area[speck].sum() > SPECKS_AREA * area.sum():
+    speck = size < 0.02 * size.max()  # share of the object's diagonal: loose pieces below it are dropped ...
+    # ... unless they make up more than this share of the area
+    if not speck.any() or area[speck].sum() > 0.02 * area.sum():
         return points, triangles, []
     return *_used(points, triangles[~speck[piece]]), [f"dropped {speck.sum()} specks of debris"]
 
@@ -240,7 +235,7 @@ def neighbours(points: FloatArray, triangles: IntArray) -> Neighbours:
     two = count == 2
     pair[two] = np.stack([order[start[two]], order[start[two] + 1]], axis=1)
     normal = _unit_normals(points, triangles)
-    for n in range(3, MOST_AT_EDGE + 1):
+    for n in range(3, 9):  # triangles at one edge, among which neighbours are looked for
         if (many := np.flatnonzero(count == n)).size:
             pair[many] = _smoothest(order[start[many][:, None] + np.arange(n)], sides, normal)
     return Neighbours(ordered[first], edge.reshape(-1, 3), pair, count)
@@ -280,7 +275,8 @@ def turned_alike(points: FloatArray, triangles: IntArray) -> tuple[IntArray, boo
     triangles = np.where(flip[:, None], triangles[:, ::-1], triangles)
     piece = np.unique(np.minimum(label[:n], label[n:]), return_inverse=True)[1].ravel()
     volume = np.asarray(np.bincount(piece, _volumes(points, triangles)), dtype=float)
-    flat = np.abs(volume) <= FLAT * np.bincount(piece, _areas(points, triangles)) * _sizes(points, triangles, piece)
+    # volume of a piece over its area and size, below which it has no inside
+    flat = np.abs(volume) <= 1e-6 * np.bincount(piece, _areas(points, triangles)) * _sizes(points, triangles, piece)
     inverted = (volume < 0) & ~flat
     triangles = np.where(inverted[piece][:, None], triangles[:, ::-1], triangles)
     turned = int(np.sum(flip != inverted[piece]))
@@ -299,7 +295,7 @@ def _without_shells(points: FloatArray, triangles: IntArray) -> tuple[FloatArray
     """A closed mesh without the closed pieces that lie inside another one: nobody meets them, and they fill no less."""
     piece = pieces_of(points, triangles)
     count = piece.max() + 1
-    if count == 1 or count > MOST_SHELLS:
+    if count == 1 or count > 50:  # pieces that are compared with each other, to find those inside others
         return points, triangles, []
     parts = [triangles[piece == k] for k in range(count)]
     inner = np.array([any(_inside(points, part, other) for other in parts if other is not part) for part in parts])
@@ -311,7 +307,7 @@ def _without_shells(points: FloatArray, triangles: IntArray) -> tuple[FloatArray
 def _inside(points: FloatArray, piece: IntArray, other: IntArray) -> bool:
     """Whether a piece lies inside another, but for a few places where it may come through."""
     corners = np.unique(piece)
-    asked = points[corners[:: 1 + len(corners) // CORNERS_ASKED]]
+    asked = points[corners[:: 1 + len(corners) // 100]]  # corners of a piece are tested, about 100
     return float(np.mean([winding_number(x, points, other) > 0.5 for x in asked])) > 0.9
 
 

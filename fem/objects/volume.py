@@ -12,7 +12,6 @@ from numba import njit
 
 from softjaw.fem.objects.gap import FloatArray, IntArray
 
-CELLS = 128  # of the grid along the longest side
 OFF_CENTRE = 0.5 + 1e-4 * np.sqrt(2.0)  # of a cell, where lines run: not through the corners of regular meshes
 
 
@@ -32,7 +31,7 @@ def centroid(points: FloatArray, triangles: IntArray, closed: bool) -> tuple[Flo
         corners = points[triangles] - middle
         volume = np.einsum("ka,ka->k", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6
         return middle + volume @ corners.sum(axis=1) / (4 * volume.sum()), 0.0
-    step = float((high - low).max()) / CELLS
+    step = float((high - low).max()) / 128  # cells along the longest side
     shape = np.maximum(np.ceil((high - low) / step).astype(int), 1)
     inside, known = _votes(points, triangles, low, step, shape)
     grid = low + step * (np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), axis=-1) + OFF_CENTRE)

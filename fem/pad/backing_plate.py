@@ -17,9 +17,9 @@ from scipy.linalg import cho_factor, cho_solve
 from softjaw.fem.pad.shape import BackingPlate, TiltingMount
 from softjaw.fem.shell.element import Shell, patch
 from softjaw.fem.shell.wall_model import LinearShell
+from softjaw.friction.patch import NEGLIGIBLE
 
 FloatArray = NDArray[np.float64]
-CLOSE = 1e-9  # of the outline, within which a node is on the patch's rim
 
 
 @dataclass(frozen=True)
@@ -120,7 +120,7 @@ def _plate(x: tuple[float, ...], y: tuple[float, ...], symmetry: tuple[bool, boo
     X = np.stack([*np.meshgrid(x, y, indexing="ij"), np.zeros((len(x), len(y)))], axis=-1)
     shell = Shell(patch(X, np.array([0.0, 0.0, 1.0]), plate.thickness), plate.young_modulus, plate.poisson_ratio)
     # nodes on the rim count as held, whatever rounding makes of their place
-    rim = 0.5 * np.array(plate.support) + CLOSE * (np.ptp(x) + np.ptp(y))
+    rim = 0.5 * np.array(plate.support) + NEGLIGIBLE * (np.ptp(x) + np.ptp(y))
     held = (np.abs(X[..., :2]) <= rim).all(axis=-1)
     if not held.any():
         raise ValueError(
@@ -130,5 +130,5 @@ def _plate(x: tuple[float, ...], y: tuple[float, ...], symmetry: tuple[bool, boo
     fixed = np.repeat(held[..., None], 6, axis=-1)
     for axis in range(2):
         if symmetry[axis]:
-            fixed[np.abs(X[..., axis]) < CLOSE, axis] = fixed[np.abs(X[..., axis]) < CLOSE, 3 + axis] = True
+            fixed[np.abs(X[..., axis]) < NEGLIGIBLE, axis] = fixed[np.abs(X[..., axis]) < NEGLIGIBLE, 3 + axis] = True
     return shell, fixed.ravel(), ~fixed[..., :3]

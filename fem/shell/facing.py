@@ -28,7 +28,6 @@ from softjaw.fem.objects.spline_surface import SplineSurface, evaluate
 
 IntArray = NDArray[np.int32]
 FAR = 1.0  # gap of a point that faces no wall [m]
-SHARP = 1e-13  # how well the place is found [m]
 LONGEST_TURN, LONGEST_SLIDE = 0.1, 0.004  # of one iteration [rad], [m]
 
 
@@ -193,7 +192,7 @@ def _face(points, places, lines_t, lines_s, coefficients, periodic, closed, low,
                 break
             size = abs(r[0]) + abs(r[1]) + abs(r[2])
             # the derivatives below belong to this very place, so it is checked before the step, not after
-            if size <= SHARP:
+            if size <= 1e-13:  # how well the place is found [m]
                 ok = True
                 break
             for c in range(3):

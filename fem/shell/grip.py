@@ -25,14 +25,10 @@ from softjaw.fem.shell.wall_problem import WallProblem
 LONGEST_STEP, SHORTEST_STEP = 5e-4, 1.0 / 16.0  # of the closing [m] while a wall snaps in; part of it, or it jumps
 JUMP = 1e-3  # change of closing displacement between two forces that may have passed over a limit [m]
 WALL_BALANCE = 1e-6  # of the normal force
-CREEP_ITERATIONS = 600  # of a wall that creeps for one force
-SLOW = 2e-5  # velocity at which it may have come to rest, see ``creep``
 # Newton iterations of a step from one state to the next: good ones take 3 to 8, with friction 4 to 14.
 LONGEST_SOLVE, WITH_FRICTION = 12, 24
 # opening below which a wall without a further state counts as collapsed at once, and after nodal gaps have failed too
 FOLDED, INDENTED = 0.75, 0.95
-SAME_END = 0.05  # part of the force by which the ends of the load path with both kinds of gaps may differ
-HARDLY_SHUT = 0.01  # part of the opening: a wall that has closed by less has not jumped
 GIVES_WAY = 0.5  # stiffness of the grasp over the mean one so far, below which the wall counts as snapped in
 
 
@@ -51,7 +47,8 @@ def jumps(low: tuple[float, float], high: tuple[float, float]) -> bool:
     (False, True, False)
     """
     (force, shut), (more, then) = low, high
-    return then > HARDLY_SHUT and GIVES_WAY * (then - shut) / (more - force) > shut / force
+    # part of the opening: a wall that has closed by less has not jumped
+    return then > 0.01 and GIVES_WAY * (then - shut) / (more - force) > shut / force
 
 
 @dataclass(frozen=True)
@@ -173,7 +170,8 @@ class Grip(LoadPath[WallProblem]):
         """
         left, _ = self.opening.last
         low, high = sorted([limit, self._peak])
-        if left < INDENTED and high - low <= SAME_END * high:
+        # part of the force by which the ends of the load path with both kinds of gaps may differ
+        if left < INDENTED and high - low <= 0.05 * high:
             raise CheckError(
                 f"the wall seems to give way at {high:.3g} N on this mesh: with gaps of either kind its load path ends "
                 f"there (at {low:.4g} and {high:.4g} N), its opposite sides {1 - left:.0%} of their distance closer; "
@@ -221,7 +219,8 @@ class Grip(LoadPath[WallProblem]):
     def _creep(self, here: OnPath | None, force: float, work: Work) -> OnPath:
         """State at ``force`` that the wall creeps to from the last one on the path."""
         assert self._last is not None
-        self.solver.left, slow = CREEP_ITERATIONS, SLOW
+        # iterations of a wall that creeps for one force
+        self.solver.left, slow = 600, 2e-5  # velocity at which it may have come to rest, see ``creep``
         start, (_, reached) = self._last, self.opening.last
         for ahead, speed in creep(self.problem, self.solver, start, force):
             if self.opening(self.problem.wall_state(ahead)) <= 0.0:

@@ -20,10 +20,10 @@ from softjaw.fem.objects.stacked import wall_surface
 from softjaw.fem.shell.element import FloatArray, Shell
 from softjaw.fem.shell.facing import Wall
 from softjaw.fem.shell.wall_material import WallMaterial
-from softjaw.fem.shell.wall_mesh import ON_LINE, BodyMesh, MeshSize, body_mesh
+from softjaw.fem.shell.wall_mesh import BodyMesh, MeshSize, body_mesh
 from softjaw.fem.shell.wall_model import LinearShell, LinearWall, NonlinearWall
+from softjaw.friction.patch import NEGLIGIBLE
 
-SAME_POSE = 1e-9  # how exactly poses must be images of each other, in units of their size
 HALF_TURN = np.diag([-1.0, -1.0, 1.0])
 
 
@@ -60,10 +60,10 @@ def supported(
 
 
 def _clamped(mesh: BodyMesh, held: FloatArray) -> None:
-    lines = mesh.s <= max(mesh.surface.flat[0], mesh.s[0]) + ON_LINE
+    lines = mesh.s <= max(mesh.surface.flat[0], mesh.s[0]) + NEGLIGIBLE
     # the mesh of a tube begins off the axis
-    if mesh.s[0] > ON_LINE:
-        lines |= mesh.s >= min(mesh.surface.flat[1], mesh.s[-1]) - ON_LINE
+    if mesh.s[0] > NEGLIGIBLE:
+        lines |= mesh.s >= min(mesh.surface.flat[1], mesh.s[-1]) - NEGLIGIBLE
     held[np.unique(mesh.number[:, lines])] = True
 
 
@@ -162,11 +162,11 @@ def grasp(body: ThinWalled, poses: tuple[Pose, Pose], allowed: tuple[bool, bool]
     size = max(np.abs(pose.origin).max() for pose in turned_poses)
 
     def alike(p: Pose, q: Pose) -> bool:
-        same = np.abs(p.rotation - q.rotation).max() <= SAME_POSE
-        return same and np.abs(p.origin - q.origin).max() <= SAME_POSE * size
+        same = np.abs(p.rotation - q.rotation).max() <= NEGLIGIBLE
+        return same and np.abs(p.origin - q.origin).max() <= NEGLIGIBLE * size
 
     # the plane y = 0 halves both pads, the plane x = 0 makes one finger the other's image
-    across = allowed[1] and turned.symmetric[1] and all(_is_own_image(pose, SAME_POSE * size) for pose in turned_poses)
+    across = allowed[1] and turned.symmetric[1] and all(_is_own_image(pose, NEGLIGIBLE * size) for pose in turned_poses)
     between = allowed[0] and turned.symmetric[0] and alike(_image(turned_poses[0]), turned_poses[1])
     flipped = tuple(across and pose.rotation[1, 1] < 0 for pose in turned_poses)
     solved = tuple(_half_turned(p) if flip else p for p, flip in zip(turned_poses, flipped, strict=True))
@@ -248,4 +248,4 @@ def _image(pose: Pose) -> Pose:
 def _is_own_image(pose: Pose, tolerance: float) -> bool:
     """Whether y = 0 of the grasp frame is the pad's own plane y = 0."""
     # either sign: half a turn about the approach leaves the pad in the same plane
-    return abs(abs(pose.rotation[1, 1]) - 1.0) <= SAME_POSE and abs(pose.origin[1]) <= tolerance
+    return abs(abs(pose.rotation[1, 1]) - 1.0) <= NEGLIGIBLE and abs(pose.origin[1]) <= tolerance

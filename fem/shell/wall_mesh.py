@@ -13,13 +13,13 @@ from skfem import ElementQuad1
 
 from softjaw.fem.objects.outer_surface import OuterSurface, Turned
 from softjaw.fem.shell.element import FloatArray, IntArray, ShellMesh, grid_elements
+from softjaw.friction.patch import NEGLIGIBLE
 
 Outer = OuterSurface | Turned
 Thickness = float | Sequence[tuple[float, float]]  # of a wall [m], or pairs (z, thickness)
 LINE_SAMPLES = 4000  # of the wanted element size along a line
 TURN = np.radians(25.0)  # largest turn of the outline within one element
 SQUARE = ElementQuad1()
-ON_LINE = 1e-9  # places this close to an end or an edge of the wall are on it [m]
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ def along(surface: Outer, size: MeshSize, open_bottom: bool, open_top: bool, mar
     # fine where pads touch, and wherever the outline bends: facets must follow a rounded edge
     h = np.minimum(np.minimum(size.along + size.growth * off, size.coarse), TURN / np.maximum(bend, 1e-9))
     h = limited(x, h, size.growth)
-    edges = sorted({edge for edge in (*surface.flat, *marks) if begin + ON_LINE < edge < end - ON_LINE})
+    edges = sorted({edge for edge in (*surface.flat, *marks) if begin + NEGLIGIBLE < edge < end - NEGLIGIBLE})
     runs = [divided(a, b, x, h) for a, b in pairwise([begin, *edges, end])]
     return np.concatenate([*(run[:-1] for run in runs), runs[-1][-1:]])
 
@@ -234,7 +234,7 @@ def _steps(surface: Outer, thickness: Thickness) -> list[float]:
     if isinstance(thickness, float):
         return []
     z = surface.curve.derivative(np.linspace(*surface.wall, 257))[:, 0]
-    low, high = z.min() + ON_LINE, z.max() - ON_LINE
+    low, high = z.min() + NEGLIGIBLE, z.max() - NEGLIGIBLE
     return [surface.station(height) for height, _ in thickness if low < height < high]
 
 

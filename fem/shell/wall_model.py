@@ -16,7 +16,6 @@ from softjaw.fem.shell.element import FloatArray, IntArray, Shell
 from softjaw.fem.shell.wall_mesh import BodyMesh
 
 AT_ONCE = 192  # right-hand sides; bounds the memory
-LOOSE = 1e15  # ratio of the largest to the smallest stiffness from which on a shell counts as loose
 
 
 def free_numbers(fixed: FloatArray) -> tuple[IntArray, IntArray]:
@@ -50,7 +49,7 @@ class LinearShell:
         load[self.free] = np.random.default_rng(0).normal(size=len(self.free))
         ratio = stiffest * np.abs(self.solve(load)).max() / np.abs(load).max()
         # `not <` counts NaN as loose, too
-        if not ratio < LOOSE:
+        if not ratio < 1e15:  # ratio of the largest to the smallest stiffness from which on a shell counts as loose
             raise ConvergenceError(
                 "the shell can move freely: fix more of it, or give it weak springs (see fem.shell.thin_walled)"
             )

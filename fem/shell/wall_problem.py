@@ -31,7 +31,6 @@ from softjaw.fem.shell.wall_kernel import contact_forces, contact_tangent, frict
 from softjaw.fem.shell.wall_model import NonlinearWall
 
 IntArray = NDArray[np.int32]
-CARRIED = 0.3  # part of a node's area that must face the wall for the node to carry load
 ROUNDING = 1.5e-18  # norm of the residual over the wall's modulus [m^2]: its forces are differences of large numbers
 
 
@@ -128,7 +127,8 @@ class WallProblem(ContactProblem):
                 weighted, part, force, self._wall_force,
             )  # fmt: skip
             # a node that hangs over the rim with most of its area would put all of its pressure on the rest
-            gaps = np.where(f.nodal(part) > CARRIED * f.area, f.nodal(weighted), FAR * f.area)
+            # part of a node's area that must face the wall for the node to carry load
+            gaps = np.where(f.nodal(part) > 0.3 * f.area, f.nodal(weighted), FAR * f.area)
             contacts.append(Evaluated(points, facing.gap, facing.normal, lam, gaps, f.active(x, gaps), force, facing))
         return contacts
 

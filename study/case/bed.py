@@ -25,10 +25,8 @@ from softjaw.study.case.task import Task, payload_alone
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 GRID = (25, 11)  # points of a pad's face along length and width
-STEEPEST = 3.0  # slope of a height field that still counts as touched: further out it is the object's flank
 CRUSHED = 0.25  # strain of the bed at its highest pressure that leaves half of a grasp
 MOTIONS = 50  # slip motions whose wrenches bound what a contact on springs carries
-BESIDE = 0.6  # of a pad's sides, from its middle: a solve looks so far at the surface
 
 
 @njit(cache=True)
@@ -77,7 +75,8 @@ class Side:
         filled = np.where(np.isfinite(self.height), self.height, jaws.pad[2])
         self.slope = _slopes(filled, x[1] - x[0], y[1] - y[0])
         # a cell whose neighbour misses the object, or lies far behind it, is at a silhouette: its slope says nothing
-        edge = np.abs(self.slope).max(axis=-1) > STEEPEST
+        # slope of a height field that still counts as touched: further out it is the object's flank
+        edge = np.abs(self.slope).max(axis=-1) > 3.0
         self.slope[edge] = 0.0
 
     @cached_property
@@ -183,7 +182,8 @@ class JawsOnSurface:
         corners = (lids - self.point) @ self.axes
         low, high = corners.min(axis=1), corners.max(axis=1)
         length, width, thick = self.jaws.pad
-        reach = BESIDE * np.array([length, width])
+        # share of a pad's sides, from its middle: a solve looks so far at the surface
+        reach = 0.6 * np.array([length, width])
         beside = ((low[:, :2] <= reach) & (high[:, :2] >= -reach)).all(axis=1)
         faces = self.sides[0].touch, -self.sides[1].touch
         return any(bool((beside & (low[:, 2] <= z + thick) & (high[:, 2] >= z - thick)).any()) for z in faces)

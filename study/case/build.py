@@ -20,8 +20,6 @@ from softjaw.study.scene import Scene
 from softjaw.study.scene.sections import Gripper
 from softjaw.study.units import in_si
 
-FACET = 0.25  # of a pad's shorter side: narrower facets are hardly felt
-
 
 def geometry() -> Any:
     """The module that builds what needs compiled loops; most scenes are checked and planned without it."""
@@ -182,7 +180,8 @@ def warnings(scene: Scene) -> tuple[str, ...]:
 
 def told(scene: Scene) -> list[str]:
     """Lines with all `warnings`, and notes on meshes: what was mended, tolerated, or may be meant otherwise."""
-    notes, width = [], FACET * min(scene.gripper.pad_size[:2])
+    # share of a pad's shorter side: narrower facets are hardly felt
+    notes, width = [], 0.25 * min(scene.gripper.pad_size[:2])
     for shape in dict.fromkeys(shape for shape in shapes_of(scene) if shape.shape == "mesh"):
         mesh = geometry().mesh_object(shape)
         centroid = _centroid_note(mesh) if scene.task.centre_of_mass is None else ""

@@ -16,9 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.fem.objects.gap import Pose
+from softjaw.friction.patch import NEGLIGIBLE
 from softjaw.study.case.build import check_object, forces_apart, middle_of, own_frame, pad_shape, surface_triangles
 from softjaw.study.case.fit import doubt, fit_of, jaws_of
-from softjaw.study.case.poses import ROUNDING, axis_poses, explicit_poses, moved, turn_of_pose
+from softjaw.study.case.poses import axis_poses, explicit_poses, moved, turn_of_pose
 from softjaw.study.quantities import MISSING, REALISATION
 from softjaw.study.scene import Scene
 from softjaw.study.units import UNITS, in_si, split_unit
@@ -78,10 +79,10 @@ def turn_between(first: Candidate, second: Candidate, axis_symmetry: int) -> flo
         Angle in [0, 2 pi) [rad].
     """
     angle, other = (turn_of_pose(*pair, axis_symmetry) for pair in zip(first.poses, second.poses, strict=True))
-    if angle is None or other is None or abs(math.remainder(angle - other, 2 * math.pi)) > ROUNDING:
+    if angle is None or other is None or abs(math.remainder(angle - other, 2 * math.pi)) > NEGLIGIBLE:
         return None
     # A turn just below 0 by rounding would otherwise become a whole one.
-    return 0.0 if abs(angle) <= ROUNDING else angle % (2 * math.pi)
+    return 0.0 if abs(angle) <= NEGLIGIBLE else angle % (2 * math.pi)
 
 
 def groups(places: Sequence[Candidate], axis_symmetry: int) -> list[list[tuple[int, float]]]:

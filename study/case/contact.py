@@ -16,18 +16,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from softjaw.fem.objects.gap import Pose
 from softjaw.friction.frame import Frame, contact_frame, contact_length, in_frame
-from softjaw.friction.patch import ContactPatch
+from softjaw.friction.patch import NEGLIGIBLE, ContactPatch
 from softjaw.friction.torque import pure_torque
 from softjaw.friction.wrench import FrictionLimits, friction_limits
 from softjaw.lsfit.ellipsoid import Ellipsoid, three_motion_ellipsoid
 from softjaw.scoring.contact import SoftContact
-from softjaw.study.case.result import MARGIN
+from softjaw.study.case.result import UNDECIDED
 from softjaw.study.flags import Flag, raised
 from softjaw.study.quantities import MODELS
 
 FloatArray = NDArray[np.float64]
 X_OF_PAD = np.array([1.0, 0.0, 0.0])  # the contact frame's x axis follows the pad's long side
-LOADED = 1e-9  # of the largest pressure, below which a face carries no load
 ANTIPODAL = np.radians(5.0)  # beyond this misalignment a flag says so
 
 
@@ -119,7 +118,7 @@ class Contact:
     @property
     def loaded(self) -> NDArray[np.bool_]:
         """Which faces of the patch carry load ``(n,)``."""
-        return self.patch.pressure > LOADED * self.patch.pressure.max(initial=0.0)
+        return self.patch.pressure > NEGLIGIBLE * self.patch.pressure.max(initial=0.0)
 
     @property
     def area(self) -> float:
@@ -157,14 +156,14 @@ def angles(first: Contact, second: Contact) -> tuple[float, float]:
 def slips(lean: float, mu: float) -> bool:
     """Whether the line of the contacts, which leans by so much [rad], leaves a friction cone."""
     # Just below a right angle, beyond which the tangent would change its sign.
-    return bool(np.tan(min(lean, 1.57)) > mu + MARGIN)
+    return bool(np.tan(min(lean, 1.57)) > mu + UNDECIDED)
 
 
 def pose_flags(contacts: Sequence[Contact]) -> Flag:
     """Flags of how two contacts stand, and of their frames."""
     first, second = contacts
     normals, line = angles(first, second)
-    flags = Flag.NOT_ANTIPODAL * (max(normals, line) > ANTIPODAL - MARGIN)
+    flags = Flag.NOT_ANTIPODAL * (max(normals, line) > ANTIPODAL - UNDECIDED)
     flags |= Flag.SLIPS * slips(line, first.mu)
     for c in contacts:
         flags |= raised(c.frame.flag)

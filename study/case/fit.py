@@ -20,7 +20,6 @@ from softjaw.study.units import shown_text
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
-DRAWN = 1e-3  # of the object's size, by which its triangles may be off the surface that is solved with
 DIGITS = 4  # of lengths in messages
 
 
@@ -158,4 +157,5 @@ def jaws_of(scene: Scene) -> Jaws:
 
 def doubt(points: FloatArray) -> float:
     """By how much triangles with these points ``(k, 3)`` may be off the surface that is solved with [m]."""
-    return DRAWN * float(np.linalg.norm(np.ptp(points, axis=0)))
+    # share of the object's size, by which its triangles may be off the surface that is solved with
+    return 1e-3 * float(np.linalg.norm(np.ptp(points, axis=0)))

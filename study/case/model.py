@@ -18,9 +18,9 @@ from softjaw.fem.pad.backing_plate import relative_compliance
 from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.pad.shape import BackingPlate, TiltingMount
 from softjaw.fem.petsc import PETSc, unknown_options
+from softjaw.friction.patch import NEGLIGIBLE
 from softjaw.study.case.build import build_object, pad_shape
 from softjaw.study.case.candidates import candidates
-from softjaw.study.case.poses import ROUNDING
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.scene import Scene
 from softjaw.study.scene.sections import Gripper
@@ -108,7 +108,7 @@ def approach(obj: GapObject, pose: Pose, gripper: Gripper) -> Finger:
     element = min(side / n for side, n in zip(size[:2], gripper.elements, strict=False))
     surface = obj.near(touch, box * [-1, -1, -0.5], box, element if gripper.element == "hex8" else 0.5 * element)
     face = _contact_face(size)
-    if abs(surface.gap(touch.to_object(face))[0].min()) > ROUNDING:  # smoothed: met earlier or later
+    if abs(surface.gap(touch.to_object(face))[0].min()) > NEGLIGIBLE:  # smoothed: met earlier or later
         # A smoothed surface may stand before the old touch, so the pad steps back before it looks again.
         for step in STEPS_BACK:
             back = Pose(touch.rotation, touch.origin - step * size[2] * touch.rotation[:, 2])

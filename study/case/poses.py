@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.fem.objects.gap import Pose
+from softjaw.friction.patch import NEGLIGIBLE
 from softjaw.study.scene.grasps import GraspPose
 
 if TYPE_CHECKING:
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 STANDOFF = 5.0  # distance of a pad's origin from the point it is aimed at [m]; the press closes it to first touch
-ROUNDING = 1e-9  # of directions [-] and of lines of approach [m]: no larger differences, and they are alike
 
 
 def axis_poses(station: float, angle: float, roll: float, middle: CentreLine | None = None) -> tuple[Pose, Pose]:
@@ -93,14 +93,14 @@ def turn_of_pose(first: Pose, other: Pose, axis_symmetry: int) -> float | None:
     """
     turn = other.rotation @ first.rotation.T
     # Only turns about z take the object to itself, so all else is no image.
-    if abs(turn[2, 2] - 1) > ROUNDING or np.abs(turn[2, :2]).max() > ROUNDING:
+    if abs(turn[2, 2] - 1) > NEGLIGIBLE or np.abs(turn[2, :2]).max() > NEGLIGIBLE:
         return None
     angle = math.atan2(turn[1, 0], turn[0, 0])
     step = 2 * math.pi / axis_symmetry if axis_symmetry else 0.0
-    if step and abs(angle - step * round(angle / step)) > ROUNDING:
+    if step and abs(angle - step * round(angle / step)) > NEGLIGIBLE:
         return None
     shift = other.rotation.T @ (turn @ first.origin - other.origin)  # in the pad's frame: z is along the approach
-    return None if np.abs(shift[:2]).max() > ROUNDING else angle
+    return None if np.abs(shift[:2]).max() > NEGLIGIBLE else angle
 
 
 def moved(poses: tuple[Pose, Pose], shift: float, turn: float) -> tuple[Pose, Pose]:

@@ -21,18 +21,15 @@ from softjaw.study.case.build import has_wall, pad_shape
 from softjaw.study.case.contact import Contact
 from softjaw.study.case.model import Finger, contact_rules, image_signs, pad_of, press_of, settings
 from softjaw.study.case.poses import turn_of_pose
-from softjaw.study.case.result import MARGIN
+from softjaw.study.case.result import UNDECIDED
 from softjaw.study.case.wall import thin_body, wall_values
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import MODELS
 from softjaw.study.scene import Scene
 
 OBLIQUE_EXCESS = 0.05  # of the commanded force: beyond it the force along the contact normal is another one
-OVERLAP = 0.1  # of the closing displacement, beyond which the mesh is coarse for the contact
-FEW_ELEMENTS = 6  # loaded ones, below which the mesh is coarse too
 BENT = np.radians(120.0)  # between the object's normals at neighbouring loaded faces, beyond which it is coarse too
 MESH_HOLE = 0.01  # of a pad's face before a hole of the mesh, beyond which that is flagged
-LOCKING = 0.45  # Poisson's ratio above which trilinear elements are too stiff
 MAX_SLOPE = np.radians(60.0)  # of an approach against the planes across a thin-walled object's axis
 UPRIGHT, HALF_TURN = (1.0, 1.0, 1.0), (-1.0, -1.0, 1.0)  # signs of the axes of a pad's frame
 
@@ -123,7 +120,8 @@ class PressedContact(Contact):
     @property
     def on_few_elements(self) -> bool:
         """Whether so few elements are loaded that the contact's shape is theirs."""
-        return bool(np.count_nonzero(self.loaded) < FEW_ELEMENTS * self.state.pad.shape.per_side**2)
+        # with fewer loaded elements the mesh is coarse too
+        return bool(np.count_nonzero(self.loaded) < 6 * self.state.pad.shape.per_side**2)
 
     @property
     def coarse(self) -> bool:
@@ -139,9 +137,11 @@ class PressedContact(Contact):
         # a blade thinner than an element is met on its flanks alone, or not on them, as the faces happen to lie
         pairs = zip(_neighbours(normals), _neighbours(loaded.reshape(n * k, m * k)), strict=True)
         bent = any((np.einsum("ijc,ijc->ij", a, b)[p & q] < np.cos(BENT)).any() for (a, b), (p, q) in pairs)
-        overlaps = self.state.checks.penetration_depth > OVERLAP * self.state.closing
+        # share of the closing displacement, beyond which the mesh is coarse for the contact
+        overlaps = self.state.checks.penetration_depth > 0.1 * self.state.closing
         # Trilinear elements alone lock when the foam is nearly incompressible.
-        return bool(overlaps or few or bent or (shape.element == "hex8" and law.poisson_ratio > LOCKING))
+        # Poisson's ratio above which trilinear elements are too stiff
+        return bool(overlaps or few or bent or (shape.element == "hex8" and law.poisson_ratio > 0.45))
 
     @property
     def free_face(self) -> float:
@@ -158,10 +158,10 @@ def state_flags(contacts: Sequence[PressedContact]) -> int:
     """Flags of the solved states of both fingers."""
     first, second = contacts
     between_faces = float((second.finger.pose.origin - first.finger.pose.origin) @ first.finger.pose.rotation[:, 2])
-    flags = Flag.COLLISION * (first.free_face + second.free_face > between_faces * (1.0 - MARGIN))
+    flags = Flag.COLLISION * (first.free_face + second.free_face > between_faces * (1.0 - UNDECIDED))
     flags |= Flag.UNSTABLE * (min(c.state.checks.ellipticity for c in contacts) <= 0)
     flags |= Flag.JUMPED * any(c.state.path_dependent for c in contacts)
-    flags |= Flag.OBLIQUE * (max(abs(c.force_excess) for c in contacts) > OBLIQUE_EXCESS - MARGIN)
+    flags |= Flag.OBLIQUE * (max(abs(c.force_excess) for c in contacts) > OBLIQUE_EXCESS - UNDECIDED)
     flags |= Flag.MESH_HOLE * (max(c.finger.hole_share for c in contacts) > MESH_HOLE)
     for c in contacts:
         flags |= Flag.NODAL * c.nodal_instead | Flag.COARSE * c.coarse

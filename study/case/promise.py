@@ -20,11 +20,6 @@ from softjaw.study.case.task import Task, task_of
 from softjaw.study.quantities import MISSING, SLIPS, WORSE
 from softjaw.study.scene import Scene
 
-DIGITS = 3  # of a payload over the best one, by which units are ranked: ties go to the first
-SURELY = 1.1  # of the friction coefficient, beyond which a bed of springs is believed that a grasp slips
-RIM = 0.4  # of a pad's side, from its middle: where pressure centred further out bears on the rim alone
-MOST_JUDGED = 2000  # units whose order of work is looked at where the scene does not ask for it
-
 
 @dataclass(frozen=True)
 class Promise:
@@ -47,7 +42,8 @@ def promise(surface: Any, unit: Unit, task: Task | None) -> Promise | None:
         _, lean = grip.misalignment
         centres = np.abs([side.centre for side in grip.sides]) / jaws.pad[:2]
         payload = grip.peak * held(grip.contacts, task) if task else 0.0
-        return Promise(payload, lean, bool((centres > RIM).any()))
+        # share of a pad's side, from its middle: where pressure centred further out bears on the rim alone
+        return Promise(payload, lean, bool((centres > 0.4).any()))
     except NoContactError:
         return None
 
@@ -58,7 +54,8 @@ def chosen(scene: Scene, units: Sequence[Unit]) -> list[Unit]:
     Each point of a sweep chooses for itself; images of one grasp count once.
     """
     where = scene.candidates
-    if where.solve_best is None and len(units) > MOST_JUDGED:
+    # units whose order of work is looked at where the scene does not ask for it
+    if where.solve_best is None and len(units) > 2000:
         return list(units)
     known: list[tuple[Unit, float]] = []
     for unit in units:
@@ -78,7 +75,8 @@ def _seen(unit: Unit, found: Promise | None, skip: bool) -> tuple[Unit, float]:
     if found is None:
         return unit, -math.inf
     mu = unit.scene.friction.mu
-    if not slips(found.lean, SURELY * mu):
+    # a bed of springs is believed that a grasp slips where 1.1 of the friction coefficient do not hold it
+    if not slips(found.lean, 1.1 * mu):
         return replace(unit, hopeless=found.rim), found.payload
     text = (
         f"the line that joins the contacts leans by {math.degrees(found.lean):.0f} degrees on a bed of springs,"
@@ -101,7 +99,8 @@ def _best(known: Sequence[tuple[Unit, float]], count: int | None) -> list[Unit]:
     for members in points.values():
         best = max((known[i][1] for i in members), default=0.0)
         share = [max(payload, 0.0) / best if best > 0 else 0.0 for _, payload in known]
-        ranks = sorted(members, key=lambda i: (made[i].hopeless, -round(share[i], DIGITS), i))
+        # digits of a payload over the best one, by which units are ranked: ties go to the first
+        ranks = sorted(members, key=lambda i: (made[i].hopeless, -round(share[i], 3), i))
         for place, i in enumerate(ranks[count:], start=count + 1):
             text = f"place {place} of {len(ranks)} on a bed of springs, candidates.solve_best is {count}"
             made[i] = replace(made[i], state=WORSE, reason=text)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-MARGIN = 1e-6  # of a limit: what is nearer to it is undecided
+UNDECIDED = 1e-6  # of a limit: what is nearer to it is undecided
 TIE = 1e-6  # relative difference of values that is none: images of one grasp, or equal within rounding
 
 
@@ -37,9 +37,9 @@ class TimeLimitError(BaseException):
 
 
 def surely_below(value: float, limit: float) -> bool:
-    """Whether a value is below a limit by more than `MARGIN`; no where that is undecided, or the value is NaN.
+    """Whether a value is below a limit by more than `UNDECIDED`; no where that is undecided, or the value is NaN.
 
     >>> surely_below(0.9, 1.0), surely_below(1.0 - 1e-12, 1.0), surely_below(1.1, 1.0)
     (True, False, False)
     """
-    return value <= limit * (1.0 - MARGIN)
+    return value <= limit * (1.0 - UNDECIDED)

@@ -35,12 +35,8 @@ IntArray = NDArray[np.int64]
 SAMPLES = 300  # points of the surface from which grasps are looked for
 TURNS = 4  # rounds of setting a grasp straight; most end after two
 STRAIGHT = math.radians(0.5)  # tilt between two rounds that ends them
-CENTRED = 5e-4  # shift between two rounds that ends them [m]
-FLATTEST = 0.05  # relative difference of principal curvatures below which the long side follows the object's own axes
 APART, NEAR = 0.5, 0.25  # of the pad's length: grasps that are nearer are at one place; and one, if directions agree
-DIGITS = 3  # of a payload over the best one, by which grasps are ranked
 ALIKE, ROLLED = math.radians(20.0), math.radians(30.0)  # the same for approach and roll
-LEAST = 0.02  # of the best payload, below which a grasp is not proposed
 
 
 @dataclass(frozen=True)
@@ -94,7 +90,8 @@ def straightened(
         depth = 0.5 * (grip.sides[0].touch - grip.sides[1].touch)
         point = grip.point + grip.axes @ np.array([*shift, depth])
         axes = axes_of(approach / np.linalg.norm(approach), grip.axes[:, 0])
-        done = tilt[2] > math.cos(STRAIGHT) and np.abs(shift).max() < CENTRED
+        # shift between two rounds that ends them [m]
+        done = tilt[2] > math.cos(STRAIGHT) and np.abs(shift).max() < 5e-4
         grip = JawsOnSurface(surface, point, axes, jaws)
         if done:
             break
@@ -117,7 +114,8 @@ def long_sides(grip: JawsOnSurface, own: FloatArray) -> list[FloatArray]:
     order = np.argsort(np.abs(values))
     small, large = np.abs(values)[order]
     flattest = grip.axes[:, :2] @ vectors[:, order[0]]
-    if large - small <= FLATTEST * max(large, 1.0 / grip.jaws.pad[0]):
+    # relative difference of principal curvatures below which the long side follows the object's own axes
+    if large - small <= 0.05 * max(large, 1.0 / grip.jaws.pad[0]):
         flattest = axes_of(grip.axes[:, 2], own)[:, 0]
     return [flattest, np.cross(grip.axes[:, 2], flattest)]
 
@@ -228,11 +226,13 @@ def thinned(seen: Sequence[SampledGrasp], count: int, length: float) -> list[Sam
         some = [g for g in seen if (not g.state) is good]
         best = max((g.payload for g in some), default=0.0)
         # rounded, so that those that are equal but for rounding come in the order in which they were found
-        ranked = sorted(some, key=lambda g: -round(g.payload / best, DIGITS) if best > 0 else 0.0)
+        # digits of a payload over the best one, by which grasps are ranked
+        ranked = sorted(some, key=lambda g: -round(g.payload / best, 3) if best > 0 else 0.0)
         chosen: list[SampledGrasp] = []
         for alike in (same_point, same_grasp):
             for grasp in ranked:
-                if len(chosen) == count or grasp.payload < LEAST * best:
+                # share of the best payload, below which a grasp is not proposed
+                if len(chosen) == count or grasp.payload < 0.02 * best:
                     break
                 if not any(alike(grasp, other, length) for other in chosen):
                     chosen.append(grasp)

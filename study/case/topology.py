@@ -14,7 +14,6 @@ from softjaw.friction.patch import ContactPatch
 from softjaw.study.quantities import RIMS
 
 FloatArray = NDArray[np.float64]
-UNLOADED_PRESSURE = 1e-6  # of the largest pressure, up to which a face is not loaded: rounding must not make pieces
 
 
 def topology(pressure: ArrayLike, faces: tuple[int, int]) -> dict[str, int]:
@@ -39,7 +38,8 @@ def topology(pressure: ArrayLike, faces: tuple[int, int]) -> dict[str, int]:
     {'pieces': 1, 'holes': 1, 'rims': 13}
     """
     p = np.asarray(pressure, float).reshape(faces)
-    loaded = p > UNLOADED_PRESSURE * p.max()
+    # share of the largest pressure, up to which a face is not loaded: rounding must not make pieces
+    loaded = p > 1e-6 * p.max()
     pieces = ndimage.label(loaded, np.ones((3, 3)))[1]
     # Padded, so that all that is not loaded and reaches a rim is one region, which is no hole.
     holes = ndimage.label(np.pad(~loaded, 1, constant_values=True))[1] - 1

@@ -15,7 +15,7 @@ from softjaw.fem.shell.thin_walled import Grasp, ThinWalled, WallMesh, object_fa
 from softjaw.fem.shell.wall_stress import faces
 from softjaw.study.case.build import outer_surface
 from softjaw.study.case.geometry import material_of
-from softjaw.study.case.result import MARGIN, surely_below
+from softjaw.study.case.result import UNDECIDED, surely_below
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import ALONG, AROUND
 from softjaw.study.scene import Scene
@@ -107,7 +107,7 @@ def wall_flags(scene: Scene, state: Pressed, values: dict[str, Any]) -> Flag:
     flags = Flag.SNAPPED * state.wall.snapped
     flags |= Flag.DENTED * (not surely_below(values["maps/indentation"], DENTED_SHARE * 0.5 * values["maps/opening"]))
     friction = 2.0 * scene.friction.mu * state.force
-    flags |= Flag.SLIDES_OUT * (values["maps/support_force"] > friction + MARGIN * state.force)
+    flags |= Flag.SLIDES_OUT * (values["maps/support_force"] > friction + UNDECIDED * state.force)
     strength = thin_body(scene.object).material.yield_strength
     return flags | Flag.YIELDS * (strength is not None and not surely_below(values["maps/wall_stress"], strength))
 

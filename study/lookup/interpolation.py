@@ -18,9 +18,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softjaw.friction.patch import NEGLIGIBLE
+
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
-COORDINATE_ROUNDING = 1e-9  # differences of coordinates that are only rounding, in units of their size
 CLAIM_FACTOR = 2.0  # between estimate and claim: with less, less than 95 % of the errors stay within it
 CLOSING_GAP_RATIO = 1.5  # a gap that closes a circle may be this much wider than the others
 
@@ -47,7 +48,7 @@ class Nodes:
     @property
     def slack(self) -> float:
         """How far beside the ends a coordinate still counts as on them."""
-        return COORDINATE_ROUNDING * max(abs(float(self.x[0])), abs(float(self.x[-1])))
+        return NEGLIGIBLE * max(abs(float(self.x[0])), abs(float(self.x[-1])))
 
     @cached_property
     def quick(self) -> tuple[list[float], list[float], int, float, float, bool]:
@@ -75,21 +76,21 @@ def circle(name: str, units: str, values: ArrayLike, period: float, half_turn: b
     if not period:
         x = np.array([angles[0], angles[0] + 2 * math.pi])
         return Nodes(name, units, x, np.zeros(2, np.int64), np.zeros(2, bool), 2 * math.pi, free=True)
-    turns = np.floor((angles - angles[0]) / period + COORDINATE_ROUNDING)
+    turns = np.floor((angles - angles[0]) / period + NEGLIGIBLE)
     folded = np.maximum(angles - turns * period, angles[0])
     order = np.argsort(folded, kind="stable")
-    order = order[np.concatenate([[True], np.diff(folded[order]) > COORDINATE_ROUNDING * period])]
+    order = order[np.concatenate([[True], np.diff(folded[order]) > NEGLIGIBLE * period])]
     x, swapped = folded[order], half_turn & (turns[order] % 2 == 1)
     if len(x) == 1:
         return Nodes(name, units, _point(float(x[0])), order.repeat(2), swapped.repeat(2), period, half_turn)
-    if x[0] + period - x[-1] <= CLOSING_GAP_RATIO * np.diff(x).max() * (1 + COORDINATE_ROUNDING):
+    if x[0] + period - x[-1] <= CLOSING_GAP_RATIO * np.diff(x).max() * (1 + NEGLIGIBLE):
         x, order = np.append(x, x[0] + period), np.append(order, order[0])
         swapped = np.append(swapped, swapped[0] ^ half_turn)
     return Nodes(name, units, x, order, swapped, period, half_turn)
 
 
 def _point(x: float) -> FloatArray:
-    slack = COORDINATE_ROUNDING * max(abs(x), 1.0)
+    slack = NEGLIGIBLE * max(abs(x), 1.0)
     return np.array([x - slack, x + slack])
 
 
@@ -122,7 +123,7 @@ def corners(axes: Sequence[Nodes], points: FloatArray) -> Corners:
         v = np.clip(np.nan_to_num(v), x[0], x[-1])
         i = np.clip(np.searchsorted(x, v, "right") - 1, 0, len(x) - 2)
         s = (v - x[i]) / (x[i + 1] - x[i])
-        s = np.where(s < COORDINATE_ROUNDING, 0.0, np.where(s > 1 - COORDINATE_ROUNDING, 1.0, s))
+        s = np.where(s < NEGLIGIBLE, 0.0, np.where(s > 1 - NEGLIGIBLE, 1.0, s))
         inside[:, a] &= (s == 0) | (s == 1) | (not nodes.exact)
         cell[:, a], share[:, a] = i, s
     upper = np.array(list(np.ndindex(2, 2, 2)))
@@ -142,7 +143,7 @@ def place(quick: tuple, v: float) -> tuple[int, float] | None:
             return None
         return (0, 0.0) if i < 0 else (last, 1.0)
     share = (v - x[i]) * inverse[i]
-    return None if exact and COORDINATE_ROUNDING < share < 1 - COORDINATE_ROUNDING else (i, share)
+    return None if exact and NEGLIGIBLE < share < 1 - NEGLIGIBLE else (i, share)
 
 
 def blend(table: FloatArray, at: Corners) -> FloatArray:

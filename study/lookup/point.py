@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from softjaw.friction.patch import NEGLIGIBLE
 from softjaw.study.flags import flags_in
-from softjaw.study.lookup.interpolation import COORDINATE_ROUNDING, Corners, FloatArray
+from softjaw.study.lookup.interpolation import Corners, FloatArray
 from softjaw.study.lookup.source import Source
 from softjaw.study.quantities import BOTH_ENDS, BY_KEY, DONE, FAILED, FORCE_RANGE, MAIN, MISSING
 from softjaw.study.quantities import STATES as OF_CASES
@@ -298,4 +299,4 @@ def _neighbours(values: FloatArray, x: FloatArray) -> tuple[NDArray[np.int64], F
     low = np.clip(np.searchsorted(v, near, side="right") - 1, 0, max(len(v) - 2, 0))
     high = np.minimum(low + 1, len(v) - 1)
     share = (near - v[low]) / np.where(high > low, v[high] - v[low], 1.0)
-    return np.stack([order[low], order[high]]), np.where(np.abs(x - near) > COORDINATE_ROUNDING, np.nan, share)
+    return np.stack([order[low], order[high]]), np.where(np.abs(x - near) > NEGLIGIBLE, np.nan, share)

@@ -16,7 +16,7 @@ from softjaw.lsfit.body import ExactSurface
 from softjaw.study.case.contact import ANTIPODAL, Contact, angles, pose_flags
 from softjaw.study.case.evaluate import ECCENTRICITIES, exact_score, soft
 from softjaw.study.case.limit_surface import STANDS_IN, SurfaceFit, fit_surfaces
-from softjaw.study.case.result import MARGIN
+from softjaw.study.case.result import UNDECIDED
 from softjaw.study.flags import Flag, flags_in, raised
 from softjaw.study.messages import USAGE, Problem, StudyError
 from softjaw.study.patch.contacts import check_facing, exact_surface, grasp_lengths, opposite
@@ -241,7 +241,7 @@ def _notes(patches: Sequence[EvaluatedPatch], grasp: dict[str, Any] | None) -> l
         notes += [*patch.read.notes, *(name + note for note in _patch_notes(patch))]
     if grasp is None:
         return notes
-    if grasp["misalignment"] > ANTIPODAL - MARGIN:
+    if grasp["misalignment"] > ANTIPODAL - UNDECIDED:
         notes.append(f"the contacts are {np.degrees(grasp['misalignment']):.2g} deg from antipodal")
     if grasp["slips"]:
         notes.append(Flag.SLIPS.sentence)

@@ -18,7 +18,6 @@ from softjaw.study.patch.faces import ReadPatch, checked
 from softjaw.study.patch.patch_reader import ENDINGS, Reading, checked_file, read_table
 
 EXACT = 2000  # motions whose hull gives the volume of the limit surface itself, to some 1e-4
-EQUAL = 1e-6  # difference of cosines that decides nothing
 HALF_TURN = np.diag([1.0, -1.0, -1.0])  # about x: how the second of two equal fingers stands
 
 
@@ -74,7 +73,8 @@ def check_facing(contacts: Sequence[Contact], names: Sequence[str]) -> None:
         text = f"{names[1]} has its contact at the same place as {names[0]}"
         raise ValueError(f"{text}; both have to use the coordinates of one object")
     pairs = zip(contacts, names, (line, -line), strict=True)
-    away = [name for c, name, to in pairs if c.normal @ to < -EQUAL * distance]
+    # difference of cosines that decides nothing
+    away = [name for c, name, to in pairs if c.normal @ to < -1e-6 * distance]
     if away:
         found = f"the normals of {away[0]} and {away[-1]} point away from each other"
         remedy = "turn both (--flip-normals, flip_normals=True)"

@@ -16,7 +16,7 @@ from softjaw.fem.contact.measured import Measured, MeasuredPress
 from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.fem.objects.gap import NoContactError
 from softjaw.fem.objects.measured_face import MeasuredFace, cell_of, measured_face
-from softjaw.friction.patch import ContactPatch, FloatArray
+from softjaw.friction.patch import NEGLIGIBLE, ContactPatch, FloatArray
 from softjaw.study.case.model import contact_rules, pad_of, settings
 from softjaw.study.messages import SOME_FAILED, USAGE, Problem, StudyError
 from softjaw.study.patch.faces import ReadPatch, refuse
@@ -32,9 +32,6 @@ from softjaw.study.patch.patch_reader import (
 )
 from softjaw.study.scene import Scene
 
-LOADED = 1e-9  # of the largest pressure, below which a face carries no load
-BESIDE = 1.5  # half sides of the pad: a point beyond them belongs to something else, or has another unit
-COVERED = 0.8  # of the pad's side: what fewer points cover is continued by much
 MOST_POINTS = 20_000
 COLUMNS = "x_mm, y_mm, z_mm, or y_mm, z_mm of a contour along the pad's width"
 
@@ -71,7 +68,7 @@ def solve_deformed(file: str, unit: str | None, scene: Scene) -> ReadPatch:
     except (ConvergenceError, CheckError) as error:
         raise StudyError(SOME_FAILED, f"{file}: the pad has no state with this face: {error}") from error
     patch = extract(found.state.pad, found.state)
-    loaded = patch.pressure > LOADED * patch.pressure.max(initial=0.0)
+    loaded = patch.pressure > NEGLIGIBLE * patch.pressure.max(initial=0.0)
     kept = np.flatnonzero(loaded).tolist()
     back = np.array([0.0, 0.0, found.state.closing])  # to where the backing plate stands
     own = ContactPatch(
@@ -111,7 +108,8 @@ def _points(path: Path, unit: str | None, scene: Scene) -> tuple[FloatArray, tup
     problems = []
     for name in needed:
         # the face moves into the foam and bulges, but neither through the plate nor far
-        most = sides[name] if name == "z" else 0.5 * BESIDE * sides[name]
+        # a point beyond 1.5 half sides of the pad belongs to something else, or has another unit
+        most = sides[name] if name == "z" else 0.75 * sides[name]
         for i in np.flatnonzero(np.abs(metres[name]) > most).tolist():
             found, expected = f"{1e3 * metres[name][i]:.4g} mm", f"at most {1e3 * most:.4g} mm from the face's centre"
             remedy = "check the unit, and that the origin is the centre of the undeformed contact face"
@@ -121,6 +119,7 @@ def _points(path: Path, unit: str | None, scene: Scene) -> tuple[FloatArray, tup
         f"the points cover {100 * np.ptp(metres[name]) / sides[name]:.0f} % of the pad along {name}: the face is "
         "continued straight beyond them"
         for name in needed
-        if name != "z" and np.ptp(metres[name]) < COVERED * sides[name]
+        # share of the pad's side: what fewer points cover is continued by much
+        if name != "z" and np.ptp(metres[name]) < 0.8 * sides[name]
     ]
     return np.column_stack([metres[name] for name in needed]), tuple(notes)

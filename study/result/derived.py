@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softjaw.study.case.candidates import axes
-from softjaw.study.case.result import MARGIN
+from softjaw.study.case.result import UNDECIDED
 from softjaw.study.result.layout import DONE, Derived
 from softjaw.study.scene import Scene
 
@@ -153,7 +153,7 @@ def crossing_error(forces: ArrayLike, values: ArrayLike, limit: float) -> FloatA
 def first_crossing(forces: ArrayLike, values: ArrayLike, limit: float) -> FloatArray:
     """Force at which values first pass a limit, by straight lines from 0 at no force; NaN where they never do.
 
-    A solved value within `MARGIN` of the limit has passed it.
+    A solved value within `UNDECIDED` of the limit has passed it.
 
     Parameters
     ----------
@@ -173,7 +173,7 @@ def first_crossing(forces: ArrayLike, values: ArrayLike, limit: float) -> FloatA
     y = np.concatenate([np.zeros((*values.shape[:-1], 1)), values], axis=-1)
     # Nothing beyond the first gap is used: the true crossing may lie inside it.
     known = np.cumprod(np.isfinite(y), axis=-1).astype(bool)
-    above = known & (y >= limit * (1.0 - MARGIN))
+    above = known & (y >= limit * (1.0 - UNDECIDED))
     k = np.maximum(above.argmax(axis=-1), 1)[..., None]
     low, high = np.take_along_axis(y, k - 1, -1)[..., 0], np.take_along_axis(y, k, -1)[..., 0]
     # Equal neighbours would divide by 0; the clip then gives an end of their interval.

@@ -13,7 +13,6 @@ import numpy as np
 
 from softjaw.study.messages import IN_USE, OTHER_FILE, StudyError, printable
 
-MOST_PACKED = 1000  # times that data in a file may be smaller than what is read from it
 # what h5py raises for damage: its own errors have no class of their own
 BROKEN = (RuntimeError, OSError, KeyError, ValueError, TypeError, AttributeError, OverflowError, MemoryError)
 
@@ -52,7 +51,8 @@ class StoredFile:
             virtual = plist.get_layout() == h5py.h5d.VIRTUAL
             nbytes = dataset.size * max(dataset.dtype.itemsize, 1) if dataset.shape is not None else 0
             # A header can claim any size, and a reader allocates it before it misses the data.
-            too_large = nbytes > self._bytes * (MOST_PACKED if dataset.chunks else 1)
+            # times that data in a file may be smaller than what is read from it
+            too_large = nbytes > self._bytes * (1000 if dataset.chunks else 1)
             if virtual or plist.get_external_count() or too_large:
                 raise StudyError(OTHER_FILE, f"{self.path}: {path} is not stored in this file; do not trust it")
             return dataset

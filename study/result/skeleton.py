@@ -41,7 +41,6 @@ from softjaw.study.units import shown_text
 
 HDF5_VERSIONS = ("earliest", "v110")  # programs that bring an older HDF5 of their own can read it
 TEXT = h5py.string_dtype("utf-8")
-EVEN_STEPS = 1e-6  # relative difference of steps that makes an axis uneven
 SESSION_ROWS, REPORT = f"{ROOT}/provenance/sessions", f"{ROOT}/report"
 MIN_PACKED_BYTES, CHUNK_BYTES, DEFLATE_LEVEL = 4096, 2**20, 4
 # What a grown file has of its own, or what is filled again once nothing is missing.
@@ -324,7 +323,8 @@ def axes_of(layout: Layout, chosen: Sequence[int]) -> dict[str, Any]:
     there. Beside an uneven axis it draws dots instead, and then needs both.
     """
     values = [np.asarray(layout.axes[i].values, float) for i in chosen]
-    even = all(np.ptp(np.diff(v)) <= EVEN_STEPS * np.ptp(v) for v in values[-2:] if len(v) > 2)
+    # relative difference of steps that makes an axis uneven
+    even = all(np.ptp(np.diff(v)) <= 1e-6 * np.ptp(v) for v in values[-2:] if len(v) > 2)
     names = ["." if len(v) == 2 and even else layout.names[i] for v, i in zip(values, chosen, strict=True)]
     return {"axes": names, **{f"{name}_indices": i for i, name in enumerate(names) if name != "."}}
 

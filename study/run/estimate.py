@@ -20,7 +20,6 @@ from softjaw.study.case.poses import turn_of_pose
 
 FloatArray = NDArray[np.float64]
 FACE_GRID = (13, 7)  # points of a pad's face
-MOST_PATHS = 40  # load paths that are looked at, evenly spread; the others take the time of the nearest one
 # Measured on cylinders, boxes, bottles and meshes of 64 to 2304 solved elements, CPU time of one core of 2024.
 CASE, ELEMENT = 0.03, 2.5e-4  # seconds of a force: friction, fits and score; contact, for each trilinear element
 QUADRATIC_FACTOR = 10.0  # times as dear is a triquadratic element
@@ -34,7 +33,8 @@ DEEP, HARD = 0.4, 4.0  # closing over the pad's thickness from which forces are 
 
 def estimated(units: Sequence[Any]) -> list[float]:
     """Expected time of each unit of work on objects without a wall [s]."""
-    step = -(-len(units) // MOST_PATHS) if units else 1
+    # load paths that are looked at, evenly spread; the others take the time of the nearest one
+    step = -(-len(units) // 40) if units else 1
     known = [_seconds(unit, *surface_triangles(unit.scene.object)) for unit in units[::step]]
     return [known[i // step] for i in range(len(units))]
 

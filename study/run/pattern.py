@@ -19,7 +19,7 @@ from softjaw.friction.patch import NoContactError
 from softjaw.study.case.build import build_object, own_frame, shapes_of, surface_triangles
 from softjaw.study.case.fit import jaws_of
 from softjaw.study.case.poses import STANDOFF, explicit_poses
-from softjaw.study.case.result import MARGIN
+from softjaw.study.case.result import UNDECIDED
 from softjaw.study.quantities import NO_GRASP
 from softjaw.study.ranking import largest
 from softjaw.study.scene.grasps import GraspPose
@@ -35,7 +35,6 @@ ROLL, TILT = math.radians(15.0), math.radians(5.0)  # first steps of a turn abou
 FINEST_STEP_SHARE = 1 / 8  # of the first step: 1.6 mm along a pad of 50 mm, 0.6 degrees of tilt
 SAME_POSE_STEPS = 0.5  # of a step, within which two poses are one
 POSES_PER_ROUND = 4  # poses of a round: few, so that the next ones start from the better of them
-MIN_BED_PAYLOAD_KG = 1e-9  # below which a payload on a bed of springs is none
 
 
 def with_places(poses: Sequence[GraspPose], rounds: Sequence[Sequence[Place]]) -> tuple[GraspPose, ...]:
@@ -87,7 +86,7 @@ def next_poses(result: Any, values: FloatArray, scene: Scene, each: int) -> tupl
         if poses := _neighbours(scene, rounds, values, share):
             return tuple(poses[: min(left, POSES_PER_ROUND)])
         before = given + sum(len(some) for some in rounds if some[0][0] > share)
-        if share < 1.0 and gained(values, before) < where.refine_within * (1 + MARGIN):
+        if share < 1.0 and gained(values, before) < where.refine_within * (1 + UNDECIDED):
             return ()
         share /= 2
     return ()
@@ -109,7 +108,8 @@ def _neighbours(scene: Scene, rounds: Any, values: FloatArray, share: float) -> 
     known = [_frame(pose, placed) for pose in with_places(scene.candidates.poses, rounds)]
     poses: list[tuple[float, Place]] = []
     for best in best_places(values):
-        reference = max(promise(JawsOnSurface(surface, *known[best], jaws)), MIN_BED_PAYLOAD_KG)
+        # payload on a bed of springs, below which it is none [kg]
+        reference = max(promise(JawsOnSurface(surface, *known[best], jaws)), 1e-9)
         for point, axes in _moved(known[best], share, jaws.pad):
             if any(apart((point, axes), other, jaws.pad) < SAME_POSE_STEPS * share for other in known):
                 continue

@@ -31,7 +31,6 @@ FILL_FACTOR = 20.0  # factor entries over dofs^(4/3), the growth of nested disse
 SECONDS_PER_UNKNOWN, BYTES_PER_UNKNOWN = 1e-4, 1.6e4
 DENSE_COPIES = 8  # copies of a linear wall's dense stiffness: compliance, inverse, assembled entries and their factors
 SECONDS_PER_CUBE = 2.1e-10  # seconds per force and cube of the unknowns of that stiffness
-COVER_MARGIN = 0.1  # of the pad's length, round what it covers
 
 
 @dataclass(frozen=True)
@@ -341,7 +340,7 @@ def _mirrors(scene: Any, symmetric: tuple[bool, bool]) -> tuple[bool, bool]:
 def _covered(scene: Any, surface: Any) -> tuple[float, float, float]:
     """Heights that a pad reaches over at the middle station, and half of what it covers round the object [m]."""
     gripper, where = scene.gripper, scene.candidates
-    margin = COVER_MARGIN * max(gripper.pad_size[:2])
+    margin = 0.1 * max(gripper.pad_size[:2])  # share of the pad's length, round what it covers
     ends = _heights(surface)
     middle = 0.5 * sum(ends) if where.poses else where.station_values[len(where.station_values) // 2]
     along = 1e-3 * where.half_extent_mm(gripper) + margin

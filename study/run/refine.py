@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softjaw.study.case.result import MARGIN
+from softjaw.study.case.result import UNDECIDED
 from softjaw.study.flags import LOST
 from softjaw.study.quantities import DONE, MISSING
 from softjaw.study.run.pattern import gained, next_poses, with_places
@@ -28,7 +28,6 @@ FloatArray = NDArray[np.float64]
 Rounds = tuple[tuple[Any, ...], ...]  # what each round added: stations [mm], or poses as `pattern.Place`
 STEEPER_SLOPE = 1.5  # how much steeper a score may be than its slopes between stations show
 FINEST_SPACING_SHARE = 1 / 64  # of the scene's mean distance of stations; nearer ones would only follow a jump
-SAME_ROUND_SHARE = 0.5  # of the largest chance: intervals with at least that are divided in the same round
 
 
 def refined(scene: Scene, rounds: Rounds) -> Scene:
@@ -103,7 +102,7 @@ def chances(stations: FloatArray, score: FloatArray, sound: NDArray[np.bool_], f
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.nan_to_num(np.where(best > 0, most / best - 1, 0.0), nan=0.0)
     slopes = np.maximum(share.max(axis=(0, 2, 3)), 0.0)
-    return np.where(h >= 2 * finest * (1 - MARGIN), slopes, 0.0)
+    return np.where(h >= 2 * finest * (1 - UNDECIDED), slopes, 0.0)
 
 
 def chances_in(result: Any) -> FloatArray:
@@ -165,8 +164,9 @@ def next_stations(result: Any, scene: Scene, each: int) -> tuple[float, ...]:
     left = where.refine // each - len(added)
     chance = chances_in(result)
     stations = sorted({*given, *added})
-    widest = SAME_ROUND_SHARE * float(chance.max(initial=0.0))
-    limit = max(where.refine_within * (1 + MARGIN), widest * (1 - MARGIN))
+    # share of the largest chance: intervals with at least that are divided in the same round
+    widest = 0.5 * float(chance.max(initial=0.0))
+    limit = max(where.refine_within * (1 + UNDECIDED), widest * (1 - UNDECIDED))
     # Rounded, so that chances that are equal but for rounding come in the order of their stations.
     order = np.lexsort((np.arange(len(chance)), -chance.round(6)))
     chosen = [i for i in order if chance[i] > limit][: max(left, 0)]

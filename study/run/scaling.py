@@ -20,8 +20,6 @@ from softjaw.study.run.plan import Plan, measured_seconds
 from softjaw.study.run.progress import duration
 from softjaw.study.run.shares import by_cost
 
-STATE_WRITES = 3  # of a case besides its values: begun, checksums, state
-MIN_LIMIT_SHARE = 0.05  # share of the time below which something does not count as the limit
 GOOD_EFFICIENCY = 0.8
 # Measured on one machine with a local disk: a look at a node's counter [s], and one write of a rank [s].
 CLAIM, WRITE = 2e-5, 1.5e-5
@@ -105,7 +103,8 @@ def replay(paths: Sequence[LoadPath], ranks: int, machine: Machine) -> Replay:
         "division of load paths": free - max(longest, whole / ranks),
     }
     worst = max(shares, key=lambda name: shares[name])
-    return Replay(ranks, time, whole / ranks / time, worst if shares[worst] > MIN_LIMIT_SHARE * time else "-")
+    # share of the time below which something does not count as the limit
+    return Replay(ranks, time, whole / ranks / time, worst if shares[worst] > 0.05 * time else "-")
 
 
 def measured_paths(plan: Plan, seconds: NDArray[np.float64]) -> list[LoadPath]:
@@ -138,7 +137,7 @@ def scaling_text(plan: Plan, path: Path, ranks: Sequence[int], repeat: int = 1) 
         raise StudyError(OTHER_FILE, f"{path}: no case was timed yet; run the study first, or give -n one number")
     columns = plan.layout.columns
     row = sum(int(np.prod(c.shape)) * c.dtype.itemsize for c in columns)
-    writes = len(columns) + STATE_WRITES
+    writes = len(columns) + 3  # a case besides its values: begun, checksums, state
     machine = Machine(PER_NODE, CLAIM, WRITE * writes, max(writes / WRITES_PER_S, row / BYTES_PER_S))
     replays = [replay(paths, n, machine) for n in ranks]
     times = [sum(load_path.seconds) for load_path in paths]

@@ -19,7 +19,6 @@ Angle = Annotated[float, Field(ge=-360, le=360)]
 POSE = [{"point_mm": [0, 0, 20], "approach": [1, 0, 0], "long_side": [0, 0, 1]}]
 EXAMPLE = "for example `stations = 35` with `stations_mm = [25, 175]`"
 BUDGET = 120  # cases of a refinement
-NARROW = 0.01  # stations within this share of the object are all but one; in metres they would spread over it
 # keys that stations, poses and a sampler share
 OF_EVERY_KIND = ("roll_deg", "shift_mm", "refine", "refine_within", "solve_best")
 ALONG = 0.996  # cosine between approach and long side from which they are parallel
@@ -214,7 +213,8 @@ class Candidates(SceneSection):
         (low, high), half = span, self.half_extent_mm(gripper)
         first, last = (converted(place, "m", "mm") for place in (places[0], places[-1]))
         spread = places[-1] - places[0]
-        if len(places) > 1 and spread < NARROW * (high - low) and low <= first <= last <= high:
+        # stations within this share of the object are all but one; in metres they would spread over it
+        if len(places) > 1 and spread < 0.01 * (high - low) and low <= first <= last <= high:
             yield (
                 f"candidates.stations_mm: {spread:.3g} mm between first and last station of an object of"
                 f" {high - low:g} mm; metres? Then write {first:g} to {last:g}"

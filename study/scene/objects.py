@@ -15,7 +15,6 @@ from softjaw.study.scene.section import Interval, Point, SceneSection, Text, num
 from softjaw.study.units import UNITS, in_si, si
 
 SMALLEST_MM, LARGEST_MM = 1.0, 2000.0
-THICKEST = 0.1  # of the smallest extent: a thicker wall is no shell
 WALL_KEYS = ("base_wall_mm", "young_modulus_gpa", "wall_poisson_ratio", "yield_strength_mpa", "allowed_dent_mm",
              "wall_heights_mm")  # fmt: skip
 
@@ -126,7 +125,8 @@ class Walled(Shape):
         for i, (low, high) in enumerate(pairwise(self.wall_mm if isinstance(self.wall_mm, tuple) else ()), 1):
             if high[0] <= low[0]:
                 yield wrong(high, f"pairs [z, thickness] with z rising from {low[0]:g} mm", "wall_mm", i)
-        most = THICKEST * min((high - low for low, high in self.spans_mm.values()), default=math.inf)
+        # share of the smallest extent: a thicker wall is no shell
+        most = 0.1 * min((high - low for low, high in self.spans_mm.values()), default=math.inf)
         thick = [t for t in self.thicknesses_mm if not 0 < t <= most]
         if thick:
             expected = f"a thickness above 0 and up to {most:g} mm, a tenth of the object's smallest extent"

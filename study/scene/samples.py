@@ -7,7 +7,6 @@ from collections.abc import Mapping
 import numpy as np
 
 SEED = 20240229  # any number; the samples of a scene are always the same
-DIGITS = 9  # of a sample, so that no rounding error of a machine makes another one
 UPPER = 0.975  # where a 95 % interval ends
 
 
@@ -35,4 +34,5 @@ def latin_hypercube(
     cube = qmc.LatinHypercube(len(half_widths), scramble=False, optimization="random-cd", seed=SEED).random(count)
     normal = ndtri(cube) / ndtri(UPPER)
     values = np.array([means[key] for key in half_widths]) + normal * np.array([*half_widths.values()])
-    return [dict(zip(half_widths, (float(f"{v:.{DIGITS}g}") for v in row), strict=True)) for row in values]
+    # digits of a sample, so that no rounding error of a machine makes another one
+    return [dict(zip(half_widths, (float(f"{v:.9g}") for v in row), strict=True)) for row in values]

@@ -11,6 +11,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import AfterValidator, Field, model_validator
 
 from softjaw.fem.pad.halving import halved
+from softjaw.friction.patch import NEGLIGIBLE
 from softjaw.study.messages import shown
 from softjaw.study.scene.errors import Errors, wrong
 from softjaw.study.scene.objects import Shape, Walled
@@ -32,7 +33,6 @@ Names = Annotated[tuple[int | str, ...], Field(strict=False, min_length=1)]
 MOST_ELEMENTS, LARGEST_ASPECT = 1_000_000, 20.0
 UNCERTAIN = ("object", "gripper", "friction", "candidates", "task")  # sections whose numbers may be
 MOST_MESHES = 4  # of a case, each 1.4 times as fine in every direction as the one before; each costs 3 times as much
-ROUNDING = 1e-9  # of a length: the plate's solver finds nodes this close to the rim of the support on it, too
 CONVEX_FITS = ("full", "quartic")  # models that a convex program can fit, too
 OPTION_CHARACTERS = {*string.ascii_lowercase, *string.digits, "_"}
 VALUE_CHARACTERS = {*string.ascii_letters, *string.digits, *"_,.+-"}
@@ -145,7 +145,7 @@ class Gripper(SceneSection):
         if any(exponent == 0 for exponent, _ in self.terms_kpa):
             yield wrong(self.terms_kpa, "exponents other than 0, such as 0.01", "terms_kpa")
         total = sum(modulus for _, modulus in self.terms_kpa)
-        if total <= 0 or not math.isclose(total, self.shear_modulus_kpa, rel_tol=ROUNDING):
+        if total <= 0 or not math.isclose(total, self.shear_modulus_kpa, rel_tol=NEGLIGIBLE):
             expected = f"the sum of the moduli of terms_kpa, {total:g} kPa, and > 0; leave it out"
             yield wrong(self.shear_modulus_kpa, expected, "shear_modulus_kpa")
 
@@ -168,7 +168,7 @@ class Gripper(SceneSection):
         counts = [self.elements[:2], halved(self.elements)[:2]][: accuracy.meshes]
         size = self.pad_length_mm, self.pad_width_mm
         need = [max(side / n[axis] if n[axis] % 2 else 0.0 for n in counts) for axis, side in enumerate(size)]
-        if any(held < (1 - ROUNDING) * least for held, least in zip(self.sheet_support_mm, need, strict=True)):
+        if any(held < (1 - NEGLIGIBLE) * least for held, least in zip(self.sheet_support_mm, need, strict=True)):
             meshes = " and ".join(f"{list(n)}" for n in counts)
             expected = f"at least {need[0]:g} x {need[1]:g} mm, which holds nodes of meshes of {meshes} elements"
             yield wrong(self.sheet_support_mm, f"{expected}; even numbers need less", "sheet_support_mm")

@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 
 from softjaw.study.case.result import TIE
+from softjaw.friction.patch import NEGLIGIBLE
 from softjaw.study.flags import LOST, OF_FILE, flags_in
 from softjaw.study.quantities import BY_KEY, FORCE_RANGE, MAIN, STATES, map_row
 from softjaw.study.ranking import Sure, at_level, judged, passed_over, rank_values, ranked, score_of, sure, task_keys
@@ -20,7 +21,6 @@ from softjaw.study.table import Column, Row, Table, as_text, number, terminal_wi
 from softjaw.study.units import in_si, shown, shown_text, shown_unit
 
 NOTES_WIDTH, LABEL_WIDTH = 11, 20  # characters
-ROUNDING = 1e-9  # of the largest force, by which a bound may miss it
 MEANING = {"error": "error estimate from two meshes", "interval": "95 % uncertainty interval"}  # of ±
 
 
@@ -150,7 +150,7 @@ def safe_range(ds: xr.Dataset, index: Index) -> str:
         return "-"
     if len(known) > 1 and not low <= high:
         return "none"
-    more = "+" * bool(high >= forces(ds)[-1] * (1 - ROUNDING))
+    more = "+" * bool(high >= forces(ds)[-1] * (1 - NEGLIGIBLE))
     return "..".join("" if np.isnan(bound) else f"{bound:.3g}" for bound in (low, high)) + more
 
 

@@ -20,7 +20,6 @@ from softjaw.study.table import PAPER, Column, Row, Table, as_text, with_unit, w
 from softjaw.study.units import shown, shown_unit
 
 FloatArray = NDArray[np.float64]
-SAME_PLACE = 1e-9  # relative difference of coordinates that is only rounding
 MOST_SETTINGS, MOST_VALUES = 12, 8  # that a text lists
 STATES = ("solved in both", "only in a", "only in b", "in neither")
 
@@ -148,7 +147,8 @@ def _matched(one: xr.Dataset, other: xr.Dataset) -> tuple[Match, ...]:
 
 def _match(one: Any, other: Any) -> Match:
     scale = max(np.abs(one.values).max(), np.abs(other.values).max(), 1e-300)
-    same = np.abs(one.values[:, None] - other.values) <= SAME_PLACE * scale
+    # relative difference of coordinates that is only rounding
+    same = np.abs(one.values[:, None] - other.values) <= 1e-9 * scale
     if one.options and other.options:  # numbers stand for texts
         same = np.array(one.options)[:, None] == np.array(other.options)
     at = np.nonzero(same)

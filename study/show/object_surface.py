@@ -11,12 +11,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from softjaw.friction.patch import NEGLIGIBLE
 from softjaw.study.case.build import build_object, has_wall, middle_of, outer_surface, surface_triangles
 from softjaw.study.quantities import ALONG, AROUND
 from softjaw.study.scene import SceneError
 
-ON_PLANE = 1e-9  # distance from a cutting plane that is only rounding [m]
-NEAR = 3e-3  # distance from the wall within which a point of the surface moves with it [m]
 FINER = 6  # places between those of the file among which the nearest is searched
 NOBODY = -1  # candidate of triangles that no candidate grasps
 
@@ -172,7 +171,7 @@ def cut(corners: np.ndarray, normal: np.ndarray, offset: float) -> np.ndarray:
     """Triangles ``(m, 3, 3)`` cut along the plane ``x . normal = offset``."""
     d = corners @ normal - offset
     # A corner that lies on the plane but for rounding would leave a sliver.
-    d[np.abs(d) < ON_PLANE] = 0.0
+    d[np.abs(d) < NEGLIGIBLE] = 0.0
     through = (d.min(axis=1) < 0) & (d.max(axis=1) > 0)
     if not through.any():
         return corners
@@ -229,7 +228,7 @@ def wall_of(shape: Any, points: np.ndarray) -> Wall | None:
     fine = np.meshgrid(np.arange(0, AROUND, 1 / FINER), np.linspace(0, ALONG - 1, FINER * ALONG), indexing="ij")
     around, along = (f.ravel() for f in fine)
     distance, nearest = cKDTree(between(grid, around, along)).query(points)
-    off = distance > NEAR
+    off = distance > 3e-3  # distance from the wall within which a point of the surface moves with it [m]
     return Wall(np.where(off, np.nan, around[nearest]), np.where(off, np.nan, along[nearest]))
 
 

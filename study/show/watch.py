@@ -28,7 +28,6 @@ from softjaw.study.show.status import no_grasps, place, reasons
 from softjaw.study.units import shown_text, shown_unit
 
 INTERRUPTED = 130  # what shells say of a program that Ctrl-C ended
-BAR = 40
 
 
 def watch(path: Path, every: float, stream: TextIO | None = None, sleep: Callable[[float], None] = time.sleep) -> int:
@@ -110,7 +109,7 @@ class View:
 
     def _drawn(self, result: Any, codes: np.ndarray, runner: str, line: str) -> Group:
         title = f" ({result.title})" if result.title else ""
-        bar = ProgressBar(total=codes.size, completed=int(np.sum(codes != MISSING)), width=BAR)
+        bar = ProgressBar(total=codes.size, completed=int(np.sum(codes != MISSING)), width=40)
         lines = [line, *([f"{runner}{_since(result)}"] if runner else []), best_so_far(result, codes)]
         if self._failure >= 0:
             where = tuple(int(i) for i in np.unravel_index(self._failure, result.layout.shape))

@@ -17,8 +17,6 @@ from softjaw.study.messages import CANNOT_WRITE, USAGE, StudyError, write_file
 
 HERE = Path(__file__).parent
 PAD_LENGTH, PAD_WIDTH, OPENING = 50.0, 22.0, 85.0  # mm, as in the template of a mesh
-MOST_STATIONS = 8  # proposed: at two angles a first map of 16 candidates
-LONGER = 1.01  # an axis is the longest where it is so many times as long as z, so that rounding does not choose
 
 
 @dataclass(frozen=True)
@@ -40,7 +38,8 @@ def longest(sides: Mapping[str, float]) -> str:
     ('z', 'y')
     """
     axis = max(sides, key=lambda name: sides[name])
-    return axis if sides[axis] > LONGER * sides["z"] else "z"
+    # an axis is the longest where it is so many times as long as z, so that rounding does not choose
+    return axis if sides[axis] > 1.01 * sides["z"] else "z"
 
 
 def heights(height: float) -> tuple[float, ...]:
@@ -50,7 +49,7 @@ def heights(height: float) -> tuple[float, ...]:
     ((25.0, 30.5, 36.0), ())
     """
     room = height - PAD_LENGTH
-    count = min(MOST_STATIONS, 1 + int(room // 5))
+    count = min(8, 1 + int(room // 5))  # at two angles a first map of 16 candidates
     # Down to 0.1 mm, so that rounding leads over neither end.
     return tuple(math.floor(10 * (PAD_LENGTH / 2 + room * i / max(count - 1, 1))) / 10 for i in range(max(count, 0)))
 

@@ -22,8 +22,6 @@ from softjaw.study.show.stored_surface import (
 from softjaw.study.show.view.model import FORCE, View
 from softjaw.study.show.view.pads import Pad
 
-ALIKE = 1e-3  # difference of the fingers' pressures over the largest one that is not drawn twice
-SAMPLES = 300  # exact wrenches that are drawn
 SLIPS = {"x": "slip along x", "turn": "turn about z"}
 
 
@@ -34,7 +32,8 @@ def patch(view: View, index: Index) -> Block | None:
         return None
     one, two = (np.sort(pad.pressure, axis=None) for pad in both)
     top = max(one[-1], two[-1])
-    alike = bool(np.abs(one - two).max() <= ALIKE * top)
+    # difference of the fingers' pressures over the largest one that is not drawn twice
+    alike = bool(np.abs(one - two).max() <= 1e-3 * top)
     fingers = {"both fingers alike": both[0]} if alike else {f"finger {k}": pad for k, pad in enumerate(both, start=1)}
     titles = [f"{name}: friction against a {slip}" for name in fingers for slip in SLIPS.values()]
     made = plots.figure(len(fingers), 2, titles, specs=[[{"type": "scene"}] * 2] * len(fingers),
@@ -135,6 +134,6 @@ def _in_space(made: Any, surface: StoredSurface, model: str) -> None:
         x, y, z = np.moveaxis(points.astype(np.float32), -1, 0)
         made.add_surface(x=x, y=y, z=z, colorscale=[[0, colour], [1, colour]], showscale=False, row=2, col=1,
                          opacity=0.75 if model == "ccm" else 0.25, name=plots.MODELS[model][0])  # fmt: skip
-    exact = surface.samples(SAMPLES)
+    exact = surface.samples(300)  # exact wrenches that are drawn
     if exact is not None and model == "ccm":
         made.add_trace(plots.points(exact * surface.unit, plots.INK, 1.5), row=2, col=1)

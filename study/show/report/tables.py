@@ -32,7 +32,6 @@ from softjaw.study.show.status import MOST_PLACES
 from softjaw.study.show.tables.overview import RULE, wall_text
 
 BEST, MOST_REASONS = 6, 20
-MOST_CASES = 8000  # that a page lists one by one; more would make it heavy
 # Columns of a page that has room for them.
 SHOWN = ("payload", "quality", "quality_fitted", "e_n", "f_x_max", "f_y_max", "tau_z_max")
 MORE = ("epsilon", "contact_area", "p_max", "closing", "indentation", "wall_stress", "safety_factor")
@@ -95,7 +94,7 @@ def every_case(ds: xr.Dataset) -> list[Block]:
     count = ds.status.size
     if count == 1:
         return []
-    if count > MOST_CASES:
+    if count > 8000:  # a page with more rows would be heavy
         summary = f"The {count} cases are too many to be listed here; softjaw export writes all of them."
         return [text(summary, "note")]
     names = [name for name in (*SHOWN, *MORE) if field(ds, name) is not None]

@@ -35,7 +35,6 @@ from softjaw.study.show.status import no_grasps
 from softjaw.study.table import as_text, number, with_error
 from softjaw.study.units import shown_text
 
-NOTED = 1e-3  # relative difference of scores worth a sentence
 CAVEAT = (
     "The paper publishes neither the pad dimensions of its gripper nor the numbers behind its figures. The dimensions "
     "used here are in the scene below. Absolute numbers of its figures can therefore not be reproduced, only "
@@ -141,7 +140,8 @@ def _other_force(ds: xr.Dataset, best_case: Index) -> list[str]:
     score = ds.attrs["score"]
     tops = [i for k in range(len(forces(ds))) for i in order(ds, k)[:1] if not lost(ds, i) or i == best_case]
     top = tops[largest(np.array([at(ds, score, i) for i in tops]))]
-    higher = at(ds, score, top) > at(ds, score, best_case) * (1 + NOTED)
+    # relative difference of scores worth a sentence
+    higher = at(ds, score, top) > at(ds, score, best_case) * (1 + 1e-3)
     if score == "payload" or top[-1] == best_case[-1] or not higher:
         return []
     what = "quality, a score per unit of normal force," if score == "quality" else score

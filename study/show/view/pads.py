@@ -9,13 +9,12 @@ import numpy as np
 import xarray as xr
 
 from softjaw.fem.objects.gap import Pose
-from softjaw.study.case.contact import LOADED
+from softjaw.friction.patch import NEGLIGIBLE
 from softjaw.study.result.layout import DONE
 from softjaw.study.show.grasps import Index, at
 
 LIFT = 2e-4  # how far off the object contact faces are drawn, besides where they overlap it [m]
 MOTIONS = ("x", "y", "turn")
-ARROWS = 14  # along the longer side of a pad, at most
 Faces = dict[str, np.ndarray]
 
 
@@ -50,7 +49,7 @@ class Pad:
     @property
     def loaded(self) -> np.ndarray:
         """Faces that carry pressure ``(i, j)``."""
-        return self.pressure > LOADED * self.pressure.max(initial=1e-300)
+        return self.pressure > NEGLIGIBLE * self.pressure.max(initial=1e-300)
 
     def own(self, x: np.ndarray) -> np.ndarray:
         """Points of the object's frame in the pad's frame."""
@@ -99,7 +98,7 @@ class Pad:
         """
         if not self.pressure.size:
             return np.empty((0, 3)), np.empty((0, 3))
-        step = -(-max(self.pressure.shape) // ARROWS)
+        step = -(-max(self.pressure.shape) // 14)  # along the longer side of a pad, at most
         some = (slice(step // 2, None, step),) * 2
         loaded = self.loaded[some]
         c, n, load = self.centroid[some][loaded], self.normal[some][loaded], (self.pressure * self.area)[some][loaded]

@@ -16,7 +16,6 @@ from softjaw.study.show.view.model import FORCE, NEUTRAL, PAD
 from softjaw.study.show.view.pads import Pad
 
 LIGHT = {"ambient": 0.62, "diffuse": 0.42, "specular": 0.0}  # colours have to be those of the bar
-CREASE = 40  # degrees; normals are not averaged over sharper bends
 PAPER, MARGIN = 250, 6  # grey level from which a pixel is empty paper, and pixels that are kept round what is drawn
 
 
@@ -71,7 +70,8 @@ def surface(
     if candidate is not None:
         mesh.cell_data["candidate"] = candidate
     # points of two candidates' cells lie on each other: joined, or the light would show the cells' borders
-    mesh = mesh.clean().compute_normals(split_vertices=True, feature_angle=CREASE, cell_normals=False)
+    # degrees; normals are not averaged over sharper bends
+    mesh = mesh.clean().compute_normals(split_vertices=True, feature_angle=40, cell_normals=False)
     plotter.add_mesh(mesh, **{**LIGHT, **look})
 
 

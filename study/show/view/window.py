@@ -19,7 +19,6 @@ from softjaw.study.show.view import solids
 from softjaw.study.show.view.model import CROSSED, LONGEST, NEUTRAL, OPEN, View
 
 SIZE = (1400, 900)
-MARK = 4.0  # radius of the balls where fingers of explicit poses touch [mm]
 BAR = {"vertical": True, "height": 0.36, "width": 0.045, "title_font_size": 15, "label_font_size": 13, "n_labels": 5,
        "color": INK, "fmt": "%.4g", "position_x": 0.07}  # fmt: skip
 
@@ -84,7 +83,8 @@ def _object(plotter: Any, view: View, index: Index, quantity: str) -> None:
         solids.surface(plotter, x, corners[shown], values[cell[shown]], cell[shown], name="object", **colours)
     places, owner = view.marks
     if len(places):
-        solids.dots(plotter, 1e3 * places, MARK, values[owner], name="marks", **colours)
+        # radius of the balls where fingers of explicit poses touch [mm]
+        solids.dots(plotter, 1e3 * places, 4.0, values[owner], name="marks", **colours)
 
 
 def _pads(plotter: Any, view: View, index: Index, motion: str) -> None:

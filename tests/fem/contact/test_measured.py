@@ -5,7 +5,7 @@ import pytest
 from scipy.interpolate import RegularGridInterpolator
 
 from softjaw.fem.contact.extract import extract
-from softjaw.fem.contact.measured import MARGIN, LiftedFace, MeasuredPress
+from softjaw.fem.contact.measured import NOISE_MARGIN, LiftedFace, MeasuredPress
 from softjaw.fem.contact.press import Press
 from softjaw.fem.materials import material
 from softjaw.fem.objects.gap import NoContactError
@@ -123,7 +123,7 @@ def test_a_face_pressed_in_by_less_than_its_error_is_not_judged():
     face = measured_face(np.column_stack([y, z]), 2e-3)
     found = MeasuredPress(pad_of((4, 4, 2))).solve(face)
     assert not found.judged
-    assert found.margin == MARGIN * face.doubt
+    assert found.margin == NOISE_MARGIN * face.doubt
 
 
 def test_a_lifted_face_has_the_derivatives_of_what_it_adds():
