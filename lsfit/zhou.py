@@ -117,16 +117,16 @@ def _solve(
     if min(weights) < 0 or not np.isfinite(weights).all():
         raise ValueError(f"lam, beta, gamma are {weights}: expected finite numbers, none negative")
     (m, k), d, f = M.shape, samples.rank, A.shape[1] - M.shape[1]
-    one, none = eye_array(m), csr_array((m, f))
+    unit, none = eye_array(m), csr_array((m, f))
     slip = [[-G[:, :, i], none, diags_array(samples.T[:, i]), None, None, None] for i in range(d)]
     S = upper_triangle(A)
     rows = block_array(
         [
             # the modulus |P - 1| is not smooth; bounded from both sides it becomes linear
-            [M, none, None, -one, None, None],
-            [-M, none, None, -one, None, None],
-            [None, none, -one, None, None, None],
-            [None, none, None, None, -one, None],
+            [M, none, None, -unit, None, None],
+            [-M, none, None, -unit, None, None],
+            [None, none, -unit, None, None, None],
+            [None, none, None, None, -unit, None],
             *slip,
             [None, None, None, None, None, csr_array([[-1.0]])],
             [-diags_array(size), None, None, None, None, None],

@@ -246,10 +246,10 @@ def check_h5py() -> Finding:
     )
     if answer.code != 0:
         return Finding(answer.trouble, INSTALL)
-    parallel, own, version = answer.output.split(" ", 2)
+    parallel, bundled, version = answer.output.split(" ", 2)
     if parallel == "1":
         return Finding(f"{version} with MPI")
-    cure = ".venv/bin/pip uninstall h5py (that build hides the system's)" if own == "1" else INSTALL
+    cure = ".venv/bin/pip uninstall h5py (that build hides the system's)" if bundled == "1" else INSTALL
     return Finding(f"{version} without MPI", cure)
 
 

@@ -67,7 +67,7 @@ def printable(text: str) -> str:
     >>> print(printable("a\x1b[2Jb"))
     a\u001b[2Jb
     """
-    return UNPRINTABLE.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
+    return UNPRINTABLE.sub(lambda match: f"\\u{ord(match[0]):04x}", text)
 
 
 def shortened(text: str, width: int = 80) -> str:
@@ -150,8 +150,8 @@ def why(error: Exception) -> str:
     >>> why(OSError("Unable to create file (unable to open file: errno = 13, error message = 'Permission denied')"))
     'Permission denied'
     """
-    found = re.search(r"error message = '([^']*)'", str(error))
-    return found[1] if found else getattr(error, "strerror", None) or str(error)
+    message = re.search(r"error message = '([^']*)'", str(error))
+    return message[1] if message else getattr(error, "strerror", None) or str(error)
 
 
 def remove(path: Path) -> None:

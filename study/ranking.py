@@ -74,11 +74,11 @@ def _places(values: np.ndarray) -> IntArray:
     """Place of every value in the ranking, counted from 0; those within `TIE` of the next share one."""
     known = np.nan_to_num(values, nan=-np.inf)
     order = np.argsort(-known, kind="stable")
-    found = known[order]
+    ranked = known[order]
     # share of the largest value, below which a difference is none
-    same = TIE * np.abs(found[1:]) + 1e-12 * np.abs(values[np.isfinite(values)]).max(initial=0.0)
+    same = TIE * np.abs(ranked[1:]) + 1e-12 * np.abs(values[np.isfinite(values)]).max(initial=0.0)
     with np.errstate(invalid="ignore"):  # from one that is not there to the next
-        apart = found[:-1] - found[1:] > np.where(np.isfinite(same), same, 0.0)
+        apart = ranked[:-1] - ranked[1:] > np.where(np.isfinite(same), same, 0.0)
     places = np.empty(len(order), np.int64)
     places[order] = np.concatenate([[0], np.cumsum(apart)])[: len(order)]
     return places

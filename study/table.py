@@ -157,8 +157,8 @@ def plain(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [plain(v) for v in value]
     if hasattr(value, "tolist"):
-        found = plain(value.tolist())
-        return None if isinstance(found, list) and found and all(v is None for v in found) else found
+        values = plain(value.tolist())
+        return None if isinstance(values, list) and values and all(v is None for v in values) else values
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 

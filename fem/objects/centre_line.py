@@ -66,8 +66,8 @@ class CentreLine:
         z = self.z[(self.z >= low) & (self.z <= high)]
         if self.straight or not len(z):
             return np.inf
-        one, two = (np.column_stack([self._curve(z, k), np.full(len(z), 2.0 - k)]) for k in (1, 2))
-        curvature = np.linalg.norm(np.cross(one, two), axis=1) / np.linalg.norm(one, axis=1) ** 3
+        velocity, acceleration = (np.column_stack([self._curve(z, k), np.full(len(z), 2.0 - k)]) for k in (1, 2))
+        curvature = np.linalg.norm(np.cross(velocity, acceleration), axis=1) / np.linalg.norm(velocity, axis=1) ** 3
         return float(1.0 / curvature.max()) if curvature.any() else np.inf
 
     def straightened(self, x: FloatArray, sense: float = 1.0) -> FloatArray:

@@ -140,10 +140,10 @@ def _declared(path: Path, kind: str, data: bytes) -> tuple[int, int]:
         return 3 * faces, faces
     if kind in SCENES:
         return _declared_in_scene(path, kind, data), 1
-    found = [re.findall(pattern, data, re.MULTILINE) for pattern in DECLARED[kind]]
+    numbers = [re.findall(pattern, data, re.MULTILINE) for pattern in DECLARED[kind]]
     if kind == ".obj":
-        return len(found[0]), len(found[1])
-    points, faces = (int(values[0]) if values and values[0][:15].isdigit() else 0 for values in found)
+        return len(numbers[0]), len(numbers[1])
+    points, faces = (int(values[0]) if values and values[0][:15].isdigit() else 0 for values in numbers)
     return points, faces
 
 

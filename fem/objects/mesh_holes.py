@@ -107,14 +107,14 @@ def filling(points: FloatArray, loop: list[int], taken: set[tuple[int, int]]) ->
             cut[i, j] = k[cost.argmin()]
     if not np.isfinite(best[0, n - 1]):
         return None
-    found, spans = [], [(0, n - 1)]
+    triangles, spans = [], [(0, n - 1)]
     while spans:
         i, j = spans.pop()
         if j > i + 1:
             corner = int(cut[i, j])
-            found.append((loop[i], loop[corner], loop[j]))
+            triangles.append((loop[i], loop[corner], loop[j]))
             spans += [(i, corner), (corner, j)]
-    return np.array(found)
+    return np.array(triangles)
 
 
 def lid_corners(points: FloatArray, loops: list[list[int]]) -> FloatArray:

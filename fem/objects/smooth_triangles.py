@@ -64,9 +64,9 @@ class SmoothTriangles:
         length = np.linalg.norm(np.diff(self.points[self.edges], axis=1)[:, 0], axis=1)
         narrower = np.full(len(self.edges), np.inf)
         np.minimum.at(narrower, self.edge_of, 2.0 * area[:, None] / np.maximum(length[self.edge_of], 1e-300))
-        found = np.flatnonzero(self.crease & (self.turn < np.radians(SHARP)) & (narrower >= width))
+        creases = np.flatnonzero(self.crease & (self.turn < np.radians(SHARP)) & (narrower >= width))
         # an arc over chords of this length that turn by this angle
-        return found, narrower[found] * self.turn[found] / 8.0
+        return creases, narrower[creases] * self.turn[creases] / 8.0
 
     def bulge(self, which: IntArray) -> FloatArray:
         """How far the middle of each edge of the triangles ``which`` lies from its chord, ``(k,)`` [m]."""
@@ -174,8 +174,8 @@ def _corner_normals(
     points: FloatArray, triangles: IntArray, area: FloatArray, normal: FloatArray, smooth: IntArray
 ) -> FloatArray:
     """Unit normal ``(3 m, 3)`` at each triangle's corners: the mean over the faces joined across smooth edges."""
-    one, two = smooth.T
-    links = np.concatenate([one, _following(one)]), np.concatenate([_following(two), two])
+    before, after = smooth.T
+    links = np.concatenate([before, _following(before)]), np.concatenate([_following(after), after])
     m = triangles.size
     group = connected_components(coo_array((np.ones(len(links[0])), links), shape=(m, m)), directed=False)[1]
     x = points[triangles]
@@ -187,14 +187,15 @@ def _corner_normals(
     return (total / np.maximum(np.linalg.norm(total, axis=1), 1e-300)[:, None])[group]
 
 
-def _tangent(chord: FloatArray, one: FloatArray, two: FloatArray) -> FloatArray:
+def _tangent(chord: FloatArray, first: FloatArray, second: FloatArray) -> FloatArray:
     """Part of the ``chord (e, 3)`` that lies in the tangent planes with the normals of both sides of an edge."""
     length = np.linalg.norm(chord, axis=1)[:, None]
-    steep = np.abs(np.stack([np.einsum("ed,ed->e", chord, n) for n in (one, two)])).max(axis=0) > STEEP * length[:, 0]
-    line = np.cross(one, two)
+    off = np.abs(np.stack([np.einsum("ed,ed->e", chord, n) for n in (first, second)])).max(axis=0)
+    steep = off > STEEP * length[:, 0]
+    line = np.cross(first, second)
     sine = np.linalg.norm(line, axis=1)
     line /= np.maximum(sine, 1e-300)[:, None]
-    plane = chord - np.einsum("ed,ed->e", chord, one)[:, None] * one
+    plane = chord - np.einsum("ed,ed->e", chord, first)[:, None] * first
     common = np.einsum("ed,ed->e", chord, line)[:, None] * line
     # sine of the angle below which two normals at a crease have no line in common
     tangent = np.where((sine > 0.02)[:, None], common, plane)

@@ -60,11 +60,11 @@ class Stacked:
         g, normal, hessian = np.zeros(len(x)), np.zeros((len(x), 3)), np.zeros((len(x), 3, 3))
         none = np.zeros((self._wall.nodes.max() + 1, 3))
         near = np.flatnonzero(close)
-        found = face(self._wall, x[near], self._wall.places(x[near]), none, none)
+        met = face(self._wall, x[near], self._wall.places(x[near]), none, none)
         # points beyond the ends of the wall face nothing and are left to the triangles
-        hit = found.gap < FAR
-        for own, value in ((g, found.gap), (normal, found.normal), (hessian, found.H)):
-            own[near[hit]] = value[hit]
+        hit = met.gap < FAR
+        for values, value in ((g, met.gap), (normal, met.normal), (hessian, met.H)):
+            values[near[hit]] = value[hit]
         rest = np.setdiff1d(np.arange(len(x)), near[hit])
         if len(rest):
             g[rest], normal[rest], _ = self._triangles.gap(x[rest])

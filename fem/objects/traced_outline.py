@@ -201,9 +201,9 @@ def find_wall(mesh: MeshObject, facet: float, rim: float, wanted: tuple[float, f
     at_end = np.abs(z - 0.5 * (low + high)) > 0.4 * (high - low)
     bad, slope = folded(rays, facet).any(axis=1) & at_end, np.gradient(r, z)
     first, last = _run(bad | (slope > STEEP)), len(z) - 1 - _run((bad | (slope < -STEEP))[::-1])
-    found = max(z[min(first, len(z) - 1)], low + rim), min(z[max(last, 0)], high - rim)
+    steep_ends = max(z[min(first, len(z) - 1)], low + rim), min(z[max(last, 0)], high - rim)
     asked = wanted or (low, high)
-    ends = max(found[0], asked[0]), min(found[1], asked[1])
+    ends = max(steep_ends[0], asked[0]), min(steep_ends[1], asked[1])
     # share of the height has to be wall
     if ends[1] - ends[0] < 0.3 * (min(asked[1], high) - max(asked[0], low)) or ends[1] <= ends[0]:
         raise MeshError(
@@ -212,7 +212,7 @@ def find_wall(mesh: MeshObject, facet: float, rim: float, wanted: tuple[float, f
         )
     inside = (z >= ends[0]) & (z <= ends[1])
     radius = float(r[inside].mean())
-    lids = low if ends[0] == found[0] else None, high if ends[1] == found[1] else None
+    lids = low if ends[0] == steep_ends[0] else None, high if ends[1] == steep_ends[1] else None
     return Wall(ends, lids, _centre_line(z[inside], centre[inside], ends, 2 * radius, tolerance), radius)
 
 
@@ -221,9 +221,9 @@ def folded(rays: Rays, facet: float) -> NDArray[np.bool_]:
     return ~(rays.outer - rays.inner <= facet)
 
 
-def _run(found: NDArray[np.bool_]) -> int:
+def _run(flags: NDArray[np.bool_]) -> int:
     """Length of the run of True at the beginning."""
-    return int(len(found) if found.all() else np.argmin(found))
+    return int(len(flags) if flags.all() else np.argmin(flags))
 
 
 def _centre_line(

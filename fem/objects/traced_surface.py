@@ -123,16 +123,16 @@ def _refuse_folds(z: FloatArray, rays: Rays, facet: float) -> None:
 def _symmetric(R: FloatArray, on_axis: FloatArray, tolerance: float) -> tuple[FloatArray, tuple[bool, bool], bool]:
     """Radii with the symmetries that they nearly have, made exact."""
     k = np.arange(R.shape[1])
-    found = []
+    symmetric = []
     for axis, mirrored in ((0, R.shape[1] // 2 - k), (1, -k)):
         image = R[:, mirrored % len(k)]
-        found.append(bool(on_axis[axis] and np.abs(R - image).max() <= tolerance))
-        if found[-1]:
+        symmetric.append(bool(on_axis[axis] and np.abs(R - image).max() <= tolerance))
+        if symmetric[-1]:
             # an exact symmetry lets the wall be meshed by halves
             R = 0.5 * (R + image)
     mean = R.mean(axis=1, keepdims=True)
-    is_round = all(found) and bool(np.abs(R - mean).max() <= tolerance)
-    return (np.repeat(mean, len(k), axis=1) if is_round else R), (found[0], found[1]), is_round
+    is_round = all(symmetric) and bool(np.abs(R - mean).max() <= tolerance)
+    return (np.repeat(mean, len(k), axis=1) if is_round else R), (symmetric[0], symmetric[1]), is_round
 
 
 @dataclass(frozen=True)

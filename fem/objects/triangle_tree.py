@@ -40,10 +40,10 @@ def _built(centres, lower, upper):
                 low[node, d], high[node, d] = min(low[node, d], lower[i, d]), max(high[node, d], upper[i, d])
                 c_low[d], c_high[d] = min(c_low[d], centres[i, d]), max(c_high[d], centres[i, d])
         if n > LEAF:
-            own = order[a : a + n].copy()
-            along = centres[own, np.argmax(c_high - c_low)]
+            members = order[a : a + n].copy()
+            along = centres[members, np.argmax(c_high - c_low)]
             # a stable sort keeps equal centres in order, so the tree is the same everywhere
-            order[a : a + n] = own[np.argsort(along, kind="mergesort")]
+            order[a : a + n] = members[np.argsort(along, kind="mergesort")]
             start[used], count[used] = a, n // 2
             start[used + 1], count[used + 1] = a + n // 2, n - n // 2
             start[node], count[node] = used, 0
@@ -133,12 +133,12 @@ def closest(x, corners, order, low, high, start, count):
                         best, triangle[i], feature[i] = d2, k, kind
                         feet[i] = foot
                 continue
-            one, two = start[node], start[node] + 1
-            d_one, d_two = _to_box(x[i], low[one], high[one]), _to_box(x[i], low[two], high[two])
+            first, second = start[node], start[node] + 1
+            d_one, d_two = _to_box(x[i], low[first], high[first]), _to_box(x[i], low[second], high[second])
             # the nearer box comes to lie on top: what it yields often spares the other
             if d_one < d_two:
-                one, two, d_one, d_two = two, one, d_two, d_one
-            stack[top], bound[top], stack[top + 1], bound[top + 1] = one, d_one, two, d_two
+                first, second, d_one, d_two = second, first, d_two, d_one
+            stack[top], bound[top], stack[top + 1], bound[top + 1] = first, d_one, second, d_two
             top += 2
     return feet, triangle, feature
 
@@ -164,12 +164,12 @@ def _hits(o, d, p):
 
 
 @njit(cache=True)
-def first_hit(o, d, least, own, anyone, corners, order, low, high, start, count, stack):
-    """Distance beyond ``least`` to the first triangle but ``own`` on a ray, and its number; infinite and -1 if none.
+def first_hit(o, d, least, skipped, anyone, corners, order, low, high, start, count, stack):
+    """Distance beyond ``least`` to the first triangle but ``skipped`` on a ray, and its number; infinite and -1 if none.
 
     ``anyone`` stops at whichever triangle is found first.
     """
-    best, found = np.inf, -1
+    best, nearest = np.inf, -1
     top, stack[0] = 1, 0
     while top > 0:
         top -= 1
@@ -189,13 +189,13 @@ def first_hit(o, d, least, own, anyone, corners, order, low, high, start, count,
             top += 2
             continue
         for k in order[start[node] : start[node] + count[node]]:
-            if k != own:
+            if k != skipped:
                 t = _hits(o, d, corners[k])
                 if least < t < best:
-                    best, found = t, k
+                    best, nearest = t, k
                     if anyone:
-                        return best, found
-    return best, found
+                        return best, nearest
+    return best, nearest
 
 
 @njit(cache=True)

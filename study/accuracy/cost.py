@@ -108,18 +108,18 @@ def settings_in(ds: xr.Dataset) -> list[Setting]:
     best = tuple(0 if axis.long_name in SMALLEST else length - 1 for axis, length in zip(swept, shape, strict=True))
     last = int(np.ravel_multi_index(best, shape))
     errors = {name: np.abs(values - values[last]) / np.abs(values[last]) for name, values in maps.items()}
-    own = scene.with_values({}).effective()
-    found = []
+    tables = scene.with_values({}).effective()
+    settings = []
     for i, index in enumerate(np.ndindex(shape)):
         values = {axis.long_name: scene.sweep[axis.long_name][j] for axis, j in zip(swept, index, strict=True)}
-        given = all(_same(own[key.partition(".")[0]].get(key.partition(".")[2]), v) for key, v in values.items())
+        given = all(_same(tables[key.partition(".")[0]].get(key.partition(".")[2]), v) for key, v in values.items())
         known = {name: error[i][np.isfinite(error[i])] for name, error in errors.items()}
         worst, median = ({n: float(f(e)) if e.size else np.nan for n, e in known.items()} for f in (np.max, np.median))
         solved = np.isfinite(seconds[i])
         mean = float(seconds[i][solved].mean()) if solved.any() else np.nan
         words = {key: _words(value) for key, value in values.items()}
-        found.append(Setting(words, mean, worst, median, int((~solved).sum()), given, i == last))
-    return found
+        settings.append(Setting(words, mean, worst, median, int((~solved).sum()), given, i == last))
+    return settings
 
 
 def _by_point(values: FloatArray, shape: Sequence[int]) -> FloatArray:
@@ -127,8 +127,8 @@ def _by_point(values: FloatArray, shape: Sequence[int]) -> FloatArray:
     return values.reshape(int(np.prod(shape)), -1)
 
 
-def _same(one: Any, other: Any) -> bool:
-    return bool(np.array_equal(one, other))
+def _same(value: Any, other: Any) -> bool:
+    return bool(np.array_equal(value, other))
 
 
 def _words(value: Any) -> str:
@@ -177,9 +177,9 @@ def cost_picture(ds: xr.Dataset) -> bytes:
                 line = [(s.seconds, s.worst[name]) for s in settings if s.values[last] == value and s.worst[name] > 0]
                 colour, marker = LOOKS[k % len(LOOKS)]
                 plot.plot(*np.transpose(line or [(np.nan, np.nan)]), color=colour, marker=marker, label=value)
-            own = [(s.seconds, s.worst[name]) for s in settings if s.given and s.worst[name] > 0]
-            if own:
-                plot.plot(*np.transpose(own), "o", ms=11, mfc="none", color="black", label="as in the scene")
+            given = [(s.seconds, s.worst[name]) for s in settings if s.given and s.worst[name] > 0]
+            if given:
+                plot.plot(*np.transpose(given), "o", ms=11, mfc="none", color="black", label="as in the scene")
             plot.set(xscale="log", yscale="log", xlabel="time per case [s]", title=f"largest error of {name}")
         axes[0][-1].legend(title=last)
         return pictures.as_png(drawn)

@@ -188,11 +188,11 @@ class JawsOnSurface:
         faces = self.sides[0].touch, -self.sides[1].touch
         return any(bool((beside & (low[:, 2] <= z + thick) & (high[:, 2] >= z - thick)).any()) for z in faces)
 
-    def _angles(self, one: FloatArray, other: FloatArray) -> tuple[float, float]:
+    def _angles(self, first: FloatArray, other: FloatArray) -> tuple[float, float]:
         two = other * [1.0, -1.0, -1.0]
         (x, y), (u, v) = self.sides[0].centre, self.sides[1].centre
         line = np.array([u - x, -v - y, self.opening])
-        return angle(one, -two), max(angle(one, line), angle(-two, line))
+        return angle(first, -two), max(angle(first, line), angle(-two, line))
 
 
 def held(contacts: Sequence[Contact], task: Task) -> float:

@@ -76,15 +76,15 @@ def _inside(corners: FloatArray, half: FloatArray) -> FloatArray:
 def _on_sides(corners: FloatArray, half: FloatArray) -> FloatArray:
     """Heights at which edges cross the sides of the rectangle."""
     start, step = corners, np.roll(corners, -1, axis=1) - corners
-    found = []
+    crossings = []
     for k in (0, 1):
         for side in (-half[k], half[k]):
             along = step[..., k]
             t = np.divide(side - start[..., k], along, out=np.full(along.shape, np.nan), where=along != 0.0)
             place = start + t[..., None] * step
             crosses = (t >= 0.0) & (t <= 1.0) & (np.abs(place[..., 1 - k]) <= half[1 - k])
-            found.append(place[crosses][:, 2])
-    return np.concatenate(found)
+            crossings.append(place[crosses][:, 2])
+    return np.concatenate(crossings)
 
 
 def _on_corners(corners: FloatArray, half: FloatArray) -> FloatArray:
@@ -93,13 +93,13 @@ def _on_corners(corners: FloatArray, half: FloatArray) -> FloatArray:
     area = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
     # seen from its edge a triangle has no height of its own: its neighbours have it
     a, u, v, area = (part[area != 0.0] for part in (a, u, v, area))
-    found = []
+    depths = []
     for sign in ((-1, -1), (-1, 1), (1, -1), (1, 1)):
         x, y = (np.array(sign) * half - a[:, :2]).T
         s, t = (x * v[:, 1] - y * v[:, 0]) / area, (u[:, 0] * y - u[:, 1] * x) / area
         over = (s >= 0.0) & (t >= 0.0) & (s + t <= 1.0)
-        found.append((a[:, 2] + s * u[:, 2] + t * v[:, 2])[over])
-    return np.concatenate(found)
+        depths.append((a[:, 2] + s * u[:, 2] + t * v[:, 2])[over])
+    return np.concatenate(depths)
 
 
 def fit_of(points: FloatArray, triangles: IntArray, jaws: Jaws, doubt: float = 0.0) -> Fit:

@@ -71,20 +71,20 @@ def chosen(scene: Scene, units: Sequence[Unit]) -> list[Unit]:
     return _best(known, where.solve_best if isinstance(where.solve_best, int) else None)
 
 
-def _seen(unit: Unit, found: Promise | None, skip: bool) -> tuple[Unit, float]:
-    if found is None:
+def _seen(unit: Unit, promise: Promise | None, skip: bool) -> tuple[Unit, float]:
+    if promise is None:
         return unit, -math.inf
     mu = unit.scene.friction.mu
     # a bed of springs is believed that a grasp slips where 1.1 of the friction coefficient do not hold it
-    if not slips(found.lean, 1.1 * mu):
-        return replace(unit, hopeless=found.rim), found.payload
+    if not slips(promise.lean, 1.1 * mu):
+        return replace(unit, hopeless=promise.rim), promise.payload
     text = (
-        f"the line that joins the contacts leans by {math.degrees(found.lean):.0f} degrees on a bed of springs,"
+        f"the line that joins the contacts leans by {math.degrees(promise.lean):.0f} degrees on a bed of springs,"
         f" friction holds up to {math.degrees(math.atan(mu)):.0f}"
     )
     if not skip:
-        return replace(unit, hopeless=True), found.payload
-    return replace(unit, hopeless=True, state=SLIPS, reason=text), found.payload
+        return replace(unit, hopeless=True), promise.payload
+    return replace(unit, hopeless=True, state=SLIPS, reason=text), promise.payload
 
 
 def _best(known: Sequence[tuple[Unit, float]], count: int | None) -> list[Unit]:

@@ -98,16 +98,16 @@ def straightened(
     return grip
 
 
-def same_place(one: JawsOnSurface, other: JawsOnSurface) -> bool:
+def same_place(grip: JawsOnSurface, other: JawsOnSurface) -> bool:
     """Whether two grips are so near that both would lead to the same grasps."""
-    near = np.linalg.norm(one.point - other.point) < 0.5 * NEAR * one.jaws.pad[0]
-    return bool(near and abs(one.axes[:, 2] @ other.axes[:, 2]) > math.cos(0.5 * ALIKE))
+    near = np.linalg.norm(grip.point - other.point) < 0.5 * NEAR * grip.jaws.pad[0]
+    return bool(near and abs(grip.axes[:, 2] @ other.axes[:, 2]) > math.cos(0.5 * ALIKE))
 
 
-def long_sides(grip: JawsOnSurface, own: FloatArray) -> list[FloatArray]:
+def long_sides(grip: JawsOnSurface, axis: FloatArray) -> list[FloatArray]:
     """Directions for the pads' long side, in space: the flattest of the surface and the one across it.
 
-    Where the surface curves alike every way, the object's own longest axis ``own`` decides.
+    Where the surface curves alike every way, the object's own longest ``axis`` decides.
     """
     H = sum(_curvature(side, flip) for side, flip in zip(grip.sides, (1.0, -1.0), strict=True))
     values, vectors = np.linalg.eigh(H)
@@ -116,7 +116,7 @@ def long_sides(grip: JawsOnSurface, own: FloatArray) -> list[FloatArray]:
     flattest = grip.axes[:, :2] @ vectors[:, order[0]]
     # relative difference of principal curvatures below which the long side follows the object's own axes
     if large - small <= 0.05 * max(large, 1.0 / grip.jaws.pad[0]):
-        flattest = axes_of(grip.axes[:, 2], own)[:, 0]
+        flattest = axes_of(grip.axes[:, 2], axis)[:, 0]
     return [flattest, np.cross(grip.axes[:, 2], flattest)]
 
 
@@ -162,16 +162,16 @@ def antipodal_grasps(
     points, triangles = np.ascontiguousarray(surface[0]), np.ascontiguousarray(surface[1])
     corners = points[triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])  # twice the area long
-    own = longest_axis(corners, np.linalg.norm(normals, axis=1))
+    axis = longest_axis(corners, np.linalg.norm(normals, axis=1))
     seen: list[SampledGrasp] = []
     starts: list[JawsOnSurface] = []
     for place, normal in sampled(corners, normals, samples, seed):
         try:
-            start = straightened((points, triangles), place, axes_of(-normal, own), jaws)
+            start = straightened((points, triangles), place, axes_of(-normal, axis), jaws)
             if any(same_place(start, other) for other in starts):
                 continue
             starts.append(start)
-            for along in long_sides(start, own):
+            for along in long_sides(start, axis):
                 axes = axes_of(start.axes[:, 2], along)
                 grip = straightened((points, triangles), start.point, axes, jaws)
                 if lids is None or not grip.over(lids):
@@ -240,17 +240,17 @@ def thinned(seen: Sequence[SampledGrasp], count: int, length: float) -> list[Sam
     return kept
 
 
-def same_point(one: SampledGrasp, other: SampledGrasp, length: float) -> bool:
+def same_point(grasp: SampledGrasp, other: SampledGrasp, length: float) -> bool:
     """Whether two grasps have their middles at one place."""
-    return float(np.linalg.norm(one.point - other.point)) < APART * length
+    return float(np.linalg.norm(grasp.point - other.point)) < APART * length
 
 
-def same_grasp(one: SampledGrasp, other: SampledGrasp, length: float) -> bool:
+def same_grasp(grasp: SampledGrasp, other: SampledGrasp, length: float) -> bool:
     """Whether two grasps are alike in place, approach and roll; the fingers may change places."""
     return (
-        float(np.linalg.norm(one.point - other.point)) < NEAR * length
-        and abs(float(one.approach @ other.approach)) > math.cos(ALIKE)
-        and abs(float(one.long_side @ other.long_side)) > math.cos(ROLLED)
+        float(np.linalg.norm(grasp.point - other.point)) < NEAR * length
+        and abs(float(grasp.approach @ other.approach)) > math.cos(ALIKE)
+        and abs(float(grasp.long_side @ other.long_side)) > math.cos(ROLLED)
     )
 
 

@@ -37,16 +37,16 @@ def export(options: Namespace) -> str:
         tuple(options.approaches or ("minus-x",)), closing, in_si("depth_mm", options.depth),
         in_si("wider_mm", options.wider), options.joints, *options.frames,
     )  # fmt: skip
-    found = grasps(ds, choice, gripper)
+    ranked = grasps(ds, choice, gripper)
     if options.form != "graspgen":  # which has a field for those that do not hold
-        found, left = usable(found)
+        ranked, left = usable(ranked)
         if left:
             print(f"note: {left}", file=sys.stderr)
-    if not found:
+    if not ranked:
         raise StudyError(USAGE, f"{options.file}: no grasp is left to write; 'softjaw show' lists all")
     if options.form in PLANNERS:
-        return _written(options, [PLANNERS[options.form](found, gripper, ds)])
-    return _written(options, [SIMULATORS[options.form](grasp) for grasp in found])
+        return _written(options, [PLANNERS[options.form](ranked, gripper, ds)])
+    return _written(options, [SIMULATORS[options.form](grasp) for grasp in ranked])
 
 
 def _vtk(options: Namespace, ds: Any) -> Path:

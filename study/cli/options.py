@@ -94,7 +94,7 @@ class Parser(argparse.ArgumentParser):
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> tuple[Any, list[str]]:
         """Refuse what is left over here, where the options that exist are known."""
-        found, rest = super().parse_known_args(args, namespace)
+        parsed, rest = super().parse_known_args(args, namespace)
         if rest:
             # A mistyped option leaves its value over as well: the option is the one to name.
             slip = next((word for word in rest if word.startswith("-")), rest[0])
@@ -102,7 +102,7 @@ class Parser(argparse.ArgumentParser):
             kind = "option" if slip.startswith("-") else "word"
             known = list(self._option_string_actions) if kind == "option" else []
             self.error(f"unknown {kind} '{name}'{_meant(name, known)} '{self.prog} --help' lists all")
-        return found, rest
+        return parsed, rest
 
 
 def _meant(word: str, known: Sequence[str]) -> str:

@@ -99,14 +99,14 @@ def petsc_overrides(words: Sequence[str]) -> list[str]:
     >>> petsc_overrides(["-contact_snes_monitor", "-contact_snes_rtol", "1e-9"])
     ['petsc.contact_snes_monitor=true', 'petsc.contact_snes_rtol=1e-9']
     """
-    found: list[list[str]] = []
+    options: list[list[str]] = []
     for word in words:
         if word.startswith("-contact_"):
-            found.append([word[1:], "true"])
+            options.append([word[1:], "true"])
         # A number with a sign is a value; any other word with a dash is an option of somebody else.
-        elif (word.startswith("-") and not word[1:2].isdigit()) or not found or found[-1][1] != "true":
+        elif (word.startswith("-") and not word[1:2].isdigit()) or not options or options[-1][1] != "true":
             text = f"PETSc option '{word}' after '--': softjaw takes only options of the contact solver, -contact_..."
             raise StudyError(USAGE, f"{text}; others go into the environment variable PETSC_OPTIONS")
         else:
-            found[-1][1] = word
-    return [f"petsc.{name}={value}" for name, value in found]
+            options[-1][1] = word
+    return [f"petsc.{name}={value}" for name, value in options]

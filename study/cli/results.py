@@ -36,8 +36,8 @@ def show(options: Namespace) -> str:
 
 def compare(options: Namespace) -> str:
     """Print two maps side by side."""
-    one, other = map(open, options.files)
-    table = compared(one, other, options.quantity, options.model)
+    first, second = map(open, options.files)
+    table = compared(first, second, options.quantity, options.model)
     return FORMS[options.form](table) if options.form else compare_text(table, options.top, terminal_width())
 
 

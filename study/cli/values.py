@@ -29,10 +29,10 @@ def bound(text: str) -> tuple[str, float]:
 
 def names(text: str) -> tuple[str, ...]:
     """Names with commas between them, none of them empty."""
-    found = tuple(name.strip() for name in text.split(","))
-    if not all(found):
+    parts = tuple(name.strip() for name in text.split(","))
+    if not all(parts):
         raise argparse.ArgumentTypeError(f"found {text}, expected names with commas between them")
-    return found
+    return parts
 
 
 def pair(text: str) -> tuple[str, ...]:
@@ -87,9 +87,9 @@ def positive(text: str) -> float:
 def direction(text: str) -> list[float]:
     """Three numbers with commas between them, not all of them 0."""
     try:
-        found = [float(part) for part in text.split(",")]
+        vector = [float(part) for part in text.split(",")]
     except ValueError:
-        found = []
-    if len(found) != 3 or not all(map(math.isfinite, found)) or not any(found):
+        vector = []
+    if len(vector) != 3 or not all(map(math.isfinite, vector)) or not any(vector):
         raise argparse.ArgumentTypeError(f"found {text}, expected three numbers such as 1,0,0, not all of them 0")
-    return found
+    return vector

@@ -73,23 +73,23 @@ def cases(
 
 def _fingers(ds: xr.Dataset, model: str) -> dict[str, np.ndarray]:
     """What `FINGER` lists, over axes and finger."""
-    own = ds.sel(model=model)
+    of_model = ds.sel(model=model)
     R, o = ds.finger_pose_rotation.values, ds.finger_pose_origin.values
     S, rho = ds.finger_S.values, ds.limit_surface_rho.values
     muS = ds.finger_f_x_max.sel(model="pcm").values  # the planar model's friction is mu S in every direction
-    found = {
+    values = {
         "pose_origin": o,
         "pose_rotation": R,
         "frame_origin": np.einsum("...ij,...j->...i", R, ds.finger_frame_origin.values) + o,
         "frame_axes": ds.finger_frame_axes.values @ np.swapaxes(R, -1, -2),
-        **{name: own[f"finger_{name}"].values for name in ("f_x_max", "f_y_max", "tau_z_max")},
+        **{name: of_model[f"finger_{name}"].values for name in ("f_x_max", "f_y_max", "tau_z_max")},
         "S": S,
         "F_N": ds.finger_F_N.values,
-        "semi_axes": own.limit_surface_semi_axes.values * S[..., None],
+        "semi_axes": of_model.limit_surface_semi_axes.values * S[..., None],
         "unit": muS[..., None] * np.stack([np.ones_like(rho), np.ones_like(rho), rho], axis=-1),
-        **{name: own[f"limit_surface_{name}"].values for name in ("coefficients", "matrix", "certificate")},
+        **{name: of_model[f"limit_surface_{name}"].values for name in ("coefficients", "matrix", "certificate")},
     }
-    return {name: found[name] for name, _, _ in FINGER}
+    return {name: values[name] for name, _, _ in FINGER}
 
 
 def as_json(ds: xr.Dataset, model: str = "ccm", listed: Iterable[dict[str, Any]] | None = None) -> str:

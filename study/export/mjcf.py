@@ -59,10 +59,10 @@ def friction(contact: PointContact) -> tuple[float, float, float]:
 
 def as_mjcf(grasp: RankedGrasp) -> str:
     """A MuJoCo model of one grasp."""
-    found = cell(grasp)
+    contacts = cell(grasp)
     known = grasp.mass if np.isfinite(grasp.mass) else OBJECT_MASS
-    middle = -found.rotation.T @ found.origin
-    width = float(np.linalg.norm(found.contacts[0].origin - found.contacts[1].origin))
+    middle = -contacts.rotation.T @ contacts.origin
+    width = float(np.linalg.norm(contacts.contacts[0].origin - contacts.contacts[1].origin))
     body = f'mass="{numbers(known)}" diaginertia="{numbers(*[known * width**2 / 10] * 3)}"'  # of a ball of this width
     return "\n".join(
         [
@@ -71,25 +71,25 @@ def as_mjcf(grasp: RankedGrasp) -> str:
             '  <option timestep="0.001" gravity="0 0 0" cone="elliptic" impratio="100" noslip_iterations="50"/>',
             "  <worldbody>",
             "    <!-- the object, in the frame of its own file -->",
-            f'    <body name="object" {_pose(found.rotation, found.origin)}>',
+            f'    <body name="object" {_pose(contacts.rotation, contacts.origin)}>',
             '      <freejoint name="object"/>',
             f'      <inertial pos="{numbers(*middle)}" {body}/>',
-            *(_plate(f, contact, found) for f, contact in enumerate(found.contacts, 1)),
+            *(_plate(f, contact, contacts) for f, contact in enumerate(contacts.contacts, 1)),
             "    </body>",
-            *(line for f, contact in enumerate(found.contacts, 1) for line in _finger(f, contact)),
+            *(line for f, contact in enumerate(contacts.contacts, 1) for line in _finger(f, contact)),
             "  </worldbody>",
             "  <contact>",
             *(
                 f'    <pair name="finger{f}" geom1="pad{f}" geom2="plate{f}" condim="4" '
                 f'friction="{numbers(*friction(contact))} 0 0" solref="0.004 1"/>'
-                for f, contact in enumerate(found.contacts, 1)
+                for f, contact in enumerate(contacts.contacts, 1)
             ),
             "  </contact>",
             "  <actuator>  <!-- a force of F_N at control 0, and of F_N plus the control otherwise -->",
             *(
                 f'    <general name="press{f}" joint="close{f}" gainprm="1" biastype="affine" '
                 f'biasprm="{numbers(contact.F_N)} 0 0"/>'
-                for f, contact in enumerate(found.contacts, 1)
+                for f, contact in enumerate(contacts.contacts, 1)
             ),
             "  </actuator>",
             "</mujoco>",
@@ -102,10 +102,10 @@ def _pose(rotation: FloatArray, origin: FloatArray) -> str:
     return f'pos="{numbers(*origin)}" quat="{numbers(turn[3], *turn[:3])}"'
 
 
-def _plate(f: int, contact: PointContact, found: Cell) -> str:
+def _plate(f: int, contact: PointContact, contacts: Cell) -> str:
     """The object's side of a contact, in the object's own frame: a plate whose face is the contact plane."""
     centre = contact.origin + PLATE * contact.rotation[:, 2]
-    placed = _pose(found.rotation.T @ contact.rotation, found.rotation.T @ (centre - found.origin))
+    placed = _pose(contacts.rotation.T @ contact.rotation, contacts.rotation.T @ (centre - contacts.origin))
     size = numbers(2 * RADIUS, 2 * RADIUS, PLATE)
     return f'      <geom name="plate{f}" type="box" size="{size}" {placed} contype="0" conaffinity="0"/>'
 

@@ -32,7 +32,7 @@ def torsional_radius(contact: PointContact) -> float:
 
 def as_usd(grasp: RankedGrasp) -> str:
     """A stage of both fingers at one grasp, with the frame of the object's own file, as USD in text form (.usda)."""
-    found = cell(grasp)
+    contacts = cell(grasp)
     return "\n".join(
         [
             "#usda 1.0",
@@ -52,9 +52,9 @@ def as_usd(grasp: RankedGrasp) -> str:
             "    }",
             '    def Xform "object"  # the frame of the object\'s own file: put its mesh in here',
             "    {",
-            *_placed(found.rotation, found.origin),
+            *_placed(contacts.rotation, contacts.origin),
             "    }",
-            *(line for f, contact in enumerate(found.contacts, 1) for line in _finger(f, contact)),
+            *(line for f, contact in enumerate(contacts.contacts, 1) for line in _finger(f, contact)),
             "}",
         ]
     )

@@ -58,7 +58,7 @@ def _isaac_grasp(grasp: RankedGrasp, gripper: GripperFrame) -> dict[str, Any]:
     }
 
 
-def as_graspgen(found: Sequence[RankedGrasp], gripper: GripperFrame, ds: xr.Dataset) -> str:
+def as_graspgen(grasps: Sequence[RankedGrasp], gripper: GripperFrame, ds: xr.Dataset) -> str:
     """A GraspGen file of all grasps, also of those that do not hold, with everything else that is known beside them."""
     keys = task_keys(ds, "object")
     made = {
@@ -66,17 +66,17 @@ def as_graspgen(found: Sequence[RankedGrasp], gripper: GripperFrame, ds: xr.Data
         "gripper": {"name": gripper.gripper_frame, "approach_axis": "z", "closing_axis": gripper.closing,
                     "depth": gripper.depth, "about": _about(ds, gripper)},
         "grasps": {
-            "transforms": [grasp.matrix.tolist() for grasp in found],
-            "object_in_gripper": [not grasp.lost for grasp in found],
-            "qualities": [grasp.merit for grasp in found],
-            "forces": [grasp.force for grasp in found],
-            "widths": [plain(grasp.maps["opening"]) for grasp in found],
-            "names": [grasp.name for grasp in found],
-            "warnings": [grasp.warnings for grasp in found],
+            "transforms": [grasp.matrix.tolist() for grasp in grasps],
+            "object_in_gripper": [not grasp.lost for grasp in grasps],
+            "qualities": [grasp.merit for grasp in grasps],
+            "forces": [grasp.force for grasp in grasps],
+            "widths": [plain(grasp.maps["opening"]) for grasp in grasps],
+            "names": [grasp.name for grasp in grasps],
+            "warnings": [grasp.warnings for grasp in grasps],
         },
         "softjaw": {
-            "file": str(ds.attrs["file"]), "units": found[0].units if found else {}, "meaning": MEANING,
-            "cases": [{key: plain(value) for key, value in grasp.case.items()} for grasp in found],
+            "file": str(ds.attrs["file"]), "units": grasps[0].units if grasps else {}, "meaning": MEANING,
+            "cases": [{key: plain(value) for key, value in grasp.case.items()} for grasp in grasps],
         },
     }  # fmt: skip
     return json.dumps(made, indent=1)

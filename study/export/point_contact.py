@@ -68,8 +68,8 @@ def cell(grasp: RankedGrasp) -> Cell:
     across, along = pads[0]["pose_rotation"][:, 2], pads[0]["pose_rotation"][:, 0]
     W = np.column_stack([across, along, np.cross(across, along)])
     middle = (pads[0]["pose_origin"] + pads[1]["pose_origin"]) / 2
-    one, two = (_contact(finger, W, middle) for finger in pads)
-    return Cell((one, two), W.T, -W.T @ middle)
+    first, second = (_contact(finger, W, middle) for finger in pads)
+    return Cell((first, second), W.T, -W.T @ middle)
 
 
 def _contact(finger: dict[str, Any], W: FloatArray, middle: FloatArray) -> PointContact:

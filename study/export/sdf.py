@@ -40,15 +40,15 @@ def patch_radius(contact: PointContact) -> float:
 
 def as_sdf(grasp: RankedGrasp) -> str:
     """A model of both fingers at one grasp, with the frame of the object's own file."""
-    found = cell(grasp)
+    contacts = cell(grasp)
     return "\n".join(
         [
             '<?xml version="1.0"?>',
             *(f"<!-- {line} -->" for line in heading(grasp)),
             f'<sdf version="{VERSION}">',
             f'  <model name="{grasp.name}">',
-            f'    <frame name="object"><pose>{_pose(found.rotation, found.origin)}</pose></frame>',
-            *(line for f, contact in enumerate(found.contacts, 1) for line in _finger(f, contact)),
+            f'    <frame name="object"><pose>{_pose(contacts.rotation, contacts.origin)}</pose></frame>',
+            *(line for f, contact in enumerate(contacts.contacts, 1) for line in _finger(f, contact)),
             "  </model>",
             "</sdf>",
         ]

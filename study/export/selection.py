@@ -110,9 +110,9 @@ class RankedGrasp:
     @property
     def matrix(self) -> FloatArray:
         """Rotation and origin as a homogeneous matrix ``(4, 4)``."""
-        found = np.eye(4)
-        found[:3, :3], found[:3, 3] = self.rotation, self.origin
-        return found
+        matrix = np.eye(4)
+        matrix[:3, :3], matrix[:3, 3] = self.rotation, self.origin
+        return matrix
 
     def half(self, opening: str) -> float:
         """Half of the opening at first touch or under load [m], which is where each finger stands."""
@@ -187,7 +187,7 @@ def grasps(ds: xr.Dataset, choice: Selection, gripper: GripperFrame) -> list[Ran
     best, mass = max(score, default=0.0), in_si("mass_g", task_keys(ds, "object").get("mass_g"))
     mass, units = np.nan if mass is None else mass, maps_in(ds)
     made = []
-    for i, (case, place) in enumerate(zip(found, places, strict=True)):
+    for i, (case, place) in enumerate(zip(cases, places, strict=True)):
         merit = float(score[i] / best) if best > 0 else 0.0
         for approach in gripper.approach:
             R, o = gripper_frame(case, approach, gripper.closing, gripper.depth)

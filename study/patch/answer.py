@@ -143,8 +143,8 @@ def _count(read: ReadPatch, chosen: NDArray[np.bool_]) -> str:
 
 
 def grasp_record(
-    one: EvaluatedPatch,
-    two: EvaluatedPatch | None,
+    first: EvaluatedPatch,
+    second: EvaluatedPatch | None,
     kind: str,
     distance: float | None = None,
     object_length: float | None = None,
@@ -154,22 +154,22 @@ def grasp_record(
 
     Parameters
     ----------
-    one, two : EvaluatedPatch
-        The contacts, in the coordinates of one object; without ``two`` the second is like the first, half a turn
+    first, second : EvaluatedPatch
+        The contacts, in the coordinates of one object; without ``second`` it is like the first, half a turn
         about x away from it.
     kind : str
         Limit surface, one of `SURFACES`.
     distance : float, optional
-        Between the contacts, where ``two`` is not given [m].
+        Between the contacts, where ``second`` is not given [m].
     object_length, contact_length : float, optional
         Lengths by which torques of forces and torques about normals are divided; by default the distance, and the
         longer side of the larger contact [m].
     """
-    both = one, two or one
-    contacts = one.contact, two.contact if two else opposite(one.contact, float(distance or 0.0))
-    if two is not None:
+    both = first, second or first
+    contacts = first.contact, second.contact if second else opposite(first.contact, float(distance or 0.0))
+    if second is not None:
         try:
-            check_facing(contacts, (one.read.file, two.read.file))
+            check_facing(contacts, (first.read.file, second.read.file))
         except ValueError as error:
             raise StudyError(USAGE, f"--other: {error}") from error
     d, *lengths = grasp_lengths(contacts, object_length, contact_length)
@@ -200,9 +200,9 @@ def _patch_record(evaluated: EvaluatedPatch) -> dict[str, Any]:
     names = ("origin", "axes", "centre_of_pressure", "flag", "overhang_count", "overhang_share")
     friction = {}
     for model, limits in contact.limits.items():
-        found = {key: getattr(limits, name) for key, name in LIMITS.items()}
-        found["tau_pure"] = pure_torque(contact.local, contact.mu, model)
-        friction[model] = {name: found[name] for name in FRICTION}
+        values = {key: getattr(limits, name) for key, name in LIMITS.items()}
+        values["tau_pure"] = pure_torque(contact.local, contact.mu, model)
+        friction[model] = {name: values[name] for name in FRICTION}
     return {
         "file": evaluated.read.file,
         "faces": evaluated.read.faces,
@@ -220,17 +220,17 @@ def _patch_record(evaluated: EvaluatedPatch) -> dict[str, Any]:
 
 
 def _surfaces_record(evaluated: EvaluatedPatch, model: str) -> dict[str, Any]:
-    found: dict[str, Any] = {}
+    surfaces: dict[str, Any] = {}
     for kind in ("exact", *SURFACES):
         surface = evaluated.surface(model, kind)
-        found[kind] = {"volume": surface.volume, "semi_axes": surface.semi_axes}
+        surfaces[kind] = {"volume": surface.volume, "semi_axes": surface.semi_axes}
         if kind != "exact":
             fit = evaluated.fits[model][kind]
             # samples in a plane bound no body, so there is nothing to be off from
             errors = fit.fit_error if evaluated.exact[model].rank == SPACE else (None, None, None)
-            found[kind] |= {"stands_in": fit.certificate == STANDS_IN}
-            found[kind] |= dict(zip(("E_1", "E_rad", "E_dir"), errors, strict=True))
-    return found
+            surfaces[kind] |= {"stands_in": fit.certificate == STANDS_IN}
+            surfaces[kind] |= dict(zip(("E_1", "E_rad", "E_dir"), errors, strict=True))
+    return surfaces
 
 
 def _notes(patches: Sequence[EvaluatedPatch], grasp: dict[str, Any] | None) -> list[str]:

@@ -141,10 +141,10 @@ def _surface_table(surfaces: dict[str, Any]) -> Table:
                Column("E_rad", label="E_rad [%]", digits=3), Column("E_dir", "rad", digits=3)]  # fmt: skip
     rows = []
     for kind, title in SURFACES.items():
-        found = surfaces[kind]
-        error = None if found["E_rad"] is None else 100 * found["E_rad"]
-        volume = found["volume"] / exact if exact else None
-        rows.append({"kind": title, "volume": volume, "E_rad": error, "E_dir": found["E_dir"]})
+        surface = surfaces[kind]
+        error = None if surface["E_rad"] is None else 100 * surface["E_rad"]
+        volume = surface["volume"] / exact if exact else None
+        rows.append({"kind": title, "volume": volume, "E_rad": error, "E_dir": surface["E_dir"]})
     return Table("", columns, rows)
 
 

@@ -49,12 +49,12 @@ def contact_of(patch: ContactPatch, mu: float, x_axis: ArrayLike | None = None) 
         raise TypeError(f"patch is a {type(patch).__name__}: expected {expected}")
     mu = checked_mu(mu)
     try:
-        found = Contact(patch, mu, x_hint=principal_direction(patch) if x_axis is None else x_axis)
+        contact = Contact(patch, mu, x_hint=principal_direction(patch) if x_axis is None else x_axis)
     except ValueError as error:
         raise type(error)(str(error).replace("x_hint", "x_axis")) from error
-    if found.frame.flag & FrameFlag.ORIENTATION:
+    if contact.frame.flag & FrameFlag.ORIENTATION:
         raise ValueError("patch: found normals that oppose their neighbours, expected all to one side; turn the others")
-    return found
+    return contact
 
 
 def opposite(contact: Contact, distance: float) -> Contact:

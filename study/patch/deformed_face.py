@@ -61,29 +61,30 @@ def solve_deformed(file: str, unit: str | None, scene: Scene) -> ReadPatch:
     rules = contact_rules(scene, walled=False)
     wanted, *others = (pad_of(scene, (False, False), rule, False) for rule in rules)
     try:
-        found = MeasuredPress(wanted, others, dict(scene.petsc), settings(scene)).solve(face)
+        measured = MeasuredPress(wanted, others, dict(scene.petsc), settings(scene)).solve(face)
     except NoContactError as error:
         remedy = "z points along the approach, so that pressed foam has z < 0: change its sign if it is the other way"
         raise StudyError(USAGE, f"{file}: {error}; {remedy}") from error
     except (ConvergenceError, CheckError) as error:
         raise StudyError(SOME_FAILED, f"{file}: the pad has no state with this face: {error}") from error
-    patch = extract(found.state.pad, found.state)
+    patch = extract(measured.state.pad, measured.state)
     loaded = patch.pressure > NEGLIGIBLE * patch.pressure.max(initial=0.0)
     kept = np.flatnonzero(loaded).tolist()
-    back = np.array([0.0, 0.0, found.state.closing])  # to where the backing plate stands
-    own = ContactPatch(
+    back = np.array([0.0, 0.0, measured.state.closing])  # to where the backing plate stands
+    in_file = ContactPatch(
         patch.centroid[loaded] - back, patch.area[loaded], patch.normal[loaded], patch.pressure[loaded],
         None if patch.corners is None else patch.corners[loaded] - back,
     )  # fmt: skip
-    return ReadPatch(file, own, len(loaded), lambda i: f"face {kept[i]} of the pad", (*notes, *_notes(face, found)))
+    notes = (*notes, *_notes(face, measured))
+    return ReadPatch(file, in_file, len(loaded), lambda i: f"face {kept[i]} of the pad", notes)
 
 
-def _notes(face: MeasuredFace, found: Measured) -> tuple[str, ...]:
+def _notes(face: MeasuredFace, measured: Measured) -> tuple[str, ...]:
     """What a reader should know of the solve."""
-    closing, own = found.state.closing, found.state.notes
+    closing, own = measured.state.closing, measured.state.notes
     told = f"the points scatter by {1e3 * face.noise:.2g} mm round the smoothed face, which is good to"
-    text = f"{told} {1e3 * face.doubt:.2g} mm; closed by {1e3 * closing:.3g} mm, {found.state.force:.3g} N"
-    if not found.judged:
+    text = f"{told} {1e3 * face.doubt:.2g} mm; closed by {1e3 * closing:.3g} mm, {measured.state.force:.3g} N"
+    if not measured.judged:
         return text, "the face is pressed in by hardly more than its error: contact cannot be told from noise", *own
     return text, *own
 

@@ -114,9 +114,9 @@ def split_header(header: str, pressure_name: str | None = None) -> tuple[str, st
     text = header.strip().lower()
     wanted = (pressure_name or "pressure").strip().lower()
     name, unit = text, None
-    if found := HEADER.fullmatch(text):
-        name = found["name"]
-        unit = (found["tail"] or found["boxed"] or "").replace(" ", "").replace("^", "").replace("²", "2") or None
+    if match := HEADER.fullmatch(text):
+        name = match["name"]
+        unit = (match["tail"] or match["boxed"] or "").replace(" ", "").replace("^", "").replace("²", "2") or None
     if text in ALIASES or text in KINDS:
         name, unit = ALIASES.get(text, text), None
     if wanted == text:
@@ -134,14 +134,14 @@ def read_table(path: Path, reading: Reading) -> Faces:
     """Faces of a CSV file with one face per line: centre, area and normal of each, or its corners."""
     numbers, (headers, *cells) = table_rows(path)
     headers = [header.strip() for header in headers]
-    found = [split_header(header, reading.pressure_name) for header in headers]
-    position = {pair[0]: i for i, pair in enumerate(found) if pair}
-    twice = [(pair[0], headers[i], headers[position[pair[0]]]) for i, pair in enumerate(found)
+    pairs = [split_header(header, reading.pressure_name) for header in headers]
+    position = {pair[0]: i for i, pair in enumerate(pairs) if pair}
+    twice = [(pair[0], headers[i], headers[position[pair[0]]]) for i, pair in enumerate(pairs)
              if pair is not None and position[pair[0]] != i]  # fmt: skip
     refuse([Problem(str(path), 1, name, f"{one} and {other}", "one column for it", "remove one of the two")
             for name, one, other in twice] + _missing(path, headers, position, reading))  # fmt: skip
     needed = _needed(position)
-    given = {pair[0]: pair[1] for pair in found if pair}
+    given = {pair[0]: pair[1] for pair in pairs if pair}
     units = {name: given[name] or reading.unit_of(KINDS[name]) or "" for name in needed}
     bare = [name for name in needed if not units[name]]
     refuse([without_unit(path, kind, [headers[position[name]] for name in bare if KINDS[name] == kind])
@@ -149,8 +149,8 @@ def read_table(path: Path, reading: Reading) -> Faces:
     values = table_numbers(path, numbers[1:], cells, headers, {name: position[name] for name in needed})
     with np.errstate(over="ignore"):  # what is not finite is reported with its place
         values = {name: FACTORS[KINDS[name]][units[name]] * row for name, row in values.items()}
-    unused = [h for pair, h in zip(found, headers, strict=True) if pair and pair[0] not in needed]
-    unused += [h for pair, h in zip(found, headers, strict=True) if pair is None]
+    unused = [h for pair, h in zip(pairs, headers, strict=True) if pair and pair[0] not in needed]
+    unused += [h for pair, h in zip(pairs, headers, strict=True) if pair is None]
     notes = (f"not used of {path}: {', '.join(unused)}",) if unused else ()
     stacked = {names: np.stack([values[name] for name in names], axis=-1) for names in (CENTRE, NORMAL)
                if names[0] in values}  # fmt: skip

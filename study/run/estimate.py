@@ -71,10 +71,10 @@ def _planes(scene: Any, low: FloatArray, high: FloatArray, off: float) -> int:
     return min(planes, 1) if wanted == "half" else planes
 
 
-def _alike(one: FloatArray, other: FloatArray, off: float) -> bool:
-    both = np.isfinite(one) & np.isfinite(other)
-    same_rim = np.mean(np.isfinite(one) != np.isfinite(other)) < 0.1  # rounding decides what a line at the rim meets
-    return bool(same_rim and np.abs(one[both] - other[both]).max(initial=0.0) <= off)
+def _alike(values: FloatArray, other: FloatArray, off: float) -> bool:
+    both = np.isfinite(values) & np.isfinite(other)
+    same_rim = np.mean(np.isfinite(values) != np.isfinite(other)) < 0.1  # rounding decides what a line at the rim meets
+    return bool(same_rim and np.abs(values[both] - other[both]).max(initial=0.0) <= off)
 
 
 def heights(

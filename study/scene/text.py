@@ -130,10 +130,10 @@ def changes(theirs: str, ours: str) -> list[tuple[str, Any, Any]]:
     ValueError
         One of them is not TOML.
     """
-    one, other = (_values(text) for text in (theirs, ours))
+    before, after = (_values(text) for text in (theirs, ours))
     # In the order of our scene, which is the one that the reader knows.
-    keys = [key for key in dict.fromkeys([*other, *one]) if one.get(key) != other.get(key)]
-    return [(key, one.get(key), other.get(key)) for key in keys]
+    keys = [key for key in dict.fromkeys([*after, *before]) if before.get(key) != after.get(key)]
+    return [(key, before.get(key), after.get(key)) for key in keys]
 
 
 def _values(text: str) -> dict[str, Any]:

@@ -118,17 +118,17 @@ def _about_mesh(options: Namespace, scene: Path, measure: Callable) -> dict[str,
         lacks = " and ".join(name for name, given in needs.items() if not given)
         text = f"a mesh needs {lacks}; units are never guessed, as in 'softjaw init mesh --mesh my.stl --unit mm'"
         raise StudyError(USAGE, text)
-    found = measure(options)
+    measured = measure(options)
     file = os.path.relpath(Path(options.mesh).absolute(), scene.absolute().parent)
-    longest_side, next_side, _ = sorted(found.extents, reverse=True)
+    longest_side, next_side, _ = sorted(measured.extents, reverse=True)
     return {
         "MESH": json.dumps(file, ensure_ascii=False),
         "UNIT": options.unit,
-        "AXIS": found.axis,
-        "SIZE": " x ".join(f"{side:.4g}" for side in found.extents),
+        "AXIS": measured.axis,
+        "SIZE": " x ".join(f"{side:.4g}" for side in measured.extents),
         "LONG": _larger(PAD_LENGTH, longest_side, "longer"),
         "WIDE": _larger(PAD_WIDTH, next_side, "wider"),
-        "STATIONS": _stations(found),
+        "STATIONS": _stations(measured),
     }
 
 
@@ -137,18 +137,18 @@ def _larger(pad: float, side: float, word: str) -> str:
     return f"# {word} than the object, {side:.3g} mm: the rest of it stays free" if pad > side else ""
 
 
-def _stations(found: Measured) -> str:
+def _stations(measured: Measured) -> str:
     """Lines that propose stations, or say why there are none that `check` would not warn of."""
-    wide, deep, height = found.extents
+    wide, deep, height = measured.extents
     angles = [angle for angle, width in ((0, wide), (90, deep)) if width <= OPENING]
     if height < PAD_LENGTH:
         return f"# Stations along its axis: none, because the pad is longer than the object there, {height:.3g} mm."
-    if not angles or not found.stations:
+    if not angles or not measured.stations:
         why = f"it is wider than {OPENING:g} mm" if not angles else "the line through its middle bends too much"
         return f"# Stations along its axis: none that would do everywhere, because {why}."
     return (
         "# Or, for an object with an axis, stations: heights above its lowest point, at which the pad stays on it.\n"
-        f"# stations_mm = {json.dumps(found.stations)}\n"
+        f"# stations_mm = {json.dumps(measured.stations)}\n"
         f"# angles_deg = {json.dumps(angles)}        # about the centre line of the object's sections; those where it"
         f" is at most {OPENING:g} mm wide"
     )
