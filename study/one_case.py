@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,7 @@ from softjaw.fem.objects.gap import Pose
 from softjaw.friction.patch import ContactPatch
 from softjaw.friction.wrench import FrictionLimits
 from softjaw.lsfit.ellipsoid import Ellipsoid
+from softjaw.lsfit.surface import LimitSurface
 from softjaw.study import pipeline
 from softjaw.study.case.build import check_object
 from softjaw.study.case.candidates import decided, units, with_sampled_grasps
@@ -30,9 +31,6 @@ from softjaw.study.quantities import BY_KEY, MAIN, MODELS, STATES, TABLE, checke
 from softjaw.study.result.surfaces import fitted_surface
 from softjaw.study.scene import Scene
 from softjaw.study.units import converted, shown_text
-
-if TYPE_CHECKING:
-    from softjaw.lsfit.surface import LimitSurface
 
 FloatArray = NDArray[np.float64]
 SAME = {"rel_tol": 1e-9, "abs_tol": 1e-12}  # stations [m], angles [deg] and forces [N] that are the scene's own

@@ -165,7 +165,7 @@ def _hits(o, d, p):
 
 @njit(cache=True)
 def first_hit(o, d, least, skipped, anyone, corners, order, low, high, start, count, stack):
-    """Distance beyond ``least`` to the first triangle but ``skipped`` on a ray, and its number; infinite and -1 if none.
+    """Distance beyond ``least`` to the first triangle but ``skipped`` on a ray and its number; infinite and -1 if none.
 
     ``anyone`` stops at whichever triangle is found first.
     """

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from itertools import product
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,10 +22,8 @@ from softjaw.study.case.poses import STANDOFF, explicit_poses
 from softjaw.study.case.result import UNDECIDED
 from softjaw.study.quantities import NO_GRASP
 from softjaw.study.ranking import largest
+from softjaw.study.scene import Scene
 from softjaw.study.scene.grasps import GraspPose
-
-if TYPE_CHECKING:
-    from softjaw.study.scene import Scene
 
 FloatArray = NDArray[np.float64]
 Frame = tuple[FloatArray, FloatArray]  # a point [m]; long side, short side and approach as columns

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,9 +20,7 @@ from softjaw.study.case.result import UNDECIDED
 from softjaw.study.flags import LOST
 from softjaw.study.quantities import DONE, MISSING
 from softjaw.study.run.pattern import gained, next_poses, with_places
-
-if TYPE_CHECKING:
-    from softjaw.study.scene import Scene
+from softjaw.study.scene import Scene
 
 FloatArray = NDArray[np.float64]
 Rounds = tuple[tuple[Any, ...], ...]  # what each round added: stations [mm], or poses as `pattern.Place`

@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from softjaw.fem.shell.wall_material import wall_material
+from softjaw.study.case.build import axis_span, has_wall, told
 from softjaw.study.units import UNITS, shown, shown_text
 
 
 def scene_text(scene: Any, file: str) -> str:
     """What would be run, in a few lines."""
-    # here and below: who only reads results must not load all that checks scenes
-    from softjaw.study.case.build import has_wall, told
-
     c, g, o = scene.candidates, scene.gripper, scene.object
     name = f" '{o.name}'" if getattr(o, "name", None) else ""
     where = (
@@ -73,12 +72,8 @@ def _intervals(scene: Any) -> str:
 
 def wall_text(shape: Any) -> str:
     """Thickness, material and support of an object's wall; empty for a rigid object."""
-    from softjaw.study.case.build import has_wall
-
     if not has_wall(shape):
         return ""
-    from softjaw.fem.shell.wall_material import wall_material
-
     name = None if shape.wall_material == "custom" else shape.wall_material
     found = wall_material(name, shape.young_modulus, shape.wall_poisson_ratio, shape.yield_strength)
     given = shape.thicknesses_mm
@@ -111,8 +106,6 @@ def compliance_text(scene: Any) -> str:
 
 def _extent(shape: Any) -> str:
     """Where the object begins and ends along its axis, and for a mesh what that is counted from."""
-    from softjaw.study.case.build import axis_span
-
     span = axis_span(shape)
     if span is None:
         return ", unbounded along its axis"
