@@ -181,8 +181,8 @@ def chosen(ds: xr.Dataset, choice: Selection) -> tuple[list[dict[str, Any]], lis
 
 def grasps(ds: xr.Dataset, choice: Selection, gripper: GripperFrame) -> list[RankedGrasp]:
     """The chosen grasps with the gripper's pose, one for each direction of approach."""
-    found, places, by = chosen(ds, choice)
-    values = [case["maps"][by] if by != LEAST_FORCE else 1.0 / case["maps"]["force_low"] for case in found]
+    cases, places, by = chosen(ds, choice)
+    values = [case["maps"][by] if by != LEAST_FORCE else 1.0 / case["maps"]["force_low"] for case in cases]
     score = np.nan_to_num([max(float(value), 0.0) for value in values])
     best, mass = max(score, default=0.0), in_si("mass_g", task_keys(ds, "object").get("mass_g"))
     mass, units = np.nan if mass is None else mass, maps_in(ds)

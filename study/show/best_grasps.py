@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from softjaw.study.case.result import TIE
 from softjaw.friction.patch import NEGLIGIBLE
+from softjaw.study.case.result import TIE
 from softjaw.study.flags import LOST, OF_FILE, flags_in
 from softjaw.study.quantities import BY_KEY, FORCE_RANGE, MAIN, STATES, map_row
 from softjaw.study.ranking import Sure, at_level, judged, passed_over, rank_values, ranked, score_of, sure, task_keys

@@ -42,7 +42,7 @@ def lopsided(tmp_path_factory):
 def test_the_other_finger_is_the_mirror_image(lopsided):
     """Beyond the mesh's own asymmetry of facets it is x of the object that changes its sign: y of the pad."""
     poses = candidates(lopsided)[0].poses
-    first, other = fingers = [approach(build_object(lopsided.object), pose, lopsided.gripper) for pose in poses]
+    _, other = fingers = [approach(build_object(lopsided.object), pose, lopsided.gripper) for pose in poses]
     assert image_signs(*fingers, lopsided.gripper.pad_size) == (1, -1)
     both = OnRigid(lopsided, fingers, poses, coarser=False)
     assert len(both.parts) == 1
