@@ -16,14 +16,12 @@ each together with a second number from elsewhere, and writes this page.
 
 * **outcome**: solved, failed or refused, each as it should. `gap` is a known fault, or a number that the second one
   does not confirm; gaps do not count as ok.
-* **difference**: largest relative difference of closing displacement, e_n and S (or of what `source` in `cases.toml`
-  names). `cases.toml` has the one that is allowed, with its reason. Force balance, tension and penetration are checked
-  at every solved force.
+* **compared with**: where the second number comes from; `source` in `cases.toml` says which one.
+* **difference**: the largest relative one of closing displacement, e_n and S (or of what `source` names). `cases.toml`
+  has the one that is allowed, with its reason. Force balance, tension and penetration are checked at every force.
 """
 ROW = "hard case"
 OK = "ok"
-# Kinds of sources that the table names; those of the others show in what was compared.
-NAMED_KINDS = ("closed form", "limit", "scaling law", "invariance", "independent code", "bound")
 OUTCOME = HEAD.index("outcome")
 _rows: dict[str, list[str]] = {}
 
@@ -31,9 +29,7 @@ _rows: dict[str, list[str]] = {}
 def row(case: HardCase, outcome: Outcome, verdict: Verdict) -> list[str]:
     """Cells of one case."""
     difference = "" if verdict.difference is None else f"{verdict.difference:.0e}"
-    source = case.source.what if case.source else "none"
-    if case.source and case.source.kind in NAMED_KINDS:
-        source = f"{case.source.kind}: {source}"
+    source = case.source.kind if case.source else "none"
     word = outcome.text if verdict.word == OK else f"{outcome.text}; {verdict.word}"
     return [case.name, case.hard, word, source, difference]
 

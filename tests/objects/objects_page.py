@@ -13,7 +13,7 @@ from tests.objects.reasons import reason_of
 
 SECONDS, SHARE = 60.0, 0.98  # goals: CPU time to the first map, share of tried candidates that end solved
 LONGEST = 80  # characters of a message
-HEAD = ("object", "CPU s", "candidates", "solved", "best pose: quality")
+HEAD = ("object", "CPU s", "candidates", "solved", "best quality")
 INTRODUCTION = """# Objects that users bring
 
 Written by `make objects`. Each object is an STL file, run as a user would: `softjaw init mesh`, `softjaw run` on two
@@ -58,7 +58,7 @@ def share(found: Sequence[Found]) -> tuple[int, int]:
 
 def object_row(f: Found) -> list[object]:
     """Cells of an object."""
-    return [f.name, f"{f.seconds:.0f}", f.count(*TRIED), f.count(SOLVED), f.best]
+    return [f.name, f"{f.seconds:.0f}", f.count(*TRIED), f.count(SOLVED), f.best.rpartition(": ")[2]]
 
 
 def kind_rows(scenes: Sequence[Found]) -> list[list[object]]:

@@ -73,7 +73,7 @@ def test_candidates_are_counted_and_shared():
     assert one.count(*TRIED) == 12
     assert one.count(UNTRIED) == 0
     text = page([one], [two], SEED)
-    assert "| drill | 100 | 12 | 11 | 3: 0.05 |" in text
+    assert "| drill | 100 | 12 | 11 | 0.05 |" in text
 
 
 def test_what_was_found_is_kept(tmp_path):
