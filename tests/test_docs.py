@@ -10,7 +10,6 @@ from pathlib import Path
 
 import pytest
 
-import softjaw
 from docs.generate import PAGES
 from softjaw.study.cli.options import COMMANDS
 from softjaw.study.flags import Flag
@@ -52,12 +51,6 @@ def test_every_command_and_option_is_shown():
     for name in (name for group in COMMANDS.values() for name, *_ in group):
         assert f"### softjaw {name}\n" in page("commands")
         assert f"usage: softjaw {name} " in page("commands")
-
-
-def test_every_public_name_has_its_docstring():
-    for name in softjaw.__all__:
-        body = page("api").partition(f"## `softjaw.{name}`\n")[2].partition("\n## ")[0]
-        assert len(body) > 80, name
 
 
 def anchors(text: str) -> set[str]:

@@ -34,7 +34,6 @@ def slow(block: list[str]) -> bool:
     return any(("softjaw run " in line and FIRST not in line) or SOLVES.search(line) for line in block)
 
 
-
 def as_typed(line: str) -> str:
     """The line with an mpirun that this machine accepts."""
     return re.sub(r"^mpirun -n (\d+)", lambda found: shlex.join(mpirun(int(found[1]))), line)
@@ -117,16 +116,6 @@ def test_make_knows_the_target(command):
     assert done.returncode == 0, done.stderr
 
 
-# One process looks for all of them: it imports everything once.
-COLLECT = """
-import shlex, sys, pytest
-for command in sys.argv[1:]:
-    code = pytest.main(["--collect-only", "-q", *shlex.split(command)[1:]])
-    if code:
-        sys.exit(f"{command}: {code!r}")
-"""
-
-
 PYTEST = sorted(set(re.findall(r"(?<=`)pytest [^`]+(?=`)", TEXT)))
 
 
@@ -134,14 +123,6 @@ def test_the_test_files_that_it_names_exist():
     assert len(PYTEST) > 3
     named = {word for command in PYTEST for word in shlex.split(command) if word.startswith("tests/")}
     assert not [path for path in sorted(named) if not (ROOT / path).exists()]
-
-
-@pytest.mark.long
-def test_pytest_finds_the_tests():
-    done = subprocess.run(
-        [sys.executable, "-c", COLLECT, *PYTEST], cwd=ROOT, capture_output=True, text=True, timeout=120, check=False
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
 
 
 def test_every_path_that_it_names_exists():

@@ -152,7 +152,7 @@ def test_isaac_grasp_has_the_fields_of_its_documentation(said):
         assert grasp["cspace_position"] == pytest.approx(dict.fromkeys(("left", "right"), RADIUS - 0.001))
         assert grasp["pregrasp_cspace_position"] == pytest.approx(dict.fromkeys(("left", "right"), RADIUS + 0.01))
     assert [g["confidence"] for g in found["grasps"].values()] == pytest.approx(sorted(
-        (0.3 + np.delete(STATIONS, LOST)) / 0.34, reverse=True))  # fmt: skip
+        (1.0 + np.delete(STATIONS, LOST)) / 1.04, reverse=True))  # fmt: skip
     assert "warnings: coarse" in text
 
 

@@ -43,9 +43,9 @@ allowed_dent_mm = 1.5
 weight_direction = [0, 0, -1]
 safety = 1
 [gripper]
-elements = [6, 4, 3]
+elements = [4, 4, 2]
 [accuracy]
-wall_element_mm = 4
+wall_element_mm = 6
 [candidates]
 stations_mm = [30, 50]
 angles_deg = [0]
@@ -102,7 +102,7 @@ def test_the_size_of_a_shell_is_that_of_the_mesh_that_is_solved(solved):
     fingers = solver.pressing(FINE, EffectChoice(solver).levels)
     assert size.shell == pytest.approx(6 * fingers.shell.nodes, rel=0.1)  # the axis is one node
     solver.destroy()
-    fine = wall_size(scene.with_values({"accuracy.wall_element_mm": 1.0}))
+    fine = wall_size(scene.with_values({"accuracy.wall_element_mm": 1.5}))
     assert fine.shell > 4 * size.shell
     assert fine.memory > 4 * size.memory
     assert memory(scene) > memory(scene.with_values({"effects.object": "rigid"}))
