@@ -9,9 +9,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import trimesh
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
-from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from softjaw.fem.contact.checks import refuse_fall
@@ -73,24 +73,22 @@ def outcome(function, *arguments):
         return type(error)
 
 
+def body(mesh):
+    """Corners and triangles."""
+    return np.array(mesh.vertices), np.array(mesh.faces)
+
+
 def hull(points):
-    """Convex body of corners: the corners, and triangles turned outwards."""
-    x = np.asarray(points, float)
-    triangles = ConvexHull(x, qhull_options="QJ" if len(x) > 8 else "Qt").simplices.astype(np.int64)
-    a, b, c = x[triangles].transpose(1, 0, 2)
-    wrong = np.einsum("ij,ij->i", np.cross(b - a, c - a), a - x.mean(axis=0)) < 0
-    triangles[wrong] = triangles[wrong][:, ::-1]
-    return x, triangles
+    """Convex body of corners."""
+    return body(trimesh.convex.convex_hull(np.asarray(points, float)))
 
 
 def union(*bodies):
     """Several meshes as one."""
-    first = np.cumsum([0, *(len(x) for x, _ in bodies)])
-    triangles = np.concatenate([t + n for (_, t), n in zip(bodies, first, strict=False)])
-    return np.concatenate([x for x, _ in bodies]), triangles
+    return body(trimesh.util.concatenate([trimesh.Trimesh(*mesh, process=False) for mesh in bodies]))
 
 
-CUBE = hull(np.stack(np.meshgrid(*[[-0.5, 0.5]] * 3, indexing="ij"), axis=-1).reshape(-1, 3))
+CUBE = body(trimesh.creation.box())
 OCTAHEDRON = hull(0.5 * np.concatenate([np.eye(3), -np.eye(3)]))
 SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]])
 FLAT_PIECE = SQUARE, np.array([[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]])

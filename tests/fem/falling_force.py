@@ -1,0 +1,43 @@
+"""An artificial grasp of one unknown, whose force falls from 2.5 N to 2 N while the fingers close from 1 to 2 mm."""
+
+import numpy as np
+
+from softjaw.fem.contact.problem import Control
+
+MM = 1e-3
+
+
+def force(x):
+    """Force [N] at a closing displacement of x [mm]."""
+    return x**3 - 4.5 * x**2 + 6 * x
+
+
+def crossings(F):
+    """Closing displacements with this force [mm], ascending."""
+    roots = np.roots([1.0, -4.5, 6.0, -F])
+    return np.sort(roots[np.abs(roots.imag) < 1e-9].real)
+
+
+class Curve:
+    """One unknown, the closing displacement."""
+
+    control, friction = Control(closing=0.0), None
+    thickness, share, rounding = 20 * MM, 1.0, 0.0
+
+    def begin(self):
+        """Nothing has touched yet."""
+
+    def accept(self, x):
+        """Without friction the path does not matter."""
+
+    def force_scale(self, closing):
+        return 1.0
+
+    def closing_of_bed(self, force):
+        return 0.1 * MM
+
+    def normal_force(self, x):
+        return float(force(x[0] / MM))
+
+    def closing(self, x):
+        return float(x[0])
