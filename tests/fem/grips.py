@@ -17,6 +17,7 @@ from softjaw.fem.shell.wall_material import WallMaterial, wall_material
 from softjaw.fem.shell.wall_problem import WallProblem
 from softjaw.friction.frame import contact_frame, in_frame
 from softjaw.friction.wrench import friction_limits
+from tests.fem.reference import dense
 
 SIZE = (0.03, 0.02, 0.02)
 COARSE = WallMesh(0.003, 0.005, 0.010)
@@ -87,9 +88,23 @@ def stirred(problem: WallProblem, rng: np.random.Generator) -> np.ndarray:
     x = np.zeros(problem.size)
     x[: problem.model.size] = 2e-6 * rng.normal(size=problem.model.size)
     for f in problem.fingers:
-        own, pad = x[f.unknowns], f.pad
+        part, pad = x[f.unknowns], f.pad
         u = 2e-5 * rng.normal(size=pad.dofs.shape) + [0, 0, 1.5e-3]
-        own[pad.dofs[pad.dofs >= 0]] = u[pad.dofs >= 0]
-        own[pad.closing_dof] = 1.5e-3
-        own[pad.closing_dof + 1 :] = 4e-4 * np.abs(rng.normal(size=len(pad.node_area)))
+        part[pad.dofs[pad.dofs >= 0]] = u[pad.dofs >= 0]
+        part[pad.closing_dof] = 1.5e-3
+        part[pad.closing_dof + 1 :] = 4e-4 * np.abs(rng.normal(size=len(pad.node_area)))
     return x
+
+
+def check_tangent(problem: WallProblem, x: np.ndarray, h: float, within: float) -> None:
+    """Compare the tangent with central differences of ``h`` for the wall's and each finger's unknowns, part by part.
+
+    The differences are those of large forces: ``within`` is relative to the largest entry of the whole column.
+    """
+    K, rng = dense(problem, x), np.random.default_rng(2)
+    parts = [slice(0, problem.model.size), *(f.unknowns for f in problem.fingers)]
+    for moved in parts:
+        step = np.zeros(problem.size)
+        step[moved] = rng.normal(size=step[moved].size)
+        change = (problem.residual(x + h * step) - problem.residual(x - h * step)) / (2 * h)
+        assert np.abs(change - K @ step).max() <= within * np.abs(change).max() + 1e-3
