@@ -85,17 +85,21 @@ def ball(rows=24, columns=48, radius=0.03):
     return turned(np.column_stack([-radius * np.cos(t), radius * np.sin(t)]), columns)
 
 
-@pytest.mark.parametrize(("rows", "columns"), [(24, 48), (12, 24)])
-def test_a_faceted_ball_is_nearly_a_ball(rows, columns):
+def test_a_faceted_ball_is_nearly_a_ball():
     """Facets of h on radius R: flat ones are off by h^2 / (8 R) and more, smooth ones by an order less in h^2 / R^2."""
-    x, triangles = ball(rows, columns)
-    flat, smooth = (MeshObject(x, triangles, None, (), angle).near(side(0.0), *BOX, 0.002) for angle in (0.0, 30.0))
-    points = flat.pose.to_object(in_box())
-    exact = np.linalg.norm(points, axis=1) - 0.03
-    close = np.abs(exact) < 2e-3
-    rough, fine = (np.abs(region.gap(points)[0] - exact)[close].max() for region in (flat, smooth))
-    assert rough > 0.03 * (np.pi / rows) ** 2 / 8
-    assert fine < rough / 12
+    errors = []
+    for rows in (12, 24):
+        bodies = [
+            MeshObject(*ball(rows, 2 * rows), None, (), angle).near(side(0.0), *BOX, 0.002) for angle in (0.0, 30.0)
+        ]
+        points = bodies[0].pose.to_object(in_box())
+        exact = np.linalg.norm(points, axis=1) - 0.03
+        close = np.abs(exact) < 2e-3
+        rough, fine = (np.abs(region.gap(points)[0] - exact)[close].max() for region in bodies)
+        assert rough > 0.03 * (np.pi / rows) ** 2 / 8
+        assert fine < rough / 12
+        errors.append(rough)
+    assert np.log2(errors[0] / errors[1]) > 1.6
 
 
 def test_edges_above_the_crease_angle_stay_and_neighbours_stay_joined():
@@ -114,16 +118,6 @@ def test_edges_above_the_crease_angle_stay_and_neighbours_stay_joined():
     assert len(y[end]) > 2 * 24 * 5
     octagon = turned([[0, 0], [0, 0.02], [0.05, 0.02], [0.05, 0]], 8)
     assert smooth_triangles(*octagon).bulge(np.arange(len(octagon[1]))).max() < 1e-15
-
-
-def test_gradient_and_hessian_are_those_of_the_gap():
-    region = MeshObject(*turned(bottle(0.003))).near(side(0.11, radius=0.02), *BOX, 0.002)
-    x, h = region.pose.to_object(in_box(200, 0.95)), 1e-6
-    _, normal, hessian = region.gap(x)
-    for k, e in enumerate(np.eye(3)):
-        up, down = region.gap(x + h * e), region.gap(x - h * e)
-        assert np.abs((up[0] - down[0]) / (2 * h) - normal[:, k]).max() < 1e-5
-        assert np.abs((up[1] - down[1]) / (2 * h) - hessian[:, :, k]).max() < 2e-3 * np.abs(hessian).max()
 
 
 @pytest.mark.parametrize("axis", [0, 1])

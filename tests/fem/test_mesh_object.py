@@ -8,11 +8,11 @@ import pytest
 import pyvista as pv
 
 from softjaw.fem.errors import MeshError
-from softjaw.fem.objects.closest import ellipse_gap
 from softjaw.fem.objects.gap import NoContactError, Pose, first_touch
 from softjaw.fem.objects.mesh_file import read_triangles
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.fem.objects.shapes import Sphere
+from softjaw.fem.objects.spline_grid import coefficients, evaluate
 from softjaw.fem.objects.triangles import cleaned, winding_number
 
 FLASK = Path(__file__).parents[2] / "jobs" / "objects" / "flask.stl"
@@ -41,50 +41,8 @@ def box_points(lower, upper, n=400):
     return np.random.default_rng(3).uniform(lower, upper, (n, 3))
 
 
-def region_error(mesh, exact, pose, lower, upper):
-    """Largest errors of gap and normal near the surface, in the box shrunk by nothing."""
-    region = mesh.near(pose, lower, upper)
-    x = pose.to_object(box_points(np.asarray(lower), np.asarray(upper)))
-    g, normal, _ = region.gap(x)
-    reference, direction = exact(x)
-    close = np.abs(reference) < 4e-3
-    return np.abs(g - reference)[close].max(), np.abs(normal - direction)[close].max()
-
-
-def spheroid(x, a=0.025, c=0.04):
-    """Distance to the ellipsoid of revolution with semi-axes a (x, y) and c (z): an ellipse in the meridian's plane."""
-    r = np.hypot(x[:, 0], x[:, 1])
-    g, n, _ = ellipse_gap(np.stack([r, x[:, 2]], axis=1), a, c)
-    return g, np.stack([n[:, 0] * x[:, 0] / r, n[:, 0] * x[:, 1] / r, n[:, 1]], axis=1)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("levels", [2, 3])
-def test_region_of_flat_facets_converges_to_the_sphere_and_the_spheroid_when_mesh_and_grid_are_refined(levels):
-    """Halving triangles and grid: the facets' sagitta, edge^2 / (8 R), bounds the distance, and falls to a quarter.
-
-    Smooth triangles are ten times as close at once, and then as close as flat pieces follow them: a part of the step.
-    """
-    lower, upper = [-0.008, -0.006, -0.004], [0.008, 0.006, 0.004]
-    for radii, exact in (((RADIUS,) * 3, lambda x: Sphere(RADIUS).gap(x)[:2]), ((0.025, 0.025, 0.04), spheroid)):
-        pose = Pose(TILT, np.array([radii[0], 0, 0]))
-        errors = [
-            [region_error(MeshObject(*ball(level, radii), step, (), angle), exact, pose, lower, upper)
-             for level, step in ((3, 1.6e-3), (4, 0.8e-3), (5, 0.4e-3))[:levels]]
-            for angle in (0.0, 30.0)
-        ]  # fmt: skip
-        (gap, normal), (smooth, _) = np.array(errors).transpose(0, 2, 1)
-        assert smooth[0] < 0.15 * gap[0]
-        assert (smooth < np.array([1.6e-5, 8e-6, 5e-6])[:levels]).all(), smooth
-        assert (np.log2(gap[:-1] / gap[1:]) > 1.6).all(), gap
-        assert (normal[:-1] / normal[1:] > 1.5).all(), normal
-        assert gap[-1] < (4e-5, 3e-5)[levels - 2]
-
-
 def test_spline_alone_is_of_fourth_order():
     """Samples of a sphere's distance, without triangles: orders 4, 3, 2 for the value and its derivatives."""
-    from softjaw.fem.objects.spline_grid import coefficients, evaluate
-
     x, errors = np.random.default_rng(0).uniform(-0.5, 0.5, (200, 3)), []
     for n in (21, 41, 81):
         s = np.linspace(-1, 1, n)
@@ -112,7 +70,7 @@ def test_region_is_twice_differentiable(region):
     y, h = box_points(region.lower + 1e-4, region.upper - 1e-4, 100), 1e-6
     x = region.pose.to_object(y)
     _, normal, H = region.gap(x)
-    for e, column in zip(np.eye(3), range(3), strict=True):
+    for column, e in enumerate(np.eye(3)):
         up, down = region.gap(x + h * e), region.gap(x - h * e)
         assert np.abs((up[0] - down[0]) / (2 * h) - normal[:, column]).max() < 1e-6
         assert np.abs((up[1] - down[1]) / (2 * h) - H[:, :, column]).max() < 1e-3 * np.abs(H).max()

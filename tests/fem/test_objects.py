@@ -145,13 +145,13 @@ def test_ellipse_distance_is_exact_out_to_the_medial_axis(ratio, share):
 
 def test_ellipse_near_its_axes_and_evolute_is_finite_and_below_every_other_distance():
     rng = np.random.default_rng(1)
-    t = np.linspace(0, 2 * np.pi, 4001)
+    t = np.linspace(0, 2 * np.pi, 2001)
     for ratio in (0.05, 0.5, 20.0):
         a, b = 0.03, 0.03 * ratio
         evolute = np.stack([(a * a - b * b) / a * np.cos(t) ** 3, (b * b - a * a) / b * np.sin(t) ** 3], axis=1)
         axes = np.concatenate([np.outer(np.linspace(-2, 2, 401), e) * max(a, b) for e in np.eye(2)])
         cusps = [evolute[::20], evolute[::20] * (1 + 1e-12)]
-        x = np.concatenate([*cusps, axes, axes + 1e-300, rng.normal(0, a, (300, 2))])
+        x = np.concatenate([*cusps, axes, axes + 1e-300, rng.normal(0, a, (100, 2))])
         g, n, H = EllipticCylinder(a, b, 0.1).gap(np.column_stack([x, np.zeros(len(x))]))
         assert np.isfinite(g).all()
         assert np.isfinite(n).all()

@@ -10,7 +10,7 @@ from softjaw.fem.contact.load_stepping import Work
 from softjaw.fem.contact.path import OnPath
 from softjaw.fem.errors import CheckError
 from softjaw.fem.objects.gap import Pose
-from softjaw.fem.shell.facing import FAR, Wall, face
+from softjaw.fem.shell.facing import FAR, face
 from softjaw.fem.shell.opening import Opening
 from softjaw.fem.shell.thin_walled import WallMesh, grasp
 from softjaw.fem.shell.wall_material import WallMaterial
@@ -42,7 +42,7 @@ def test_the_opening_is_the_part_of_the_distance_that_is_left(symmetry):
     if not symmetry[0]:
         assert opening(squeezed(body, 0.0, 0.05)) == pytest.approx(1.0, abs=1e-12)
     opening.watch(squeezed(body, 0.5), 2.0)
-    with pytest.raises(CheckError, match=r"the wall collapsed: its opposite sides meet at 3 N"):
+    with pytest.raises(CheckError, match="3 N"):
         opening.watch(squeezed(body, 1.5), 4.0)  # half way between 0.5 and -0.5
 
 
@@ -50,15 +50,15 @@ def test_the_opening_is_the_part_of_the_distance_that_is_left(symmetry):
 def test_a_wall_as_soft_as_foam_collapses_before_the_force_is_reached():
     """It folds between the pads; how far it is followed before depends on rounding, so the force is high."""
     soft = grip(thin(2e-4, WallMaterial(1e8, 0.38)), elements=(6, 4, 2), mesh=ROUGH)
-    ladder = soft.load_path([0.02, 1.0, 6.0, 12.0])
-    assert [next(ladder).wall.opening < 0.75 for _ in range(3)] == [False, True, True]
+    path = soft.load_path([0.02, 1.0, 6.0, 12.0])
+    assert [next(path).wall.opening < 0.75 for _ in range(3)] == [False, True, True]
     with pytest.raises(CheckError):
-        next(ladder)
+        next(path)
 
 
 def test_a_wall_that_gives_way_is_flagged_and_stays_flagged():
-    found = [s.wall.snapped for s in grip(thin(2e-4), elements=(6, 4, 2), mesh=ROUGH).load_path([0.3, 1.5, 4.0])]
-    assert found == [False, True, True]
+    snapped = [s.wall.snapped for s in grip(thin(2e-4), elements=(6, 4, 2), mesh=ROUGH).load_path([0.3, 1.5, 4.0])]
+    assert snapped == [False, True, True]
     stiff = grip(thin(1e-3), elements=(6, 4, 2), mesh=ROUGH).load_path([0.5, 5.0])
     assert not any(s.wall.snapped for s in stiff)
 
@@ -134,8 +134,7 @@ def test_a_long_side_that_points_down_gives_the_same_patch_turned():
 @pytest.fixture(scope="module")
 def quarter():
     """The part of the can's wall between 0 and 90 degrees."""
-    held = grip(thin(), elements=(4, 2, 2), mesh=ROUGH).problem
-    return held.fingers[0].wall
+    return grip(thin(), elements=(4, 2, 2), mesh=ROUGH).problem.fingers[0].wall
 
 
 def still(wall):
@@ -145,6 +144,7 @@ def still(wall):
 
 def test_a_part_of_a_wall_is_not_faced_from_beyond_its_edges(quarter):
     assert not quarter.closed
+    assert grip(thin(), elements=(4, 2, 2), mesh=ROUGH, allowed=(False, False)).problem.fingers[0].wall.closed
     theta = np.array([-0.02, 0.02, 0.5 * np.pi - 0.02, 0.5 * np.pi + 0.02])
     points = np.column_stack([0.036 * np.cos(theta), 0.036 * np.sin(theta), np.full(4, 0.075)])
     found = face(quarter, points, quarter.places(points), *still(quarter))
@@ -179,12 +179,6 @@ def test_a_pad_over_the_rim_is_carried_up_to_the_rim():
     assert patch.pressure[height > 0.2051].max() == 0.0
     assert patch.pressure[height > 0.2025].max() > 0.3 * patch.pressure.max()
     assert finger.checks.penetration_depth < 0.15 * finger.closing
-
-
-def test_the_wall_of_a_partly_meshed_body_is_not_closed():
-    whole = grip(thin(), elements=(4, 2, 2), mesh=ROUGH, allowed=(False, False)).problem.fingers[0].wall
-    assert isinstance(whole, Wall)
-    assert whole.closed
 
 
 def closing_and_e_n(elements, size):
