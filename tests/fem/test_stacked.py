@@ -7,7 +7,7 @@ from softjaw.fem.objects.gap import Pose
 from softjaw.fem.objects.outer_surface import Section, of_sections
 from softjaw.fem.objects.shapes import EllipticCylinder, Revolution
 from softjaw.fem.objects.spline_surface import spline_surface
-from softjaw.fem.objects.stacked import Stacked
+from softjaw.fem.objects.stacked import Stacked, wall_surface
 
 PROFILE = [
     (0.0, 0.03), (0.005, 0.033), (0.03, 0.034), (0.06, 0.034), (0.09, 0.034), (0.12, 0.03), (0.15, 0.014),
@@ -78,6 +78,15 @@ def test_splines_converge_with_the_fourth_order(m):
         return np.abs(surface.at(t, z)[0] - point(t, z)).max()
 
     assert worst(m) / worst(2 * m) > 12
+
+
+def test_lines_of_a_wall_that_rounding_doubles_are_one():
+    """Ends of the wall that fall on breaks of its outline but for rounding."""
+    outer = of_sections([Section(z, r) for z, r in PROFILE])
+    breaks = outer.curve.breaks
+    low, *_, high = breaks[(breaks > outer.wall[0]) & (breaks < outer.wall[1])]
+    surface = wall_surface(outer, np.nextafter(low, 0.0), np.nextafter(high, 1.0))
+    assert np.diff(surface.s).min() > 1e-9
 
 
 def test_a_grid_that_does_not_close_is_refused():
