@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import re
 import shutil
 import struct
@@ -133,17 +132,6 @@ def test_a_mesh_that_is_no_object_is_found_by_check(folder, what, capsys):
     refused((code, told.out, told.err), folder, 2, *WRONG_MESHES[what][1])
 
 
-@pytest.mark.long
-@pytest.mark.ranks
-def test_a_mesh_that_is_no_object_is_refused_before_a_run_starts(folder):
-    spoil_mesh(folder, "a bottle of 200 m")
-    refused(run(2, folder, scene="mesh.toml"), folder, 2, "200 m", "unit")
-
-
-def test_options_of_another_solver_are_refused(folder):
-    refused(run(0, folder, "--", "-snes_monitor"), folder, 2, "-contact_", "'-snes_monitor'")
-
-
 def every_rank(folder, *words):
     """Exit codes of two ranks, each told by a shell of its own, and standard error."""
     scene, out = str(folder / "scene.toml"), str(folder / "out.hdf")
@@ -173,30 +161,6 @@ def test_all_ranks_leave_a_file_of_others_with_the_same_code(folder):
     assert errors.count("error: ") == 1
     assert "not a readable result file" in errors
     assert (folder / "out.hdf").read_text() == "my notes"
-
-
-@pytest.mark.long
-def test_files_of_others_are_left_alone(folder):
-    """In use, or of another scene; test_run has the details, and places that cannot be written."""
-    path = folder / "out.hdf"
-    assert run(0, folder)[0] == 0
-    before = path.read_bytes()
-    code, _, errors = run(0, folder, "--set", "friction.mu=0.5")
-    assert code == 3
-    assert errors.count("error: ") == 1
-    assert "made from another scene" in errors
-    assert path.read_bytes() == before
-
-    def while_locked():
-        with path.with_name("out.hdf.lock").open("w") as lock:
-            fcntl.flock(lock, fcntl.LOCK_SH)
-            return run(0, folder)
-
-    code, _, errors = while_locked()
-    assert code == 4
-    assert errors.count("error: ") == 1
-    assert "in use by another run" in errors
-    assert path.read_bytes() == before
 
 
 def test_cases_that_cannot_be_solved_fail_with_their_reasons_and_the_others_go_on(folder):

@@ -50,32 +50,6 @@ def test_both_definitions_of_e_n_and_the_projected_one():
 
 
 @pytest.mark.long
-def test_friction_that_acts_back_is_taken_where_it_moves_e_n():
-    """At 112 mm it moves e_n by less than 2 %, at 73.5 mm by up to 6 %, at 175 mm by a third.
-
-    `auto` is off by less than 2 %, twice its target, and takes at every force what the scene could ask for.
-    """
-    from softjaw.study.case.effects import LITTLE, MUCH, UNDECIDED
-
-    name = "effects.friction_pressure_coupling"
-    where = ["candidates.stations_mm=[73.5294, 112, 175]", "load.normal_force_n=[1, 2, 13]"]
-    auto, free, coupled = (solved(*where, f'{name}="{level}"') for level in ("auto", "none", "tangential"))
-    e_n, without, with_it = (of(found, "maps/e_n") for found in (auto, free, coupled))
-    moved, off = (np.abs(with_it / other - 1.0).reshape(3, 3) for other in (without, e_n))
-    print(f"e_n moves by\n{np.array2string(100 * moved, precision=1)} %, auto is off by\n"
-          f"{np.array2string(100 * off, precision=1)} %")  # fmt: skip
-    assert moved[0].max() > 0.02
-    assert moved[1].max() < 0.02
-    assert moved[2].max() > 0.1
-    assert off.max() < 0.02
-    levels = [result.effects["friction_pressure_coupling"] for result in auto]
-    taken = np.array([level.level != "none" for level in levels])
-    np.testing.assert_array_equal(e_n, np.where(taken, with_it, without))
-    assert 0 < taken.sum() < taken.size
-    assert {level.reason for level in levels} <= {LITTLE, MUCH, UNDECIDED}
-
-
-@pytest.mark.long
 def test_claims_of_the_lookup_hold(tmp_path):
     """Between the stations and forces of the bottle's map, on cases that it does not hold.
 

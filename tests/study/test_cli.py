@@ -12,18 +12,16 @@ import subprocess
 import sys
 from functools import cache
 from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 import pytest
 
-from softjaw import study
 from softjaw.study.cli import main, program
 from softjaw.study.cli.quick import petsc_overrides
 from softjaw.study.doctor import launch_environment
-from softjaw.study.messages import MEANING, StudyError
+from softjaw.study.messages import StudyError
 from tests.study.fake_run import fake_plan, fake_result
-from tests.study.launching import ROOT, launch
+from tests.study.launching import ROOT
 from tests.study.launching import study as run_fake
 
 PARSERS = next(a for a in program()._actions if isinstance(a, argparse._SubParsersAction)).choices
@@ -74,38 +72,6 @@ def test_bad_usage_is_code_2(words, capsys):
     assert "error" in capsys.readouterr().err
 
 
-def test_every_command_has_an_example(capsys):
-    assert main(["--help"]) == 0
-    text = capsys.readouterr().out
-    assert all(f"{code} {meaning}" in " ".join(text.split()) for code, meaning in MEANING.items())
-    for command in COMMANDS:
-        assert f"\n  {command} " in text
-        assert main([command, "--help"]) == 0
-        told = capsys.readouterr().out
-        assert f"example:\n  {'mpirun -n 8 ' if command == 'run' else ''}softjaw {command}" in told
-        assert max(map(len, told.partition("example:")[0].splitlines())) <= 80
-
-
-def test_check_says_what_would_be_run(scene, capsys):
-    assert main(["check", str(scene), "--set", "friction.mu=0.5"]) == 0
-    text = " ".join(capsys.readouterr().out.split())
-    assert "no errors" in text
-    assert "sphere" in text
-    assert "mu = 0.5" in text
-    assert "-5, 0, 5 mm along the axis, 0, 90 deg about it" in text
-    assert "12" in text.split("cases")[-1].splitlines()[0]
-
-
-def test_check_lists_every_problem_and_starts_nothing(scene, capsys):
-    scene.write_text(SCENE.replace("radius_mm = 30", "radius_mm = -30").replace("[load]", "[laod]"))
-    assert main(["check", str(scene)]) == 2
-    errors = capsys.readouterr().err.splitlines()
-    assert len(errors) >= 2
-    assert all(line.startswith("error: ") for line in errors)
-    assert any("radius_mm" in line for line in errors)
-    assert any("laod" in line for line in errors)
-
-
 def test_a_missing_file_is_a_sentence(tmp_path, capsys):
     assert main(["check", str(tmp_path / "no.toml")]) == 2
     assert main(["status", str(tmp_path / "no.hdf")]) == 3
@@ -123,26 +89,6 @@ def test_petsc_options_belong_to_run_and_have_a_prefix(scene, capsys):
     for words in (["-snes_monitor"], ["1e-3"], ["-contact_snes_rtol", "1", "2"]):
         with pytest.raises(StudyError, match=r"-contact_.*others go into the environment variable PETSC_OPTIONS"):
             petsc_overrides(words)
-
-
-@pytest.mark.parametrize(
-    ("words", "meant"),
-    [("shwo f.hdf", "show"), ("show f.hdf --fource=3", "--force"), ("check f.toml --sett a=1", "--set")],
-)
-def test_a_slip_of_the_finger_gets_a_suggestion(words, meant, capsys):
-    assert main(words.split()) == 2
-    told = capsys.readouterr()
-    assert f"; did you mean '{meant}'? 'softjaw " in told.err
-    assert told.out == ""
-
-
-def test_no_command_is_answered_with_the_help(capsys):
-    assert main([]) == 2
-    bare = capsys.readouterr().out
-    assert main(["--help"]) == 0
-    assert bare == capsys.readouterr().out
-    assert len(bare.splitlines()) <= 50
-    assert max(map(len, bare.splitlines())) <= 80
 
 
 EXAMPLES = [
@@ -180,26 +126,6 @@ def test_status_tells_programs_the_state_of_every_case(finished, capsys):
     rows = list(csv.DictReader(io.StringIO(capsys.readouterr().out)))
     assert [row["state"] for row in rows].count("complete") == 35
     assert rows[9].items() >= {"row": "9", "state": "failed", "message": "no contact at this force"}.items()
-
-
-def fake_pipeline(monkeypatch):
-    """What the commands need of ``study.pipeline``."""
-    module = ModuleType("softjaw.study.pipeline")
-    module.patch_faces = lambda scene: 200
-    module.axis_symmetry = lambda scene: 0
-    monkeypatch.setitem(sys.modules, "softjaw.study.pipeline", module)
-    monkeypatch.setattr(study, "pipeline", module, raising=False)
-
-
-def test_plan_counts_before_anything_is_spent(scene, tmp_path, capsys, monkeypatch):
-    fake_pipeline(monkeypatch)
-    target = tmp_path / "new" / "ball.hdf"
-    assert main(["plan", str(scene), "-n", "4", "-o", str(target)]) == 0
-    text = capsys.readouterr().out
-    assert "12 = 3 x 2 x 2 (station, angle, normal_force)" in text
-    assert "3 load paths of 2 forces, 3 candidates are images of others" in text
-    assert "a bed of springs" in text
-    assert not target.parent.exists()
 
 
 def test_the_best_grasp_is_the_one_with_the_highest_quality(finished, capsys):
@@ -283,14 +209,6 @@ def test_quick_answers_take_hardly_longer_than_loading_their_libraries(command, 
     libraries = ["-c", "import h5py, numpy, softjaw.study.scene"]
     spent = [lambda w=w: processor_seconds(sys.executable, *w)() for w in (words, libraries)]
     assert spent[0] < 2.0 * spent[1]
-
-
-@pytest.mark.ranks
-def test_a_bad_scene_is_told_once_by_all_ranks_together(tmp_path):
-    code, output, errors = launch(2, "-m", "softjaw", "run", tmp_path / "no.toml")
-    assert code == 2
-    assert output == ""
-    assert errors.count("error: ") == 1
 
 
 def test_bad_usage_is_told_by_the_first_rank_only(monkeypatch, capsys):

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import ast
-import html
 import importlib
-import json
 from pathlib import Path
 
 import pytest
@@ -14,15 +12,9 @@ from softjaw.friction.frame import FrameFlag
 from softjaw.scoring.quality import ScoreFlag
 from softjaw.study import pipeline
 from softjaw.study.case import candidates as grasps
-from softjaw.study.cli import main
 from softjaw.study.flags import OF_FILE, Flag, flag_definitions, flag_sentences, flag_words, flags_in, raised
-from softjaw.study.lookup import GraspMap
 from softjaw.study.quantities import map_row
 from softjaw.study.result.datasets import MESSAGE_BYTES
-from softjaw.study.result.skeleton import create
-from softjaw.study.result.store import open_result
-from softjaw.study.result.write import ResultWriter, record
-from softjaw.study.run.plan import make_plan
 from softjaw.study.scene import parse_scene
 from softjaw.study.show.best_grasps import LABEL_WIDTH
 
@@ -57,14 +49,6 @@ def bits_combined_in(file):
 @pytest.mark.parametrize("file", list(modules_with_flags()))
 def test_every_bit_that_the_study_combines_has_a_row(file):
     assert not {name: value for name, value in bits_combined_in(file) if 0 < value & ~TABLE}
-
-
-def test_the_search_for_bits_finds_a_bit_without_a_row(tmp_path, monkeypatch):
-    module = tmp_path / "stray_bits.py"
-    module.write_text("STRAY = 1 << 40\ndef flags(found, a):\n    found |= STRAY * a\n    return found | (1 << 41)\n")
-    monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.setattr("tests.study.test_flags.ROOT", tmp_path)
-    assert {value for _, value in bits_combined_in(module)} >= {1 << 40, 1 << 41}
 
 
 def test_flags_of_lower_packages_have_rows_of_the_same_names():
@@ -130,49 +114,3 @@ def test_the_message_of_a_case_tells_its_flags(solved):
     _, case = solved
     assert case.values["maps/flags"] & Flag.COARSE
     assert case.message == flag_sentences(case.values["maps/flags"])
-
-
-@pytest.fixture(scope="module")
-def all_flags(solved, tmp_path_factory):
-    """A file of one case with every flag that a file holds."""
-    unit, _ = solved
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(pipeline, "state_flags", lambda *_: OF_FILE)
-        case = next(iter(pipeline.solve_unit(unit)))[1]
-    plan = make_plan(unit.scene, "cylinder.toml")
-    path = tmp_path_factory.mktemp("flags") / "all.hdf"
-    create(path, plan.layout, plan.header)
-    writer = ResultWriter(path, plan.layout, None)
-    writer.write(0, record(plan.layout, case))
-    writer.close()
-    return path
-
-
-def test_a_stored_message_tells_every_flag_to_its_end(all_flags):
-    with open_result(all_flags) as result:
-        assert int(result.read("flags/flags").item()) == OF_FILE
-        assert result.messages.item() == flag_sentences(OF_FILE)
-
-
-def test_every_reader_tells_every_flag(all_flags, capsys, monkeypatch):
-    def said(*words):
-        assert main([*words]) == 0
-        return " ".join(capsys.readouterr().out.split())
-
-    monkeypatch.setenv("COLUMNS", "400")
-    file = str(all_flags)
-    table, state, csv = said("show", file), said("status", file, "--csv"), said("show", file, "--csv")
-    exported = json.loads(said("export", file, "--json"))["cases"][0]
-    page = all_flags.with_suffix(".html")
-    said("report", file, "-o", str(page))
-    shown = html.unescape(page.read_text())
-    point = GraspMap(all_flags).at(station=0, angle=0, force=1)
-    assert point.flags == exported["flags"] == OF_FILE
-    assert str(OF_FILE) in csv
-    for flag in flags_in(OF_FILE):
-        assert f"{flag.word} (1 of 1): {flag.sentence}" in table
-        assert flag.sentence in state
-        assert flag.word in exported["flag_words"]
-        assert flag.sentence in exported["message"]
-        assert flag.sentence in str(point)
-        assert f"{flag.word}: {flag.sentence}" in shown

@@ -15,11 +15,10 @@ import h5py
 import numpy as np
 import pytest
 
-from softjaw.study.doctor import launch_environment
-from softjaw.study.result.layout import DONE, MISSING
+from softjaw.study.result.layout import DONE
 from softjaw.study.result.lock import holder
 from softjaw.study.result.store import open_result, torn_rows
-from tests.study.launching import ROOT, command, contents, differing, launch, start, study, wait_for
+from tests.study.launching import contents, differing, start, study, wait_for
 
 pytestmark = [pytest.mark.long, pytest.mark.ranks]
 VICTIMS = ("one rank", "all ranks", "mpirun")
@@ -127,28 +126,3 @@ def test_no_kill_loses_a_result(tmp_path):
     met, kept, files = campaign()
     print(f"{met} kills of {files} files, {kept} results kept over them")
     assert kept > 5 * files
-
-
-@pytest.mark.parametrize("victim", VICTIMS)
-def test_a_real_study_goes_on_to_the_same_bits(tmp_path, victim):
-    path, whole = tmp_path / "killed.hdf", tmp_path / "whole.hdf"
-    scene = ("-m", "softjaw", "run", "jobs/smoke.toml", "--set", "candidates.stations_mm=[-10, 0, 10]", "-o")
-
-    def interrupt():
-        words = command(2, *scene, path)
-        process = subprocess.Popen(
-            words[words.index("mpirun") :], env=launch_environment(), cwd=ROOT, stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-        )  # fmt: skip
-        wait_for(lambda: process.poll() is not None or count_done(path) > 0, 60)
-        kill(process, victim, random.Random(1))
-        wait_for(lambda: not holder(path))
-        done_rows(path)
-        return launch(0, *scene, path), launch(0, *scene, whole)
-
-    (code, _, errors), (first, _, _) = interrupt()
-    assert (code, first) == (0, 0), errors
-    assert differing(path, contents(whole)) == []
-    with open_result(path) as result:
-        assert not (result.status == MISSING).any()
-        assert len(result.sessions) == 2

@@ -116,20 +116,6 @@ def test_a_run_with_too_few_addresses_says_so_at_once(tmp_path, kilobytes):
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.long
-def test_a_run_with_enough_addresses_starts_and_ends(tmp_path):
-    assert smoke(tmp_path, addresses=int(1.3e9))[0] == messages.DONE
-
-
-@pytest.mark.long
-@pytest.mark.ranks
-@pytest.mark.parametrize("ranks", [1, 2])
-def test_the_least_memory_that_a_scene_may_set_is_enough_on_every_rank(tmp_path, ranks):
-    """The second rank made its first product in BLAS within the bound, and asked for ever for 128 MB."""
-    code, errors = smoke(tmp_path, "--set", "run.memory_gb=0.1", ranks=ranks)
-    assert code == messages.DONE, errors
-
-
 def test_libraries_of_linear_algebra_are_not_let_loose_without_room():
     called = []
     with limited_memory(0.05, 1), pytest.raises(MemoryError):
@@ -221,22 +207,6 @@ def test_one_case_fails_with_its_reason_and_the_others_go_on(tmp_path, how, rank
     assert [row for row, code in enumerate(codes) if code == FAILED] == [13, 14, 16, 17]
     assert (codes[[row for row in range(36) if row not in (13, 14, 16, 17)]] == DONE).all()
     assert messages[13].startswith(text)
-    assert study(0, path, "--retry-failed")[0] == 0
-    assert differing(path, whole(tmp_path)) == []
-
-
-@pytest.mark.long
-@pytest.mark.ranks
-@pytest.mark.parametrize("how", ["hang", "stuck"])
-def test_forces_that_are_apart_are_given_up_only_with_the_rank_that_had_them(tmp_path, how):
-    path = tmp_path / f"{how}.hdf"
-    assert study(3, path, "--apart", f"--{how}", 13, "--limit", 1)[0] == SOME_FAILED
-    codes, messages = states(path)
-    lost = {row for row, code in enumerate(codes) if code == FAILED}
-    # a rank that came back goes on; one that did not takes with it what else it was to solve of the candidate
-    assert {13, 16} <= lost <= ({13, 16} if how == "hang" else {13, 14, 16, 17})
-    assert {codes[row] for row in range(36) if row not in lost} == {DONE}
-    assert "lower force" not in messages[13]
     assert study(0, path, "--retry-failed")[0] == 0
     assert differing(path, whole(tmp_path)) == []
 
@@ -349,25 +319,6 @@ def test_a_file_system_that_turns_read_only_is_told_once(small_disk):
         assert code == CANNOT_WRITE, errors
         assert errors.count("error: ") == 1
         assert "Read-only file system" in errors
-
-
-@pytest.mark.long
-@pytest.mark.ranks
-@pytest.mark.parametrize(("stations", "ranks"), [(6, 4), (1, 4), (2, 3)])
-def test_more_ranks_than_cores_or_load_paths(tmp_path, stations, ranks):
-    path = tmp_path / "many.hdf"
-    code, _, errors = study(ranks, path, "--stations", stations)
-    assert code == 0, errors
-    assert differing(path, whole(tmp_path, "--stations", stations)) == []
-
-
-@pytest.mark.long
-@pytest.mark.ranks
-@pytest.mark.parametrize("ranks", [3, 4])
-def test_an_exception_on_one_rank_ends_all_with_one_traceback(tmp_path, ranks):
-    code, _, errors = study(ranks, tmp_path / "bug.hdf", "--bug", 2)
-    assert code == 70
-    assert errors.count("Traceback (most recent call last)") == 1
 
 
 @pytest.mark.long

@@ -7,13 +7,10 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from softjaw.friction.torque import pure_torque
-from softjaw.friction.wrench import friction_limits
 from softjaw.study import pipeline
 from softjaw.study.case.build import build_object
 from softjaw.study.case.candidates import units
 from softjaw.study.scene import load_scene
-from tests.friction.test_torque import centred, two_ends
 from tests.study.launching import ROOT
 
 MU = 0.8
@@ -73,40 +70,3 @@ def test_frame_distance_and_quality_are_continuous_over_stations(force):
     assert jumps(distance).max() < 2e-3
     assert np.abs(np.diff(values(results, "fingers/frame_axes", force)[:, 2], axis=0)).max() < 0.07
     np.testing.assert_allclose(quality, quality[::-1], rtol=1e-6)
-
-
-@pytest.mark.long
-def test_half_the_step_between_stations_makes_half_the_change():
-    """From one end alone to both alike, of the smaller steps at least: a jump would stay as large as it is."""
-    _, results = grasps(63, WAIST, 73, "[1]")
-    for name in ("maps/quality", "maps/contact_distance", "fingers/frame_origin", "fingers/frame_axes"):
-        line = values(results, name, 0)
-        changes = [np.abs(np.diff(line[::step], axis=0)).max() for step in (1, 2)]
-        assert changes[0] < 0.55 * changes[1], name
-
-
-@pytest.mark.long
-def test_torque_about_the_centre_of_pressure_and_without_force_over_stations():
-    """Their ratio follows from loads and places of the two ends alone: 1 where they bear alike, up to 1.3 beside it."""
-    stations, results = grasps(63, WAIST, 73, "[1]")
-    tau_z, tau_pure = values(results, "maps/tau_z_max", 0), values(results, "maps/tau_pure", 0)
-    assert (tau_z / tau_pure).max() == pytest.approx(1.33, abs=0.03)
-    assert tau_z[-1] / tau_pure[-1] < 1.002
-    for k in np.flatnonzero(stations > 64.5)[::6]:
-        patch = centred(two_ends(*ends(results[k][0].patch)))
-        expected = friction_limits(patch, MU).tau_z / pure_torque(patch, MU)
-        assert tau_z[k] / tau_pure[k] == pytest.approx(expected, rel=0.02), stations[k]
-
-
-def ends(patch):
-    """Load, place, length and width of the two parts of a patch that lie before and behind its widest gap along x."""
-    load, r = patch["pressure"][0] * patch["area"][0], patch["centroid"][0]
-    x = np.sort(r[load > 0, 0])
-    widest = np.argmax(np.diff(x))
-    found = []
-    for part in (r[:, 0] <= x[widest], r[:, 0] > x[widest]):
-        p = load[part] / load[part].sum()
-        middle = p @ r[part, :2]
-        length, width = np.sqrt(12 * p @ (r[part, :2] - middle) ** 2)
-        found.append((load[part].sum(), middle[0], length, width))
-    return found

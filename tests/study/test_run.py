@@ -69,28 +69,6 @@ def test_a_rank_that_is_killed_loses_nothing_and_another_number_of_ranks_goes_on
     assert not list(tmp_path.glob("*.part"))
 
 
-@pytest.mark.long
-def test_orphans_of_a_killed_mpirun_keep_a_resume_away_until_they_are_gone(tmp_path, uninterrupted):
-    path = tmp_path / "orphans.hdf"
-
-    def kill_mpirun():
-        process = start(2, path, "--delay", 0.3)
-        wait_for(lambda: begun(path))
-        process.kill()
-        process.communicate()
-        codes = [study(0, path)[0]]
-        deadline = time.monotonic() + 40
-        while codes[-1] == 4 and time.monotonic() < deadline:
-            codes.append(study(0, path)[0])
-            time.sleep(0.2)
-        return codes
-
-    codes = kill_mpirun()
-    assert codes[-1] == 0
-    assert set(codes[:-1]) <= {4}
-    assert differing(path, uninterrupted) == []
-
-
 def test_what_is_no_grasp_is_never_solved_and_no_failure(tmp_path):
     """A unit of two candidates: alike on any number of ranks, when it is resumed, and when failures are tried again."""
     path = tmp_path / "wide.hdf"

@@ -8,8 +8,8 @@ import pytest
 import trimesh
 
 from softjaw.study.case import candidates, poses
-from softjaw.study.case.build import build_object, warnings
-from softjaw.study.scene import load_scene, parse_scene
+from softjaw.study.case.build import build_object
+from softjaw.study.scene import parse_scene
 from tests.fem.test_centre_line import bent
 from tests.study.formula_results import OBJECT
 
@@ -132,18 +132,6 @@ def test_stations_of_a_straight_mesh_stay_on_the_axis_bit_for_bit(tmp_path):
             assert pose.origin.tobytes() == same.origin.tobytes()
 
 
-def test_what_is_doubtful_about_a_centre_line_is_said_in_check_and_with_the_case(tmp_path):
-    """A cup with a post beside it over part of its height, and a station above the last section."""
-    cup, post = trimesh.creation.cylinder(0.03, 0.1), trimesh.creation.cylinder(0.008, 0.04)
-    post.apply_translation([0.06, 0, 0])
-    scene = mesh_scene(trimesh.util.concatenate([cup, post]), tmp_path, [10, 50, 60, 99.9])
-    places = candidates.candidates(scene)
-    notes = [place.note for place in places if place.angle == 0]
-    assert (bool(notes[0]), notes[1] == notes[2] != notes[3], bool(notes[3])) == (False, True, True)
-    assert sum(note in text for text in warnings(scene) for note in {*notes} - {""}) == 2
-    assert places[2].poses[0].origin[0] - poses.STANDOFF == pytest.approx(-0.019, abs=1e-7)
-
-
 def test_axes_end_with_station_angle_and_force_in_si_units():
     over = [
         "sweep.object.semi_axis_b_mm=[40, 10, 20]",
@@ -163,13 +151,6 @@ def test_axes_end_with_station_angle_and_force_in_si_units():
 def test_axes_of_explicit_poses_number_the_candidates():
     axes = candidates.axes(posed(((0, 0, 0), (1, 0, 0), (0, 0, 1)), ((0, 0, 9), (0, 1, 0), (0, 0, 1))))
     assert [(a.name, a.values.tolist(), a.units) for a in axes[:2]] == [("station", [0, 1], ""), ("angle", [0], "rad")]
-
-
-def test_swept_keys_of_one_name_keep_their_section_in_the_axis_name():
-    apart = candidates._sweep_axes({"object.length_mm": (10.0,), "score.object_length_mm": (10.0,)})
-    assert [a.name for a in apart] == ["length", "object_length"]
-    alike = candidates._sweep_axes({"effects.friction": ("auto",), "x.friction": ("a",), "x.angle_deg": (90.0,)})
-    assert [a.name for a in alike] == ["effects_friction", "x_friction", "x_angle"]
 
 
 @pytest.mark.parametrize(
@@ -273,12 +254,6 @@ def test_finer_meshes_more_forces_and_better_elements_cost_more():
     one, triquadratic = ({"accuracy.meshes": 1}, {"gripper.element": "hex27"})
     ratios = [candidates.path_cost(base.with_values(v)) / candidates.path_cost(base) for v in (one, triquadratic)]
     assert ratios == pytest.approx([1 / 1.15, 8])
-
-
-def test_the_bottle_has_70_candidates_and_35_units():
-    scene = load_scene(JOBS / "bottle-rigid.toml")
-    assert len(candidates.candidates(scene)) == 70
-    assert len(candidates.units(scene, lambda s: 0)) == 35
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import subprocess
 import sys
-import timeit
 from pathlib import Path
 
 import numpy as np
@@ -97,12 +96,6 @@ def test_one_point_is_the_same_as_an_array_of_points(straight):
     grid = straight.at(STATIONS[:, None], 0.3, FORCES)
     assert grid.e_n.shape == grid.state.shape == (5, 4)
     assert grid.semi_axes().shape == (5, 4, 2, 3)
-
-
-def test_a_planner_gets_a_value_in_microseconds(straight):
-    straight.value("e_n", 0.011, 0.3, 2.5)
-    taken = min(timeit.repeat(lambda: straight.value("e_n", 0.011, 0.3, 2.5), number=1000, repeat=20)) / 1000
-    assert taken < 10e-6
 
 
 def test_units_of_people_and_missing_coordinates(straight):
@@ -336,16 +329,6 @@ def test_it_needs_neither_mpi_nor_petsc(tmp_path):
     value, loaded = done.stdout.splitlines()
     assert float(value) == pytest.approx(linear(0.01, 0.1, 2))
     assert loaded == "[]"
-
-
-def test_the_page_says_how(tmp_path, monkeypatch):
-    (tmp_path / "results").mkdir()
-    make(tmp_path / "results" / "smoke.hdf", smooth, grid_axes([0.0], [0, np.pi / 2], [1.0, 2.0]))
-    monkeypatch.chdir(tmp_path)
-    text = (ROOT / "docs" / "look-up.md").read_text(encoding="utf-8").partition("```python")[2]
-    names: dict = {"stations": np.zeros(3), "angles": np.linspace(0, 1, 3), "forces": 1.5}
-    exec(text.partition("```")[0], names)
-    assert names["e_n"] == pytest.approx(names["grasps"].at(0, [0, 0.5, 1], 1.5).e_n)
 
 
 def test_the_best_grasps_are_those_of_show_as_points_of_the_map(tmp_path):

@@ -299,30 +299,20 @@ def test_only_the_file_of_this_scene_is_resumed(path):
         verify(path, small(meshes=2), HEADER)
 
 
-def spoil_root(file):
-    del file.attrs["program"]
-
-
-def spoil_version(file):
-    file.attrs["layout_version"] = 99
-
-
-def spoil_options(file):
-    file["study"].attrs["options"] = "{}"
-
-
-def spoil_axis(file):
-    file["study"].attrs["axes"] = np.array(["station", "angle", "nothing"], object)
-
-
-@pytest.mark.parametrize("spoil", [spoil_root, spoil_version, spoil_options, spoil_axis])
+@pytest.mark.parametrize("spoil", [
+    lambda file: file.attrs.__delitem__("program"),
+    lambda file: file.attrs.modify("layout_version", 99),
+    lambda file: file.attrs.modify("layout_version", VERSION - 1),
+    lambda file: file["study"].attrs.create("options", "{}"),
+    lambda file: file["study"].attrs.create("axes", np.array(["station", "angle", "nothing"], object),
+                                            dtype=h5py.string_dtype()),
+], ids=["program", "newer", "older", "options", "axis"])  # fmt: skip
 def test_a_file_of_another_kind_is_refused_when_it_is_opened(path, spoil):
     with h5py.File(path, "r+") as file:
         spoil(file)
     with pytest.raises(StudyError) as caught:
         open_result(path)
     assert caught.value.code == OTHER_FILE
-    assert str(path) in str(caught.value)
 
 
 @pytest.mark.parametrize("kind", ["missing", "empty", "text", "truncated", "folder"])
@@ -340,39 +330,26 @@ def test_what_is_no_hdf5_file_is_refused(path, kind):
     assert caught.value.code == OTHER_FILE
 
 
-def evil_external_data(file, secret):
-    file.create_dataset("study/e_n/ccm", (5, 2, 3), "<f8", external=[(str(secret), 0, 240)])
-
-
-def evil_link(file, secret):
-    file["study/e_n/ccm"] = h5py.ExternalLink(str(secret), "/x")
-
-
-def evil_soft_link(file, _):
-    file["study/e_n/ccm"] = h5py.SoftLink("/study/e_n/pcm")
-
-
-def evil_virtual(file, secret):
+def virtual(file, name, secret):
     layout = h5py.VirtualLayout((5, 2, 3), "<f8")
     layout[...] = h5py.VirtualSource(str(secret), "x", (5, 2, 3))
-    file.create_virtual_dataset("study/e_n/ccm", layout)
+    file.create_virtual_dataset(name, layout)
 
 
-def evil_shape(file, _):
-    file.create_dataset("study/e_n/ccm", (50, 2, 3), "<f8")
-
-
-def evil_type(file, _):
-    file.create_dataset("study/e_n/ccm", (5, 2, 3), "<f4")
-
-
-@pytest.mark.parametrize("evil", [evil_external_data, evil_link, evil_soft_link, evil_virtual, evil_shape, evil_type])
-def test_data_from_elsewhere_are_not_read(path, tmp_path, evil):
+@pytest.mark.parametrize("put", [
+    virtual,
+    lambda file, name, secret: file.create_dataset(name, (5, 2, 3), "<f8", external=[(str(secret), 0, 240)]),
+    lambda file, name, secret: file.__setitem__(name, h5py.ExternalLink(str(secret), "/x")),
+    lambda file, name, secret: file.__setitem__(name, h5py.SoftLink("/study/e_n/pcm")),
+    lambda file, name, secret: file.create_dataset(name, (50, 2, 3), "<f8"),
+    lambda file, name, secret: file.create_dataset(name, (5, 2, 3), "<f4"),
+], ids=["virtual", "external data", "external link", "soft link", "shape", "type"])  # fmt: skip
+def test_data_from_elsewhere_are_not_read(path, tmp_path, put):
     secret = tmp_path / "secret"
     secret.write_bytes(b"s" * 400)
     with h5py.File(path, "r+") as file:
         del file["study/e_n/ccm"]
-        evil(file, secret)
+        put(file, "study/e_n/ccm", secret)
     with open_result(path) as read:
         assert read.read("e_n/pcm").shape == (5, 2, 3)
         with pytest.raises(StudyError) as caught:
@@ -412,31 +389,3 @@ def test_a_run_that_was_overtaken_while_it_locked_withdraws(tmp_path):
     lock.release()
 
 
-def test_the_keys_in_which_another_scene_differs_are_named(tmp_path):
-    path, layout = tmp_path / "out.hdf", small()
-    theirs = "[object]\nname = 'a'\nradius_mm = 30\n\n[friction]\nmu = 0.8\n"
-    create(path, layout, Header("one", theirs, "title", "a.toml"))
-
-    def said(scene):
-        with pytest.raises(StudyError) as refused:
-            verify(path, layout, Header("two", scene, "title", "b.toml"))
-        assert refused.value.code == OTHER_FILE
-        return refused.value.message
-
-    text = said(theirs.replace("0.8", "0.5").replace("'a'", "'b'") + "cor_grid = 3\n")
-    assert "friction.mu" in text
-    assert "friction.cor_grid" in text
-    assert "name" not in text
-    many = said("[gripper]\n" + "".join(f"k{i} = 1\n" for i in range(9)))
-    assert "gripper.k4" in many
-    assert "gripper.k5" not in many
-    assert "friction.mu" not in said(theirs)  # another mesh file
-    assert "friction.mu" not in said("no toml")
-
-
-def test_a_file_of_an_older_version_is_refused_with_the_remedy(path):
-    with h5py.File(path, "r+") as file:
-        file.attrs["layout_version"] = VERSION - 1
-    with pytest.raises(StudyError) as refused:
-        open_result(path)
-    assert refused.value.code == OTHER_FILE

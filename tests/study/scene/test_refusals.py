@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-
 import pytest
 
 from softjaw.study.case.build import build_object, check_object, shapes_of, warnings
@@ -106,27 +104,6 @@ def test_options_that_no_solver_understands_stop_a_run_before_it_starts(options,
     assert refused.value.code == 2
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("options", ["-contact_snes_type foo", "-contact_snes_rtol abc"])
-def test_options_that_petsc_refuses_are_told_in_one_sentence(tmp_path, options):
-    words = ("-o", tmp_path / "out.hdf", "--", *options.split())
-    code, output, errors = launch(0, "-m", "softjaw", "run", ROOT / "jobs" / "smoke.toml", *words)
-    assert (code, output) == (2, "")
-    assert errors.count("\n") == 1
-    assert errors.startswith(f"error: petsc: PETSc refuses the options {options}: ")
-    assert options.split()[1] in errors.partition(": PETSc")[2].partition(":")[2]
-    assert not list(tmp_path.glob("out.hdf*"))
-
-
-def test_a_wrong_scene_is_refused_before_the_solvers_are_loaded():
-    words = ("-X", "importtime", "-m", "softjaw", "run", ROOT / "jobs" / "smoke.toml", "--set", "friction.mu=-1")
-    code, _, errors = launch(0, *words)
-    assert code == 2
-    assert "error: " in errors
-    loaded = {line.rpartition("|")[2].strip() for line in errors.splitlines() if line.startswith("import time:")}
-    assert loaded.isdisjoint({"numba", "skfem", "softjaw.fem.petsc", "softjaw.study.pipeline"})
-
-
 @pytest.mark.parametrize("command", ["plan", "run"])
 def test_a_result_file_is_named_with_its_ending(tmp_path, capsys, command):
     smoke = str(ROOT / "jobs" / "smoke.toml")
@@ -169,36 +146,3 @@ def test_stations_in_metres_get_a_warning():
     )
     assert not any("metres" in text for text in warnings(at([100, 101], BOTTLE)))
     assert not any("metres" in text for text in warnings(at([0.1], BOTTLE)))
-
-
-def unwrapped(text):
-    """Sentences that were broken to the terminal's width, each on one line."""
-    return re.sub(r"\n {2,}(?=\S)", " ", text)
-
-
-def test_plan_and_run_warn_as_check_does(tmp_path, capsys):
-    scene = tmp_path / "scene.toml"
-    scene.write_text(f"{BOX}[candidates]\nstations_mm = [40]\nangles_deg = [0]\n{LOAD}")
-
-    def warned():
-        told = capsys.readouterr()
-        assert told.err == ""
-        return [line for line in unwrapped(told.out).splitlines() if line.startswith("warning: ")]
-
-    said = []
-    for command in ("check", "plan"):
-        assert main([command, str(scene)]) == 0
-        said.append(warned())
-    prepare(load_scene(scene), str(scene), [])  # what a run begins with
-    said.append(warned())
-    assert len(said[0]) == 1
-    assert said[1:] == said[:1] * 2
-
-
-def test_check_says_where_a_mesh_begins_and_ends(tmp_path, capsys):
-    scene = tmp_path / "scene.toml"
-    scene.write_text(f"{FLASK}[candidates]\nstations_mm = [10]\n{LOAD}")
-    assert main(["check", str(scene)]) == 0
-    text = unwrapped(capsys.readouterr().out)
-    assert "0 to 120 mm along its axis (the file's z, counted from the mesh's lowest point" in text
-    assert "\nwarning: candidates: at 1 of 1 stations (10 mm) the pad" in text

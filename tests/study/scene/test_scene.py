@@ -5,16 +5,13 @@ import math
 import subprocess
 import sys
 from pathlib import Path
-from typing import get_args
 
 import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from softjaw.fem.objects.mesh_file import LENGTHS
 from softjaw.study.scene import Scene, SceneError, load_scene, parse_scene
-from softjaw.study.scene.objects import SHAPES, Mesh
-from softjaw.study.units import in_si
+from softjaw.study.scene.objects import SHAPES
 
 ROOT = Path(__file__).parents[3]
 JOBS = sorted((ROOT / "jobs").glob("*.toml"))
@@ -360,22 +357,6 @@ def test_shipped_scenes_load_without_warnings_and_survive_being_written_out(path
     assert again.effective_toml() == scene.effective_toml()
 
 
-def test_the_shipped_studies_have_the_sizes_they_promise():
-    scenes = {p.stem: load_scene(p) for p in JOBS}
-    assert scenes["smoke"].cases == 4
-    assert scenes["bottle-rigid"].cases == 70 * 6
-    a, ratios = scenes["fig4-curvature"].object.semi_axis_a_mm, scenes["fig4-curvature"].sweep["object.semi_axis_b_mm"]
-    assert len(ratios) >= 9
-    assert (ratios[0] / a, ratios[-1] / a) == (0.4, 2.5)
-
-
-def test_qualities_of_the_curvature_study_are_scaled_by_the_same_lengths_for_every_ratio():
-    scene = load_scene(ROOT / "jobs" / "fig4-curvature.toml")
-    points = [scene.with_values({"object.semi_axis_b_mm": b}) for b in scene.sweep["object.semi_axis_b_mm"]]
-    assert len({point.object.extent for point in points}) > 1  # what the default would take
-    assert {(point.score.object_length_mm, point.score.contact_length_mm) for point in points} == {(120, 50)}
-
-
 def test_the_digest_follows_results_only():
     digest = parse_scene(BALL).digest
     same = ["object.name=x", "run.patches=none", "petsc.contact_snes_monitor=true",
@@ -442,13 +423,6 @@ def test_checking_a_scene_starts_no_heavy_machinery():
     )
     done = subprocess.run([sys.executable, "-c", code, JOBS[0]], cwd=ROOT, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
-
-
-def test_meshes_come_in_the_units_that_lengths_come_in():
-    assert get_args(Mesh.model_fields["unit"].annotation) == tuple(LENGTHS)
-    for name, (times, over) in LENGTHS.items():
-        mesh = Mesh(shape="mesh", mesh="a.stl", unit=name)
-        assert mesh.unit_length == times / over == in_si(f"a_{name}", 1.0)
 
 
 def test_candidates_whose_wrenches_are_stored_go_by_number_or_label():

@@ -7,25 +7,16 @@ import sys
 import tomllib
 
 import pytest
-import trimesh
 
 from softjaw.study.cli import main
 from softjaw.study.cli.options import KINDS
 from softjaw.study.doctor import launch_environment
 from softjaw.study.messages import CANNOT_WRITE, USAGE
 from softjaw.study.scene import load_scene
-from tests.objects.bodies import SCANS, hollow_bottle, hollow_bowl, mug, punctured, scan
+from tests.objects.bodies import SCANS
 from tests.study.launching import ROOT
 
 FLASK = ROOT / "jobs" / "objects" / "flask.stl"
-BODIES = {
-    "bottle": lambda: hollow_bottle(0.2, 0.033, 0.014, 0.003),
-    "flat bottle": lambda: hollow_bottle(0.1, 0.028, 0.02, 0.002),
-    "bowl": lambda: hollow_bowl(0.06, 0.004, 0.05),
-    "mug": mug,
-    "banana with holes": lambda: punctured(scan("banana"), 3),
-    **{path.stem[8:]: (lambda name=path.stem: scan(name)) for path in sorted(SCANS.glob("*.stl"))},
-}
 SMALL = {  # what makes a run of a second or two of each kind
     "bottle": ["candidates.stations=2", "load.normal_force_n=[2]"],
     "cup": ["candidates.stations=2", "load.normal_force_n=[0.5]",
@@ -43,13 +34,6 @@ def _here(tmp_path, monkeypatch):
 
 def started(kind, *more):
     return main(["init", kind, *(["--mesh", str(FLASK), "--unit", "mm"] if kind == "mesh" else []), *more])
-
-
-def test_what_to_do_next_can_be_pasted_and_tells_how_large_the_mesh_is(capsys):
-    assert started("mesh", "-o", "my scenes/mine") == 0
-    told = capsys.readouterr().out
-    assert "softjaw check 'my scenes/mine.toml'" in told
-    assert "71.5 x 49.74 x 120 mm, the last along its axis, with --unit mm --axis z" in told
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -131,28 +115,6 @@ def test_a_banana_is_grasped_along_its_longest_axis_where_its_line_bends_less_th
     assert load_scene("b.toml").candidates.refine == 36
 
 
-def test_a_pad_larger_than_the_object_stays_as_it_is_and_is_said(tmp_path):
-    trimesh.creation.cylinder(9, 36).export(tmp_path / "cork.stl")
-    assert main(["init", "mesh", "--mesh", "cork.stl", "--unit", "mm"]) == 0
-    scene, text = load_scene("cork.toml"), (tmp_path / "cork.toml").read_text()
-    assert (scene.gripper.pad_length_mm, scene.gripper.pad_width_mm) == (50, 22)
-    assert "pad_length_mm = 50            # longer than the object, 36 mm" in text
-    assert "pad_width_mm = 22             # wider than the object, 18 mm" in text
-    assert "stations_mm" not in text
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("name", BODIES)
-def test_what_is_proposed_for_a_body_is_not_warned_of(name, tmp_path, capsys):
-    BODIES[name]().export(tmp_path / "body.stl")
-    assert main(["init", "mesh", "--mesh", "body.stl", "--unit", "m"]) == 0
-    assert no_warnings(capsys, "body.toml")
-    assert load_scene("body.toml").candidates.total <= 24
-    assert with_stations(tmp_path / "body.toml").candidates.total <= 24
-    assert no_warnings(capsys, "body.toml")
-    assert main(["plan", "body.toml"]) == 0
-
-
 @pytest.mark.parametrize("there", ["bottle.toml", "bottle.sbatch"])
 def test_nothing_is_replaced_unasked(tmp_path, there, capsys):
     (tmp_path / there).write_text("mine")
@@ -182,9 +144,3 @@ def test_what_cannot_be_started_is_refused_and_writes_nothing(words, told, tmp_p
     assert main(["init", *words]) == USAGE
     assert told in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
-
-
-def test_the_kinds_are_listed(capsys):
-    assert main(["init", "--help"]) == 0
-    text = capsys.readouterr().out
-    assert all(f"  {kind} " in text for kind in KINDS)
