@@ -6,8 +6,10 @@ import argparse
 import csv
 import io
 import json
+import re
 import resource
 import shlex
+import shutil
 import subprocess
 import sys
 from functools import cache
@@ -21,11 +23,10 @@ from softjaw.study.cli.quick import petsc_overrides
 from softjaw.study.doctor import launch_environment
 from softjaw.study.messages import StudyError
 from tests.study.fake_run import fake_plan, fake_result
-from tests.study.launching import ROOT
+from tests.study.launching import ROOT, launch
 from tests.study.launching import study as run_fake
 
 PARSERS = next(a for a in program()._actions if isinstance(a, argparse._SubParsersAction)).choices
-COMMANDS = tuple(PARSERS)
 HEAVY = ("mpi4py", "petsc4py", "numba", "skfem", "pyvista", "matplotlib", "scipy")
 OUTLINE = "jobs/bottle-rigid.toml"  # a body of revolution: its outline is drawn to be judged
 QUICK = {
@@ -230,3 +231,42 @@ def test_a_run_outlives_the_reader_of_its_output(tmp_path):
         return done.returncode, done.stderr
 
     assert piped() == (0, "")
+
+
+# --- examples ---------------------------------------------------------------------------------------------------------
+
+
+RUNNABLE = [  # all but those that take minutes and are tested elsewhere
+    line.strip()
+    for name, made in PARSERS.items()
+    if name != "cost"
+    for line in str(made.epilog).partition("\n\n")[0].splitlines()[1:]
+]
+
+
+@pytest.fixture(scope="module")
+def solved(tmp_path_factory):
+    """A finished study of seconds, which stands in for all results that the examples name."""
+    path = tmp_path_factory.mktemp("solved") / "smoke.hdf"
+    code, output, errors = launch(0, "-m", "softjaw", "run", ROOT / "jobs" / "smoke.toml", "-o", path)
+    assert code == 0, output + errors
+    return path
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("example", RUNNABLE)
+def test_an_example_does_what_it_says(example, solved, tmp_path):
+    (tmp_path / "jobs").symlink_to(ROOT / "jobs")
+    (tmp_path / "results").mkdir()
+    made = re.findall(r"(?:-o|>|--screenshot) (\S+)", example)
+    for name in set(re.findall(r"results/\S+\.hdf", example)) - set(made):
+        shutil.copy(solved, tmp_path / name)
+    command = example.replace("mpirun -n 8 ", "").replace("softjaw ", f"{sys.executable} -m softjaw ", 1)
+    done = subprocess.run(
+        ["bash", "-c", command], cwd=tmp_path, env={**launch_environment(), "PYTHONPATH": str(ROOT)},
+        capture_output=True, text=True, timeout=300, check=False, stdin=subprocess.DEVNULL,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    for name in made:
+        found = tmp_path / (f"{name}.toml" if command.split()[3] == "init" else name)
+        assert found.stat().st_size > 100, name

@@ -19,16 +19,6 @@ from tests.turns import TURNS
 
 ULPS = np.finfo(float).eps * np.arange(-8, 9)
 tries = settings(max_examples=TURNS, deadline=None)
-SPHERE = """
-[object]
-shape = "sphere"
-radius_mm = 30
-[candidates]
-stations_mm = [0]
-angles_deg = [0]
-[load]
-normal_force_n = [1]
-"""
 seeds = st.integers(0, 2**32 - 1)
 scores = st.lists(st.sampled_from([0.0, 1e-3, 0.1, 0.1, 0.25, 3.0, math.nan]), min_size=1, max_size=12)
 

@@ -15,13 +15,16 @@ from softjaw.study import pipeline
 from softjaw.study.case import effects, model
 from softjaw.study.case.build import build_object
 from softjaw.study.case.candidates import units
-from softjaw.study.case.effects import ROWS, EffectChoice, neglected_traction
+from softjaw.study.case.effects import FORCED, LITTLE, MUCH, ROWS, UNDECIDED, EffectChoice, neglected_traction
+from softjaw.study.case.effects import STIFF_PLATE as STIFF
 from softjaw.study.case.result import CaseFailure
 from softjaw.study.case.solver import COARSE, Solved
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import EFFECTS, REASONS
-from softjaw.study.scene import load_scene, parse_scene
-from tests.study.test_pipeline import OVAL, PLATE, cases, solved
+from softjaw.study.scene import SceneError, load_scene, parse_scene
+from tests.study.test_pipeline import CONE, OVAL, PLATE, cases, e_n, solved
+from tests.study.test_walls import CUP
+from tests.study.test_walls import solved as on_wall
 
 ROOT = Path(__file__).resolve().parents[2]
 COUPLED = 'effects.friction_pressure_coupling="tangential"'
@@ -267,3 +270,152 @@ def test_choosing_costs_at_most_a_fifth(file, overrides, monkeypatch):
     share = 1.0 - known / total
     print(f"\n{file} {overrides[0]}: {share:.1%} of {total:.1f} s for choosing, {spent / total:.1%} with shared work")
     assert share <= 0.2
+
+
+# --- the backing plate ------------------------------------------------------------------------------------------------
+
+
+STEEL = ("gripper.sheet_thickness_mm=2",)
+PLASTIC = ("gripper.sheet_thickness_mm=1", "gripper.sheet_modulus_gpa=2")
+RIGID = 'effects.sheet="rigid"'
+
+
+def sheet_level(*overrides):
+    """Level, indicator and reason, alike in every case."""
+    (found,) = {result.effects["sheet"][:3] for _, path in solved(OVAL, *overrides) for result in path}
+    return found[0], found[1], REASONS[found[2]]
+
+
+def test_a_steel_sheet_is_rigid_and_a_plastic_one_bends():
+    name, compliance, reason = sheet_level(*STEEL)
+    assert (name, reason) == ("rigid", "indicator below the target")
+    assert compliance < 0.2 * STIFF
+    name, compliance, reason = sheet_level(*PLASTIC)
+    assert (name, reason) == ("elastic plate", "indicator above the target")
+    assert compliance > STIFF
+    assert sheet_level(*PLASTIC, RIGID) == ("rigid", compliance, "forced by the scene")
+    assert sheet_level(*STEEL, 'effects.sheet="elastic"')[::2] == ("elastic plate", "forced by the scene")
+
+
+@pytest.mark.parametrize("size", [(20, 10), (18, 9), (20, 9.5), (12, 6), (22, 10), (20, 11)])
+def test_pads_up_to_the_size_of_the_default_support_are_solved(size):
+    """Every node of their sheets is held; such a sheet is rigid, whatever it is made of."""
+    pad = [f"gripper.pad_{side}_mm={length}" for side, length in zip(("length", "width"), size, strict=True)]
+    name, compliance, reason = sheet_level(*pad, *PLASTIC, "gripper.pad_thickness_mm=6")
+    if size[0] <= 20 and size[1] <= 10:
+        assert (name, compliance, reason) == ("rigid", 0.0, "indicator below the target")
+    else:
+        assert compliance > 0.0
+
+
+def test_what_is_neglected_stays_below_the_target():
+    """The rigid sheet_level of steel is good to far less than 2 % of e_n, that of the plastic sheet is not."""
+    np.testing.assert_array_equal(e_n(OVAL, *STEEL), e_n(OVAL, *STEEL, RIGID))
+    off = {name: e_n(OVAL, *own, 'effects.sheet="elastic"') / e_n(OVAL, RIGID) - 1.0
+           for name, own in (("steel", STEEL), ("plastic", PLASTIC))}  # fmt: skip
+    assert np.abs(off["steel"]).max() < 1e-3
+    assert (off["plastic"] < -0.02).all()  # the ends of the pad give way and carry less
+    closing = [values["maps/closing"] for values in cases(OVAL, *PLASTIC)]
+    assert (np.array(closing) > [values["maps/closing"] for values in cases(OVAL, RIGID)]).all()
+
+
+@pytest.mark.long
+def test_sheets_behind_the_pads_on_a_thin_wall():
+    """Steel is as good as rigid, plastic is softer: the same force takes more closing displacement."""
+    closing = {}
+    for name, overrides in (("rigid", (RIGID,)), ("steel", STEEL), ("plastic", PLASTIC)):
+        forced = () if name == "rigid" else ('effects.sheet="elastic"',)
+        (result,) = on_wall(CUP, *overrides, *forced, forces="[1]")
+        closing[name] = result.values["maps/closing"]
+    assert closing["steel"] == pytest.approx(closing["rigid"], rel=1e-3)
+    assert closing["plastic"] > 1.02 * closing["rigid"]
+    (mounted,) = on_wall(CUP, "gripper.tilt_stiffness_nm_per_rad=10000", forces="[1]")
+    assert mounted.values["maps/closing"] == pytest.approx(closing["rigid"], rel=1e-4)
+
+
+def test_a_mount_that_tilts_spreads_the_contact_on_a_slope_and_a_stiff_one_changes_nothing():
+    place = dict(stations="[75]", forces="[3]")
+    rigid, stiff, soft = (
+        cases(CONE, *([f"gripper.tilt_stiffness_nm_per_rad={k}"] if k else []), **place)[0] for k in (None, 1e4, 0.2)
+    )
+    assert stiff["maps/e_n"] == pytest.approx(rigid["maps/e_n"], rel=2e-3)
+    # turned to the slope the pad bears on more of its length
+    assert soft["maps/contact_area"] > 1.05 * rigid["maps/contact_area"]
+    assert soft["maps/e_n"][0] > 1.02 * rigid["maps/e_n"][0]
+
+
+def test_a_plate_that_tilts_cannot_be_elastic():
+    text = f"[object]\n{OVAL}\n[candidates]\nstations_mm = [0]\nangles_deg = [0]\n[load]\nnormal_force_n = [2]"
+    parse_scene(text, overrides=["gripper.tilt_stiffness_nm_per_rad=1"])
+    with pytest.raises(SceneError, match="tilt_stiffness_nm_per_rad"):
+        parse_scene(text, overrides=["gripper.tilt_stiffness_nm_per_rad=1", 'effects.sheet="elastic"'])
+
+
+# --- friction that acts back on the pressure --------------------------------------------------------------------------
+
+
+UNCOUPLED = 'effects.friction_pressure_coupling="none"'
+AUTO = 'effects.friction_pressure_coupling="auto"'
+
+
+def coupling_levels(*overrides):
+    """Level and reason in every case."""
+    found = [result.effects[COUPLING] for _, path in solved(OVAL, *overrides) for result in path]
+    return [(own.level, own.reason) for own in found]
+
+
+def test_levels_and_what_they_change():
+    """A pad that cannot slide freely is stiffer; without friction nothing changes; e_n moves by a few per cent."""
+    assert set(coupling_levels(UNCOUPLED)) == {("none", FORCED)}
+    assert set(coupling_levels(COUPLED)) == {("tangential traction", FORCED)}
+    off = e_n(OVAL, COUPLED) / e_n(OVAL, UNCOUPLED) - 1.0
+    assert (np.abs(off) < 0.05).all()
+    assert (np.abs(off) > 1e-3).all()
+    for one, other in zip(cases(OVAL, COUPLED), cases(OVAL, UNCOUPLED), strict=True):
+        assert one["maps/closing"] < other["maps/closing"]
+        assert one["work/load_steps"][0] > other["work/load_steps"][0]
+    smooth = ("friction.mu=0", COUPLED)
+    closing = [[v["maps/closing"] for v in cases(OVAL, *own)] for own in (smooth, ("friction.mu=0", UNCOUPLED))]
+    np.testing.assert_allclose(*closing, rtol=1e-9)
+
+
+def test_what_auto_takes_or_leaves_is_what_the_scene_could_ask_for():
+    """Bit by bit, at every force by itself; which cases take it follows from the measured change."""
+    auto, taken, free = (e_n(OVAL, *own) for own in ((AUTO,), (COUPLED,), (UNCOUPLED,)))
+    found = [result.effects[COUPLING] for _, path in solved(OVAL, AUTO) for result in path]
+    with_it = np.array([own.level == "tangential traction" for own in found]).reshape(auto.shape)
+    np.testing.assert_array_equal(auto, np.where(with_it, taken, free))
+    for own, true in zip(found, (taken / free - 1.0).ravel(), strict=True):
+        assert own.reason in (LITTLE, MUCH, UNDECIDED)
+        assert own.change == pytest.approx(true, abs=0.01)
+
+
+SLOPE = 'shape = "revolution"\nprofile_mm = [[0, 21], [20, 23.7], [40, 26.3], [60, 29]]'  # 7.6 degrees
+
+
+def test_what_pressing_has_used_is_missing_for_holding():
+    """On a slope it is what slope and force ask for at most, for the plate bears a part; half and whole."""
+    small = {"forces": "[3]", "elements": "[8, 4, 3]"}
+    place = (COUPLED, "candidates.stations_mm=[30]")
+
+    def of(*more):
+        [values] = cases(SLOPE, *place, *more, **small)
+        return values
+
+    plain, left = of(), of("friction.used_by_pressing=true")
+    whole = of("friction.used_by_pressing=true", 'effects.model_size="full"')
+    used = plain["maps/f_x_max"] - left["maps/f_x_max"]
+    assert 0.3 < used[0] / (np.tan(8 / 60) * plain["maps/F_N"]) < 1.0
+    assert used[1:].tolist() == [0.0, 0.0]  # planar models know nothing of it
+    assert left["maps/f_y_max"][0] == pytest.approx(plain["maps/f_y_max"][0], rel=1e-12)
+    assert left["maps/f_x_max"][0] == pytest.approx(whole["maps/f_x_max"][0], rel=1e-6)
+    assert left["maps/e_n"][0] == pytest.approx(whole["maps/e_n"][0], rel=1e-6)
+    assert left["maps/quality"][0] < plain["maps/quality"][0]
+
+
+@pytest.mark.long
+def test_symmetry_does_not_matter_with_friction():
+    small = {"forces": "[3]", "elements": "[8, 4, 3]"}
+    np.testing.assert_allclose(
+        e_n(OVAL, COUPLED, **small), e_n(OVAL, COUPLED, 'effects.model_size="full"', **small), rtol=1e-7
+    )

@@ -13,7 +13,6 @@ from softjaw.study.case.candidates import units
 from softjaw.study.scene import load_scene
 from tests.study.launching import ROOT
 
-MU = 0.8
 WAIST = 67.5  # station in the middle of the waist [mm], where the bottle is its own mirror image
 
 

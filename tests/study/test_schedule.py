@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import subprocess
 import sys
 from itertools import chain
@@ -14,6 +15,7 @@ from softjaw.study.doctor import launch_environment
 from softjaw.study.quantities import DONE, MISSING, WIDE, WORSE
 from softjaw.study.run.load_path import settle
 from softjaw.study.run.plan import Plan, makespan, sensible_ranks, unit_seconds
+from softjaw.study.run.progress import Progress
 from softjaw.study.run.scaling import LoadPath, Machine, replay, replayed
 from softjaw.study.run.shares import by_cost, shares
 
@@ -201,3 +203,42 @@ def test_a_case_that_an_earlier_run_left_out_is_missing_once_it_is_asked_for():
     units = [SimpleNamespace(rows=(rows,), state=state, apart=False, reason="") for rows, state in wanted.items()]
     assert settle(writer, units, [], False).tolist() == [DONE, MISSING, WORSE, WIDE]
     assert writer.forgotten == [1]
+
+
+# --- progress ---------------------------------------------------------------------------------------------------------
+
+
+class Run:
+    """A run of 100 equal cases whose clock stands where the test puts it."""
+
+    def __init__(self, cases=100, already=0):
+        self.now, self.codes = 0.0, np.full(cases, MISSING)
+        self.codes[:already] = DONE
+        self.progress = Progress(np.ones(cases), self.codes, io.StringIO(), live=False, clock=lambda: self.now)
+
+    def at(self, now, done):
+        self.now = now
+        self.codes = np.where(np.arange(len(self.codes)) < done, DONE, MISSING)
+        return self.progress.line(self.codes)
+
+
+def test_compiling_is_not_taken_for_solving():
+    run = Run()
+    assert run.at(30.0, 2) == "2/100 done"  # 30 s of compiling
+    assert run.at(31.0, 12) == "12/100 done"  # ten cases, but one second
+    assert run.at(40.0, 20) == "20/100 done, 0.556 s/case, 44 s left"  # 18 cases in 10 s; 80 are left
+    assert run.at(70.0, 82) == "82/100 done, 0.5 s/case, 9.0 s left"
+
+
+@pytest.mark.parametrize(("cases", "enough"), [(20, 5), (1000, 30), (100_000, 50)])
+def test_a_rest_is_foretold_after_enough_cases(cases, enough):
+    run = Run(cases)
+    run.at(1.0, 1)
+    assert "left" not in run.at(20.0, enough)
+    assert "left" in run.at(20.0, enough + 1)
+
+
+def test_cases_of_earlier_sessions_do_not_count():
+    run = Run(already=50)
+    assert run.at(9.0, 51) == "51/100 done"
+    assert run.at(19.0, 61) == "61/100 done, 1 s/case, 39 s left"

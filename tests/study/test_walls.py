@@ -16,7 +16,7 @@ from softjaw.study.case.result import CaseFailure
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import REASONS
 from softjaw.study.scene import parse_scene
-from tests.study.test_pipeline import SCALES, differing
+from tests.study.test_pipeline import differing
 
 CUP = """shape = "revolution"
 profile_mm = [[0, 24], [4, 28], [30, 30], [60, 32], [80, 34]]
@@ -64,12 +64,6 @@ def units_of(*arguments, **choices):
 def solved(*arguments, **choices):
     """Results of the first unit, force by force."""
     return [result for _, result in pipeline.solve_unit(units_of(*arguments, **choices)[0])]
-
-
-def alike(found, expected, tolerance):
-    """Values that differ, but for the work and the sampled wrenches, whose scale is the patch's size."""
-    scales = SCALES | {"maps/support_force": 1e-2, "wall/place": 1e-2}
-    return [n for n in differing(found, expected, tolerance, scales) if n.startswith(("maps/", "wall/", "fingers/"))]
 
 
 def test_the_level_follows_the_indentation_and_says_so():

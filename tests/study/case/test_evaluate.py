@@ -20,6 +20,7 @@ from softjaw.study.case.contact import Contact
 from softjaw.study.case.errors import OF_MESHES, OF_VIEWS, estimate, mesh_errors
 from softjaw.study.case.evaluate import FACING, EvaluationSettings, evaluate, lengths, quality
 from softjaw.study.case.task import Task, centre_of_volume
+from softjaw.study.case.topology import topology
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import MODELS, TABLE, misses
 from softjaw.study.scene import parse_scene
@@ -179,3 +180,24 @@ def test_the_centre_of_mass_is_that_of_the_volume_in_its_own_frame():
     assert centre_of_volume(body) == pytest.approx(corners.mean(axis=0), rel=1e-12)
     ball = build_object(SphereShape(shape="sphere", radius_mm=30))
     assert centre_of_volume(ball) == pytest.approx([0, 0, 0], abs=1e-15)
+
+
+RING = np.array([[0, 0, 0, 0, 0], [0, 1, 1, 1, 0], [0, 1, 0, 1, 0], [0, 1, 1, 1, 0], [0, 0, 0, 0, 0]])
+
+
+@pytest.mark.parametrize(
+    ("loaded", "pieces", "holes", "rims"),
+    [
+        (np.zeros((5, 5)), 0, 0, 0),
+        (np.ones((5, 5)), 1, 0, 15),
+        (RING, 1, 1, 0),
+        (np.eye(5), 1, 0, 15),  # faces that meet at a corner are one piece
+        (np.diag([1, 1, 0, 1, 1]), 2, 0, 15),
+        (np.diag([0, 1, 1, 1, 0]), 1, 0, 0),
+        (np.pad(RING, [(0, 0), (0, 5)]) + np.pad(RING, [(0, 0), (5, 0)]), 2, 2, 0),
+        (np.outer([1, 0, 0, 1], [0, 1, 1, 0]), 2, 0, 3),
+        (np.outer([0, 1, 1, 0], [1, 0, 0, 0]), 1, 0, 4),
+    ],
+)  # fmt: skip
+def test_pieces_holes_and_rims(loaded, pieces, holes, rims):
+    assert topology(3e4 * loaded.ravel(), loaded.shape) == {"pieces": pieces, "holes": holes, "rims": rims}

@@ -1,7 +1,6 @@
 """From scenes to axes, candidates and units of work: frames, symmetry, and every row exactly once."""
 
 from itertools import chain
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,7 +12,6 @@ from softjaw.study.scene import parse_scene
 from tests.fem.test_centre_line import bent
 from tests.study.formula_results import OBJECT
 
-JOBS = Path(__file__).parents[3] / "jobs"
 Z = np.array([0.0, 0.0, 1.0])
 CYLINDER = (
     OBJECT
