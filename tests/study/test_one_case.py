@@ -159,17 +159,3 @@ POSE = {"point_mm": [0, 0, 500], "approach": [1, 0, 0], "long_side": [0, 0, 1]}
 def test_what_names_no_case_is_refused(scene, asked, error, words):
     with pytest.raises(error, match=words):
         sj.press(scene, **{"force": 1.0, **asked})
-
-
-def test_a_name_that_a_case_does_not_have_is_refused(solved):
-    case = solved[2]
-    for ask in (lambda: case.value("enn"), lambda: case.fingers("enn")):
-        with pytest.raises(KeyError, match="enn is not a value of this case"):
-            ask()
-    for ask in (lambda: case.value("e_n", "x"), lambda: case.limit_surface(1, "x")):
-        with pytest.raises(ValueError, match="expected one of ccm"):
-            ask()
-    with pytest.raises(ValueError, match="expected 1 or 2"):
-        case.limit_surface(0)
-    with pytest.raises(TypeError, match="force is missing"):
-        sj.press(solved[0], 0.0, 0.0)

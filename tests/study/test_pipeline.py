@@ -234,26 +234,6 @@ def test_an_explicit_pose_is_the_same_grasp_as_station_and_angle():
         assert differing(result.values, expected, 1e-9, SCALES) == []
 
 
-@pytest.mark.parametrize(("overrides", "rho", "length"), [
-    ((), 0.05, 0.05),
-    (('score.object_length_mm="longest"',), 0.05, 0.12),
-    (('score.contact_length_mm="object"', 'score.object_length_mm="longest"'), 0.12, 0.12),
-    (("score.contact_length_mm=20", "score.object_length_mm=80"), 0.02, 0.08),
-])  # fmt: skip
-def test_quality_is_the_closed_form_with_the_stored_limits(overrides, rho, length):
-    """7/12 d^2 (V1 A2 + A1 V2): contacts with semi-axes f_x, f_y, tau_z / rho per unit force, arms over a length."""
-    for values in cases(OVAL, *overrides, angles="[0]"):
-        S = values["fingers/S"][:, None]
-        f_x, f_y, tau = (values[f"fingers/{name}_max"] / S for name in ("f_x", "f_y", "tau_z"))
-        V, A = 4 / 3 * np.pi * f_x * f_y * tau / rho, np.pi * f_x * f_y
-        rotation, at = values["fingers/pose_rotation"], values["fingers/pose_origin"]
-        origin = np.einsum("fij,fj->fi", rotation, values["fingers/frame_origin"]) + at
-        d = np.linalg.norm(origin[1] - origin[0])
-        assert values["maps/contact_distance"] == pytest.approx(d, rel=1e-12)
-        expected = 7 / 12 * (d / length) ** 2 * (V[0] * A[1] + A[0] * V[1])
-        assert values["maps/quality"] == pytest.approx(expected, rel=1e-9)
-
-
 def test_without_friction_nothing_is_held_and_a_flag_says_so():
     [(_, path)] = solved(OVAL, "friction.mu=0")
     for result, held in zip(path, cases(OVAL), strict=True):
@@ -337,11 +317,6 @@ def test_a_solver_that_is_cut_short_takes_more_steps_to_the_same_answer():
     for found, expected in zip(cut, cases(OVAL), strict=True):
         assert differing(found, expected, 1e-7, SCALES) == []
     assert sum(sum(values["work/step_halvings"]) for values in cut) > 0
-
-
-def test_a_symmetry_that_is_forced_but_not_there_is_refused():
-    with pytest.raises(ValueError, match=r"'quarter' needs 2 plane\(s\) of symmetry.*have 1 here; use 'auto'"):
-        solved(CONE, 'effects.model_size="quarter"', stations="[75]")
 
 
 @pytest.mark.long

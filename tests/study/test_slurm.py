@@ -82,20 +82,6 @@ def test_other_ends_are_final_and_keep_their_code(tmp_path, slurm, code):
     assert not any("scontrol" in line for line in calls(tmp_path))
 
 
-def test_outside_slurm_the_script_is_a_plain_run(tmp_path, slurm):
-    plain = {name: value for name, value in slurm.items() if not name.startswith("SLURM")}
-    assert finished(SCRIPTS[-1], tmp_path, plain, "a.toml", FAKE_CODE="75")[0] == 75
-    assert calls(tmp_path) == ["-n 1 .venv/bin/softjaw run a.toml"]
-
-
-def test_a_scene_that_is_not_named_is_asked_for(tmp_path, slurm):
-    for script in SCRIPTS:
-        process = subprocess.run(["bash", script], cwd=tmp_path, env=slurm, capture_output=True, text=True, check=False)
-        assert process.returncode != 0
-        assert "scene" in process.stderr
-    assert not (tmp_path / "calls").exists()
-
-
 def test_all_scripts_are_sound_and_share_what_they_do(tmp_path, slurm, monkeypatch, capsys):
     texts = [path.read_text() for path in (*SCRIPTS, HERE / "run.sbatch")]
     assert len(texts) == 4

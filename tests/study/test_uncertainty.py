@@ -10,15 +10,12 @@ from scipy.stats import norm
 import softjaw
 from softjaw.study.case.candidates import axes, candidates
 from softjaw.study.case.poses import axis_poses, moved
-from softjaw.study.lookup import GraspMap
 from softjaw.study.ranking import Sure
 from softjaw.study.result.intervals import half_width
-from softjaw.study.result.read import read_patch
 from softjaw.study.run.plan import make_plan
 from softjaw.study.scene import parse_scene
 from softjaw.study.scene.errors import SceneError
 from softjaw.study.scene.samples import latin_hypercube
-from softjaw.study.show.best_grasps import best
 
 BALL = """
 [object]
@@ -163,17 +160,6 @@ def test_maps_are_those_of_the_scene_as_given_with_what_the_samples_say(file, tm
     assert (np.diff(ds.e_n_samples.values[0, 0, 0, order]) < 0).all()  # a stiffer pad has a smaller contact
     scaled = ds.quality_samples.values[0, 0, 0] / mu**5
     assert (np.diff(scaled[order]) < 0).all()
-
-
-def test_the_interval_is_told_where_the_maps_are(file):
-    table = best(softjaw.open(file))
-    assert "quality_interval" in [c.name for c in table.columns]
-    row = table.rows[0]
-    ds = softjaw.open(file)
-    assert row["quality_interval"] == float(ds.quality_interval.sel(station=row["station"]).squeeze())
-    look_up = GraspMap(file)
-    assert look_up.value("quality_interval", 0.0, 0.0, 2.0) == pytest.approx(float(ds.quality_interval[0, 0, 0]))
-    assert read_patch(file, station=0).pressure.dims == ("angle", "normal_force", "finger", "face")
 
 
 def test_grasps_that_inputs_move_alike_are_told_apart():

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -26,7 +22,6 @@ from tests.study.formula_results import (
     without_result,
 )
 
-ROOT = Path(__file__).parents[3]
 MESH = '[object]\nshape = "mesh"\nmesh = "x.stl"\nunit = "mm"\n[candidates]' + SCENE.partition("[candidates]")[2]
 ROUND = SCENE.replace("semi_axis_b_mm = 20", "semi_axis_b_mm = 25")
 
@@ -62,13 +57,6 @@ def test_a_point_has_the_errors_of_the_mesh_in_the_unit_of_the_value(tmp_path, s
     assert np.isnan(point.mesh_error("opening"))
     assert "by the mesh +- 0.1 mm" in str(point)
     assert np.isnan(straight.at(0.02, 0.0, 3.0).mesh_error("e_n"))
-
-
-def test_solved_cases_come_back_as_they_were_stored(tmp_path):
-    smoothed = GraspMap(make(tmp_path / "a.hdf", smooth))
-    grid = np.meshgrid(STATIONS, ANGLES, FORCES, indexing="ij")
-    assert smoothed.value("e_n", *grid) == pytest.approx(smooth(*grid), rel=1e-15)
-    assert not smoothed.error("e_n", *grid).any()
 
 
 @pytest.mark.parametrize("along", [0, 1, 2, None])
@@ -201,14 +189,6 @@ def test_where_the_contact_changes_its_kind_there_is_no_smooth_value(tmp_path):
     assert there.at(0.01, 0.1, 2).nearest.e_n == pytest.approx(there.at(0.01, 0.1, 2).e_n)
 
 
-def test_a_dataset_and_a_part_of_it_can_be_looked_up(tmp_path):
-    import softjaw
-
-    whole = softjaw.open(make(tmp_path / "a.hdf"))
-    part = GraspMap(whole.isel(station=slice(None, None, 2)))
-    assert part.at(0.01, 0.1, 2).e_n == pytest.approx(GraspMap(whole).at(0.01, 0.1, 2).e_n)
-
-
 def test_angles_repeat_with_the_objects_symmetry(tmp_path):
     around = GraspMap(make(tmp_path / "a.hdf", smooth))  # 0 to 150 deg; an elliptic cylinder repeats after 180
     last, first = (smooth(0.01, a, 2.0) for a in (ANGLES[5], ANGLES[0]))
@@ -317,18 +297,6 @@ def test_bounds_of_the_force_are_maps_too(tmp_path):
     assert there.at(0.015, 0.1, 2).value("force_high") == pytest.approx(4.5)
     assert "force_high" in str(there.at(0.015, 0.1, 2))
     assert there.quantities["force_high"][0] == "N"
-
-
-def test_it_needs_neither_mpi_nor_petsc(tmp_path):
-    path = make(tmp_path / "a.hdf")
-    code = (
-        f"import sys; from softjaw.study.lookup import GraspMap; print(GraspMap({str(path)!r}).at(0.01, 0.1, 2).e_n);"
-        "print(sorted({'mpi4py', 'petsc4py', 'numba', 'skfem', 'scipy', 'matplotlib'} & set(sys.modules)))"
-    )
-    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
-    value, loaded = done.stdout.splitlines()
-    assert float(value) == pytest.approx(linear(0.01, 0.1, 2))
-    assert loaded == "[]"
 
 
 def test_the_best_grasps_are_those_of_show_as_points_of_the_map(tmp_path):

@@ -128,15 +128,6 @@ def test_xarray_has_coordinates_with_units(result, python):
     assert units == "m"
 
 
-@pytest.mark.skipif(shutil.which("h5ls") is None, reason="no h5ls on this machine; apt: hdf5-tools")
-def test_h5ls_shows_units_and_the_report(result):
-    told = answer(["h5ls", "-vd", f"{result}/study/tau_z_max/ccm"])
-    assert re.search(r'Attribute: units.*\n.*\n +Data:\n +"N m"', told)
-    assert '"station", "angle", "normal_force"' in told
-    told = answer(["h5dump", "-d", "/study/report", result])
-    assert "/study/definitions" in told
-
-
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine")
 def test_h5web_opens_at_the_map_with_its_axes(result, web, tmp_path):
     words = ["NX Heatmap", "grasp quality, ccm", "station along the object's axis [m]", "cylinder.hdf"]
