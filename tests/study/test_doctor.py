@@ -136,18 +136,14 @@ print(os.environ.get("NUMBA_CACHE_DIR", ""), "numba" in sys.modules)
 
 
 def test_the_folder_goes_with_the_process_and_numba_is_not_needed():
-    def told():
-        # a home that cannot be, and packages that numba could not write beside
-        code = "import softjaw.study.doctor as e\ne.ROOT = e.Path('/dev/null')\n" + CODE
-        surroundings = {k: v for k, v in os.environ.items() if k not in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME")}
-        command = [sys.executable, "-c", code]
-        done = subprocess.run(
-            command, capture_output=True, text=True, env={**surroundings, "HOME": "/dev/null"}, cwd=doctor.ROOT,
-            check=True,
-        )  # fmt: skip
-        return done.stdout.split()
-
-    folder, loaded = told()
+    code = "import softjaw.study.doctor as e\ne.ROOT = e.Path('/dev/null')\n" + CODE
+    surroundings = {k: v for k, v in os.environ.items() if k not in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME")}
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(
+        command, capture_output=True, text=True, env={**surroundings, "HOME": "/dev/null"}, cwd=doctor.ROOT,
+        check=True,
+    )  # fmt: skip
+    folder, loaded = done.stdout.split()
     assert Path(folder).name.startswith(doctor.PASSING)
     assert not Path(folder).exists()
     assert loaded == "False"

@@ -1,7 +1,8 @@
-"""Kill -9 of one rank, of all ranks and of mpirun at random moments: no result is lost and every file goes on."""
+"""Kills, hangs and full disks under mpirun: no result is lost, only the case itself fails, and every file goes on."""
 
 from __future__ import annotations
 
+import contextlib
 import os
 import random
 import shutil
@@ -15,7 +16,8 @@ import h5py
 import numpy as np
 import pytest
 
-from softjaw.study.result.layout import DONE
+from softjaw.study.messages import CANNOT_WRITE, SOME_FAILED, STOPPED
+from softjaw.study.result.layout import DONE, FAILED, MISSING
 from softjaw.study.result.lock import holder
 from softjaw.study.result.store import open_result, torn_rows
 from tests.study.launching import contents, differing, start, study, wait_for
@@ -107,22 +109,156 @@ def test_no_kill_loses_a_result_of_a_study_that_gets_more_stations(tmp_path):
 
 def test_no_kill_loses_a_result(tmp_path):
     seed = 20240721
-    whole = tmp_path / "whole.hdf"
-    assert study(0, whole, *OPTIONS)[0] == 0
-    expected = contents(whole)
+    expected = whole(tmp_path, *OPTIONS)
+    chance, met, kept, number = random.Random(seed), 0, 0, 0
+    while met < ALL_KILLS:
+        path = tmp_path / f"{number}.hdf"
+        hits, progress = killed_again_and_again(path, number, chance)
+        for before, after in pairwise(progress):
+            assert before <= after, f"rows {sorted(before - after)} of {path} were lost"
+        assert differing(path, expected) == []
+        met, kept, number = met + hits, kept + len(progress[-1]), number + 1
+        assert number < ALL_KILLS, "most runs were over before they could be killed"
+    print(f"{met} kills of {number} files, {kept} results kept over them")
+    assert kept > 5 * number
 
-    def campaign():
-        chance, met, kept, number = random.Random(seed), 0, 0, 0
-        while met < ALL_KILLS:
-            path = tmp_path / f"{number}.hdf"
-            hits, progress = killed_again_and_again(path, number, chance)
-            for before, after in pairwise(progress):
-                assert before <= after, f"rows {sorted(before - after)} of {path} were lost"
-            assert differing(path, expected) == []
-            met, kept, number = met + hits, kept + len(progress[-1]), number + 1
-            assert number < ALL_KILLS, "most runs were over before they could be killed"
-        return met, kept, number
 
-    met, kept, files = campaign()
-    print(f"{met} kills of {files} files, {kept} results kept over them")
-    assert kept > 5 * files
+# --- what one case or one disk can do --------------------------------------------------------------------------------
+
+
+def states(path):
+    with open_result(path) as result:
+        return result.status.ravel(), result.messages.ravel()
+
+
+def whole(folder, *words):
+    """What an undisturbed run writes."""
+    assert study(0, folder / "whole.hdf", *words)[0] == 0
+    return contents(folder / "whole.hdf")
+
+
+@pytest.mark.parametrize(
+    ("how", "ranks", "text"),
+    [
+        ("hang", 2, "not solved within 3 s"),
+        ("stuck", 3, "did not come back to Python within 6 s, so its rank was given up"),
+        ("greedy", 2, "more memory than run.memory_gb leaves to a rank"),
+    ],
+)
+def test_one_case_fails_with_its_reason_and_the_others_go_on(tmp_path, how, ranks, text):
+    path = tmp_path / f"{how}.hdf"
+    code, _, errors = study(ranks, path, f"--{how}", 13, *([] if how == "greedy" else ["--limit", 3]))
+    assert code == SOME_FAILED, errors
+    codes, messages = states(path)
+    # the case, the force above it, and both for the other candidate of the unit
+    assert [row for row, code in enumerate(codes) if code == FAILED] == [13, 14, 16, 17]
+    assert (codes[[row for row in range(36) if row not in (13, 14, 16, 17)]] == DONE).all()
+    assert messages[13].startswith(text)
+    assert study(0, path, "--retry-failed")[0] == 0
+    assert differing(path, whole(tmp_path)) == []
+
+
+def test_a_single_process_that_hangs_ends_itself_and_gives_the_case_up_the_third_time(tmp_path):
+    path = tmp_path / "alone.hdf"
+    for _ in range(2):
+        code, _, errors = study(0, path, "--stuck", 13, "--limit", 1)
+        assert code == 1
+        assert "Timeout (0:00:02)!" in errors  # and where it was in Python
+    assert study(0, path, "--stuck", 13, "--limit", 1)[0] == SOME_FAILED
+    assert [row for row, code in enumerate(states(path)[0]) if code == FAILED] == [13, 14, 16, 17]
+
+
+@pytest.mark.parametrize(("how", "ranks"), [("unplug", 0), ("unplug", 3), ("remove", 0), ("remove", 2)])
+def test_a_place_that_gets_lost_ends_the_run_with_one_sentence(tmp_path, how, ranks):
+    path = tmp_path / "lost.hdf"
+    code, _, errors = study(ranks, path, f"--{how}", 13)
+    assert code == CANNOT_WRITE, errors
+    assert errors.count("error: ") == 1  # Open MPI adds lines of its own
+    assert "Traceback" not in errors
+    if how == "unplug":
+        assert (states(path)[0] == DONE).any()
+    assert study(2, path)[0] == 0
+    assert differing(path, whole(tmp_path)) == []
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """A file system of 3 MB."""
+
+    def mount():
+        words = ["mount", "-t", "tmpfs", "-o", "size=3m", "tmpfs", tmp_path]
+        return subprocess.run(words, capture_output=True).returncode == 0
+
+    if not mount():
+        pytest.skip("no right to mount a small file system")
+    yield tmp_path
+    subprocess.run(["umount", "-l", tmp_path], check=True)
+
+
+def fill(folder):
+    """Take all space that is left."""
+    with contextlib.suppress(OSError), (folder / "filler").open("wb", buffering=0) as file:
+        while file.write(b"x" * 4096):
+            pass
+
+
+def test_a_file_system_that_did_not_reserve_the_space_ends_the_run_and_keeps_what_is_stored(small_disk):
+    """The file's space is given back by hand, as a file system that copies on write would have to take it anew."""
+    path = small_disk / "holes.hdf"
+
+    process = start(2, path, "--delay", 0.15)
+    wait_for(lambda: path.exists() and (states(path)[0] == DONE).sum() >= 6)
+    process.send_signal(signal.SIGUSR1)
+    process.communicate(timeout=60)
+    before = states(path)[0]
+    subprocess.run(["cp", "--sparse=always", path, small_disk / "sparse"], check=True)
+    (small_disk / "sparse").replace(path)
+    fill(small_disk)
+    refused = study(2, path)
+    after = states(path)[0]
+    (small_disk / "filler").unlink()
+    code, _, errors = refused
+    assert code == CANNOT_WRITE, errors
+    assert "Traceback" not in errors
+    assert (after[before == DONE] == DONE).all()
+    assert study(2, path)[0] == 0
+
+
+def test_a_file_system_that_turns_read_only_is_told_once(small_disk):
+    path = small_disk / "readonly.hdf"
+
+    def run():
+        assert study(0, path)[0] == 0
+        subprocess.run(["mount", "-o", "remount,ro", small_disk], check=True)
+        answers = study(2, path), study(2, small_disk / "new.hdf")
+        subprocess.run(["mount", "-o", "remount,rw", small_disk], check=True)
+        return answers
+
+    for code, _, errors in run():
+        assert code == CANNOT_WRITE, errors
+        assert errors.count("error: ") == 1
+        assert "Read-only file system" in errors
+
+
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGUSR1"])
+def test_ranks_leave_in_order_when_mpirun_is_told_to_stop(tmp_path, name):
+    """mpirun answers TERM with 1, whatever its ranks say, and kills them after some two seconds: they are quicker."""
+    path = tmp_path / "stopped.hdf"
+
+    process = start(2, path, "--hang", 14, "--delay", 0.1)
+    wait_for(lambda: path.exists() and states(path)[0][13] == DONE)
+    began = time.monotonic()
+    process.send_signal(getattr(signal, name))
+    if name == "SIGUSR1":  # a second signal: there is no time after all
+        time.sleep(0.3)
+        process.send_signal(signal.SIGUSR1)
+    process.communicate(timeout=60)
+    code, seconds = process.returncode, time.monotonic() - began
+    assert code == (1 if name == "SIGTERM" else STOPPED)
+    assert seconds < 20  # the case would take a minute
+    with open_result(path) as result:
+        assert result.sessions[0]["reason"].startswith("stopped by SIG")
+        missing = result.status.ravel() == MISSING
+        assert not result.read("status/attempts").ravel()[missing].any()
+    assert study(0, path)[0] == 0
+    assert differing(path, whole(tmp_path)) == []

@@ -160,17 +160,14 @@ def test_any_number_of_ranks_writes_the_same_bits(tmp_path, scene, alone, ranks)
 def test_a_run_that_is_stopped_or_killed_goes_on_with_other_ranks_to_the_same_bits(tmp_path, scene, alone, how, ranks):
     path = tmp_path / f"{how}.hdf"
 
-    def interrupt():
-        process = subprocess.Popen(
-            [sys.executable, "-c", SLOWLY, "run", str(scene), "-o", str(path)], env=launch_environment(), cwd=ROOT,
-            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, stdin=subprocess.DEVNULL,
-        )  # fmt: skip
-        wait_for(lambda: path.exists() and done(path) >= 2)
-        process.send_signal(getattr(signal, how))
-        process.communicate(timeout=60)
-        return process.returncode, done(path)
-
-    code, before = interrupt()
+    process = subprocess.Popen(
+        [sys.executable, "-c", SLOWLY, "run", str(scene), "-o", str(path)], env=launch_environment(), cwd=ROOT,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, stdin=subprocess.DEVNULL,
+    )  # fmt: skip
+    wait_for(lambda: path.exists() and done(path) >= 2)
+    process.send_signal(getattr(signal, how))
+    process.communicate(timeout=60)
+    code, before = process.returncode, done(path)
     assert code == (75 if how == "SIGUSR1" else -signal.SIGKILL)
     assert 2 <= before < CASES
     code, _, errors = run(ranks, scene, path)

@@ -175,17 +175,14 @@ def same_bits(scene, expected, own):
 def test_a_refined_study_has_the_same_bits_on_any_number_of_ranks(tmp_path):
     scene = tmp_path / "vase.toml"
 
-    def compare():
-        scene.write_text(SCENE)
-        alone, _ = refined(scene, "alone.hdf", 0)
-        with open_result(alone) as result:
-            assert 2 <= len(result.layout.added) <= sum(map(len, result.layout.added)) == 6  # 12 cases on a round body
-            best = result.read("quality/ccm")[..., -1].max()
-        assert best > 0.6  # 0.19 at the scene's own stations
-        same_bits(scene, contents(alone), 20)
-        assert "0 of 44 cases to solve" in refined(scene, "alone.hdf", 2)[1]
-
-    compare()
+    scene.write_text(SCENE)
+    alone, _ = refined(scene, "alone.hdf", 0)
+    with open_result(alone) as result:
+        assert 2 <= len(result.layout.added) <= sum(map(len, result.layout.added)) == 6  # 12 cases on a round body
+        best = result.read("quality/ccm")[..., -1].max()
+    assert best > 0.6  # 0.19 at the scene's own stations
+    same_bits(scene, contents(alone), 20)
+    assert "0 of 44 cases to solve" in refined(scene, "alone.hdf", 2)[1]
 
 
 # --- poses ------------------------------------------------------------------------------------------------------------
@@ -367,22 +364,19 @@ def test_refined_poses_have_the_same_bits_on_any_number_of_ranks_and_after_a_kil
         with open_result(path) as result:
             return result.layout.added
 
-    def compare():
-        scene.write_text(POSES.replace("BUDGET", "12"))
-        alone, _ = refined(scene, "alone.hdf", 0)
-        assert len(added(alone)) >= 2
-        expected = contents(alone)
-        same_bits(scene, expected, 4)
-        killed = tmp_path / "killed.hdf"
-        process = subprocess.Popen(
-            command(0, "-m", "softjaw", "run", scene, "-o", killed), env=launch_environment(), cwd=ROOT,
-            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, stdin=subprocess.DEVNULL,
-        )  # fmt: skip
-        wait_for(lambda: len(added(killed)) == 1)
-        process.kill()
-        process.wait(timeout=30)
-        assert len(added(killed)) >= 1
-        refined(scene, "killed.hdf", 2)
-        assert differing(killed, expected) == []
-
-    compare()
+    scene.write_text(POSES.replace("BUDGET", "12"))
+    alone, _ = refined(scene, "alone.hdf", 0)
+    assert len(added(alone)) >= 2
+    expected = contents(alone)
+    same_bits(scene, expected, 4)
+    killed = tmp_path / "killed.hdf"
+    process = subprocess.Popen(
+        command(0, "-m", "softjaw", "run", scene, "-o", killed), env=launch_environment(), cwd=ROOT,
+        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, stdin=subprocess.DEVNULL,
+    )  # fmt: skip
+    wait_for(lambda: len(added(killed)) == 1)
+    process.kill()
+    process.wait(timeout=30)
+    assert len(added(killed)) >= 1
+    refined(scene, "killed.hdf", 2)
+    assert differing(killed, expected) == []

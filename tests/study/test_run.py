@@ -137,14 +137,11 @@ def test_forces_that_are_apart_fail_alone(tmp_path):
 def test_a_signal_stops_in_order_and_the_same_command_goes_on(tmp_path, uninterrupted, name, ranks):
     path = tmp_path / f"{name}.hdf"
 
-    def stop():
-        process = start(ranks, path, "--delay", 0.15)
-        wait_for(lambda: begun(path))
-        process.send_signal(getattr(signal, name))
-        output, _ = process.communicate(timeout=60)
-        return process.returncode, output
-
-    code, _ = stop()
+    process = start(ranks, path, "--delay", 0.15)
+    wait_for(lambda: begun(path))
+    process.send_signal(getattr(signal, name))
+    output, _ = process.communicate(timeout=60)
+    code, _ = process.returncode, output
     assert code == 75
     left = (states(path) == MISSING).sum()
     assert left > 0
@@ -158,15 +155,12 @@ def test_a_signal_stops_in_order_and_the_same_command_goes_on(tmp_path, uninterr
 def test_a_case_that_takes_too_long_is_abandoned_when_there_is_no_time(tmp_path):
     path = tmp_path / "hangs.hdf"
 
-    def stop():
-        process = start(0, path, "--hang", 14)
-        wait_for(lambda: begun(path) and states(path)[13] == DONE)
-        began = time.monotonic()
-        process.terminate()
-        process.communicate(timeout=60)
-        return process.returncode, time.monotonic() - began
-
-    code, seconds = stop()
+    process = start(0, path, "--hang", 14)
+    wait_for(lambda: begun(path) and states(path)[13] == DONE)
+    began = time.monotonic()
+    process.terminate()
+    process.communicate(timeout=60)
+    code, seconds = process.returncode, time.monotonic() - began
     assert code == 75
     assert seconds < 10  # the case would take a minute
     with open_result(path) as result:
@@ -187,16 +181,13 @@ def test_another_scene_is_refused(tmp_path, whole, uninterrupted):
 def test_a_file_that_is_no_result_is_refused(tmp_path, whole, what, ranks):
     path = tmp_path / f"{what}.hdf"
 
-    def spoil():
-        if what == "truncated":
-            shutil.copy(whole, path)
-            os.truncate(path, 100_000)
-        else:
-            path.write_text("my notes")
-        size = path.stat().st_size
-        return *study(ranks, path), size == path.stat().st_size
-
-    code, _, errors, same = spoil()
+    if what == "truncated":
+        shutil.copy(whole, path)
+        os.truncate(path, 100_000)
+    else:
+        path.write_text("my notes")
+    size = path.stat().st_size
+    code, _, errors, same = *study(ranks, path), size == path.stat().st_size
     assert code == 3
     assert errors.count("error: ") == 1
     assert same
@@ -206,18 +197,15 @@ def test_a_file_that_is_no_result_is_refused(tmp_path, whole, what, ranks):
 def test_a_second_run_at_the_same_time_is_refused_and_status_can_be_asked(tmp_path, ranks):
     path = tmp_path / "busy.hdf"
 
-    def second():
-        process = start(ranks, path, "--delay", 1.0)
-        wait_for(lambda: begun(path))
-        told = subprocess.run(
-            [sys.executable, "-m", "softjaw", "status", str(path)], cwd=ROOT, capture_output=True, text=True
-        )
-        answer = study(0, path)
-        process.send_signal(signal.SIGUSR1)
-        process.communicate(timeout=60)
-        return told, answer, process.returncode
-
-    told, (code, _, _), first = second()
+    process = start(ranks, path, "--delay", 1.0)
+    wait_for(lambda: begun(path))
+    told = subprocess.run(
+        [sys.executable, "-m", "softjaw", "status", str(path)], cwd=ROOT, capture_output=True, text=True
+    )
+    answer = study(0, path)
+    process.send_signal(signal.SIGUSR1)
+    process.communicate(timeout=60)
+    told, (code, _, _), first = told, answer, process.returncode
     assert told.returncode == 0
     assert code == 4
     assert first == 75
@@ -250,14 +238,11 @@ def test_a_torn_row_is_solved_again(tmp_path, whole, uninterrupted, ranks):
 
     path = tmp_path / "torn.hdf"
 
-    def tear():
-        shutil.copy(whole, path)
-        with h5py.File(path, "r+") as file:
-            file["study/fingers/f_x_max"][2, 1, 0, 1, 2] += 1e-12
-            file["study/patch/normal"][5, 0, 0, 0, 3, 1] = 0.0
-        return study(ranks, path)
-
-    code, _, _ = tear()
+    shutil.copy(whole, path)
+    with h5py.File(path, "r+") as file:
+        file["study/fingers/f_x_max"][2, 1, 0, 1, 2] += 1e-12
+        file["study/patch/normal"][5, 0, 0, 0, 3, 1] = 0.0
+    code, _, _ = study(ranks, path)
     assert code == 0
     assert differing(path, uninterrupted) == []
 

@@ -74,12 +74,9 @@ def test_a_pad_that_just_meets_the_box_round_the_object_is_not_refused(angle):
 def test_a_run_refuses_poses_off_the_object_by_their_labels(tmp_path):
     """The ball's corner of its box: only trying tells that the pad passes."""
 
-    def run():
-        text = BALL + pose([0, 0, 0], "near") + pose([0, 38, 50], "far") + LOAD
-        (tmp_path / "scene.toml").write_text(text)
-        return launch(2, "-m", "softjaw", "run", tmp_path / "scene.toml", "-o", tmp_path / "out.hdf")
-
-    code, output, errors = run()
+    text = BALL + pose([0, 0, 0], "near") + pose([0, 38, 50], "far") + LOAD
+    (tmp_path / "scene.toml").write_text(text)
+    code, output, errors = launch(2, "-m", "softjaw", "run", tmp_path / "scene.toml", "-o", tmp_path / "out.hdf")
     assert (code, output) == (2, "")
     assert errors.count("error: candidates.poses[1]: ") == 1  # mpirun adds lines of its own
     assert not list(tmp_path.glob("out.hdf*"))
