@@ -163,24 +163,6 @@ def test_on_a_slope_the_force_along_the_normal_is_the_commanded_one_over_the_cos
             assert bool(int(values["maps/flags"]) & Flag.OBLIQUE) == flagged
 
 
-@pytest.mark.parametrize(("shape", "overrides"), [
-    (OVAL, ("candidates.roll_deg=30",)), (BALL, ("candidates.roll_deg=70",)), (BOX, ()), (OVAL, ()),
-])  # fmt: skip
-def test_both_fingers_are_alike_on_a_symmetric_object(monkeypatch, shape, overrides):
-    monkeypatch.setattr(pressing, "turn_of_pose", lambda *_: None)  # solve them one after the other
-    solved.cache_clear()
-    for values in cases(shape, *overrides):
-        for name, both in values.items():
-            # frames are mirrored, and the directions in which the acoustic tensor is sampled are not
-            if name.startswith(("fingers/", "checks/")) and not any(
-                w in name for w in ("frame", "pose", "ellipticity")
-            ):
-                one, two = np.asarray(both, float)
-                assert two == pytest.approx(one, rel=1e-8, abs=1e-9), name
-        assert values["maps/misalignment"] == pytest.approx(0.0, abs=1e-7)
-    solved.cache_clear()
-
-
 @pytest.mark.parametrize("shape", [OVAL, CONE])
 def test_a_finger_that_is_an_image_has_what_its_own_solution_gives(monkeypatch, shape):
     place = dict(stations="[75]" if shape == CONE else "[0]", angles="[20]")
