@@ -11,15 +11,10 @@ import numpy as np
 import pytest
 import trimesh
 
-<<<<<<< HEAD
-from softjaw.study.result.layout import DONE, MISSING
-from softjaw.study.result.skeleton import rewrite
-=======
 from softjaw.study.doctor import launch_environment
 from softjaw.study.quantities import DONE, MISSING, WIDE
 from softjaw.study.result.layout import layout_from_options
-from softjaw.study.result.skeleton import grow
->>>>>>> 6216a2b (Tests of the study stand with the thing they are about)
+from softjaw.study.result.skeleton import rewrite
 from softjaw.study.result.store import open_result, torn_rows
 from softjaw.study.run.pattern import FINEST_STEP_SHARE, SAME_POSE_STEPS, apart, gained, next_poses, with_places
 from softjaw.study.run.plan import make_plan, measured_seconds
@@ -335,7 +330,7 @@ def test_a_grown_file_of_poses_keeps_rows_labels_and_places(tmp_path):
     filled(path, small)
     with open_result(path) as before:
         quality = before.read("quality/ccm")
-    grow(path, big.layout, big.header)
+    rewrite(path, big.layout, big.header)
     with open_result(path) as after:
         assert after.layout.added == tuple(rounds)
         assert after.read("quality/ccm")[:2].tobytes() == quality.tobytes()
