@@ -33,7 +33,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from softjaw.scoring.bodies import Body, ellipsoid_inside, is_ellipsoid, joined
 from softjaw.scoring.contact import SoftContact
-from softjaw.scoring.gauge import LORENTZ, cone_programme, contact_support, gauge
+from softjaw.scoring.gauge import LORENTZ, Bounds, cone_programme, contact_support, gauge
 from softjaw.scoring.reach import reach
 
 FloatArray = NDArray[np.float64]
@@ -43,14 +43,6 @@ NO_WRENCH = 1e-9  # relative to the largest wrench of a contact: what counts as 
 _ROUNDS = 12  # of following a ray to its facet
 
 
-class EpsilonBound(NamedTuple):
-    """Epsilon lies between ``lower`` and ``upper``; ``wrench (6,)`` is the unit wrench that gives the upper bound."""
-
-    lower: float
-    upper: float
-    wrench: FloatArray
-
-
 def epsilon(
     contacts: Sequence[SoftContact],
     object_length: ArrayLike,
@@ -58,7 +50,7 @@ def epsilon(
     centre_of_mass: ArrayLike = (0.0, 0.0, 0.0),
     kind: str = "linf",
     tolerance: float = 1e-4,
-) -> EpsilonBound:
+) -> Bounds:
     """Radius of the largest ball around 0 in the grasp wrench space, for normal forces of at most one [-].
 
     Parameters
@@ -105,7 +97,7 @@ def epsilon(
     # ellipsoids inside the bodies give lower bounds only
     if not exact:
         upper, u = _weakest_of_bodies(C, bodies, u, kind)
-    return EpsilonBound(min(lower, upper), upper, u)
+    return Bounds(min(lower, upper), upper, u)
 
 
 def separating_wrench(c: FloatArray, D: FloatArray) -> FloatArray | None:

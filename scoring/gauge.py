@@ -16,7 +16,7 @@ gives the formulas. Every cone is ``y_0 >= |(y_1, y_2, y_3)|``; with ``y_0`` alo
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,12 +26,12 @@ from softjaw.scoring.bodies import joined
 FloatArray = NDArray[np.float64]
 
 
-class Gauge(NamedTuple):
-    """Bounds on the reach along each wrench, and the directions that give the upper ones."""
+class Bounds(NamedTuple):
+    """Bounds of numbers that are found by search, and the unit wrenches or directions that give the upper ones."""
 
-    lower: FloatArray  # (m,)
-    upper: FloatArray  # (m,)
-    u: FloatArray  # (m, r), u . w = 1
+    lower: Any  # number or (m,)
+    upper: Any
+    u: FloatArray  # (6,) or (m, r)
 
 
 def contact_support(c: FloatArray, D: FloatArray, u: FloatArray) -> FloatArray:
@@ -39,7 +39,7 @@ def contact_support(c: FloatArray, D: FloatArray, u: FloatArray) -> FloatArray:
     return u @ c.T + np.linalg.norm(np.einsum("iad,md->mia", D, u), axis=2)
 
 
-def gauge(c: FloatArray, D: FloatArray, w: FloatArray, kind: str = "linf", tolerance: float = 1e-10) -> Gauge:
+def gauge(c: FloatArray, D: FloatArray, w: FloatArray, kind: str = "linf", tolerance: float = 1e-10) -> Bounds:
     """Largest ``s`` with ``s w`` in the grasp wrench space, between two bounds.
 
     Parameters
@@ -58,7 +58,7 @@ def gauge(c: FloatArray, D: FloatArray, w: FloatArray, kind: str = "linf", toler
     # stationarity reads w ~ sum z_0 c - D' z_1: the multipliers are the loads, friction with the other sign
     lower = _reach(c, D, w, z * [1, -1, -1, -1], kind)
     # rounding may put the lower bound above the upper one where both are the same
-    return Gauge(np.minimum(lower, upper), upper, u)
+    return Bounds(np.minimum(lower, upper), upper, u)
 
 
 def _facing(

@@ -15,6 +15,7 @@ from argparse import Namespace
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from subprocess import CompletedProcess
 
 from softjaw.study.messages import CANNOT_WRITE, DONE, USAGE
 
@@ -24,6 +25,7 @@ ROOT = Path(__file__).parents[2]  # where the package softjaw lies
 COMPILED = ("fem", "fem/objects", "fem/pad", "fem/shell", "friction", "lsfit", "scoring", "study/case")
 PASSING = "softjaw-numba-"  # how temporary folders of compiled loops begin
 LAUNCHED = ("OMPI_", "PMIX_", "PMI_", "PRTE_", "HYDRA_")  # variables by which a rank finds the mpirun above it
+NOT_IN_TIME = 124  # exit code, as of timeout(1)
 NEEDED_SPACE = 1e9  # bytes; the largest shipped study writes about 0.2 GB
 SYSTEM_PACKAGES = "python3-petsc4py python3-h5py python3-h5py-mpi python3-mpi4py openmpi-bin"
 INSTALL = f"run 'make setup', or: apt-get install --no-install-recommends {SYSTEM_PACKAGES}"
@@ -114,24 +116,15 @@ def mpirun(ranks: int) -> list[str]:
     return command if trial.returncode == 0 else f"mpirun -n {ranks} --oversubscribe".split()
 
 
-@dataclass(frozen=True)
-class Answer:
-    """What a program said: exit code (None: still running when its time was up), standard output and error."""
-
-    code: int | None
-    output: str
-    errors: str
-
-    @property
-    def trouble(self) -> str:
-        """Last thing it said, or how it ended, in one line."""
-        if self.code is None:
-            return "no answer in time"
-        said = [line.strip() for line in self.errors.splitlines() if line.strip()]
-        return said[-1] if said else f"ended with exit code {self.code}"
+def trouble(answer: CompletedProcess[str]) -> str:
+    """Last line of standard error of a program, or how the program ended; code 124: it was not done in time."""
+    if answer.returncode == NOT_IN_TIME:
+        return "no answer in time"
+    lines = [line.strip() for line in answer.stderr.splitlines() if line.strip()]
+    return lines[-1] if lines else f"ended with exit code {answer.returncode}"
 
 
-def ask(code: str, *, prefix: tuple[str, ...] = (), limit: float = 60.0) -> Answer:
+def ask(code: str, *, prefix: tuple[str, ...] = (), limit: float = 60.0) -> CompletedProcess[str]:
     """Run a piece of Python in a process of its own, behind ``prefix`` (mpirun), for at most ``limit`` seconds."""
     with subprocess.Popen(
         [*prefix, sys.executable, "-c", code],
@@ -150,8 +143,8 @@ def ask(code: str, *, prefix: tuple[str, ...] = (), limit: float = 60.0) -> Answ
                 process.communicate(timeout=10.0)
             except subprocess.TimeoutExpired:
                 process.kill()
-            return Answer(None, "", "")
-    return Answer(process.returncode, output.strip(), errors)
+            return CompletedProcess(process.args, NOT_IN_TIME, "", "")
+    return CompletedProcess(process.args, process.returncode, output.strip(), errors)
 
 
 # --- checks -----------------------------------------------------------------------------------------------------------
@@ -180,21 +173,21 @@ def check_packages() -> Finding:
     """The packages that pip brings import."""
     names = "numpy scipy skfem numba clarabel pydantic matplotlib"
     answer = ask(f"import {names.replace(' ', ', ')}; print('scipy', scipy.__version__, 'numba', numba.__version__)")
-    if answer.code != 0:
-        return Finding(answer.trouble, "run 'make setup', or: .venv/bin/pip install -e .")
-    return Finding(answer.output)
+    if answer.returncode != 0:
+        return Finding(trouble(answer), "run 'make setup', or: .venv/bin/pip install -e .")
+    return Finding(answer.stdout)
 
 
 def check_numpy() -> Finding:
     """The compiled system packages were built for the numpy that is imported."""
     answer = ask("import numpy; print(numpy.__version__); import h5py; from softjaw.fem.petsc import PETSc")
-    version = answer.output or "not importable"
-    if "dtype size changed" in answer.errors or "compiled using NumPy 1" in answer.errors:
+    version = answer.stdout or "not importable"
+    if "dtype size changed" in answer.stderr or "compiled using NumPy 1" in answer.stderr:
         older = "numpy>=1.26,<2" if version.startswith("2") else "numpy>=2"
         return Finding(f"{version} does not fit the system's h5py and petsc4py", f".venv/bin/pip install '{older}'")
-    if not answer.output:
-        return Finding(f"numpy: {answer.trouble}", ".venv/bin/pip install -e .")
-    return Finding(f"{version}, fits h5py and petsc4py" if answer.code == 0 else version)
+    if not answer.stdout:
+        return Finding(f"numpy: {trouble(answer)}", ".venv/bin/pip install -e .")
+    return Finding(f"{version}, fits h5py and petsc4py" if answer.returncode == 0 else version)
 
 
 SADDLE = """
@@ -219,13 +212,13 @@ print(".".join(map(str, PETSc.Sys.getVersion())), "with real scalars; MUMPS solv
 def check_petsc() -> Finding:
     """petsc4py is found, has real scalars, and MUMPS factorises a matrix with a zero on its diagonal."""
     answer = ask(SADDLE)
-    if answer.code == 0:
-        return Finding(answer.output)
-    if "complex scalars" in answer.errors:
-        return Finding(answer.trouble, "apt-get install python3-petsc4py-real and unset PETSC_DIR and PETSC_ARCH")
-    if "MUMPS" in answer.errors or "mumps" in answer.errors:
-        return Finding(answer.trouble, "use a PETSc that was configured with MUMPS; Debian's and conda-forge's are")
-    return Finding(answer.trouble, INSTALL)
+    if answer.returncode == 0:
+        return Finding(answer.stdout)
+    if "complex scalars" in answer.stderr:
+        return Finding(trouble(answer), "apt-get install python3-petsc4py-real and unset PETSC_DIR and PETSC_ARCH")
+    if "MUMPS" in answer.stderr or "mumps" in answer.stderr:
+        return Finding(trouble(answer), "use a PETSc that was configured with MUMPS; Debian's and conda-forge's are")
+    return Finding(trouble(answer), INSTALL)
 
 
 def check_blas() -> Finding:
@@ -244,9 +237,9 @@ def check_h5py() -> Finding:
         "import h5py, sys; c = h5py.get_config(); v = h5py.version;"
         "print(int(c.mpi), int(h5py.__file__.startswith(sys.prefix)), v.version, 'on HDF5', v.hdf5_version)"
     )
-    if answer.code != 0:
-        return Finding(answer.trouble, INSTALL)
-    parallel, bundled, version = answer.output.split(" ", 2)
+    if answer.returncode != 0:
+        return Finding(trouble(answer), INSTALL)
+    parallel, bundled, version = answer.stdout.split(" ", 2)
     if parallel == "1":
         return Finding(f"{version} with MPI")
     cure = ".venv/bin/pip uninstall h5py (that build hides the system's)" if bundled == "1" else INSTALL
@@ -268,11 +261,11 @@ def check_mpi() -> Finding:
             "if comm.rank == 0: print(total, MPI.Get_library_version().split(',')[0].split(chr(10))[0])"
         )
         answer = ask(code, prefix=tuple(mpirun(2)), limit=90.0)
-    if "every rank is alone" in answer.errors:
+    if "every rank is alone" in answer.stderr:
         return Finding("mpirun and mpi4py belong to different MPI libraries", "put mpi4py's own mpirun first in PATH")
-    if answer.code != 0:
-        return Finding(f"two ranks: {answer.trouble}", f"see whether 'mpirun -n 2 true' works; {INSTALL}")
-    total, library = answer.output.splitlines()[-1].split(" ", 1)
+    if answer.returncode != 0:
+        return Finding(f"two ranks: {trouble(answer)}", f"see whether 'mpirun -n 2 true' works; {INSTALL}")
+    total, library = answer.stdout.splitlines()[-1].split(" ", 1)
     if total != "3":
         return Finding("two ranks lost data in one file", f"set TMPDIR to a disk with MPI-IO, {folder} has none")
     return Finding(f"{library}, two ranks write one file")
@@ -300,9 +293,9 @@ print("pyvista", pyvista.__version__, "through", plotter.render_window.GetClassN
 def check_pictures() -> Finding:
     """A sphere is drawn without a screen; a missing OpenGL library ends the process that tries."""
     answer = ask(DRAWING)
-    if answer.code == 0:
-        return Finding(answer.output.splitlines()[-1])
-    return Finding(f"no 3-D pictures: {answer.trouble}", "apt-get install libosmesa6 (or libegl1 libegl-mesa0)")
+    if answer.returncode == 0:
+        return Finding(answer.stdout.splitlines()[-1])
+    return Finding(f"no 3-D pictures: {trouble(answer)}", "apt-get install libosmesa6 (or libegl1 libegl-mesa0)")
 
 
 def check_cache() -> Finding:

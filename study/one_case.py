@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from softjaw.fem.objects.gap import Pose
 from softjaw.friction.patch import ContactPatch
 from softjaw.friction.wrench import FrictionLimits
-from softjaw.lsfit.ellipsoid import Ellipsoid
 from softjaw.lsfit.surface import LimitSurface
 from softjaw.study import pipeline
 from softjaw.study.case.build import check_object
@@ -28,7 +27,7 @@ from softjaw.study.case.result import CaseFailure, CaseResult
 from softjaw.study.flags import Flag, flags_in
 from softjaw.study.messages import SOME_FAILED, StudyError
 from softjaw.study.quantities import BY_KEY, MAIN, MODELS, STATES, TABLE, checked_model
-from softjaw.study.result.surfaces import fitted_surface
+from softjaw.study.result.surfaces import finger_surface
 from softjaw.study.scene import Scene
 from softjaw.study.units import converted, shown_text
 
@@ -151,17 +150,7 @@ class Case:
 
     def limit_surface(self, finger: int, model: str = "ccm", fitted: bool = True) -> LimitSurface:
         """Limit surface of finger 1 or 2 in (f_x, f_y, tau_z) [N, N, N m]; see `GraspPoint.limit_surface`."""
-        if finger not in (1, 2):
-            raise ValueError(f"finger is {finger!r}: expected 1 or 2")
-        contact = self.result.contacts[finger - 1]
-        S = contact.limits[checked_model(model)].S
-        if not fitted:
-            return Ellipsoid(contact.ellipsoids[model].semi_axes * S)
-        names = ("limit_surface/coefficients", "limit_surface/matrix")
-        surface = fitted_surface(*(self.fingers(name, model)[finger - 1] for name in names))
-        if surface is None:
-            raise ValueError("the contact carries no load in some direction, so no body was fitted: take fitted=False")
-        return surface.scaled(contact.mu * S * np.array([1.0, 1.0, contact.rho]))
+        return finger_surface(self.fingers, finger, checked_model(model), fitted)
 
     def __str__(self) -> str:
         """Main quantities in a few lines, with their errors where they are known."""

@@ -45,7 +45,7 @@ def _measured(options: Namespace) -> start.Measured:
     try:
         axis = options.axis or start.longest(sides("z"))
         extents = tuple(sides(axis).values())
-        return start.Measured(axis, extents, tuple(s for s in start.heights(extents[2]) if not remark(axis, s)))
+        return axis, extents, tuple(s for s in start.heights(extents[2]) if not remark(axis, s))
     except (ValueError, OSError) as error:
         raise StudyError(USAGE, f"--mesh: {error}") from error
 

@@ -14,7 +14,6 @@ from softjaw.study.lookup.interpolation import Corners, FloatArray
 from softjaw.study.lookup.source import Source
 from softjaw.study.quantities import BOTH_ENDS, BY_KEY, DONE, FAILED, FORCE_RANGE, MAIN, MISSING
 from softjaw.study.quantities import STATES as OF_CASES
-from softjaw.study.result.surfaces import fitted_surface
 from softjaw.study.units import shown_text
 
 if TYPE_CHECKING:
@@ -164,23 +163,14 @@ class GraspPoint:
         ValueError
             No value here, several points, or no fitted surface in all of the cases around.
         """
-        from softjaw.lsfit.ellipsoid import Ellipsoid
+        # compiled loops, which a look-up does without until a surface is asked for
+        from softjaw.study.result.surfaces import finger_surface
 
-        if finger not in (1, 2):
-            raise ValueError(f"finger is {finger!r}: expected 1 or 2")
         if self.shape or self.reason:
             raise ValueError(
                 self.reason if not self.shape else "limit surfaces are made one at a time: ask for one point"
             )
-        if not fitted:
-            return Ellipsoid(self.semi_axes(model)[finger - 1])
-        S, rho = self.fingers("S")[finger - 1], self.fingers("limit_surface/rho")[finger - 1]
-        mu = self.fingers("f_x_max", "pcm")[finger - 1] / S
-        P, A = self.coefficients(model)[finger - 1], self.fingers("limit_surface/matrix", model)[finger - 1]
-        unit = mu * S * np.array([1.0, 1.0, rho])
-        if (surface := fitted_surface(P, A)) is None:
-            raise ValueError("the cases around have no fitted surface of one kind: take fitted=False")
-        return surface.scaled(unit)
+        return finger_surface(self.fingers, finger, model, fitted)
 
     def __str__(self) -> str:
         """Main quantities at one point, in a few lines."""

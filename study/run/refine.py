@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -36,13 +35,12 @@ def refined(scene: Scene, rounds: Rounds) -> Scene:
     if where.poses:
         return _with_poses(scene, rounds)
     stations = tuple(sorted({*given, *(s for added in rounds for s in added)}))
-    numbers = _Renumbered(given, stations, len(where.angles_deg))
     fixed: dict[str, Any] = {"stations": None, "stations_mm": stations, "refine": None}
     # What was left out as not among the best stays so in the file; the added stations are all solved.
     fixed["solve_best"] = "holding" if where.solve_best == "holding" else None
     parts: dict[str, Any] = {"candidates": where.model_copy(update=fixed)}
     if not isinstance(names := scene.limit_surface.wrench_samples, str):
-        samples = numbers(where.numbers(names))
+        samples = _renumbered(where.numbers(names), given, stations, len(where.angles_deg))
         parts["limit_surface"] = scene.limit_surface.model_copy(update={"wrench_samples": samples})
     return scene.model_copy(update=parts)
 
@@ -55,17 +53,12 @@ def _with_poses(scene: Scene, rounds: Rounds) -> Scene:
     return scene.model_copy(update={"candidates": where.model_copy(update=fixed)})
 
 
-@dataclass(frozen=True)
-class _Renumbered:
-    """Numbers of candidates among more stations, from those among the given ones."""
-
-    given: tuple[float, ...]
-    stations: tuple[float, ...]
-    angles: int
-
-    def __call__(self, numbers: Sequence[int]) -> tuple[int, ...]:
-        places = [(self.stations.index(self.given[n // self.angles]), n % self.angles) for n in numbers]
-        return tuple(s * self.angles + a for s, a in places)
+def _renumbered(
+    numbers: Sequence[int], given: Sequence[float], stations: Sequence[float], angles: int
+) -> tuple[int, ...]:
+    """Numbers of candidates among more ``stations``, from those among the ``given`` ones."""
+    places = [(stations.index(given[n // angles]), n % angles) for n in numbers]
+    return tuple(s * angles + a for s, a in places)
 
 
 def chances(stations: FloatArray, score: FloatArray, sound: NDArray[np.bool_], finest: float) -> FloatArray:

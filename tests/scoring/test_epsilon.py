@@ -87,8 +87,8 @@ def test_the_bounds_meet_and_no_wrench_is_weaker(kind, n, seed):
     bound = epsilon(contacts, 0.9, 0.8, com, kind)
     c, D = maps(contacts, 0.9, 0.8, com)
     assert 0 < bound.lower <= bound.upper <= bound.lower * (1 + 1e-4)
-    assert np.linalg.norm(bound.wrench) == pytest.approx(1, rel=1e-12)
-    assert joint_support(c, D, bound.wrench[None], kind)[0] == pytest.approx(bound.upper, rel=1e-12)
+    assert np.linalg.norm(bound.u) == pytest.approx(1, rel=1e-12)
+    assert joint_support(c, D, bound.u[None], kind)[0] == pytest.approx(bound.upper, rel=1e-12)
     assert least_found(c, D, kind, rng) >= bound.lower
 
 
@@ -110,7 +110,7 @@ def test_contacts_that_press_the_object_out_have_exactly_nothing():
         bound = epsilon(facing(A, A, 1.0, np.radians(degrees)), 1.0, 1.0)
         assert bound[:2] == (0, 0)
         c, D = maps(facing(A, A, 1.0, np.radians(degrees)), 1.0, 1.0)
-        assert joint_support(c, D, bound.wrench[None], "linf")[0] == 0
+        assert joint_support(c, D, bound.u[None], "linf")[0] == 0
 
 
 def test_contacts_that_cannot_resist_some_wrench_have_exactly_nothing():

@@ -12,15 +12,16 @@ import pytest
 from softjaw.study import doctor
 from softjaw.study.doctor import (
     COMPILED,
-    Answer,
+    NOT_IN_TIME,
     ask,
     launch_environment,
     outside_mpi,
+    trouble,
 )
 
 
 def answering(code, output="", errors=""):
-    return lambda *_, **__: Answer(code, output, errors)
+    return lambda *_, **__: subprocess.CompletedProcess([], code, output, errors)
 
 
 @pytest.mark.ranks
@@ -44,7 +45,7 @@ def test_all_is_well_on_a_machine_that_was_set_up(capsys):
         ("h5py", (0, "0 1 3.14.0 on HDF5 1.14.6", ""), "3.14.0 on HDF5 1.14.6 without MPI", "pip uninstall h5py"),
         ("h5py", (0, "0 0 3.7.0 on HDF5 1.10.8", ""), "without MPI", "python3-h5py python3-h5py-mpi"),
         ("mpi", (1, "", "every rank is alone"), "different MPI libraries", "mpirun first in PATH"),
-        ("mpi", (None, "", ""), "no answer in time", "mpirun -n 2 true"),
+        ("mpi", (NOT_IN_TIME, "", ""), "no answer in time", "mpirun -n 2 true"),
         ("mpi", (0, "1 Open MPI v4.1.4", ""), "lost data", "MPI-IO"),
         ("pictures", (-6, "", "bad X server connection"), "no 3-D pictures: bad X server", "libosmesa6"),
     ],
@@ -89,15 +90,15 @@ def test_a_check_that_fails_itself_does_not_hide_the_others(monkeypatch, capsys)
 
 
 def test_a_crash_and_a_hang_are_answers():
-    assert ask("import os; os.abort()").trouble == "ended with exit code -6"
-    assert ask("import time; time.sleep(60)", limit=0.5).trouble == "no answer in time"
+    assert trouble(ask("import os; os.abort()")) == "ended with exit code -6"
+    assert trouble(ask("import time; time.sleep(60)", limit=0.5)) == "no answer in time"
 
 
 @pytest.mark.ranks
 def test_two_ranks_see_each_other_whatever_started_this_process():
     told = "from mpi4py import MPI; sizes = MPI.COMM_WORLD.gather(MPI.COMM_WORLD.size); sizes and print(sizes)"
     answer = ask(told, prefix=tuple(doctor.mpirun(2)))
-    assert answer.output.strip() == "[2, 2]", answer.errors
+    assert answer.stdout.strip() == "[2, 2]", answer.stderr
 
 
 def test_the_variables_of_a_surrounding_mpirun_are_left_out(monkeypatch):
@@ -121,7 +122,7 @@ def test_threads_are_pinned_unless_the_user_chose(monkeypatch):
 
 def test_the_doctor_loads_no_mpi_itself():
     foreign = {"mpi4py", "petsc4py", "h5py", "pyvista", "numpy"}
-    assert ask(f"import sys, softjaw.study.doctor; print({foreign} & set(sys.modules))").output == "set()"
+    assert ask(f"import sys, softjaw.study.doctor; print({foreign} & set(sys.modules))").stdout == "set()"
 
 
 # --- compiled loops ---------------------------------------------------------------------------------------------------

@@ -9,8 +9,7 @@ import re
 import shlex
 import sys
 from argparse import Namespace
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from softjaw.study.messages import CANNOT_WRITE, USAGE, StudyError, write_file
@@ -19,16 +18,8 @@ HERE = Path(__file__).parent
 PAD_LENGTH, PAD_WIDTH, OPENING = 50.0, 22.0, 85.0  # mm, as in the template of a mesh
 
 
-@dataclass(frozen=True)
-class Measured:
-    """What a scene should say about a mesh.
-
-    ``axis`` of the file is the object's, along which ``extents`` [mm] are the last; at ``stations`` [mm] a pad fits on.
-    """
-
-    axis: str
-    extents: tuple[float, ...]
-    stations: tuple[float, ...]
+# The file's axis that is the object's; extents [mm], the last one along it; stations [mm] at which a pad fits on.
+Measured = tuple[str, tuple[float, ...], tuple[float, ...]]
 
 
 def longest(sides: Mapping[str, float]) -> str:
@@ -118,17 +109,17 @@ def _about_mesh(options: Namespace, scene: Path, measure: Callable) -> dict[str,
         lacks = " and ".join(name for name, given in needs.items() if not given)
         text = f"a mesh needs {lacks}; units are never guessed, as in 'softjaw init mesh --mesh my.stl --unit mm'"
         raise StudyError(USAGE, text)
-    measured = measure(options)
+    axis, extents, stations = measure(options)
     file = os.path.relpath(Path(options.mesh).absolute(), scene.absolute().parent)
-    longest_side, next_side, _ = sorted(measured.extents, reverse=True)
+    longest_side, next_side, _ = sorted(extents, reverse=True)
     return {
         "MESH": json.dumps(file, ensure_ascii=False),
         "UNIT": options.unit,
-        "AXIS": measured.axis,
-        "SIZE": " x ".join(f"{side:.4g}" for side in measured.extents),
+        "AXIS": axis,
+        "SIZE": " x ".join(f"{side:.4g}" for side in extents),
         "LONG": _larger(PAD_LENGTH, longest_side, "longer"),
         "WIDE": _larger(PAD_WIDTH, next_side, "wider"),
-        "STATIONS": _stations(measured),
+        "STATIONS": _stations(extents, stations),
     }
 
 
@@ -137,18 +128,18 @@ def _larger(pad: float, side: float, word: str) -> str:
     return f"# {word} than the object, {side:.3g} mm: the rest of it stays free" if pad > side else ""
 
 
-def _stations(measured: Measured) -> str:
+def _stations(extents: Sequence[float], stations: Sequence[float]) -> str:
     """Lines that propose stations, or say why there are none that `check` would not warn of."""
-    wide, deep, height = measured.extents
+    wide, deep, height = extents
     angles = [angle for angle, width in ((0, wide), (90, deep)) if width <= OPENING]
     if height < PAD_LENGTH:
         return f"# Stations along its axis: none, because the pad is longer than the object there, {height:.3g} mm."
-    if not angles or not measured.stations:
+    if not angles or not stations:
         why = f"it is wider than {OPENING:g} mm" if not angles else "the line through its middle bends too much"
         return f"# Stations along its axis: none that would do everywhere, because {why}."
     return (
         "# Or, for an object with an axis, stations: heights above its lowest point, at which the pad stays on it.\n"
-        f"# stations_mm = {json.dumps(measured.stations)}\n"
+        f"# stations_mm = {json.dumps(stations)}\n"
         f"# angles_deg = {json.dumps(angles)}        # about the centre line of the object's sections; those where it"
         f" is at most {OPENING:g} mm wide"
     )
