@@ -96,6 +96,15 @@ def test_faces_without_load_count_only_on_request():
     np.testing.assert_allclose(one.axes, two.axes, atol=1e-12)
 
 
+@pytest.mark.parametrize("at", [(-0.6, -0.6), (0.3, 0.2), (-0.3, 0.1), (0.6, -0.4)])
+def test_a_line_meets_a_skew_face_where_it_crosses_it(at):
+    """Sides of no two directions alike: Newton's method takes several steps, of either sign."""
+    face = ContactFace.of(mesh_patch([[[-1, -1, 0], [1, -0.6, 0.2], [0.5, 1, 0.1], [-0.7, 0.4, 0]]]))
+    point, _, missed = face.foot(np.array([*at, 1.0]), np.array([0, 0, 1.0]))
+    assert not missed
+    np.testing.assert_allclose(point[:2], at, atol=1e-12)
+
+
 def test_a_line_beside_the_face_meets_the_nearest_point_of_its_rim():
     face = ContactFace.of(mesh_patch(grid_mesh(4, 3, 1, 0.5, lambda x, y: -(x**2))))
     point, normal, missed = face.foot(np.array([1.5, 0.1, 3.0]), np.array([0, 0, 1.0]))
