@@ -151,7 +151,7 @@ def test_what_has_no_frame_never_gets_one(seed):
     with pytest.raises(NoContactError):
         contact_frame(turned, R @ X)
     plate, R, _ = shaken(mesh_patch(grid_mesh(3, 2, 1, 1)), seed)
-    with pytest.raises(ValueError, match="parallel to the contact normal"):
+    with pytest.raises(ValueError, match="parallel"):
         contact_frame(plate, R @ [0, 0, 1])
 
 

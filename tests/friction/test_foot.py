@@ -152,14 +152,14 @@ def test_the_frame_on_the_whole_face_turns_with_the_patch(seed):
 
 
 def test_a_whole_face_needs_quadrilaterals_of_one_sense():
-    with pytest.raises(ValueError, match="found none around each face, expected 4"):
+    with pytest.raises(ValueError, match="expected 4"):
         contact_frame(cylinder_grid(1, 1, 2, 5, 5), X, whole_face=True)
-    with pytest.raises(ValueError, match="found 3 around each face, expected 4"):
+    with pytest.raises(ValueError, match="expected 4"):
         contact_frame(mesh_patch(cyl_mesh(1, 1, 2, 4, 4, tri=True)), X, whole_face=True)
     patch = mesh_patch(grid_mesh(2, 1, 1, 1))
     corners = patch.corners.copy()
     corners[0] = corners[0, ::-1]
-    with pytest.raises(ValueError, match="wound both ways"):
+    with pytest.raises(ValueError, match="wound"):
         contact_frame(replace(patch, corners=corners), X, whole_face=True)
 
 

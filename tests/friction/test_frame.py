@@ -96,7 +96,7 @@ def test_contact_length_is_the_longer_side_of_the_rectangle():
 
 def test_what_has_no_frame_is_an_error():
     patch = points_patch([[0, 0], [1, 0]], [1, 1], [[0, 0, 1], [0, 0, -1]])
-    with pytest.raises(NoContactError, match="normals of the patch cancel"):
+    with pytest.raises(NoContactError):
         contact_frame(patch, X)
-    with pytest.raises(ValueError, match="parallel to the contact normal"):
+    with pytest.raises(ValueError, match="parallel"):
         contact_frame(points_patch([[0, 0]], [1]), [0, 0, 1])

@@ -148,7 +148,7 @@ def test_pure_torque_of_a_symmetric_patch_is_its_torque(patch):
 
 
 def test_what_has_no_pure_torque_is_an_error():
-    with pytest.raises(NoContactError, match="parallel to the contact normal"):
+    with pytest.raises(NoContactError):
         pure_torque(points_patch([[0.3, 0.1]], [1.0], [[0, 1, 0]]), 0.5)
     with pytest.raises(ValueError, match=r"mu is -0\.5"):
         pure_torque(lcg_patch(1, 10), -0.5)

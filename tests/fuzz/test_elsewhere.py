@@ -86,10 +86,9 @@ def test_a_pipe_is_no_mesh_table_or_result(tmp_path, told):
     """It would be waited for without end."""
     for name in ("a.stl", "a.csv", "a.hdf"):
         os.mkfifo(tmp_path / name)
-    with pytest.raises(MeshError, match="not a regular file"):
+    with pytest.raises(MeshError, match=r"a\.stl"):
         read_triangles(tmp_path / "a.stl")
-    assert "regular file" in told("patch", tmp_path / "a.csv")[1]
-    assert "not a regular file" in told("status", tmp_path / "a.hdf")[1]
+    assert told("patch", tmp_path / "a.csv")[0] == told("status", tmp_path / "a.hdf")[0] == OTHER_FILE
 
 
 @pytest.mark.long
@@ -108,7 +107,7 @@ def test_a_mesh_elsewhere_is_read_and_its_place_is_shown_and_kept(tmp_path, told
 
 @pytest.mark.parametrize("name", ["\\u001b[2J", "\\u009b2J", "a\\nb", "\\u202e", "\\u2028"])
 def test_names_hold_no_orders_for_a_terminal(name):
-    with pytest.raises(SceneError, match="without control characters"):
+    with pytest.raises(SceneError, match="name"):
         parse_scene(BALL.replace("[object]", f'[object]\nname = "{name}"'))
 
 

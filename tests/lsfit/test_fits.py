@@ -270,7 +270,7 @@ def test_samples_that_cannot_be_fitted_are_refused(W, T, message):
 def test_a_programme_that_is_not_solved_is_an_error():
     """``x >= 1`` and the slope to minus infinity: there is no least value."""
     _, triangle = quadratic_parts(2)
-    with pytest.raises(FitError, match="Clarabel stopped with"):
+    with pytest.raises(FitError):
         least_in_cone(np.zeros((3, 3)), np.ones(3), triangle, 1.0)
 
 

@@ -198,7 +198,7 @@ def test_epsilon_of_any_body():
 
 
 def test_bad_arguments_are_named():
-    with pytest.raises(ValueError, match="kind is 'l2'"):
+    with pytest.raises(ValueError, match="kind"):
         epsilon(facing(A, B), 1.0, 1.0, kind="l2")
-    with pytest.raises(ValueError, match="contacts is empty"):
+    with pytest.raises(ValueError, match="contacts"):
         epsilon([], 1.0, 1.0)

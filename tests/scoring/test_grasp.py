@@ -81,13 +81,13 @@ def test_bad_arguments_are_named():
     for contacts in ([one], [one, two, one]):
         with pytest.raises(ValueError, match="contacts"):
             grasp_score(contacts, *LENGTHS)
-    with pytest.raises(ValueError, match="object_length is 0"):
+    with pytest.raises(ValueError, match="object_length"):
         grasp_score([one, two], 0.0, 0.05)
-    with pytest.raises(ValueError, match="perpendicular unit vectors"):
+    with pytest.raises(ValueError, match="unit vectors"):
         SoftContact([0, 0, 0], 2 * np.eye(3), one.body)
-    with pytest.raises(ValueError, match="position is"):
+    with pytest.raises(ValueError, match="position"):
         SoftContact([0, 0, math.nan], np.eye(3), one.body)
-    with pytest.raises(ValueError, match="is parallel to N"):
+    with pytest.raises(ValueError, match="N"):
         contact_axes([0, 0, 1], [0, 0, 2])
 
 

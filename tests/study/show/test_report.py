@@ -263,7 +263,7 @@ def test_a_chosen_candidate_stands_beside_the_best_one(tmp_path):
         assert verdict.chosen(failed).endswith("failed: it slipped away")
         assert compared(failed)[0] != (3, 2, 1)
         assert verdict.chosen(judge(dataset(result))) == ""
-        with pytest.raises(StudyError, match="--candidate: found 12, expected 0 to 11"):
+        with pytest.raises(StudyError, match="--candidate"):
             build(dataset(result), 12)
 
 
@@ -344,7 +344,7 @@ def test_files_that_must_not_be_overwritten_or_cannot_be_written(tmp_path):
         with pytest.raises(StudyError, match="html") as error:
             write_report(path, out)
         assert error.value.code == CANNOT_WRITE
-    with pytest.raises(StudyError, match="cannot be written") as error:
+    with pytest.raises(StudyError, match=r"r\.html") as error:
         write_report(path, tmp_path / "nowhere" / "r.html")
     assert error.value.code == CANNOT_WRITE
     with pytest.raises(StudyError) as error:
