@@ -39,9 +39,9 @@ def box(texts: Iterable[str], look: str) -> Block:
     return {"kind": "box", "texts": list(texts), "look": look}
 
 
-def answer(pairs: Iterable[tuple[str, str]]) -> Block:
-    """Few large values with their names."""
-    return {"kind": "answer", "pairs": list(pairs)}
+def answer(lines: Iterable[tuple[str, str, str]]) -> Block:
+    """Few large values with their names, and a text below each."""
+    return {"kind": "answer", "lines": list(lines)}
 
 
 def bullets(texts: Iterable[str]) -> Block:

@@ -82,20 +82,6 @@ class Table:
         """The first rows (0: all of them)."""
         return replace(self, rows=self.rows[: count or None])
 
-    def merged(self, *names: str) -> Table:
-        """One row for neighbours that look alike in all columns but these, whose values it lists."""
-        others = [c for c in self.columns if c.people and c.name not in names]
-        groups: list[tuple[list[str], list[Row]]] = []
-        for row in self.rows:
-            look = [self.cell(row, c) for c in others]
-            if groups and groups[-1][0] == look:
-                groups[-1][1].append(row)
-            else:
-                groups.append((look, [row]))
-        listed = [c for c in self.columns if c.name in names]
-        rows = [rows[0] | {c.name: _several([self.cell(row, c) for row in rows]) for c in listed} for _, rows in groups]
-        return replace(self, rows=rows)
-
     def cell(self, row: Row, column: Column) -> str:
         """A value as people read it, with its error where that is known."""
         value = row.get(column.name)
@@ -185,22 +171,13 @@ def hanging(text: str, width: int) -> str:
     return "\n".join(wrapped(line, width, more=" " * (14 if line.startswith("  ") else 2)) for line in lines)
 
 
-def _several(texts: list[str]) -> str:
-    """Some values in one cell.
-
-    >>> _several(["0", "90"]), _several(["0", "60", "120"])
-    ('0,90', '0..120')
-    """
-    return ",".join(texts) if len(texts) < 3 else f"{texts[0]}..{texts[-1]}"
-
-
 # --- renderings ------------------------------------------------------------------------------------------------------
 
 
 def as_text(table: Table, width: int = PAPER, rest: str = "--json") -> str:
     """For a terminal: aligned columns with their units, notes below; lengths in mm, angles in degrees.
 
-    Columns that do not fit into ``width`` characters are hidden, and named below; ``rest`` says where all of them are.
+    Columns that do not fit into ``width`` characters are left out; ``rest`` says where all notes are.
     """
     title = [wrapped(table.title, width)] * bool(table.title)
     columns = _fitting(table, width)
@@ -209,8 +186,6 @@ def as_text(table: Table, width: int = PAPER, rest: str = "--json") -> str:
     lines = aligned(heads, cells, [i for i, c in enumerate(columns) if c.wrap]) if table.rows else []
     notes, more = list(table.notes[:MOST_NOTES]), len(table.notes) - MOST_NOTES
     notes += [f"and {more} more note{'s' * (more > 1)}: {rest} lists all"] * (more > 0)
-    if table.rows and (hidden := [c.name for c in table.columns if c.people and c not in columns]):
-        notes.append(f"columns hidden to fit {width} characters: {', '.join(hidden)} (use --csv or --json for all)")
     return "\n".join([*title, *lines, *(wrapped(note, width, more="  ") for note in notes)])
 
 

@@ -9,19 +9,24 @@ import numpy as np
 import xarray as xr
 
 from softjaw.friction.patch import NEGLIGIBLE
+from softjaw.scoring.payload import GRAVITY
 from softjaw.study.case.result import TIE
-from softjaw.study.flags import LOST, OF_FILE, flags_in
+from softjaw.study.flags import LOST, OF_FILE, Flag, flags_in
 from softjaw.study.quantities import BY_KEY, FORCE_RANGE, MAIN, STATES, map_row
 from softjaw.study.ranking import Sure, at_level, judged, passed_over, rank_values, ranked, score_of, sure, task_keys
 from softjaw.study.result.layout import DONE, MISSING
 from softjaw.study.result.read import axes_of, dataset, values_of
-from softjaw.study.show.grasps import Index, at, forces, note, place, unravelled
+from softjaw.study.show.grasps import Index, at, candidate_of, forces, note, place, unravelled
+from softjaw.study.show.places import distinct, folded_text, named, short_name, spot
 from softjaw.study.show.status import RESUME, aim, counts, largest_error, no_grasps, reasons, time_split
 from softjaw.study.table import Column, Row, Table, as_text, number, terminal_width, with_error, wrapped
 from softjaw.study.units import in_si, shown, shown_text, shown_unit
 
-NOTES_WIDTH, LABEL_WIDTH = 11, 20  # characters
-MEANING = {"error": "error estimate from two meshes", "interval": "95 % uncertainty interval"}  # of ±
+NOTES_WIDTH, OTHERS_WIDTH, LABEL_WIDTH = 11, 16, 20  # characters
+MU_ERROR = 0.1  # of mu, by which it is off where nothing is known of it
+LEVER, LEVER_SHARE = 1e-3, 0.1  # [m] and loss of payload, below which the lever of the weight is not worth a word
+BRIEF = ("payload", "quality", "e_n", "opening")  # maps of a table in a terminal
+FINER = Flag.COARSE | Flag.NO_FIT | Flag.NO_CORNERS | Flag.NODAL | Flag.LEFT_OUT  # what a finer mesh or effect cures
 
 
 def best(
@@ -49,25 +54,31 @@ def best(
     flags, shape = judged(ds), ds.status.shape[:-1]
     ds = ds.assign(flags=(ds.status.dims, flags, ds["flags"].attrs))
     order, score = [int(i) for i in ranked(ds, k, by)], score_of(ds, by)
-    listed = order[: top * (ds.sizes["angle"] if lines else 1) or None]
+    places = distinct(ds, order, rank_values(ds, score, k), k, top) if lines else []
+    listed = [place.best for place in places] or order[: top or None]
     table = case_table(ds, [(*unravelled(i, shape), k) for i in listed], True, maps)
-    table = table.merged("rank", "angle").first(top) if lines else table
-    what = f"best {len(table.rows) if not lines else min(len(listed), _count(table))} of {len(order)} solved"
-    meaning = f" (±: {text})" if (text := meaning_of_errors(table)) else ""
-    title = f"{what} candidates by {score} at {forces(ds)[k]:g} N{why}{meaning}"
     if not order:
         return Table(f"no candidate is solved at {forces(ds)[k]:g} N{why}{_solved_elsewhere(ds)}", table.columns, ())
+    rows = [row | {"others": folded_text(ds, place)} for row, place in zip(table.rows, places, strict=False)]
+    columns = [*table.columns[:-1], Column("others", programs=False, wrap=OTHERS_WIDTH), table.columns[-1]]
+    what = "places" if lines else "candidates"
+    title = f"best {len(listed)} {what} of {len(order)} solved candidates by {score} at {forces(ds)[k]:g} N"
     first = (*unravelled(order[0], shape), k)
-    notes = [*certainties(ds, order, score, k), *_legend(flags, listed, k), *[error] * bool(error)]
-    facts = {"answer": answer(ds, first), "force": float(forces(ds)[k]), "ranked_by": score, "largest_error": error}
-    return Table(title, table.columns, table.rows, notes, facts, "grasps")
+    accuracy = "; ".join(text for text in (certainty(ds, order, score, k), error) if text)
+    unsolved = [f"not solved: {', '.join(none)}; 'softjaw status' says why"] if (
+        none := no_grasps(ds.status.values[..., k])) else []
+    notes = [*[f"accuracy: {accuracy}"] * bool(accuracy), *_legend(flags, listed, k), *unsolved]
+    facts = {"answer": {key: spoken_line(*value) for key, value in answer(ds, first, why).items()},
+              "pads": pads(ds, first), "force": float(forces(ds)[k]),
+             "ranked_by": score, "largest_error": error}  # fmt: skip
+    return Table(title, columns if lines else table.columns, rows or table.rows, notes, facts, "grasps")
 
 
 def best_text(ds: xr.Dataset, width: int, force: float | None = None, top: int = 10, by: str | None = None) -> str:
     """The answer and the best grasps for a terminal; the choice is that of `best`."""
-    table = best(ds, force, top, by, lines=True)
-    told = [wrapped(table.facts["answer"], width, more="  "), ""] if table.rows else []
-    return "\n".join([*told, as_text(table, width)])
+    table = best(ds, force, top, by, lines=True, maps=BRIEF)
+    told = [wrapped(f"{name:<9}{text}", width, more=" " * 9) for name, text in table.facts.get("answer", {}).items()]
+    return "\n".join([*told, *[""] * bool(told), as_text(table, width)])
 
 
 def summary(result: Any) -> str:
@@ -77,12 +88,6 @@ def summary(result: Any) -> str:
     again = f"; {RESUME}" if np.any(result.status == MISSING) else ""
     lines = [counts(result), *reasons(result, width), *time_split(result), *table]
     return "\n".join([*lines, f"results are in {result.path}{again}"])
-
-
-def _count(table: Table) -> int:
-    """Grasps that the rows of a merged table stand for."""
-    last = str(table.rows[-1]["rank"]) if table.rows else "0"
-    return int(last.replace("..", ",").rpartition(",")[2] or last)
 
 
 def case_table(ds: xr.Dataset, cases: Iterable[Index], rank: bool = False, maps: Collection[str] = MAIN) -> Table:
@@ -99,11 +104,11 @@ def case_table(ds: xr.Dataset, cases: Iterable[Index], rank: bool = False, maps:
         Which maps a table has; the first ones are the last that a narrow text leaves out.
     """
     axes, poses = axes_of(ds), ds.attrs["poses"]
-    columns = [Column("rank")] if rank else [Column("state", wrap=NOTES_WIDTH)]
+    columns = [Column("rank"), Column("name")] if rank else [Column("name"), Column("state", wrap=NOTES_WIDTH)]
     for axis in axes[: -1 if rank else None]:
-        title = "pose" if poses and axis.name == "station" else "force" if axis is axes[-1] else ""
-        columns.append(Column(axis.name, axis.units, title, digits=5, people=not (poses and axis.name == "angle")))
-    columns += [Column("label", wrap=LABEL_WIDTH)] * poses
+        title, pose = "force" if axis is axes[-1] else "", poses and axis.name in ("station", "angle")
+        columns.append(Column(axis.name, axis.units, title, digits=5, people=not pose))
+    columns += [Column("label", wrap=LABEL_WIDTH, people=named(ds))] if poses else []
     quantities = _map_columns(ds, maps)
     values = {c.name: values_of(ds, *_of_model(ds, c.name)) for c in quantities}
     bounds = [name for name in FORCE_RANGE if name in ds]
@@ -114,7 +119,8 @@ def case_table(ds: xr.Dataset, cases: Iterable[Index], rank: bool = False, maps:
     for place_, index in enumerate(cases, start=1):
         row: Row = {axis.name: float(axis.values[i]) for axis, i in zip(axes, index, strict=True)}
         row |= {axis.name: axis.options[i] for axis, i in zip(axes, index, strict=True) if axis.options}
-        row |= {"rank": place_, "state": STATES[int(ds.status.values[index])]}
+        row |= {"rank": place_, "name": short_name(ds, candidate_of(ds, index))}
+        row |= {"state": STATES[int(ds.status.values[index])]}
         row |= {"label": str(ds.label.values[index[-3:-1]]), "flags": int(ds["flags"].values[index]) & OF_FILE}
         row |= {name: float(found[index]) for name, found in values.items()}
         row |= {name: float(ds[name].values[index[:-1]]) for name in bounds}
@@ -128,9 +134,9 @@ def _map_columns(ds: xr.Dataset, maps: Collection[str]) -> list[Column]:
     for name in (name for name in maps if name in ds):
         q, least = map_row(name), list(maps).index(name)
         error = next((e for e in (f"{name}_interval", q.of_error.name) if e in ds), "")
-        columns.append(Column(name, q.unit, q.symbol, error, drop=least * (least > 2)))
+        columns.append(Column(name, q.unit, q.symbol, error, drop=least * (least > 1)))
         columns += [Column(error, ds[error].units, people=False)] if error else []
-        if name == "e_n":
+        if name == "e_n" and maps is not BRIEF:
             columns.append(Column(f"e_n_{ds.attrs['planar']}", q.unit, drop=len(maps)))
     extra = [name for name in ("misalignment", "pad_elements") if name in ds and maps is MAIN]
     return [*columns, *(Column(name, ds[name].units, drop=99) for name in extra)]
@@ -157,23 +163,14 @@ def safe_range(ds: xr.Dataset, index: Index) -> str:
 # --- notes -----------------------------------------------------------------------------------------------------------
 
 
-def certainties(ds: xr.Dataset, order: Sequence[int], score: str, k: int) -> list[str]:
-    """Whether the best grasp is better than the others beyond the errors, and which ones are none or cannot be used."""
+def certainty(ds: xr.Dataset, order: Sequence[int], score: str, k: int) -> str:
+    """Whether the best grasp is better than the others beyond the errors."""
     flags, shape = ds["flags"].values[..., k].ravel()[order], ds.status.shape[:-1]
     values = rank_values(ds, score, k)[order]
-    units = ds[score].attrs.get("units", "") if score in ds else ""
     holding = [i for i, flag, value in zip(order, flags, values, strict=True) if not flag & LOST and np.isfinite(value)]
     same = [tuple(np.delete(index, -1)) for index in np.ndindex(shape)]
-    notes = [verdict(sure(ds, score, k), holding, same, units).replace("+-", "±")]
-    better, why = passed_over(values, flags)
-    if better and score in ds:
-        top = shown_text(values[better[0]], units, 3)
-        count = "one grasp scores" if len(better) == 1 else f"{len(better)} grasps score"
-        where = place(ds, (*unravelled(order[better[0]], shape), k))
-        notes.append(f"{count} higher (up to {top}, {where}) but cannot be used and stand last: {why}")
-    if none := no_grasps(ds.status.values[..., k]):
-        notes.append(f"not solved: {', '.join(none)}; 'softjaw status' says why")
-    return [note for note in notes if note]
+    units = ds[score].attrs.get("units", "") if score in ds else ""
+    return verdict(sure(ds, score, k), holding, same, units).replace("+-", "±")
 
 
 def verdict(found: Sure | None, order: Sequence[int], place: Sequence[tuple[int, ...]], units: str = "") -> str:
@@ -221,19 +218,16 @@ def _text(found: Sure, i: int, units: str) -> str:
 
 
 def _legend(flags: np.ndarray, listed: Sequence[int], k: int) -> list[str]:
-    """What the flags in the table mean, and how many grasps have them."""
-    marks = flags[..., k].ravel()[list(listed)]
+    """The flags in the table by what to do about them, how many grasps have each, and what the most frequent means."""
+    marks, notes = flags[..., k].ravel()[list(listed)], []
     raised = flags_in(int(np.bitwise_or.reduce(marks, initial=0)))
-    count = {flag: int(np.count_nonzero(marks & flag)) for flag in raised}
-    words = [f"{flag.word} ({count[flag]} of {len(marks)}): {flag.sentence}"
-             for flag in sorted(raised, key=lambda flag: -count[flag])]  # fmt: skip
-    return ["; ".join(words)] * bool(words)
-
-
-def meaning_of_errors(table: Table) -> str:
-    """What the numbers behind ± are."""
-    kinds = {c.error.rpartition("_")[2] for c in table.columns if c.error}
-    return ", else ".join(text for kind, text in reversed(MEANING.items()) if kind in kinds)
+    count = {flag: int(np.count_nonzero(marks & flag)) for flag in sorted(raised)}
+    for remedy, some in (("solve finer", FINER), ("look at the grasp", ~FINER)):
+        known = sorted((flag for flag in raised if flag & some), key=lambda flag: -count[flag])
+        if known:
+            words = ", ".join(f"{flag.word} ({count[flag]} of {len(marks)})" for flag in known)
+            notes.append(f"{remedy}: {words}; {known[0].word}: {known[0].sentence}")
+    return notes
 
 
 def _solved_elsewhere(ds: xr.Dataset) -> str:
@@ -247,13 +241,25 @@ def _solved_elsewhere(ds: xr.Dataset) -> str:
 # --- the answer ------------------------------------------------------------------------------------------------------
 
 
-def answer(ds: xr.Dataset, index: Index) -> str:
-    """What to do with a grasp, the best one as a rule; ``index`` is its case at the force that is shown."""
-    where = place(ds, index) or "the only candidate"
-    parts = [f"grasp at {where}{_pads(ds, index)}"]
+def answer(ds: xr.Dataset, index: Index, why: str = "") -> dict[str, tuple[str, str]]:
+    """What to do with a grasp, and more about it: where, how wide, how hard, what it holds, why it holds no more.
+
+    ``index`` is its case at the force that is shown, ``why`` says why it is that force.
+    """
+    there = spot(ds, index)
+    name = short_name(ds, candidate_of(ds, index))
+    nameless = there.words and ds.attrs["poses"] and not named(ds)
+    lines = {"where": (name if nameless else place(ds, index) or name, there.words)}
     if np.isfinite(opening := at(ds, "opening", index)):
-        parts.append(f"open the gripper wider than {shown_text(opening, 'm', 3)}")
-    return f"{', '.join(parts)}, {_press(ds, index)}".replace("\N{NO-BREAK SPACE}", " ")
+        lines["opening"] = (shown_text(opening, "m", 3), "at first touch")
+    lines |= {"force": _force(ds, index, why), "holds": _held(ds, index)}
+    lines["not more"] = ("", _limit(ds, index, there.lever))
+    return {key: value for key, value in lines.items() if any(value)}
+
+
+def spoken_line(main: str, more: str) -> str:
+    """A line of an answer."""
+    return ", ".join(text for text in (main, more) if text).replace("\N{NO-BREAK SPACE}", " ")
 
 
 def value_text(ds: xr.Dataset, name: str, index: Index, digits: int = 4, unit: bool = False) -> str:
@@ -267,38 +273,75 @@ def value_text(ds: xr.Dataset, name: str, index: Index, digits: int = 4, unit: b
 
 
 def force_to_use(ds: xr.Dataset, index: Index) -> tuple[float, float]:
-    """Smallest force that holds the object at a candidate, and its error [N]; NaN where it is not known."""
-    names = ("force_low", "force_low_error")
-    low, error = (float(ds[n].values[index[:-1]]) if n in ds else float("nan") for n in names)
-    return low, error
+    """Smallest force that holds the object at a candidate, and its error by mesh, curve and mu [N]; NaN if not known.
+
+    Friction bears in proportion to mu, so a share by which mu is off moves the force by that share.
+    """
+    low = float(ds["force_low"].values[index[:-1]]) if "force_low" in ds else float("nan")
+    curve = float(ds["force_low_error"].values[index[:-1]]) if "force_low_error" in ds else 0.0
+    shares = [0.0 if np.isnan(share) else share * low for share in (at(ds, "payload_error", index), MU_ERROR)]
+    return low, float(np.linalg.norm([0.0 if np.isnan(curve) else curve, *shares]))
 
 
-def _press(ds: xr.Dataset, index: Index) -> str:
-    """How hard to press, and what is held then."""
-    force, held = f"{forces(ds)[index[-1]]:.3g} N", value_text(ds, "payload", index, 3, unit=True)
+def _force(ds: xr.Dataset, index: Index, why: str) -> tuple[str, str]:
+    """How hard to press: the least force that holds the mass, else what some forces hold and how to name a mass."""
     mass, safety = task_keys(ds, "object").get("mass_g"), task_keys(ds).get("safety", 1.0)
+    pressed = f"{forces(ds)[index[-1]]:.3g} N per finger"
+    if mass is None:
+        held = [f"{shown_text(float(values), 'kg', 3)} at {forces(ds)[k]:g} N" for k in _three(len(forces(ds)))
+                if k != index[-1] and np.isfinite(values := at(ds, "payload", (*index[:-1], k)))]  # fmt: skip
+        return pressed, "; ".join([*[why.strip(", ")] * bool(why), *held, "with object.mass_g: the least force"])
+    wanted, (low, error) = f"{safety:g} times its {shown_text(in_si('mass_g', mass), 'kg', 3)}", force_to_use(ds, index)
+    if not np.isfinite(low):
+        return pressed, f"no solved force holds {wanted}"
+    what = f"mesh, curve and {100 * MU_ERROR:g} % of mu"
+    return f"{with_error(low, error)} N per finger", f"the least that holds {wanted} (±: {what})"
+
+
+def _three(count: int) -> list[int]:
+    """Numbers of the smallest, a middle and the largest of some forces."""
+    return sorted({0, (count - 1) // 2, count - 1})
+
+
+def _held(ds: xr.Dataset, index: Index) -> tuple[str, str]:
+    """What is held at the force shown, and what its error covers."""
+    if not np.isfinite(at(ds, "payload", index)):
+        return "", ""
     aims = task_keys(ds).get("weight_direction", "worst") != "worst"
     every = "in the direction of its weight" if aims else "in whichever direction it pulls"
-    if not np.isfinite(at(ds, "payload", index)):
-        return f"press with {force} per finger"
-    if mass is None or "force_low" not in ds:
-        return f"press with {force} per finger: it then holds {held} {every}"
-    low, error = force_to_use(ds, index)
-    wanted = f"{safety:g} times the object's {shown_text(in_si('mass_g', mass), 'kg', 3)}"
-    if not np.isfinite(low):
-        return f"press with {force} per finger: it then holds {held} {every}, but no solved force holds {wanted}"
-    least = with_error(low, error) if np.isfinite(error) else number(low)
-    return f"press with {least} N per finger: it then holds {wanted} {every} ({held} at {force})"
+    every += f" at {forces(ds)[index[-1]]:g} N" * ("force_low" in ds)
+    known = "payload_interval" in ds, np.isfinite(at(ds, "payload_error", index))
+    covers = "error not known: accuracy.meshes = 2 gives it"
+    if any(known):
+        covers = "±: uncertain inputs" if known[0] else "±: mesh, not mu or stiffness"
+    return value_text(ds, "payload", index, 3, unit=True), f"{every} ({covers})"
 
 
-def _pads(ds: xr.Dataset, index: Index) -> str:
-    """Middle of both pads, the way finger 1 closes and their long side, in the frame of the object's own file."""
+def _limit(ds: xr.Dataset, index: Index, lever: float) -> str:
+    """Why a grasp holds no more: what lies beyond its force, the lever of the weight, better grasps that fail."""
+    k, high = index[-1], float(ds["force_high"].values[index[:-1]]) if "force_high" in ds else np.nan
+    parts = []
+    if high < forces(ds)[-1] * (1 - NEGLIGIBLE):
+        parts.append(f"the wall bears {high:.3g} N at most")
+    elif k == len(forces(ds)) - 1:
+        parts.append("no larger force was solved")
+    slide = 2 * min(at(ds, "f_x_max", index), at(ds, "f_y_max", index)) / GRAVITY
+    if lever > LEVER and at(ds, "payload", index) < slide * (1 - LEVER_SHARE):
+        free = f"{number(shown(slide, 'kg'))} g"
+        parts.append(f"the weight pulls {shown_text(lever, 'm', 2)} beside the pads, {free} without that lever")
+    done = np.flatnonzero(ds["status"].values[..., k].ravel() == DONE)
+    name = score_of(ds)
+    values = rank_values(ds, name, k)[done]
+    better, lacks = passed_over(values, judged(ds)[..., k].ravel()[done])
+    if better:
+        top = f"{short_name(ds, int(done[better[0]]))} with {shown_text(values[better[0]], ds[name].units, 3)}"
+        parts.append(f"{len(better)} with more {name} cannot be used ({top}): {lacks}")
+    return "; ".join(parts)
+
+
+def pads(ds: xr.Dataset, index: Index) -> dict[str, Any]:
+    """Middle of both pads [m], the way finger 1 closes and their long side, in the frame of the object's own file."""
     if "finger_pose_origin" not in ds:
-        return ""
-    middle, turn = ds.finger_pose_origin.values[index].mean(axis=0), ds.finger_pose_rotation.values[index][0]
-    if not np.isfinite([*middle, *turn.ravel()]).all():
-        return ""
-    # adding 0 turns -0 into 0
-    x = ", ".join(f"{v + 0.0:.4g}" for v in np.round(shown(middle, "m"), 2))
-    closing, long_side = (", ".join(f"{v + 0.0:.3g}" for v in np.round(turn[:, k], 3)) for k in (2, 0))
-    return f" (pads about [{x}] mm, closing along [{closing}], long side along [{long_side}])"
+        return {}
+    turn = ds.finger_pose_rotation.values[index][0]
+    return {"middle": ds.finger_pose_origin.values[index].mean(axis=0), "closing": turn[:, 2], "long_side": turn[:, 0]}

@@ -19,11 +19,13 @@ from rich.text import Text
 from softjaw.study.messages import DONE as ENDED
 from softjaw.study.messages import SOME_FAILED, STOPPED
 from softjaw.study.quantities import DONE, FAILED, MAIN, MISSING, STATES
+from softjaw.study.ranking import ranked
 from softjaw.study.result.lock import holder
 from softjaw.study.result.read import dataset
 from softjaw.study.result.store import open_result
 from softjaw.study.run.progress import Progress, duration
-from softjaw.study.show.best_grasps import best
+from softjaw.study.show.best_grasps import case_table
+from softjaw.study.show.grasps import unravelled
 from softjaw.study.show.status import no_grasps, place, reasons
 from softjaw.study.units import shown_text, shown_unit
 
@@ -153,10 +155,11 @@ def best_so_far(result: Any, codes: np.ndarray) -> str:
     if not solved.any():
         return "best so far: no case is complete yet"
     ds, level = dataset(result), np.flatnonzero(solved)[-1]
-    table = best(ds, float(result.axes[-1].values[level]), top=1)
+    index = (*unravelled(int(ranked(ds, int(level))[0]), ds.status.shape[:-1]), int(level))
+    table = case_table(ds, [index], rank=True)
     row, poses = table.rows[0], ds.attrs["poses"]
     where = [f'"{row["label"]}"'] * poses
     where += [f"{axis.name} {shown_text(row[axis.name], axis.units, 5)}" for axis in result.axes[: -3 if poses else -1]]
     first = (c for c in table.columns if c.name in MAIN[:2])
     cells = [f"{c.name} {table.cell(row, c)} {shown_unit(c.unit)}".rstrip() for c in first]
-    return f"best so far at {table.facts['force']:g} N: {', '.join(cells)}, at {', '.join(where)}"
+    return f"best so far at {result.axes[-1].values[level]:g} N: {', '.join(cells)}, at {', '.join(where)}"

@@ -43,12 +43,11 @@ def test_people_read_units_and_as_many_digits_as_the_errors_leave():
 
 
 @pytest.mark.parametrize(("width", "hidden"), [(80, []), (40, ["force"]), (32, ["opening", "force"])])
-def test_a_narrow_text_hides_the_least_important_columns_and_names_them(width, hidden):
+def test_a_narrow_text_leaves_out_the_least_important_columns(width, hidden):
     lines = as_text(TABLE, width).splitlines()
     assert max(map(len, lines)) <= max(width, 40)
     heads = lines[1].split()
     assert [name for name in ("opening", "force") if (name.replace("opening", "open")) not in heads] == hidden
-    assert all(name in " ".join(lines[-3:]).replace("force,", "force") for name in hidden)
 
 
 def test_the_page_has_the_cells_of_the_text():
@@ -79,17 +78,6 @@ def test_no_cell_of_a_csv_is_computed_by_a_spreadsheet():
     table = Table("", [Column("a"), Column("b")], [{"a": cell, "b": 1} for cell in cells])
     _, *found = csv.reader(io.StringIO(as_csv(table)))
     assert [row[0] for row in found] == ["'=1+1", "'+A1", "'-A1", "'@x", "'\tx", "-3.5", "+2e-3", "at 0 mm", ""]
-
-
-def test_neighbours_that_look_alike_share_a_row():
-    angles = [{"rank": k, "angle": k * np.pi / 6, "value": 1.0 + (k > 3)} for k in range(1, 7)]
-    table = Table("", [Column("rank"), Column("angle", "rad"), Column("value")], [*angles, angles[0]])
-    merged = table.merged("rank", "angle")
-    assert [[merged.cell(row, c) for c in table.columns] for row in merged.rows] == [
-        ["1..3", "30..90", "1"], ["4..6", "120..180", "2"], ["1", "30", "1"],
-    ]  # fmt: skip
-    assert [row["rank"] for row in table.first(2).rows] == [1, 2]
-    assert len(table.first(0).rows) == 7
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ import xarray as xr
 from softjaw.study.flags import BORNE, LOST
 from softjaw.study.quantities import DONE, FAILED, MISSING, MODEL_NAMES, NO_GRASP, STATES
 from softjaw.study.ranking import largest
-from softjaw.study.show.best_grasps import answer, best, certainties, force_to_use, safe_range, value_text
+from softjaw.study.show.best_grasps import answer, best, certainty, safe_range, spoken_line, value_text
 from softjaw.study.show.grasps import (
     Index,
     at,
@@ -32,8 +32,7 @@ from softjaw.study.show.grasps import (
     unit_of,
 )
 from softjaw.study.show.status import no_grasps
-from softjaw.study.table import as_text, number, with_error
-from softjaw.study.units import shown_text
+from softjaw.study.table import as_text, number
 
 CAVEAT = (
     "The paper publishes neither the pad dimensions of its gripper nor the numbers behind its figures. The dimensions "
@@ -69,27 +68,6 @@ def subtitle(ds: xr.Dataset) -> str:
     return f"{Path(ds.attrs['file']).name}: {' × '.join(parts)}"
 
 
-def key_values(ds: xr.Dataset) -> list[tuple[str, str]]:
-    """What a reader wants at once: where, how wide, how hard, and how good that is."""
-    best_case = ds.attrs["best"]
-    if best_case is None:
-        return []
-    low, error = force_to_use(ds, best_case)
-    least = with_error(low, error) if np.isfinite(error) else number(low)
-    hard = f"{least} N" if low > 0 else _force(ds, best_case)
-    pairs = [("where", place(ds, best_case)), ("how hard", f"{hard} per finger")]
-    if np.isfinite(opening := at(ds, "opening", best_case)):
-        pairs.insert(1, ("how wide (opening at first touch)", shown_text(opening, "m")))
-    if "force_high" in ds:
-        pairs.append(("safe forces", f"{safe_range(ds, best_case)} N"))
-    names = {"payload": f"holds at {_force(ds, best_case)}", "quality": "grasp quality", "e_n": "e_n"}
-    return pairs + [
-        (text, value_text(ds, name, best_case, 3, unit=True))
-        for name, text in names.items()
-        if np.isfinite(at(ds, name, best_case))
-    ]
-
-
 def verdict(ds: xr.Dataset) -> list[str]:
     """The answer in sentences, and how many cases it rests on; the table of the best grasps has the numbers."""
     done, failed, missing = (int(np.sum(ds.status.values == state)) for state in (DONE, FAILED, MISSING))
@@ -103,9 +81,9 @@ def verdict(ds: xr.Dataset) -> list[str]:
     alike = [place(ds, i) for i in images(ds, index)]
     more = f"; and {len(alike) - 4} more" * (len(alike) > 4)
     same = [f"The same {score} at {'; '.join(alike[:4])}{more}."] if alike else []
-    sure = [f"{text[0].upper()}{text[1:]}." for text in certainties(ds, ranks, score, k)]
-    told = answer(ds, index)
-    return [f"{told[0].upper()}{told[1:]}.", *same, *sure, *_wall(ds, index), *_planar(ds, index),
+    text = certainty(ds, ranks, score, k)
+    sure = [f"{text[:1].upper()}{text[1:]}."] * bool(text)
+    return [*same, *sure, *_wall(ds, index), *_planar(ds, index),
             *_other_force(ds, index), cases]  # fmt: skip
 
 
@@ -200,8 +178,10 @@ def plain_report(ds: xr.Dataset) -> str:
     named, ds = ds.attrs["title"], judge(ds)
     size = subtitle(ds).partition(": ")[2]
     table = [as_text(replace(best(ds, top=TOP, lines=True), notes=()), WIDTH)] if ds.attrs["best"] else []
+    lines = answer(ds, ds.attrs["best"]) if ds.attrs["best"] else {}
+    told = [f"{name}: {spoken_line(*value)}" for name, value in lines.items()]
     reasons = [reason.text(lambda index: place(ds, index, force=True)) for reason in grouped(ds)[:MOST_REASONS]]
-    parts = [f"{named}: {size}" if named else size, "\n".join([*verdict(ds), *warnings(ds)]), *table,
+    parts = [f"{named}: {size}" if named else size, "\n".join([*told, *verdict(ds), *warnings(ds)]), *table,
              "\n".join(reasons), READING, CAVEAT.replace("the scene below", "/study/scene")]  # fmt: skip
     text = "\n\n".join(part for part in parts if part)
     # h5dump escapes these signs; their names are longer, so they come before the lines are filled

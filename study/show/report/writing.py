@@ -18,6 +18,7 @@ from softjaw.study.messages import CANNOT_WRITE, StudyError, write_file
 from softjaw.study.page import Block, Section, answer, box, heading, page, text
 from softjaw.study.quantities import FAILED, FIRST, NO_GRASP
 from softjaw.study.result.read import open
+from softjaw.study.show.best_grasps import answer as answer_lines
 from softjaw.study.show.grasps import (
     Index,
     axis_label,
@@ -66,8 +67,8 @@ def build(ds: xr.Dataset, candidate: int | None = None, place: Place = (None, No
     best = ds.attrs["best"] or (*(0 for _ in ds.status.shape[:-1]), ds.attrs["level"])
     view = View(ds, best[:-3])
     sections: list[Section] = [
-        ("verdict", "", the_answer(ds)),
-        ("object", "The object", the_object(view, best)),
+        ("answer", "", [*the_object(view, best), *the_answer(ds)]),
+        ("best", "Best grasps", best_grasps(ds)),
         ("maps", "Maps", (maps.maps(ds, best) if ds.status.size > 1 else []) +
          tables.reasons(ds, FAILED, *NO_GRASP)),
         ("wall", "What the wall bears", wall(view, best)),
@@ -91,9 +92,16 @@ def _there(*blocks: Block | None) -> list[Block]:
 
 
 def the_answer(ds: xr.Dataset) -> list[Block]:
-    """The best grasp at a glance, in sentences, what speaks against it, and the tables of the best grasps."""
-    found = [answer(verdict.key_values(ds))] if ds.attrs["best"] is not None else []
-    found.append(box(verdict.verdict(ds), "verdict"))
+    """The best grasp at a glance: where, how wide, how hard, what it holds, why no more."""
+    if ds.attrs["best"] is None:
+        return []
+    lines = answer_lines(ds, ds.attrs["best"], f", {ds.attrs['why']}")
+    return [answer((name, *value) for name, value in lines.items())]
+
+
+def best_grasps(ds: xr.Dataset) -> list[Block]:
+    """How sure the best grasp is, what speaks against it, and the tables of the best grasps."""
+    found = [box(verdict.verdict(ds), "verdict")]
     if warnings := verdict.warnings(ds):
         found.append(box(warnings, "warn"))
     if chosen := verdict.chosen(ds):

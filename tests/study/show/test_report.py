@@ -21,6 +21,7 @@ from softjaw.study.result.layout import Header, Layout
 from softjaw.study.result.read import dataset
 from softjaw.study.result.store import StoredAxis, open_result
 from softjaw.study.result.write import ResultWriter, record
+from softjaw.study.show import best_grasps
 from softjaw.study.show.best_grasps import best
 from softjaw.study.show.grasps import at, compared, judge, order
 from softjaw.study.show.report import curves, tables, verdict
@@ -194,9 +195,9 @@ def test_the_verdict_has_the_numbers_of_the_best_grasp_and_of_the_states(ordinar
         first = best(data).rows[0]
         assert data.attrs["best"] == (2, 1, 1)
         assert (first["station"], first["angle"]) == (data.station.values[2], data.angle.values[1])
-        sentences, pairs = verdict.verdict(data), dict(verdict.key_values(data))
-    found = [pair.replace("\u00a0", " ") for pair in pairs.values()]
-    assert found == ["station 20 mm, angle 28.65°", "40 mm", "5 N per finger", "5", "10 mm"]
+        sentences, lines = verdict.verdict(data), best_grasps.answer(data, data.attrs["best"])
+    found = [lines[name][0].replace("\u00a0", " ") for name in ("where", "opening", "force")]
+    assert found == ["station 20 mm, angle 28.65°", "40 mm", "5 N per finger"]
     assert any("10 % more quality" in sentence for sentence in sentences)
     assert [int(n) for n in re.findall(r"\d+", sentences[-1])] == [17, 24, 6, 1]
     assert all(sentence.replace("\u00a0", " ") in page.text for sentence in sentences)
@@ -238,9 +239,7 @@ def test_values_have_their_error_where_the_file_has_it(tmp_path):
     path = make(tmp_path / "two.hdf", layout, **{"maps/e_n_error": 0.0042, "maps/tau_z_max_error": 0.011})
     with open_result(path) as result:
         data = judge(dataset(result))
-        pairs = dict(verdict.key_values(data))
         (folded,) = tables.every_case(data)
-    assert pairs["e_n"] == "10.00 ± 0.04 mm"
     block = folded["blocks"][0]
     assert len(block["rows"]) == 24
     assert all("\N{NO-BREAK SPACE}±" in row[block["head"].index("e_n [mm]")] for row in block["rows"])
@@ -301,19 +300,20 @@ def test_odd_files_give_a_page(tmp_path, layout, options, expected):
 def test_the_verdict_warns_of_what_the_best_case_lacks(tmp_path, layout, values, expected):
     with open_result(make(tmp_path / "one.hdf", replace(layout, patches=False), **values)) as result:
         data = judge(dataset(result))
-        assert expected in " ".join([*verdict.verdict(data), *verdict.warnings(data)])
+        lines = [" ".join(line) for line in best_grasps.answer(data, data.attrs["best"]).values()]
+        assert expected in " ".join([*lines, *verdict.verdict(data), *verdict.warnings(data)])
 
 
 def test_the_verdict_says_why_a_higher_score_is_not_the_best_grasp(tmp_path):
     with open_result(make(tmp_path / "two.hdf", Layout(axes((0, 0.02), (0.0,), (1.0,)), 0, patches=False))) as result:
         data = judge(dataset(result))
         worse, better = sorted(order(data, 0), key=lambda i: at(data, "quality", i))
-        assert Flag.TOO_STRONG.word not in " ".join(verdict.verdict(data))
+        assert Flag.TOO_STRONG.word not in best_grasps.answer(data, data.attrs["best"])["not more"][1]
         marked = dataset(result)
         marked["flags"].values[better] = Flag.TOO_STRONG
         data = judge(marked)
         assert data.attrs["best"] == worse
-        assert Flag.TOO_STRONG.word in " ".join(verdict.verdict(data))
+        assert Flag.TOO_STRONG.word in best_grasps.answer(data, worse)["not more"][1]
 
 
 def test_the_same_file_gives_the_same_bytes(tmp_path):
@@ -356,8 +356,8 @@ def test_files_that_must_not_be_overwritten_or_cannot_be_written(tmp_path):
 def test_a_page_escapes_every_kind_of_block():
     """Also where a reader's attributes are made of it."""
     evil = "</script><script>x</script>'\"&<b>"
-    blocks = [text(evil), text("a", evil), heading(evil), box([evil], evil), answer([(evil, evil)]), bullets([evil]),
-              verbatim(evil), table(evil, [evil], [[evil]], texts=(0,)), details(evil, [text(evil)]),
+    blocks = [text(evil), text("a", evil), heading(evil), box([evil], evil), answer([(evil, evil, evil)]),
+              bullets([evil]), verbatim(evil), table(evil, [evil], [[evil]], texts=(0,)), details(evil, [text(evil)]),
               image(b"", evil, evil)]  # fmt: skip
     made = page(evil, evil, [(evil, evil, blocks), ("other", evil, [])])
     assert "<script" not in made
