@@ -7,7 +7,6 @@ RANKS   = 2
 SCENE   = jobs/bottle-rigid.toml
 RESULT  = results/$(basename $(notdir $(SCENE))).hdf
 PAGE    = $(RESULT:.hdf=.html)
-PICTURE = $(RESULT:.hdf=.png)
 FIGURES = results/figures
 BIN     = .venv/bin
 # Of the benchmark: any of kernels element contact getfem map; all if empty.
@@ -59,8 +58,7 @@ map: setup
 	@$(BIN)/softjaw show $(RESULT) --top 5
 	@echo
 	@echo 'result   $(RESULT)   every number, with units and definitions'
-	@echo 'report   $(PAGE)  one page with the picture, maps and definitions; open it in a browser'
-	@if [ -f $(PICTURE) ]; then echo 'picture  $(PICTURE)'; fi
+	@echo 'open     $(PAGE)   the object with both pads at the best grasp, the four numbers beside it, maps below'
 
 figures: setup
 	$(MPIRUN) $(BIN)/python -m mpi4py -m jobs.figures all -o $(FIGURES) || [ $$? = $(SOME_FAILED) ]
