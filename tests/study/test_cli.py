@@ -12,7 +12,6 @@ import shlex
 import shutil
 import subprocess
 import sys
-from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -155,7 +154,6 @@ def loaded(*words):
     return {line.partition(".")[0] for line in lines}, told.returncode
 
 
-@cache
 def processor_seconds(*command):
     """The lesser of two runs; it says little of how busy the machine is, and a ratio nothing of how fast."""
     spent = []
@@ -180,8 +178,7 @@ def test_quick_answers_load_neither_mpi_nor_petsc(command, scene, finished):
 def test_quick_answers_take_hardly_longer_than_loading_their_libraries(command, scene, finished):
     words = ["-m", "softjaw", *map(str, QUICK[command](scene, finished))]
     libraries = ["-c", "import h5py, numpy, softjaw.study.scene"]
-    spent = [lambda w=w: processor_seconds(sys.executable, *w)() for w in (words, libraries)]
-    assert spent[0] < 2.0 * spent[1]
+    assert processor_seconds(sys.executable, *words) < 2.0 * processor_seconds(sys.executable, *libraries)
 
 
 def test_bad_usage_is_told_by_the_first_rank_only(monkeypatch, capsys):
