@@ -12,6 +12,7 @@ import shlex
 import shutil
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -154,6 +155,7 @@ def loaded(*words):
     return {line.partition(".")[0] for line in lines}, told.returncode
 
 
+@cache
 def processor_seconds(*command):
     """The lesser of two runs; it says little of how busy the machine is, and a ratio nothing of how fast."""
     spent = []
