@@ -11,7 +11,7 @@ FIGURES = results/figures
 BIN     = .venv/bin
 # Of the benchmark: any of kernels element contact getfem map; all if empty.
 PARTS   =
-# Of the random scenes and bodies of `make objects`: the page of 0 is kept in docs, those of others beside their results.
+# Of the random scenes and spoiled meshes of `make objects`: the page of 0 is kept in docs, those of others beside their results.
 SEED    = 0
 # Exit code of a finished study with failed cases; the report lists them with their reasons.
 SOME_FAILED = 6
@@ -41,7 +41,7 @@ help:
 	@echo 'make test-long  all else: kernels of the BLAS, hard cases, fuzzing, kills, Slurm; STAGES=slurm for one stage'
 	@echo 'make bench      what accuracy and speed cost; PARTS="kernels" for the part that takes a minute'
 	@echo 'make hard-cases scenes at the edges of what can be simulated, into docs/hard-cases.md'
-	@echo 'make objects    scans, hollow bodies, mugs and random scenes, into docs/objects.md; SEED=7 for others'
+	@echo 'make objects    bad meshes of eleven kinds, scans and random scenes, into docs/objects.md; SEED=7 for others'
 	@echo 'make docs       docs/ as a site, with reference pages from the program, into build/site'
 	@echo 'make lint       ruff and mypy'
 	@echo 'make doctor     does this machine have what it needs, with the cure'
@@ -81,7 +81,7 @@ hard-cases: setup
 	$(BIN)/python -m pytest -q -n 2 tests/hard_cases -m "" --table docs/hard-cases.md
 
 objects: setup
-	$(BIN)/python -m tests.objects.survey --seed $(SEED) --mpirun '$(MPIRUN)'
+	$(BIN)/python -m tests.objects.survey --seed $(SEED)
 
 bench: setup
 	$(BIN)/python -m tests.benchmark.run $(PARTS)

@@ -27,6 +27,7 @@ IntArray = NDArray[np.int64]
 GRID = (25, 11)  # points of a pad's face along length and width
 CRUSHED = 0.25  # strain of the bed at its highest pressure that leaves half of a grasp
 MOTIONS = 50  # slip motions whose wrenches bound what a contact on springs carries
+INNER = (slice(1, -1), slice(1, -1))  # of height fields that reach one cell beyond the pad's face
 
 
 @njit(cache=True)
@@ -124,6 +125,11 @@ def _direction(slope: FloatArray) -> FloatArray:
     return direction / np.linalg.norm(direction)
 
 
+def _one_more(x: FloatArray) -> FloatArray:
+    """Even steps ``(n,)`` with one more at both ends."""
+    return np.concatenate([[2.0 * x[0] - x[1]], x, [2.0 * x[-1] - x[-2]]])
+
+
 class JawsOnSurface:
     """Both pads on a surface, in one pose of the gripper."""
 
@@ -133,11 +139,12 @@ class JawsOnSurface:
         x, y = (side * ((np.arange(n) + 0.5) / n - 0.5) for side, n in zip((length, width), GRID, strict=True))
         local = (surface[0] - point) @ axes
         self.local, self.triangles = np.ascontiguousarray(local), surface[1]
-        low, high = height_fields(self.local, self.triangles, x, y)
-        if not np.isfinite(low).any():
+        low, high = height_fields(self.local, self.triangles, *(_one_more(part) for part in (x, y)))
+        if not np.isfinite(low[INNER]).any():
             raise NoContactError("the pad misses the object")
         # finger 2 looks against the approach, with its short side reversed
-        self.sides = Side(low, x, y, jaws), Side(-high[:, ::-1], x, y, jaws)
+        self.sides = Side(low[INNER], x, y, jaws), Side(-high[:, ::-1][INNER], x, y, jaws)
+        self._fields = low, -high[:, ::-1]
 
     @property
     def opening(self) -> float:
@@ -176,6 +183,23 @@ class JawsOnSurface:
     def peak(self) -> float:
         """What the highest pressure leaves on the finger where that is less."""
         return min(side.peak for side in self.sides)
+
+    @property
+    def on_edges(self) -> float:
+        """Share of its force that a finger bears beside an edge of the object, where that is more."""
+        shares = []
+        for side, height in zip(self.sides, self._fields, strict=True):
+            z = np.where(np.isfinite(height), height, side.touch + side.jaws.pad[2])
+            steps = abs(side.x[1, 0] - side.x[0, 0]), abs(side.y[0, 1] - side.y[0, 0])
+            edge = np.zeros(z.shape, dtype=bool)
+            for axis, step in enumerate(steps):
+                jump = np.abs(np.diff(z, axis=axis)) > 3.0 * step
+                first, second = ([slice(None)] * 2 for _ in range(2))
+                first[axis], second[axis] = slice(None, -1), slice(1, None)
+                edge[tuple(first)] |= jump
+                edge[tuple(second)] |= jump
+            shares.append(float(side.pressure[edge[INNER]].sum() / side.pressure.sum()))
+        return max(shares)
 
     def over(self, lids: FloatArray) -> bool:
         """Whether a pad lies over a hole, given by the corners ``(n, 3, 3)`` of the triangles that close it [m]."""

@@ -184,21 +184,22 @@ def told(scene: Scene) -> list[str]:
     notes, width = [], 0.25 * min(scene.gripper.pad_size[:2])
     for shape in dict.fromkeys(shape for shape in shapes_of(scene) if shape.shape == "mesh"):
         mesh = geometry().mesh_object(shape)
-        centroid = _centroid_note(mesh) if scene.task.centre_of_mass is None else ""
-        notes += [f"note: {shape.mesh}: {text}" for text in (*mesh.notes, mesh.sharp_facets(width), centroid) if text]
+        texts = (*mesh_notes(mesh, scene.task.centre_of_mass is None), mesh.sharp_facets(width))
+        notes += [f"note: {shape.mesh}: {text}" for text in texts if text]
     return [*(f"warning: {text}" for text in warnings(scene)), *notes]
 
 
-def _centroid_note(mesh: Any) -> str:
-    """How well the centroid of a mesh that is not closed is known."""
+def mesh_notes(mesh: Any, centroid: bool = True) -> tuple[str, ...]:
+    """What of a mesh was mended or left open, and how well its ``centroid`` is known where it is not closed."""
+    if mesh.closed or not centroid:
+        return tuple(mesh.notes)
     place, error = mesh.centroid
-    if mesh.closed:
-        return ""
     named = ", ".join(f"{1e3 * x:.1f}" for x in mesh.placed.to_object(place[None])[0])
-    return (
+    note = (
         f"it is not closed: its centroid is estimated at ({named}) mm, to {1e3 * error:.1g} mm;"
         " task.centre_of_mass_mm names a better one"
     )
+    return *mesh.notes, note
 
 
 def _remarks(scene: Scene) -> Iterator[str]:

@@ -21,6 +21,7 @@ from softjaw.fem.petsc import PETSc, unknown_options
 from softjaw.friction.patch import NEGLIGIBLE
 from softjaw.study.case.build import build_object, pad_shape
 from softjaw.study.case.candidates import candidates
+from softjaw.study.case.fit import extremes
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.scene import Scene
 from softjaw.study.scene.sections import Gripper
@@ -29,6 +30,7 @@ FloatArray = NDArray[np.float64]
 MIRRORED = 2e-5  # of the pad's length, to which images agree: files are of single precision, e_n moves by less
 MOST_TRIED, MOST_NAMED = 1000, 5  # pads brought to the object beforehand (the others fail as cases), and sentences
 STEPS_BACK = (0.1, 0.4, 1.6)  # of the pad's thickness: where it stands before it is brought to the smooth surface
+ROUNDED_OFF = 2e-5  # so far a smooth surface may lie behind the triangles it is made of where a pad touches first [m]
 PLATE_POISSON = 0.3  # of the backing plate; the modulus is what a scene gives
 KNOWN_DEPTH = 0.9  # of the pad's thickness: how far round the undeformed contact face the object must be known
 
@@ -116,6 +118,11 @@ def approach(obj: GapObject, pose: Pose, gripper: Gripper) -> Finger:
                 break
         distance = first_touch(surface, back, face, 2 * step * size[2])
         touch = Pose(touch.rotation, back.origin + distance * touch.rotation[:, 2])
+    if isinstance(obj, MeshObject):
+        # the smooth surface rounds sharp edges off, and corners pass between the points of the face
+        ahead = extremes(touch.to_pad(obj.points), obj.triangles, size[:2])[0]
+        if ahead < -ROUNDED_OFF:
+            touch = Pose(touch.rotation, touch.origin + ahead * touch.rotation[:, 2])
     hole_share = obj.hole_share(touch, face, KNOWN_DEPTH * size[2]) if isinstance(obj, MeshObject) else 0.0
     return Finger(touch, surface, hole_share)
 

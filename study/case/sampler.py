@@ -37,6 +37,7 @@ TURNS = 4  # rounds of setting a grasp straight; most end after two
 STRAIGHT = math.radians(0.5)  # tilt between two rounds that ends them
 APART, NEAR = 0.5, 0.25  # of the pad's length: grasps that are nearer are at one place; and one, if directions agree
 ALIKE, ROLLED = math.radians(20.0), math.radians(30.0)  # the same for approach and roll
+EDGE_COST = 0.05  # of a payload, for which a place off the edges of the object is preferred
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,7 @@ class SampledGrasp:
     opening : float
         Distance of the pads' faces at first touch [m].
     payload : float
-        What it holds on a bed of springs, less where foam is crushed, for ranking [kg].
+        What it holds on a bed of springs, less where foam is crushed or bears on an edge, for ranking [kg].
     state : int
         Why it is not worth a solve, `WIDE`, `COLLIDES` or `SLIPS`; else `MISSING`, not computed.
     """
@@ -157,13 +158,14 @@ def antipodal_grasps(
     samples : int
         Number of those points.
     lids : (n, 3, 3) array, optional
-        Corners of the triangles that close holes [m]: no pad is put there.
+        Corners of the triangles that close holes [m]: no pad is put there if there are other places.
     """
     points, triangles = np.ascontiguousarray(surface[0]), np.ascontiguousarray(surface[1])
     corners = points[triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])  # twice the area long
     axis = longest_axis(corners, np.linalg.norm(normals, axis=1))
     seen: list[SampledGrasp] = []
+    over_holes: list[SampledGrasp] = []
     starts: list[JawsOnSurface] = []
     for place, normal in sampled(corners, normals, samples, seed):
         try:
@@ -174,11 +176,12 @@ def antipodal_grasps(
             for along in long_sides(start, axis):
                 axes = axes_of(start.axes[:, 2], along)
                 grip = straightened((points, triangles), start.point, axes, jaws)
-                if lids is None or not grip.over(lids):
-                    seen.append(judged(grip, task))
+                over = lids is not None and grip.over(lids)
+                (over_holes if over else seen).append(judged(grip, task))
         except NoContactError:
             continue
-    return thinned(seen, count, jaws.pad[0])
+    # an open box may be held nowhere else
+    return thinned(seen if any(not grasp.state for grasp in seen) else [*seen, *over_holes], count, jaws.pad[0])
 
 
 def sampled(corners: FloatArray, normals: FloatArray, count: int, seed: int) -> list[tuple[FloatArray, FloatArray]]:
@@ -212,7 +215,8 @@ def judged(grip: JawsOnSurface, task: Task) -> SampledGrasp:
     state = fit_of(grip.local, grip.triangles, grip.jaws).state
     if not state and slips(line, grip.jaws.mu):
         state = SLIPS
-    worth = 0.0 if state else grip.peak * held(grip.contacts, task)
+    inward = 1.0 - min(grip.on_edges, EDGE_COST)
+    worth = 0.0 if state else grip.peak * inward * held(grip.contacts, task)
     return SampledGrasp(grip.point, grip.axes[:, 2], grip.axes[:, 0], grip.opening, worth, state)
 
 

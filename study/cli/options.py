@@ -175,8 +175,8 @@ def _add_init_options(parser: argparse.ArgumentParser) -> None:
     add("kind", choices=tuple(KINDS), help="what to start from")
     add("-o", metavar="NAME", dest="name", help="name of both files, also with a folder (default: the kind, or the "
         "name of the mesh)")  # fmt: skip
-    add("--mesh", metavar="FILE", help="mesh of the object: .stl, .obj, .ply or .off")
-    add("--unit", choices=("mm", "cm", "m", "inch"), help="unit of the mesh's coordinates")
+    add("--mesh", metavar="FILE", help="mesh of the object: .stl, .obj, .ply, .off, .glb, .gltf or .3mf")
+    add("--unit", choices=("mm", "cm", "m", "inch"), help="unit of the mesh's coordinates (default of glTF: m)")
     add("--axis", choices=("x", "y", "z"), help="axis of the mesh along which grasps are spread (default: the longest)")
     add("--force", action="store_true", help="replace existing files")
     more = "softjaw init mesh --mesh jobs/objects/flask.stl --unit mm -o scenes/flask"

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from softjaw.study.case.build import build_object, check_object, geometry, told
+from softjaw.study.case.build import build_object, check_object, geometry, mesh_notes, told
 from softjaw.study.case.candidates import with_sampled_grasps
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.run.plan import make_plan, plan_text
@@ -45,7 +45,8 @@ def _measured(options: Namespace) -> start.Measured:
     try:
         axis = options.axis or start.longest(sides("z"))
         extents = tuple(sides(axis).values())
-        return axis, extents, tuple(s for s in start.heights(extents[2]) if not remark(axis, s))
+        stations = tuple(s for s in start.heights(extents[2]) if not remark(axis, s))
+        return axis, extents, stations, mesh_notes(build_object(shape(axis)))
     except (ValueError, OSError) as error:
         raise StudyError(USAGE, f"--mesh: {error}") from error
 

@@ -276,7 +276,7 @@ class Mesh(Walled):
 
     shape: Literal["mesh"]
     mesh: Text = Field(
-        min_length=1, max_length=4000, description="file of the mesh (.stl, .obj, .ply, .off), beside the scene file"
+        min_length=1, max_length=4000, description=f"file of the mesh ({', '.join(ENDINGS)}), beside the scene file"
     )
     unit: Literal["mm", "cm", "m", "inch"] = Field(description="unit of the mesh file's coordinates")
     axis: Literal["x", "y", "z"] = Field("z", description="axis of the mesh file that becomes the object's axis")

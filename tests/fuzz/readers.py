@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import base64
+import io
+import json
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -88,6 +92,62 @@ def ply(binary):
     return (head + "\n".join(rows) + "\n").encode()
 
 
+def gltf_tree(**changes):
+    """The JSON of a glTF scene of the octahedron in metres, whose buffer lies in it; ``changes`` replace its parts."""
+    data = (1e-3 * POINTS).astype("<f4").tobytes() + FACES.astype("<u4").tobytes()
+    views = [{"buffer": 0, "byteOffset": 0, "byteLength": 72}, {"buffer": 0, "byteOffset": 72, "byteLength": 96}]
+    kinds = [("VEC3", 5126, 6), ("SCALAR", 5125, 24)]
+    return {
+        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+        "accessors": [
+            {"bufferView": i, "componentType": of, "count": count, "type": kind}
+            for i, (kind, of, count) in enumerate(kinds)
+        ],
+        "bufferViews": views,
+        "buffers": [{"byteLength": len(data), "uri": "data:;base64," + base64.b64encode(data).decode()}],
+    } | changes  # fmt: skip
+
+
+def gltf(**changes):
+    return json.dumps(gltf_tree(**changes)).encode()
+
+
+def glb(**changes):
+    tree = gltf_tree(**changes)
+    data = base64.b64decode(tree["buffers"][0].pop("uri").partition(",")[2])
+    text = json.dumps(tree).encode()
+    text += b" " * (-len(text) % 4)
+    chunks = [len(part).to_bytes(4, "little") + kind + part for kind, part in ((b"JSON", text), (b"BIN\0", data))]
+    body = b"".join(chunks)
+    return b"glTF" + (2).to_bytes(4, "little") + (12 + len(body)).to_bytes(4, "little") + body
+
+
+BODY_3MF = "<mesh><vertices>{}</vertices><triangles>{}</triangles></mesh>".format(
+    "".join(f'<vertex x="{x:g}" y="{y:g}" z="{z:g}"/>' for x, y, z in POINTS),
+    "".join(f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in FACES),
+)
+
+
+def model_3mf(more="", built=1, head=""):
+    """The XML of a 3MF file: the octahedron as object 1, ``more`` objects, and which one is built."""
+    space = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
+    return (
+        f'<?xml version="1.0" encoding="UTF-8"?>{head}<model unit="millimeter" xmlns="{space}"><resources>'
+        f'<object id="1" type="model">{BODY_3MF}</object>{more}</resources>'
+        f'<build><item objectid="{built}"/></build></model>'
+    ).encode()
+
+
+def packed(*models, kind=zipfile.ZIP_DEFLATED):
+    """A 3MF file of these models."""
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w", kind) as archive:
+        for i, model in enumerate(models):
+            archive.writestr(f"3D/3dmodel{i or ''}.model", model)
+    return file.getvalue()
+
+
 def _scene(path):
     from softjaw.study.scene import load_scene
 
@@ -106,6 +166,19 @@ def _mesh(path):
     from softjaw.fem.objects.mesh_object import MeshObject
 
     return MeshObject.from_file(path, "mm")
+
+
+def _model(path):
+    """A model that is packed as a 3MF file after it has been made wrong, so that its checksum is right."""
+    whole = path.with_name("mesh.3mf")
+    whole.write_bytes(packed(path.read_bytes()))
+    return _mesh(whole)
+
+
+def _metres(path):
+    from softjaw.fem.objects.mesh_object import MeshObject
+
+    return MeshObject.from_file(path, "m")
 
 
 def _result(path):
@@ -130,6 +203,10 @@ QUICK = {
     "ASCII PLY": Reader("mesh.ply", ply(False), TEXTUAL, _mesh, (MeshError,)),
     "OFF": Reader("mesh.off", off(), TEXTUAL, _mesh, (MeshError,)),
     "binary PLY": Reader("mesh.ply", ply(True), TEXTUAL, _mesh, (MeshError,)),
+    "glTF": Reader("mesh.gltf", gltf(), TEXTUAL, _metres, (MeshError,)),
+    "GLB": Reader("mesh.glb", glb(), TEXTUAL, _metres, (MeshError,)),
+    "3MF": Reader("mesh.3mf", packed(model_3mf()), BINARY, _mesh, (MeshError,)),
+    "model of a 3MF": Reader("mesh.model", model_3mf(), TEXTUAL, _model, (MeshError,)),
 }
 
 

@@ -12,11 +12,15 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from softjaw.fem.errors import MeshError
+from softjaw.fem.objects.mesh_file import read_triangles
 from softjaw.study.messages import UNPRINTABLE
 from tests.fuzz.edits import BINARY, edited, edits
-from tests.fuzz.readers import QUICK, slow_readers
+from tests.fuzz.hostile_meshes import hostile
+from tests.fuzz.readers import QUICK, Reader, slow_readers
+from tests.study.launching import ROOT
 
-SECONDS, ROOM = 20, 3 * 2**29  # of CPU, and bytes beyond what the tests have already
+SECONDS, ROOM = 10, 2**30  # of CPU, and bytes beyond what the tests have already
 CHECKS = {"deadline": None, "database": None, "suppress_health_check": list(HealthCheck)}
 SLOW = ("VTU", "VTP", "result")
 
@@ -102,6 +106,18 @@ def test_many_spoilt_files_are_read_or_refused_in_time_and_in_little_memory(tmp_
         assert not wrong, wrong
 
     judged()
+
+
+def test_hostile_meshes_are_read_or_refused_in_time_and_in_little_memory(tmp_path):
+    wrong = {}
+    read_triangles(ROOT / "jobs" / "objects" / "flask.stl")  # and everything is imported
+    for name, content in hostile().items():
+        path = tmp_path / name
+        path.write_bytes(content)
+        ending = Reader(name, content, (), read_triangles, (MeshError,))
+        if complaint := complaint_apart(ending, path):
+            wrong[name] = complaint[-1500:]
+    assert not wrong, "\n\n".join(f"{name}: {text}" for name, text in wrong.items())
 
 
 @pytest.mark.parametrize(

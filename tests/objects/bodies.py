@@ -7,7 +7,6 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-import pyvista as pv
 import trimesh
 
 SCANS = Path(__file__).parent / "scans"
@@ -83,23 +82,6 @@ def mug(radius: float = 0.04, height: float = 0.095, wall: float = 0.004) -> tri
     handle.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, [1, 0, 0]))
     handle.apply_translation([radius + 0.018, 0.0, 0.5 * height])
     return trimesh.util.concatenate([cup, handle])
-
-
-def closed_mug(
-    radius: float = 0.04, height: float = 0.095, wall: float = 0.005, step: float = 0.0025
-) -> trimesh.Trimesh:
-    """A cup and its handle as one closed surface: the zero level of a distance, on a grid of ``step`` [m]."""
-    low = np.array([-radius, -radius, 0.0]) - 2.5 * step
-    high = np.array([radius + 0.05, radius, height]) + 2.5 * step
-    count = np.ceil((high - low) / step).astype(int) + 1
-    grid = pv.ImageData(dimensions=count, spacing=(step,) * 3, origin=low)
-    x, y, z = grid.points.T
-    r = np.hypot(x, y)
-    cup = np.maximum.reduce([r - radius, -z, z - height, np.minimum(radius - wall - r, z - wall)])
-    ring = np.hypot(np.hypot(x - radius - 0.018, z - 0.5 * height) - 0.025, y) - 0.006
-    handle = np.maximum(ring, radius - 0.5 * wall - r)
-    level = grid.contour([0.0], np.minimum(cup, handle)).triangulate().clean()
-    return trimesh.Trimesh(level.points, level.regular_faces)
 
 
 def punctured(mesh: trimesh.Trimesh, holes: int, rings: int = 1, seed: int = 0) -> trimesh.Trimesh:

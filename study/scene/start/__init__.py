@@ -16,10 +16,11 @@ from softjaw.study.messages import CANNOT_WRITE, USAGE, StudyError, write_file
 
 HERE = Path(__file__).parent
 PAD_LENGTH, PAD_WIDTH, OPENING = 50.0, 22.0, 85.0  # mm, as in the template of a mesh
+IN_METRES = (".glb", ".gltf")  # glTF has no other unit
 
 
-# The file's axis that is the object's; extents [mm], the last one along it; stations [mm] at which a pad fits on.
-Measured = tuple[str, tuple[float, ...], tuple[float, ...]]
+# The file's axis that is the object's; extents [mm], the last one along it; stations [mm] at which a pad fits on; notes.
+Measured = tuple[str, tuple[float, ...], tuple[float, ...], tuple[str, ...]]
 
 
 def longest(sides: Mapping[str, float]) -> str:
@@ -63,12 +64,13 @@ def init(options: Namespace, measure: Callable[[Namespace], Measured]) -> str:
             CANNOT_WRITE, f"{' and '.join(existing)}: exists already; choose another name with -o, or add --force"
         )
     words = {"NAME": base.name, "SOFTJAW": _program()}
-    mesh = _about_mesh(options, scene, measure) if options.kind == "mesh" else {}
+    mesh, notes = _about_mesh(options, scene, measure) if options.kind == "mesh" else ({}, ())
     for path, template in ((scene, f"{options.kind}.toml"), (batch, "run.sbatch")):
         write_file(path, _filled(template, words | mesh), folders=True)
     measured = []
     if mesh:
         measured = ["object:  {SIZE} mm, the last along its axis, with --unit {UNIT} --axis {AXIS}".format(**mesh)]
+        measured += [f"         {note}" for note in notes]
     lines = [
         f"written: {scene!s:<{len(str(batch))}}  the scene: what is grasped, where and how hard",
         f"written: {batch}  a Slurm job that resumes after its time limit",
@@ -102,14 +104,16 @@ def _filled(template: str, words: dict[str, str]) -> str:
     return re.sub(r"[ ]+$", "", text, flags=re.MULTILINE)
 
 
-def _about_mesh(options: Namespace, scene: Path, measure: Callable) -> dict[str, str]:
-    """What the scene says about a mesh: its file, its size, and stations that fit it."""
+def _about_mesh(options: Namespace, scene: Path, measure: Callable) -> tuple[dict[str, str], tuple[str, ...]]:
+    """What the scene says about a mesh, its file, its size, and stations that fit it; notes on the mesh."""
+    if options.mesh and not options.unit and Path(options.mesh).suffix.lower() in IN_METRES:
+        options.unit = "m"
     if not options.mesh or not options.unit:
         needs = {"--mesh FILE": options.mesh, "--unit": options.unit}
         lacks = " and ".join(name for name, given in needs.items() if not given)
         text = f"a mesh needs {lacks}; units are never guessed, as in 'softjaw init mesh --mesh my.stl --unit mm'"
         raise StudyError(USAGE, text)
-    axis, extents, stations = measure(options)
+    axis, extents, stations, notes = measure(options)
     file = os.path.relpath(Path(options.mesh).absolute(), scene.absolute().parent)
     longest_side, next_side, _ = sorted(extents, reverse=True)
     return {
@@ -120,7 +124,7 @@ def _about_mesh(options: Namespace, scene: Path, measure: Callable) -> dict[str,
         "LONG": _larger(PAD_LENGTH, longest_side, "longer"),
         "WIDE": _larger(PAD_WIDTH, next_side, "wider"),
         "STATIONS": _stations(extents, stations),
-    }
+    }, notes
 
 
 def _larger(pad: float, side: float, word: str) -> str:

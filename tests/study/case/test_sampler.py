@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from softjaw.scoring.payload import GRAVITY
-from softjaw.study.case.bed import CRUSHED, JawsOnSurface, height_fields, held
+from softjaw.study.case.bed import CRUSHED, GRID, JawsOnSurface, height_fields, held
 from softjaw.study.case.fit import Jaws, fit_of
 from softjaw.study.case.sampler import antipodal_grasps, axes_of, same_grasp, with_sampled_grasps
 from softjaw.study.case.task import Task
@@ -132,6 +132,14 @@ def test_on_a_flat_face_the_springs_hold_what_the_planar_contact_holds():
     assert held(grip.contacts, Task(np.array([0.0, 0.1, 0.0]))) < 0.2 * cones
 
 
+def test_what_a_pad_bears_beside_an_edge_is_a_share_of_its_force():
+    length, width = PAD[:2]
+    assert at_origin(box(0.2, 0.2, 0.05)).on_edges == 0.0
+    # the object ends between the last cells of the face and the ones beyond it, along the length or the width
+    assert at_origin(box(1.001 * length, 0.2, 0.05)).on_edges == pytest.approx(2 / GRID[0])
+    assert at_origin(box(0.2, 1.001 * width, 0.05)).on_edges == pytest.approx(2 / GRID[1])
+
+
 def test_no_pad_is_put_over_a_hole():
     body = box(0.2, 0.2, 0.05)
 
@@ -147,7 +155,8 @@ def test_no_pad_is_put_over_a_hole():
     assert len(antipodal_grasps(body, NARROW, TASK, 20, samples=80)) > 3
     corners = body[0][body[1]]
     all_over = corners[np.ptp(corners[..., 2], axis=1) == 0.0]  # both large faces
-    assert not [g for g in antipodal_grasps(body, NARROW, TASK, 20, samples=80, lids=all_over) if not g.state]
+    # where there is no other place a pad is put over a hole all the same
+    assert [g for g in antipodal_grasps(body, NARROW, TASK, 20, samples=80, lids=all_over) if not g.state]
 
 
 def test_grasps_are_spread_over_the_places_of_an_object():

@@ -115,6 +115,20 @@ def test_a_banana_is_grasped_along_its_longest_axis_where_its_line_bends_less_th
     assert load_scene("b.toml").candidates.refine == 36
 
 
+@pytest.mark.parametrize("ending", ["glb", "gltf", "3mf", "off"])
+def test_a_mesh_of_any_format_is_started_in_metres_where_its_format_says_so(ending, tmp_path, capsys):
+    (tmp_path / "open").mkdir()
+    body = trimesh.creation.box((0.05, 0.04, 0.09))
+    body.faces = body.faces[2:]
+    body.export(tmp_path / "open" / f"body.{ending}")
+    unit = [] if ending in ("glb", "gltf") else ["--unit", "m"]
+    assert main(["init", "mesh", "--mesh", f"open/body.{ending}", *unit]) == 0
+    assert "its centroid is estimated" in capsys.readouterr().out
+    scene = load_scene("body.toml")
+    assert scene.object.unit == "m"
+    assert main(["check", "body.toml"]) == 0
+
+
 @pytest.mark.parametrize("there", ["bottle.toml", "bottle.sbatch"])
 def test_nothing_is_replaced_unasked(tmp_path, there, capsys):
     (tmp_path / there).write_text("mine")
