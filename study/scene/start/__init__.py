@@ -19,7 +19,7 @@ PAD_LENGTH, PAD_WIDTH, OPENING = 50.0, 22.0, 85.0  # mm, as in the template of a
 IN_METRES = (".glb", ".gltf")  # glTF has no other unit
 
 
-# The file's axis that is the object's; extents [mm], the last one along it; stations [mm] at which a pad fits on; notes.
+# The file's axis that is the object's; extents [mm], the last along it; stations [mm] at which a pad fits on; notes.
 Measured = tuple[str, tuple[float, ...], tuple[float, ...], tuple[str, ...]]
 
 

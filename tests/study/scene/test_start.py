@@ -7,6 +7,7 @@ import sys
 import tomllib
 
 import pytest
+import trimesh
 
 from softjaw.study.cli import main
 from softjaw.study.cli.options import KINDS
