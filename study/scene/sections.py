@@ -11,7 +11,6 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import AfterValidator, Field, model_validator
 
 from softjaw.fem.pad.halving import halved
-from softjaw.friction.patch import NEGLIGIBLE
 from softjaw.study.messages import shown
 from softjaw.study.scene.errors import Errors, wrong
 from softjaw.study.scene.objects import Shape, Walled
@@ -145,7 +144,7 @@ class Gripper(SceneSection):
         if any(exponent == 0 for exponent, _ in self.terms_kpa):
             yield wrong(self.terms_kpa, "exponents other than 0, such as 0.01", "terms_kpa")
         total = sum(modulus for _, modulus in self.terms_kpa)
-        if total <= 0 or not math.isclose(total, self.shear_modulus_kpa, rel_tol=NEGLIGIBLE):
+        if total <= 0 or not math.isclose(total, self.shear_modulus_kpa):
             expected = f"the sum of the moduli of terms_kpa, {total:g} kPa, and > 0; leave it out"
             yield wrong(self.shear_modulus_kpa, expected, "shear_modulus_kpa")
 
@@ -168,7 +167,7 @@ class Gripper(SceneSection):
         counts = [self.elements[:2], halved(self.elements)[:2]][: accuracy.meshes]
         size = self.pad_length_mm, self.pad_width_mm
         need = [max(side / n[axis] if n[axis] % 2 else 0.0 for n in counts) for axis, side in enumerate(size)]
-        if any(held < (1 - NEGLIGIBLE) * least for held, least in zip(self.sheet_support_mm, need, strict=True)):
+        if any(held < least and not math.isclose(held, least) for held, least in zip(self.sheet_support_mm, need, strict=True)):
             meshes = " and ".join(f"{list(n)}" for n in counts)
             expected = f"at least {need[0]:g} x {need[1]:g} mm, which holds nodes of meshes of {meshes} elements"
             yield wrong(self.sheet_support_mm, f"{expected}; even numbers need less", "sheet_support_mm")
