@@ -167,7 +167,8 @@ class Gripper(SceneSection):
         counts = [self.elements[:2], halved(self.elements)[:2]][: accuracy.meshes]
         size = self.pad_length_mm, self.pad_width_mm
         need = [max(side / n[axis] if n[axis] % 2 else 0.0 for n in counts) for axis, side in enumerate(size)]
-        if any(held < least and not math.isclose(held, least) for held, least in zip(self.sheet_support_mm, need, strict=True)):
+        pairs = zip(self.sheet_support_mm, need, strict=True)
+        if any(held < least and not math.isclose(held, least) for held, least in pairs):
             meshes = " and ".join(f"{list(n)}" for n in counts)
             expected = f"at least {need[0]:g} x {need[1]:g} mm, which holds nodes of meshes of {meshes} elements"
             yield wrong(self.sheet_support_mm, f"{expected}; even numbers need less", "sheet_support_mm")
