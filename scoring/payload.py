@@ -32,7 +32,6 @@ from softjaw.scoring.bodies import PolytopeBody
 from softjaw.scoring.contact import SoftContact
 
 FloatArray = NDArray[np.float64]
-GRAVITY = 9.80665
 KINDS = ("shared", "up_to", "fixed")
 BOUND_GAP = 5e-4  # of the bounds, relative, at which the search ends
 ROUNDING_FORCE = 1e-7  # of the forces of the grasp, below which a force is rounding

@@ -10,6 +10,8 @@ from typing import Any, NamedTuple
 
 from softjaw.fem.objects.mesh_file import LENGTHS
 
+GRAVITY = 9.80665  # m/s^2
+
 
 class Unit(NamedTuple):
     """A unit that values are given or shown in: one of it is ``times / over`` SI units (two numbers, to round once)."""

@@ -125,6 +125,14 @@ def grid_triangles(rows: int, columns: int, *, closed: bool = False) -> IntArray
     return np.concatenate([np.stack([a, b, a + columns], 1), np.stack([b, b + columns, a + columns], 1)])
 
 
+def solid_centroid(points: FloatArray, triangles: IntArray) -> FloatArray:
+    """Centroid ``(3,)`` of the volume inside one closed surface of ``triangles (m, 3)``, by the divergence theorem."""
+    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    corners = points[triangles] - middle
+    volume = np.einsum("ka,ka->k", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6
+    return middle + volume @ corners.sum(axis=1) / (4 * volume.sum())
+
+
 def edges_of(triangles: IntArray) -> IntArray:
     """Points at both ends ``(3 m, 2)`` of the edges of ``triangles (m, 3)``, as each triangle runs through them."""
     return triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)

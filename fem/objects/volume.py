@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from softjaw.fem.objects.gap import FloatArray, IntArray
+from softjaw.fem.objects.gap import FloatArray, IntArray, solid_centroid
 
 OFF_CENTRE = 0.5 + 1e-4 * np.sqrt(2.0)  # of a cell, where lines run: not through the corners of regular meshes
 
@@ -27,10 +27,7 @@ def centroid(points: FloatArray, triangles: IntArray, closed: bool) -> tuple[Flo
     """
     low, high = points.min(axis=0), points.max(axis=0)
     if closed:
-        middle = 0.5 * (low + high)
-        corners = points[triangles] - middle
-        volume = np.einsum("ka,ka->k", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6
-        return middle + volume @ corners.sum(axis=1) / (4 * volume.sum()), 0.0
+        return solid_centroid(points, triangles), 0.0
     step = float((high - low).max()) / 128  # cells along the longest side
     shape = np.maximum(np.ceil((high - low) / step).astype(int), 1)
     inside, known = _votes(points, triangles, low, step, shape)

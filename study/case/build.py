@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.fem.objects import shapes as objects
-from softjaw.fem.objects.gap import GapObject, Pose
+from softjaw.fem.objects.gap import GapObject, Pose, solid_centroid
 from softjaw.fem.objects.outer_surface import OuterSurface, Section, of_revolution, of_sections
 from softjaw.fem.pad.halving import refined
 from softjaw.fem.pad.shape import PadShape
@@ -64,6 +64,19 @@ def surface_triangles(shape: Any) -> tuple[NDArray[np.float64], NDArray[np.int64
 def own_frame(shape: Any) -> Pose:
     """Where the object's frame lies in that of its mesh file [m]; every other shape is described in its own frame."""
     return geometry().mesh_object(shape).placed if shape.shape == "mesh" else Pose(np.eye(3), np.zeros(3))
+
+
+def centre_of_volume(obj: Any) -> NDArray[np.float64]:
+    """Centroid ``(3,)`` [m] of the body that an object's surface encloses, as if it were full."""
+    if hasattr(obj, "centroid"):
+        return np.asarray(obj.centroid[0])
+    return solid_centroid(*obj.surface())
+
+
+def centre_of_mass(scene: Scene, obj: Any) -> NDArray[np.float64]:
+    """Where the weight of a scene's object acts, in the object's frame ``(3,)`` [m]."""
+    given = scene.task.centre_of_mass
+    return centre_of_volume(obj) if given is None else own_frame(scene.object).to_pad(np.array(given))
 
 
 @lru_cache(maxsize=8)

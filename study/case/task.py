@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softjaw.fem.objects.volume import centroid
 from softjaw.scoring.bodies import PolytopeBody
-from softjaw.scoring.payload import GRAVITY, Payload, payload
-from softjaw.study.case.build import own_frame
+from softjaw.scoring.payload import Payload, payload
+from softjaw.study.case.build import centre_of_mass, own_frame
 from softjaw.study.case.contact import Contact
 from softjaw.study.case.limit_surface import SurfaceFit, sampled_wrenches
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import MODELS
 from softjaw.study.scene import Scene
+from softjaw.study.units import GRAVITY
 
 FloatArray = NDArray[np.float64]
 
@@ -47,18 +47,8 @@ class Task:
 def task_of(scene: Scene, obj: Any) -> Task:
     """The task that a scene's sections ``[object]`` and ``[task]`` give."""
     keys, placed = scene.task, own_frame(scene.object)
-    given = keys.centre_of_mass
-    centre = centre_of_volume(obj) if given is None else placed.to_pad(np.array(given))
     direction = None if keys.direction is None else np.array(keys.direction) @ placed.rotation
-    return Task(centre, direction, keys.drive, scene.object.mass)
-
-
-def centre_of_volume(obj: Any) -> FloatArray:
-    """Centroid ``(3,)`` [m] of the body that an object's surface encloses, as if it were full."""
-    if hasattr(obj, "centroid"):
-        return np.asarray(obj.centroid[0])
-    points, triangles = obj.surface()
-    return centroid(points, triangles, closed=True)[0]
+    return Task(centre_of_mass(scene, obj), direction, keys.drive, scene.object.mass)
 
 
 def payload_values(

@@ -21,7 +21,6 @@ from softjaw.study.case.fit import jaws_of
 from softjaw.study.case.poses import STANDOFF, explicit_poses
 from softjaw.study.case.result import UNDECIDED
 from softjaw.study.quantities import NO_GRASP
-from softjaw.study.ranking import largest
 from softjaw.study.scene import Scene
 from softjaw.study.scene.grasps import GraspPose
 
@@ -47,6 +46,8 @@ def with_places(poses: Sequence[GraspPose], rounds: Sequence[Sequence[Place]]) -
 
 def best_places(values: FloatArray) -> list[int]:
     """Numbers of the best poses, each once; ``values (poses, columns)`` with NaN where a grasp cannot be used."""
+    from softjaw.study.ranking import largest  # loads xarray, which answers about a run do without
+
     known = [column for column in values.T if np.nanmax(column, initial=0.0) > 0.0]
     return list(dict.fromkeys(largest(column) for column in known))
 

@@ -9,7 +9,6 @@ import numpy as np
 import xarray as xr
 
 from softjaw.friction.patch import NEGLIGIBLE
-from softjaw.scoring.payload import GRAVITY
 from softjaw.study.case.result import TIE
 from softjaw.study.flags import LOST, OF_FILE, Flag, flags_in
 from softjaw.study.quantities import BY_KEY, FORCE_RANGE, MAIN, STATES, map_row
@@ -20,7 +19,7 @@ from softjaw.study.show.grasps import Index, at, candidate_of, forces, note, pla
 from softjaw.study.show.places import distinct, folded_text, named, short_name, spot
 from softjaw.study.show.status import RESUME, aim, counts, largest_error, no_grasps, reasons, time_split
 from softjaw.study.table import Column, Row, Table, as_text, number, terminal_width, with_error, wrapped
-from softjaw.study.units import in_si, shown, shown_text, shown_unit
+from softjaw.study.units import GRAVITY, in_si, shown, shown_text, shown_unit
 
 NOTES_WIDTH, OTHERS_WIDTH, LABEL_WIDTH = 11, 16, 20  # characters
 MU_ERROR = 0.1  # of mu, by which it is off where nothing is known of it

@@ -9,9 +9,8 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from softjaw.study.case.build import build_object, own_frame, surface_triangles
+from softjaw.study.case.build import build_object, centre_of_mass, own_frame, surface_triangles
 from softjaw.study.case.result import TIE
-from softjaw.study.case.task import task_of
 from softjaw.study.ranking import task_keys
 from softjaw.study.scene import SceneError, parse_scene
 from softjaw.study.show.grasps import Index, axis_text, field, unravelled
@@ -107,7 +106,7 @@ def spot(ds: xr.Dataset, index: Index) -> Spot:
     try:
         scene = parse_scene(ds.attrs["scene"], check_files=False)
         scene = scene.with_values({key: v[i] for (key, v), i in zip(scene.sweep.items(), index, strict=False)})
-        centre = np.asarray(task_of(scene, build_object(scene.object)).centre_of_mass)
+        centre = centre_of_mass(scene, build_object(scene.object))
         frame, points = own_frame(scene.object), surface_triangles(scene.object)[0]
     except (SceneError, ValueError, OSError, AttributeError):
         return Spot("", math.nan)

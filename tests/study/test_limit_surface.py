@@ -17,13 +17,14 @@ from softjaw.lsfit.samples import sphere_motions
 from softjaw.lsfit.surface import FitError
 from softjaw.scoring.bodies import PolytopeBody
 from softjaw.scoring.contact import SoftContact
-from softjaw.scoring.payload import GRAVITY, payload
+from softjaw.scoring.payload import payload
 from softjaw.scoring.pose import pose_volume
 from softjaw.study.case import limit_surface
 from softjaw.study.case.contact import Contact
 from softjaw.study.case.limit_surface import AS_FITTED, ELLIPSOID, INDEPENDENT, PROGRAMME, STANDS_IN, sampled_wrenches
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import MODELS
+from softjaw.study.units import GRAVITY
 from tests.study.test_pipeline import BOX, CONE, CURVED, FLAT, MU, OVAL, PLATE, cases, solved
 
 WEIGHT = 9.80665

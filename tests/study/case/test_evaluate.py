@@ -13,18 +13,18 @@ from scipy.spatial.transform import Rotation
 from softjaw.fem.objects.gap import Pose
 from softjaw.lsfit.ellipsoid import Ellipsoid
 from softjaw.scoring.contact import SoftContact
-from softjaw.scoring.payload import GRAVITY
 from softjaw.scoring.pose import pose_volume
-from softjaw.study.case.build import build_object
+from softjaw.study.case.build import build_object, centre_of_volume
 from softjaw.study.case.contact import Contact
 from softjaw.study.case.errors import OF_MESHES, OF_VIEWS, estimate, mesh_errors
 from softjaw.study.case.evaluate import FACING, EvaluationSettings, evaluate, lengths, quality
-from softjaw.study.case.task import Task, centre_of_volume
+from softjaw.study.case.task import Task
 from softjaw.study.case.topology import topology
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import MODELS, TABLE, misses
 from softjaw.study.scene import parse_scene
 from softjaw.study.scene.objects import SphereShape
+from softjaw.study.units import GRAVITY
 from tests.friction.closed_forms import cylinder_torque
 from tests.generators import cylinder_grid
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 import trimesh
 
-from softjaw.scoring.payload import GRAVITY
 from softjaw.study.case.bed import CRUSHED, GRID, JawsOnSurface, height_fields, held
 from softjaw.study.case.fit import Jaws, fit_of
 from softjaw.study.case.sampler import antipodal_grasps, axes_of, same_grasp, with_sampled_grasps
@@ -16,6 +15,7 @@ from softjaw.study.quantities import COLLIDES, MISSING, SLIPS, WIDE, WORSE
 from softjaw.study.run.plan import make_plan
 from softjaw.study.run.shares import shares
 from softjaw.study.scene import SceneError, parse_scene
+from softjaw.study.units import GRAVITY
 from tests.objects.bodies import hollow_bowl
 
 PAD = (0.05, 0.022, 0.015)
