@@ -78,7 +78,7 @@ def fake_result(row):
     from softjaw.study.case.result import CaseResult
 
     random = np.random.default_rng(row)
-    values = {f"maps/{name}": random.random(3) for name in ("quality", "e_n", "f_x_max", "tau_z_max")}
+    values = {f"maps/{name}": random.random(3) for name in ("payload", "e_n", "f_x_max", "tau_z_max", "quality")}
     values |= {"maps/S": random.random(), "fingers/f_x_max": random.random((2, 3)), "checks/adhesion": random.random(2)}
     values |= {"work/seconds_assembly": 1e-3, "fingers/pose_rotation": random.random((2, 3, 3))}
     patch = {"pressure": random.random((2, FACES)), "normal": random.random((2, FACES, 3))}
