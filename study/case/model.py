@@ -155,22 +155,22 @@ def quadrants(finger: Finger, size: tuple[float, float, float]) -> dict[tuple[in
     return {(i, j): finger.gap(points * [i, j, 1.0])[0] for i in (1, -1) for j in (1, -1)}
 
 
-def image_signs(first: Finger, other: Finger, size: tuple[float, float, float]) -> tuple[int, int] | None:
-    """Signs of x and y in the pad's frame with which the object before one finger is that before the other one."""
+def looks_alike(first: Finger, other: Finger, signs: tuple[int, int], size: tuple[float, float, float]) -> bool:
+    """Whether the object before one finger is that before the other one with these signs of x and y of the pad."""
     one, two = quadrants(first, size), quadrants(other, size)
-    for a, b in one:
-        if all(np.abs(two[i, j] - one[i * a, j * b]).max() <= MIRRORED * size[0] for i, j in one):
-            return a, b
-    return None
+    a, b = signs
+    return all(np.abs(two[i, j] - one[i * a, j * b]).max() <= MIRRORED * size[0] for i, j in one)
+
+
+def image_signs(first: Finger, other: Finger, size: tuple[float, float, float]) -> tuple[int, int] | None:
+    """Signs with which two fingers look alike; None without any."""
+    choices = ((1, 1), (1, -1), (-1, 1), (-1, -1))
+    return next((signs for signs in choices if looks_alike(first, other, signs, size)), None)
 
 
 def mirror_planes(finger: Finger, size: tuple[float, float, float]) -> tuple[bool, bool]:
     """Whether the object, as far as the pad sees it, is its own mirror image in the planes ``x = 0`` and ``y = 0``."""
-    gap = quadrants(finger, size)
-    x, y = (max(np.abs(gap[p] - gap[q]).max() for p, q in pairs) <= MIRRORED * size[0] for pairs in (
-        [((1, 1), (-1, 1)), ((1, -1), (-1, -1))], [((1, 1), (1, -1)), ((-1, 1), (-1, -1))]
-    ))  # fmt: skip
-    return x, y
+    return looks_alike(finger, finger, (-1, 1), size), looks_alike(finger, finger, (1, -1), size)
 
 
 def usable_symmetry(scene: Scene, finger: Finger, elements: tuple[int, int, int]) -> tuple[bool, bool]:
