@@ -7,24 +7,9 @@ asked for, so ``import softjaw`` takes no time. Only `press` and `run` need PETS
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from softjaw.friction.patch import ContactPatch as ContactPatch
-    from softjaw.study.lookup import GraspMap as GraspMap
-    from softjaw.study.messages import StudyError as StudyError
-    from softjaw.study.patch.measures import fit_ellipsoid as fit_ellipsoid
-    from softjaw.study.patch.measures import fit_quartic as fit_quartic
-    from softjaw.study.patch.measures import friction_limits as friction_limits
-    from softjaw.study.patch.measures import friction_wrench as friction_wrench
-    from softjaw.study.patch.measures import grasp_quality as grasp_quality
-    from softjaw.study.patch.measures import read_pressure as read_pressure
-    from softjaw.study.result.read import open as open
-    from softjaw.study.result.read import read_patch as read_patch
-    from softjaw.study.scene import Scene as Scene
-    from softjaw.study.solve import press as press
-    from softjaw.study.solve import run as run
-
+# What type checkers know of these names stands in __init__.pyi.
 _HOMES = {
     "Scene": "study.scene",
     "press": "study.solve",

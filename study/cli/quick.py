@@ -15,7 +15,7 @@ from softjaw.study.run.plan import make_plan, plan_text
 from softjaw.study.run.scaling import scaling_text
 from softjaw.study.scene import Scene, SceneError, load_scene, start
 from softjaw.study.scene.objects import Mesh
-from softjaw.study.show.tables.overview import scene_text
+from softjaw.study.show.overview import scene_text
 from softjaw.study.table import hanging, terminal_width
 from softjaw.study.units import in_si
 

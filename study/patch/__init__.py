@@ -1,1 +1,0 @@
-"""A pressure field from elsewhere, judged by the definitions of the study: read, evaluated, reported."""

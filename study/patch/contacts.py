@@ -16,7 +16,6 @@ from softjaw.study.case.contact import Contact
 from softjaw.study.messages import OTHER_FILE, StudyError
 from softjaw.study.patch.faces import ReadPatch, checked
 from softjaw.study.patch.patch_reader import ENDINGS, Reading, checked_file, read_table
-from softjaw.study.patch.trial import trouble
 
 EXACT = 2000  # motions whose hull gives the volume of the limit surface itself, to some 1e-4
 HALF_TURN = np.diag([1.0, -1.0, -1.0])  # about x: how the second of two equal fingers stands
@@ -34,7 +33,7 @@ def read_patch(file: str, reading: Reading) -> ReadPatch:
     ending = path.suffix.lower()
     if ending == ".csv":
         return checked(read_table(path, reading), reading.flip_normals)
-    from softjaw.study.patch.vtk_faces import read_vtk  # VTK, which tables do not need
+    from softjaw.study.patch.vtk_faces import read_vtk, trouble  # VTK, which tables do not need
 
     if why := trouble(lambda: read_vtk(path, reading)):  # VTK may not survive the file
         raise StudyError(OTHER_FILE, f"{path}: damaged ({why}); write it again")

@@ -16,8 +16,8 @@ from softjaw.study.messages import OTHER_FILE, USAGE, Problem, StudyError, short
 from softjaw.study.patch.faces import Faces, corner_geometry, refuse
 
 ENDINGS = (".csv", ".vtu", ".vtp")
-LARGEST_FILE = 100 * 2**20  # bytes
-MOST_FACES = 500_000
+LARGEST_FIELD = 100 * 2**20  # bytes
+MOST_PATCH_FACES = 500_000
 FACTORS = {
     "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3},
     "area": {"m2": 1.0, "cm2": 1e-4, "mm2": 1e-6},
@@ -83,8 +83,8 @@ def checked_file(file: str, endings: Sequence[str]) -> Path:
         path.open("rb").close()
     except OSError as error:
         raise StudyError(OTHER_FILE, f"{file}: cannot be read ({error.strerror}); check the path") from error
-    if size > LARGEST_FILE:
-        text = f"{file}: has {size >> 20} MiB, more than {LARGEST_FILE >> 20} MiB"
+    if size > LARGEST_FIELD:
+        text = f"{file}: has {size >> 20} MiB, more than {LARGEST_FIELD >> 20} MiB"
         raise StudyError(USAGE, f"{text}; export the contact surface alone")
     return path
 
@@ -96,8 +96,8 @@ def refused(path: Path, line: int | None, key: str, found: str, expected: str, r
 
 def check_count(path: Path, count: int) -> None:
     """Refuse more faces than a patch may have, before they are read."""
-    if count > MOST_FACES:
-        text = f"{path}: found {count} faces, expected at most {MOST_FACES}; export the contact surface alone"
+    if count > MOST_PATCH_FACES:
+        text = f"{path}: found {count} faces, expected at most {MOST_PATCH_FACES}; export the contact surface alone"
         raise StudyError(USAGE, text)
 
 

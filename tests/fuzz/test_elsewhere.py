@@ -16,7 +16,7 @@ from softjaw.fem.objects.mesh_file import read_triangles
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.study.cli import main
 from softjaw.study.messages import OTHER_FILE, UNPRINTABLE, USAGE, StudyError
-from softjaw.study.patch.trial import trouble
+from softjaw.study.patch.vtk_faces import trouble
 from softjaw.study.result.store import open_result
 from softjaw.study.scene import SceneError, load_scene, parse_scene
 from tests.fuzz.lies import LIES

@@ -28,8 +28,8 @@ from softjaw.study.show.grasps import (
     spoken,
     unravelled,
 )
+from softjaw.study.show.overview import RULE, wall_text
 from softjaw.study.show.status import MOST_PLACES
-from softjaw.study.show.tables.overview import RULE, wall_text
 
 BEST, MOST_REASONS = 6, 20
 # Columns of a page that has room for them.

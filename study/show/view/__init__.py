@@ -1,1 +1,0 @@
-"""Results in three dimensions: the map on the object, pads, pressure, friction, deformed wall and limit surface."""

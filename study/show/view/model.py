@@ -28,7 +28,7 @@ from softjaw.study.show.view.pads import Faces, Pad, pads_of
 Place = tuple[float | None, float | None]
 NEUTRAL, OPEN, CROSSED = "#dfe3e6", "#b6bfc6", "#6d6570"  # no candidate, not computed, failed
 PAD, FORCE = "#8a9199", "#00a5bf"
-LONGEST = 6.0  # arrow [mm]
+ARROW_MM = 6.0  # the longest arrow of friction
 SLIPS = {"x": "a slip along x of the contact", "y": "a slip along y of the contact", "turn": "a turn about its normal"}
 
 

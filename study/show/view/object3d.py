@@ -20,7 +20,7 @@ from softjaw.study.result.layout import DONE
 from softjaw.study.show import plots
 from softjaw.study.show.grasps import Index, field, forces, label_of, note, order, place
 from softjaw.study.show.stored_surface import NAMES
-from softjaw.study.show.view.model import CROSSED, FORCE, LONGEST, NEUTRAL, OPEN, PAD, View
+from softjaw.study.show.view.model import ARROW_MM, CROSSED, FORCE, NEUTRAL, OPEN, PAD, View
 
 MOST = 24_000_000  # bytes of pads, walls and limit surfaces; beyond it, those of the worst grasps are left out
 CHOICES = ("quality", "quality_fitted", "e_n", "epsilon", "f_x_max", "f_y_max", "tau_z_max", "safety_factor", "F_N",
@@ -107,7 +107,7 @@ def case(view: View, index: Index, motion: str, whole: bool) -> dict[str, Any]:
         "pads": len(both), "step": step, "faces": _packed(np.round(corners / step), "<i2"),
         "lines": _packed(_joined([1e3 * pad.lines() for pad in both]), "<f4"),
         "pressure": _packed(np.concatenate([np.empty(0), *(p for _, p in pressed)]), "<f4"),
-        "arrows": _packed(_joined([pad.arrows(motion, LONGEST) for pad in both]), "<f4"),
+        "arrows": _packed(_joined([pad.arrows(motion, ARROW_MM) for pad in both]), "<f4"),
     }  # fmt: skip
     if (moved := view.displacement(index)) is not None:
         found |= {"wall": _packed(1e3 * moved[0], "<f4"), "angle": moved[1]}

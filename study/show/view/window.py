@@ -16,7 +16,7 @@ from softjaw.study.show.grasps import Index, forces, label_of
 from softjaw.study.show.object_surface import NOBODY
 from softjaw.study.show.stored_surface import COMPONENTS, weaker
 from softjaw.study.show.view import solids
-from softjaw.study.show.view.model import CROSSED, LONGEST, NEUTRAL, OPEN, View
+from softjaw.study.show.view.model import ARROW_MM, CROSSED, NEUTRAL, OPEN, View
 
 SIZE = (1400, 900)
 BAR = {"vertical": True, "height": 0.36, "width": 0.045, "title_font_size": 15, "label_font_size": 13, "n_labels": 5,
@@ -98,7 +98,7 @@ def _pads(plotter: Any, view: View, index: Index, motion: str) -> None:
         solids.block(plotter, pad, f"pad {number}")
         if pad.loaded.any():
             solids.pressures(plotter, pad, top, name=f"pad {number} pressure", scalar_bar_args=bar, pickable=False)
-            solids.arrows(plotter, pad.arrows(motion, LONGEST), name=f"pad {number} arrows", pickable=False)
+            solids.arrows(plotter, pad.arrows(motion, ARROW_MM), name=f"pad {number} arrows", pickable=False)
 
 
 def _say(plotter: Any, text: str, name: str) -> None:

@@ -12,14 +12,13 @@ import numpy as np
 import pytest
 
 from softjaw.fem.objects.shapes import EllipticCylinder
-from softjaw.study.cli import main
+from softjaw.study.cli import drawings, main
 from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, USAGE, StudyError
 from softjaw.study.quantities import ALONG, AROUND
 from softjaw.study.result.read import dataset
 from softjaw.study.result.store import open_result
 from softjaw.study.show.grasps import judge, order
 from softjaw.study.show.object_surface import NOBODY, Cells, Wall, areas, between, coloured, cut
-from softjaw.study.show.view import command
 from softjaw.study.show.view.model import quantity_of, view_of
 from softjaw.study.show.view.object3d import object_block, payload, view_page
 from softjaw.study.show.view.pads import pads_of
@@ -275,7 +274,7 @@ def test_a_window_needs_a_screen(file, monkeypatch, capsys):
     used = []
     monkeypatch.setattr("softjaw.study.show.view.window.show_window", lambda *_: used.append("window"))
     for screen, code in ((False, USAGE), (True, 0)):
-        monkeypatch.setattr(command, "has_screen", lambda screen=screen: screen)
+        monkeypatch.setattr(drawings, "has_screen", lambda screen=screen: screen)
         assert main(["view", str(file)]) == code
     assert used == ["window"]
     assert "--screenshot" in capsys.readouterr().err

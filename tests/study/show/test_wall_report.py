@@ -25,8 +25,8 @@ from softjaw.study.scene import parse_scene
 from softjaw.study.show.best_grasps import best, safe_range
 from softjaw.study.show.grasps import at, judge
 from softjaw.study.show.object_surface import undeformed
+from softjaw.study.show.overview import RULE
 from softjaw.study.show.report import curves, maps, tables, verdict, writing
-from softjaw.study.show.tables.overview import RULE
 from softjaw.study.show.view.model import View, view_of
 from tests.study.sealing import sealed
 

@@ -1,0 +1,14 @@
+from softjaw.friction.patch import ContactPatch as ContactPatch
+from softjaw.study.lookup import GraspMap as GraspMap
+from softjaw.study.messages import StudyError as StudyError
+from softjaw.study.patch.measures import fit_ellipsoid as fit_ellipsoid
+from softjaw.study.patch.measures import fit_quartic as fit_quartic
+from softjaw.study.patch.measures import friction_limits as friction_limits
+from softjaw.study.patch.measures import friction_wrench as friction_wrench
+from softjaw.study.patch.measures import grasp_quality as grasp_quality
+from softjaw.study.patch.measures import read_pressure as read_pressure
+from softjaw.study.result.read import open as open
+from softjaw.study.result.read import read_patch as read_patch
+from softjaw.study.scene import Scene as Scene
+from softjaw.study.solve import press as press
+from softjaw.study.solve import run as run

@@ -1,1 +1,0 @@
-"""What is said in terminals: best grasps, state, differences, exports."""
