@@ -77,31 +77,6 @@ def uniaxial_hyperfoam(stretch, nu, mu, alpha):
     return lateral, nominal / lateral**2
 
 
-def shear_hyperfoam(gamma, moduli, exponents):
-    """Cauchy stress ``(3, 3)`` [Pa] of hyperfoam in simple shear ``F = I + gamma e1 e2``, where J = 1.
-
-    Principal stretches are ``l, 1/l, 1`` with ``l - 1/l = gamma``, principal stresses ``t = sum 2 mu/alpha
-    (l^alpha - 1)``, stresses ``s12 = (t1 - t2) / sqrt(gamma^2 + 4)`` and ``s11 - s22 = gamma s12``.
-    """
-    stretch = gamma / 2 + np.sqrt(1 + gamma**2 / 4)
-    t1, t2 = (
-        sum(2 * mu / a * (s**a - 1) for mu, a in zip(moduli, exponents, strict=True)) for s in (stretch, 1 / stretch)
-    )
-    s12 = (t1 - t2) / np.sqrt(gamma**2 + 4)
-    s11, s22 = (t1 + t2 + gamma * s12) / 2, (t1 + t2 - gamma * s12) / 2
-    return np.array([[s11, s12, 0], [s12, s22, 0], [0, 0, 0]])
-
-
-def shear_blatz_ko(gamma, G):
-    """Cauchy stress ``G (I - b^-1)`` in simple shear: ``s12 = G gamma``, ``s22 = -G gamma^2``."""
-    return G * np.array([[0, gamma, 0], [gamma, -(gamma**2), 0], [0, 0, 0]])
-
-
-def shear_neo_hookean(gamma, G):
-    """Cauchy stress ``G (b - I)`` in simple shear: ``s12 = G gamma``, ``s11 = G gamma^2``."""
-    return G * np.array([[gamma**2, gamma, 0], [gamma, 0, 0], [0, 0, 0]])
-
-
 # -- Hertz ------------------------------------------------------------------------------------------------------------
 
 

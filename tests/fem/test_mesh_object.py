@@ -221,27 +221,9 @@ def test_unit_is_applied():
         assert np.ptp(x[:, 2]) == pytest.approx(np.ptp(points[:, 2]), rel=1e-12)
 
 
-PLY = """ply
-format ascii 1.0
-element vertex {}
-property float x
-property float y
-property float z
-element face {}
-property list uchar int vertex_indices
-end_header
-0 0 0
-1 0 0
-0 1 0
-3 0 1 {}
-"""
-DAMAGED = {
-    "cut.stl": FLASK.read_bytes()[:20_000], "junk.stl": b"hello", "huge.stl": bytes(80) + b"\xff" * 4,
-    "ascii.stl": b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 z\n", "empty.stl": b"",
-    "a.step": b"ISO-10303-21;", "a.obj": b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n",
+DAMAGED = {  # what tests/fuzz does not make of sound files
+    "junk.stl": b"hello", "empty.stl": b"", "a.step": b"ISO-10303-21;", "c.ply": b"ply\nformat ascii 1.0\n",
     "b.obj": b"v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "c.obj": b"v 0 0 0\nv 1 0 0\nv 0 1 0\n",
-    "a.ply": PLY.format(3, 1, 9).encode(), "b.ply": PLY.format(300_000_000_000, 1, 2).encode(),
-    "c.ply": b"ply\nformat ascii 1.0\n", "d.ply": PLY.format(-3, 1, 2).encode(),
 }  # fmt: skip
 
 

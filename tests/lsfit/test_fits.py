@@ -208,16 +208,6 @@ def test_directions_of_motion_improve_directions():
     assert fit_error(near, *test).Erad > fit_error(far, *test).Erad
 
 
-def test_one_face_gives_a_flat_fit():
-    W, T = samples(points_patch([[0, 0]], [2.0]), 200)
-    for surface in (full_ellipsoid(W), axis_aligned_ellipsoid(W), convex_quartic(W, T).surface):
-        assert surface.flag == FitFlag.RANK_DEFICIENT
-        assert (surface.rank, surface.volume) == (2, 0)
-        np.testing.assert_allclose(surface.semi_axes, [1, 1, 0], atol=1e-12)
-        assert surface.shadow_area == pytest.approx(np.pi, rel=1e-12)
-        np.testing.assert_allclose(fit_error(surface, W, T), 0, atol=1e-6)
-
-
 def test_wrenches_in_a_tilted_plane_are_found():
     B = np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))[0][:, :2]
     W = directions(2, 40) * [1.0, 0.5] @ B.T

@@ -43,17 +43,6 @@ def test_derivatives_match_differences(d):
         np.testing.assert_allclose(H[:, i], np.einsum("mkj,k->mj", slope, c), rtol=1e-6, atol=1e-5)
 
 
-@pytest.mark.parametrize("d", [1, 3, 6])
-def test_euler(d):
-    """A form of degree 4: ``w . grad P = 4 P`` and ``w' H w = 12 P``."""
-    E, w = exponents(d, 4), RANDOM.normal(size=(5, d))
-    c = RANDOM.normal(size=len(E))
-    P = monomials(w, E) @ c
-    np.testing.assert_allclose(np.einsum("mki,mi,k->m", monomial_gradients(w, d, 4), w, c), 4 * P, rtol=1e-10)
-    H = hessian_tensor(c, d)
-    np.testing.assert_allclose(np.einsum("ijkl,mi,mj,mk,ml->m", H, w, w, w, w), 12 * P, rtol=1e-10)
-
-
 @pytest.mark.parametrize("d", [1, 2, 3, 6])
 def test_substitution_is_composition(d):
     E, w, L = exponents(d, 4), RANDOM.normal(size=(5, d)), RANDOM.normal(size=(d, d))

@@ -206,15 +206,6 @@ def test_directions_are_judged_with_axes_of_like_length(cylinder):
     assert span_ellipsoid(*cylinder).errors.Edir == pytest.approx(10.7, rel=0.1)
 
 
-def test_the_convex_quartic_is_better_than_the_ellipsoid_and_proven(cylinder, convex):
-    W, T = cylinder
-    assert convex.gram_eigenvalue > 0
-    assert np.linalg.eigvalsh(convex.surface.hessian(W)).min() > 0
-    ellipsoid = span_ellipsoid(W, T).errors
-    assert convex.errors.Erad < 0.4 * ellipsoid.Erad
-    assert convex.errors.Edir < 0.6 * ellipsoid.Edir
-
-
 def test_the_convex_quartic_predicts_friction_for_other_motions(convex):
     patch = cylinder_grid(1, np.pi / 3, 2, 24, 24)
     motion = np.random.default_rng(1).normal(size=(200, 6))

@@ -9,7 +9,7 @@ from softjaw.friction.motion import fibonacci_twists
 from softjaw.lsfit.ellipsoid import Ellipsoid, TiltedEllipsoid
 from softjaw.lsfit.fit_error import fit_error, overclaim
 from softjaw.lsfit.form import exponents, monomials
-from softjaw.lsfit.geometry import directions, quartic_volume, sphere_rule
+from softjaw.lsfit.geometry import directions, quartic_volume
 from softjaw.lsfit.quartic import Quartic
 from softjaw.lsfit.samples import normalised_samples, sample_rank
 from softjaw.lsfit.surface import FitFlag, Image, OpenBodyError, UndecidedError, shadow_area, supported_shadow
@@ -165,11 +165,6 @@ def test_volumes_in_other_dimensions(d, rel):
     assert volume == pytest.approx((2 * math.gamma(1.25)) ** d / math.gamma(1 + d / 4), rel=rel)
 
 
-def test_the_sphere_rule_integrates_squares():
-    u, weight = sphere_rule(3, 6)
-    np.testing.assert_allclose(u.T * weight @ u, 4 * math.pi / 3 * np.eye(3), atol=1e-13)
-
-
 @every_flat
 def test_flat_bodies_carry_nothing_across_and_are_nowhere_infinite(surface):
     assert (surface.rank, surface.volume) == (2, 0)
@@ -274,16 +269,6 @@ def on_the_ellipsoid(K=200):
     """Wrenches of the ellipsoid with the semi-axes `AXES` and the unit normals there."""
     t = fibonacci_twists(K, 1.0)
     return t * AXES**2 / np.linalg.norm(t * AXES, axis=1, keepdims=True), t
-
-
-def test_an_ellipsoid_fits_itself():
-    W, T = on_the_ellipsoid()
-    ellipsoid = Ellipsoid(AXES)
-    np.testing.assert_allclose(ellipsoid.value(W), 1, rtol=1e-14)
-    np.testing.assert_allclose(fit_error(ellipsoid, W, T), 0, atol=1e-13)
-    np.testing.assert_allclose(ellipsoid.support(T), (W * T).sum(axis=1), rtol=1e-14)
-    assert all(ellipsoid.holds(w) for w in W * (1 - 1e-9))
-    assert not any(ellipsoid.holds(w) for w in W * (1 + 1e-9))
 
 
 def test_errors_of_a_swollen_ellipsoid():

@@ -1,4 +1,4 @@
-"""Chromium without a window, driven through a pair of pipes: pages, their console, pointer, keys and pictures.
+"""Chromium without a window, driven through a pair of pipes: pages, their console, requests and prints.
 
 Needs nothing but the standard library: the browser's debugging protocol is JSON, each message ended by a zero byte.
 """
@@ -17,7 +17,6 @@ from typing import Any
 PROGRAM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 WORDS = "--headless=new --no-sandbox --disable-dev-shm-usage --remote-debugging-pipe --hide-scrollbars"
 WORDS += " --use-angle=swiftshader --enable-unsafe-swiftshader --ignore-gpu-blocklist"  # WebGL without a graphics card
-KEYS = {"ArrowLeft": 37, "ArrowUp": 38, "ArrowRight": 39, "ArrowDown": 40, "Escape": 27, "Tab": 9, "End": 35}
 
 
 class Browser:
@@ -112,25 +111,6 @@ class Browser:
             assert time.monotonic() < end, expression
             time.sleep(0.1)
         return found
-
-    def point(self, x: float, y: float) -> None:
-        """Move the mouse there, in the window."""
-        self.do("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y)
-
-    def tap(self, x: float, y: float) -> None:
-        """Touch the window there with a finger."""
-        self.do("Input.dispatchTouchEvent", type="touchStart", touchPoints=[{"x": x, "y": y}])
-        self.do("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
-
-    def press(self, key: str) -> None:
-        """Press and release a key."""
-        for kind in ("rawKeyDown", "keyUp"):
-            self.do("Input.dispatchKeyEvent", type=kind, key=key, code=key, windowsVirtualKeyCode=KEYS[key])
-
-    def picture(self, whole: bool = True) -> bytes:
-        """The whole page, or the window, as PNG."""
-        answer = self.do("Page.captureScreenshot", format="png", captureBeyondViewport=whole)
-        return base64.b64decode(answer["data"])
 
     def printed(self) -> bytes:
         """The page as it would be printed, as PDF."""

@@ -8,7 +8,7 @@ from softjaw.fem.contact.press import Press
 from softjaw.fem.contact.problem import Control
 from softjaw.fem.errors import ConvergenceError, NotReachedError
 from softjaw.fem.materials import material
-from softjaw.fem.objects.shapes import EllipticCylinder, Revolution, Sphere
+from softjaw.fem.objects.shapes import EllipticCylinder, Sphere
 from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.pad.shape import PadShape
 from tests.fem import reference
@@ -88,21 +88,6 @@ def test_tangent_of_the_path_by_finite_differences(symmetry, control):
         x = press._stepping.solve(x * (1 + 1e-9), Control(force=20.0), work)
     tangent = problem.path_tangent(x, press.solver.answer)
     np.testing.assert_allclose(tangent, (high.unknowns - low.unknowns) / 0.4, atol=2e-3 * np.abs(tangent).max())
-
-
-@pytest.mark.parametrize("gap", [ROUND, BALL], ids=["cylinder", "sphere"])
-def test_a_start_on_the_tangent_is_nearer(gap):
-    """From 5 to 10 N: less than half as far off as the state at 5 N."""
-    press = press_of(BLATZ_KO, gap)
-    low, high = press.load_path([5.0, 10.0])
-    steps, x = press._stepping, press._stepping.solve(low.unknowns * (1 + 1e-9), Control(force=5.0), Work())
-    here = steps._place(x, 5.0, steps._tangent(x))
-    start = steps._ahead(here, 10.0)
-
-    def off(y):
-        return np.abs(y - high.unknowns)[: press.pad.closing_dof + 1].max()
-
-    assert off(start) < 0.5 * off(x)
 
 
 def test_looking_for_stability_leaves_the_solver_as_it_was():
@@ -245,49 +230,3 @@ def test_a_state_whose_nodes_alternate_passes_where_it_is_near_enough(scatter, p
     else:
         with pytest.raises(ConvergenceError):
             last(press, [5])
-
-
-# -- a jump of weighted gaps, where nodal ones know of none ------------------------------------------------------------
-
-NECK = np.array([
-    [115, 33], [120, 33], [125, 33], [130, 32.781], [135, 31.548], [140, 29.012], [145, 25.463], [150, 21.537],
-    [155, 17.988], [160, 15.452], [165, 14.219], [170, 14], [180, 14], [190, 14], [200, 14],
-])  # fmt: skip
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("station", [166.17647, 170.58824, 175.0])
-def test_on_a_bottles_shoulder_all_lists_of_forces_lead_to_one_state(station):
-    """Travels of 9.85 and 15.24 mm, 9.95 and 12.45 mm, 8.34 and 9.27 mm at 13 N came of these lists."""
-    from softjaw.study.case.model import approach
-    from softjaw.study.case.poses import axis_poses
-    from softjaw.study.scene.sections import Gripper
-
-    pads = Gripper(pad_length_mm=50, pad_width_mm=22, pad_thickness_mm=15, elements=(20, 10, 6))
-    finger = approach(Revolution(MM * NECK), axis_poses(station * MM, 0.0, 0.0)[0], pads)
-    states = []
-    for forces in ([1, 13], [1, 2, 4, 7, 10, 13]):
-        states.append(last(press_of(BLATZ_KO, finger.gap, (False, True), (20, 10, 6)), forces))
-    assert {state.pad.contact for state in states} == {"nodal"}
-    assert not any(state.path_dependent for state in states)
-    for state in states:
-        assert reference.e_n(state) == pytest.approx(reference.e_n(states[0]), rel=1e-8)
-        assert state.closing == pytest.approx(states[0].closing, rel=1e-9)
-
-
-def test_where_nodal_gaps_fail_the_state_beyond_the_jump_is_taken_and_says_so():
-    press = press_of()
-    tried = []
-
-    def step_to(here, goal, work):
-        tried.append((press.pad.contact, not press._others))
-        if len(tried) < 3:
-            raise ConvergenceError("the pad jumps at 7 N")
-        press._stepping.jumped = True
-        return proper(here, goal, work)
-
-    proper, press._step_to = press._step_to, step_to
-    (state,) = press.load_path([10.0])
-    assert tried == [("weighted", False), ("nodal", True), ("weighted", True)]
-    assert state.path_dependent
-    assert state.pad.contact == "weighted"

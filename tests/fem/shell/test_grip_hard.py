@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 
 from softjaw.fem.contact.extract import extract, turned
-from softjaw.fem.contact.load_stepping import Work
-from softjaw.fem.contact.path import OnPath
 from softjaw.fem.errors import CheckError
 from softjaw.fem.objects.gap import Pose
 from softjaw.fem.shell.facing import FAR, face
@@ -66,19 +64,6 @@ def test_a_wall_that_gives_way_is_flagged_and_stays_flagged(thickness, forces, s
     assert [s.wall.snapped for s in states] == snapped
 
 
-def test_a_wall_creeps_to_the_state_that_its_load_path_leads_to():
-    held = grip(thin(), elements=(4, 2, 2), mesh=ROUGH)
-    path = held.load_path([1.0, 1.5])
-    next(path)
-    start = held._last
-    expected = next(path).fingers[0].closing
-    held._last, held.opening.last = start, (1.0, 1.0)
-    here = OnPath(start, 1.0, compliance=held.problem.closing(start))
-    found = held._creep(here, 1.5, Work())
-    assert held.problem.closing(found.x) == pytest.approx(expected, rel=1e-6)
-    assert not found.jumped
-
-
 @pytest.mark.long
 def test_a_force_beyond_the_snap_is_the_same_state_from_below_and_at_once():
     at_once = next(grip(thin(3e-4), elements=(6, 4, 2), mesh=ROUGH).load_path([4.0]))
@@ -94,14 +79,6 @@ def test_a_foil_and_tiny_forces_are_solved():
     assert foil.fingers[0].checks.force_balance < 1e-8
     *_, tiny = grip(thin(4e-4), elements=(6, 4, 2), mesh=ROUGH).load_path([1e-3, 1e-2])
     assert tiny.fingers[0].closing < 1e-4
-
-
-@pytest.mark.long
-def test_many_levels_end_where_few_do():
-    forces = np.linspace(0.05, 1.5, 30)
-    *_, many = grip(thin(), elements=(4, 2, 2), mesh=ROUGH).load_path(forces)
-    *_, few = grip(thin(), elements=(4, 2, 2), mesh=ROUGH).load_path([1.5])
-    assert many.fingers[0].closing == pytest.approx(few.fingers[0].closing, rel=1e-7)
 
 
 def test_pads_and_wall_must_balance():
