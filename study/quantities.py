@@ -27,13 +27,24 @@ BOTH_ENDS = RIMS[0] | RIMS[1]
 PARTS = ("assembly", "factorisation", "rest", "friction")  # of a case's time
 # What a quantity may need that not every scene asks for; the layout of a file knows of `HELD` by their sizes.
 NEEDS = ("two meshes", "six components", "mass", "task", "wall", "finer meshes")
-HELD = ("cor grid", "samples", "patches")
+HELD = ("samples", "patches")
 # Exponents of x, y and t, highest power of x first.
 MONOMIALS = tuple(
     " ".join(f"{letter}^{k}" if k > 1 else letter for letter, k in zip("xyt", (i, j, 4 - i - j), strict=True) if k)
     for i in range(4, -1, -1)
     for j in range(4 - i, -1, -1)
 )
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One axis of the maps: ``values`` ``(k,)`` in SI units; texts are numbered and listed in ``options``."""
+
+    name: str
+    values: Any
+    units: str
+    long_name: str
+    options: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -119,8 +130,6 @@ class Quantity:
         Of `NEEDS` or `HELD`; without all of them the quantity is not in the file.
     rank : int
         Place among the main maps, 1 for the first; 0 for all others.
-    among : str
-        Dimension of the candidates that it is stored for alone, ``sampled`` or ``probe``; else nothing.
     meanings : tuple of str
         What the integers 0, 1, ... of a code mean; -1 is none.
     error : str
@@ -136,7 +145,6 @@ class Quantity:
     symbol: str = ""
     needs: tuple[str, ...] = ()
     rank: int = 0
-    among: str = ""
     meanings: tuple[str, ...] = ()
     error: str = ""
 
@@ -154,6 +162,11 @@ class Quantity:
     def by_model(self) -> bool:
         """Whether there is one value for each of `MODELS`."""
         return "model" in self.dims
+
+    @property
+    def sampled(self) -> bool:
+        """Whether it is stored for the candidates of ``limit_surface.wrench_samples`` alone."""
+        return "samples" in self.needs
 
     def error_in_unit(self, error: Any, value: Any) -> Any:
         """An error of this map as it is stored, in the map's unit; ``value`` is what a relative one is a share of."""
@@ -385,13 +398,10 @@ ROWS = (
              f" finger 1's, times {ALONG} places along the outline, in equal steps of its arc length from the bottom's"
              " middle or rim to the top; the angle runs slowest.", "wall", needs=("wall",)),
     # large arrays
-    Quantity("cor_wrench", (*F, "cor", "component"), "N, N, N m", "wrenches of a grid of centres of rotation",
-             "Friction (f_x, f_y, tau_z) of the CCM in the contact frame, for turns about the points of a"
-             " square grid of ten contact lengths a side about the origin, x first.", "fingers", needs=("cor grid",)),
     Quantity("wrench", (*FM, "sample", "component"), "N, N, N m", "wrenches of sampled motions",
              "Friction (f_x, f_y, tau_z) about the contact frame's origin for the motions in wrenches/motion; the"
              " opposite motions have the opposite wrenches. Of the candidates in wrenches/candidate only.", "wrenches",
-             needs=("samples",), among="sampled"),
+             needs=("samples",)),
     # effects: level, indicator and reason of each
     *(
         Quantity(f"{name}_{part}", (), "", f"{part} of the effect '{name}'", text, "effects", meanings=meanings)

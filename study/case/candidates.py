@@ -20,7 +20,7 @@ from softjaw.friction.patch import NEGLIGIBLE
 from softjaw.study.case.build import check_object, forces_apart, middle_of, own_frame, pad_shape, surface_triangles
 from softjaw.study.case.fit import doubt, fit_of, jaws_of
 from softjaw.study.case.poses import axis_poses, explicit_poses, moved, turn_of_pose
-from softjaw.study.quantities import MISSING, REALISATION
+from softjaw.study.quantities import MISSING, REALISATION, Axis
 from softjaw.study.scene import Scene
 from softjaw.study.units import UNITS, in_si, split_unit
 
@@ -124,17 +124,6 @@ def with_sampled_grasps(scene: Scene) -> Scene:
 
 
 # --- axes of the maps, and units of work ------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Axis:
-    """One axis of the maps: ``values`` ``(k,)`` in SI units; texts are numbered and listed in ``options``."""
-
-    name: str
-    values: FloatArray
-    units: str
-    long_name: str
-    options: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

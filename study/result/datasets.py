@@ -36,14 +36,14 @@ class Dataset:
 
 @dataclass(frozen=True)
 class Column:
-    """One case's share of a dataset; those ``among`` some candidates are stored for these only."""
+    """One case's share of a dataset; ``sampled`` ones are stored for the layout's sampled candidates only."""
 
     key: str
     path: str
     shape: tuple[int, ...]
     dtype: np.dtype
     fill: Any
-    among: str = ""
+    sampled: bool = False
 
 
 def columns_of(layout: Any) -> Iterator[Column]:
@@ -59,7 +59,7 @@ def columns_of(layout: Any) -> Iterator[Column]:
         elif q.group == "maps":
             yield Column(q.key, f"{ROOT}/{q.name}/{q.name}", shape, np.dtype(dtype), fill)
         elif q.group != "status":
-            yield Column(q.key, f"{ROOT}/{q.key}", shape, np.dtype(dtype), fill, q.among)
+            yield Column(q.key, f"{ROOT}/{q.key}", shape, np.dtype(dtype), fill, q.sampled)
     # The message stays last: `blank` and `record` address it as the last column.
     yield Column("status/message", f"{ROOT}/status/message", (), np.dtype(f"S{MESSAGE_BYTES}"), b"")
 
@@ -69,9 +69,9 @@ def datasets_of(layout: Any) -> Iterator[Dataset]:
     for c in layout.columns:
         q = BY_KEY.get(c.key) or BY_KEY[c.key.rpartition("/")[0]]
         lead, scales = layout.shape, layout.names
-        if c.among:
-            lead = (*lead[:-3], len(layout.chosen[c.among]), lead[-1])
-            scales = (*scales[:-3], c.among, scales[-1])
+        if c.sampled:
+            lead = (*lead[:-3], len(layout.sampled), lead[-1])
+            scales = (*scales[:-3], "sampled", scales[-1])
         yield Dataset(c.path, lead + c.shape, c.dtype, c.fill, described(q, c.key), scales + q.dims * bool(c.shape))
     for name in ("code", "attempts"):
         about = described(BY_KEY[f"status/{name}"], f"status/{name}")
@@ -82,11 +82,8 @@ def datasets_of(layout: Any) -> Iterator[Dataset]:
         yield from _sample_datasets(layout)
     lengths = dict(zip(layout.names, layout.shape, strict=True))
     for d in layout.derived:
-        attributes = {"units": d.units, "long_name": d.long_name, "definition": d.definition}
-        axes = tuple(name.replace(".", "_") for name in d.axes)
-        shape = tuple(lengths[name] for name in axes) + d.shape
-        scales = axes if not d.shape else ()
-        yield Dataset(f"{ROOT}/derived/{d.name}", shape, np.dtype("<f8"), np.nan, attributes, scales)
+        shape = tuple(lengths[name] for name in d.dims)
+        yield Dataset(f"{ROOT}/derived/{d.name}", shape, np.dtype("<f8"), np.nan, d.attributes, d.dims)
 
 
 def _checksums(layout: Any) -> Iterator[Dataset]:
@@ -106,14 +103,9 @@ def _sample_datasets(layout: Any) -> Iterator[Dataset]:
     about = {"units": "", "long_name": "sampled motions", "definition": text}
     shape = (layout.samples, 3)
     yield Dataset(f"{ROOT}/wrenches/motion", shape, np.dtype("<f8"), np.nan, about, ("sample", "component"))
-    what = "candidates whose wrenches are stored"
-    yield _numbers(f"{ROOT}/wrenches/candidate", what, len(layout.sampled), "sampled")
-
-
-def _numbers(path: str, what: str, count: int, scale: str) -> Dataset:
     text = "Number of the candidate, counted over stations and angles, the angle running fastest."
-    about = {"units": "", "long_name": what, "definition": text}
-    return Dataset(path, (count,), np.dtype("<i4"), 0, about, (scale,))
+    about = {"units": "", "long_name": "candidates whose wrenches are stored", "definition": text}
+    yield Dataset(f"{ROOT}/wrenches/candidate", (len(layout.sampled),), np.dtype("<i4"), 0, about, ("sampled",))
 
 
 def described(q: Quantity, key: str) -> dict[str, str]:

@@ -63,14 +63,28 @@ class Header:
 
 @dataclass(frozen=True)
 class Derived:
-    """A dataset that is filled once, after all rows: over some of the axes, with an optional trailing shape."""
+    """A dataset that is filled once, after all rows: over some of the axes."""
 
     name: str
     units: str
     long_name: str
     definition: str
     axes: tuple[str, ...] = ()
-    shape: tuple[int, ...] = ()
+
+    @property
+    def dims(self) -> tuple[str, ...]:
+        """Names of its axes in the file."""
+        return tuple(map(name_in_file, self.axes))
+
+    @property
+    def attributes(self) -> dict[str, str]:
+        """What the file says of it."""
+        return {"units": self.units, "long_name": self.long_name, "definition": self.definition}
+
+
+def name_in_file(axis: str) -> str:
+    """Name of an axis in the file; NeXus allows no dot in a name, the keys of a sweep have one."""
+    return axis.replace(".", "_")
 
 
 @dataclass(frozen=True)
@@ -88,8 +102,6 @@ class Layout:
     meshes: int = 1
     patches: bool = True
     derived: tuple[Derived, ...] = ()
-    cor_grid: int = 0
-    planar: str = "pcm"
     has: tuple[str, ...] = ()
     samples: int = 0
     sampled: tuple[int, ...] = ()
@@ -120,13 +132,8 @@ class Layout:
     @cached_property
     def asked(self) -> tuple[Quantity, ...]:
         """All quantities that this version stores for such a scene."""
-        held = zip(HELD, (self.cor_grid, self.sampled, self.patches), strict=True)
+        held = zip(HELD, (self.sampled, self.patches), strict=True)
         return quantities((*self.has, *[NEEDS[0]] * (self.meshes > 1), *(name for name, size in held if size)))
-
-    @property
-    def models(self) -> tuple[str, ...]:
-        """Friction models in the order they are shown: ccm, the planar one that the scene prefers, the other."""
-        return tuple(dict.fromkeys((MODELS[0], self.planar, *MODELS)))
 
     @property
     def rows(self) -> int:
@@ -135,8 +142,8 @@ class Layout:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the axes in the file; NeXus allows no dot in a name, the keys of a sweep have one."""
-        return tuple(axis.name.replace(".", "_") for axis in self.axes)
+        """Names of the axes in the file."""
+        return tuple(name_in_file(axis.name) for axis in self.axes)
 
     @cached_property
     def shown(self) -> tuple[int, ...]:
@@ -155,8 +162,6 @@ class Layout:
         parts = {"finger": FINGERS, "model": len(MODELS), "component": 3, "monomial": len(MONOMIALS)}
         parts |= {"session": MOST_SESSIONS, "component_2": 3}
         parts |= {"wrench": 6, "wrench_2": 6} if "six components" in self.has else {}
-        if self.cor_grid:
-            parts["cor"] = self.cor_grid**2
         if "wall" in self.has:
             parts["wall_place"] = AROUND * ALONG
         if self.sampled:
@@ -189,33 +194,23 @@ class Layout:
         texts = MOST_SESSIONS * SESSION.itemsize + REPORT_BYTES
         return sum(d.nbytes for d in self.datasets) + texts + 4096 * count + 2**16
 
-    @property
-    def chosen(self) -> dict[str, tuple[int, ...]]:
-        """Numbers of the candidates that some quantities are stored for alone."""
-        return {"sampled": self.sampled}
-
-    @cached_property
-    def _slots(self) -> dict[str, dict[int, int]]:
-        return {name: {number: slot for slot, number in enumerate(numbers)} for name, numbers in self.chosen.items()}
-
     def places(self, row: int) -> list[tuple[int, ...] | None]:
         """Where a row's values stand in the columns' datasets; None for what is stored of other candidates only."""
         index = tuple(int(i) for i in np.unravel_index(row, self.shape))
         number = index[-3] * self.shape[-2] + index[-2]
-        slots = {name: slot_of.get(number) for name, slot_of in self._slots.items()}
-        among = {name: None if slot is None else (*index[:-3], slot, index[-1]) for name, slot in slots.items()}
-        return [among[c.among] if c.among else index for c in self.columns]
+        slot = self.sampled.index(number) if number in self.sampled else None
+        among = None if slot is None else (*index[:-3], slot, index[-1])
+        return [among if c.sampled else index for c in self.columns]
 
     def lines(self, column: Column, rows: NDArray[Any]) -> NDArray[Any]:
         """Where rows stand in a column's dataset, counted over the axes of the rows in it; -1 where they have none."""
-        if not column.among:
+        if not column.sampled:
             return rows
         index = np.unravel_index(rows, self.shape)
-        chosen = self.chosen[column.among]
         slots = np.full(int(np.prod(self.shape[-3:-1])), -1)
-        slots[list(chosen)] = np.arange(len(chosen))
+        slots[list(self.sampled)] = np.arange(len(self.sampled))
         slot = slots[index[-3] * self.shape[-2] + index[-2]]
-        lead = (*self.shape[:-3], len(chosen), self.shape[-1])
+        lead = (*self.shape[:-3], len(self.sampled), self.shape[-1])
         lines = np.ravel_multi_index((*index[:-3], np.maximum(slot, 0), index[-1]), lead)  # -1 cannot be ravelled
         return np.where(slot < 0, -1, lines)
 
@@ -227,8 +222,7 @@ class Layout:
     def options(self) -> str:
         """The part of the layout that the axes do not tell, as JSON."""
         derived = [asdict(d) for d in self.derived]
-        names = ("faces", "meshes", "patches", "cor_grid", "planar", "has", "samples", "sampled",
-                 *["added"] * bool(self.added))  # fmt: skip
+        names = ("faces", "meshes", "patches", "has", "samples", "sampled", *["added"] * bool(self.added))
         return json.dumps(
             {**{name: getattr(self, name) for name in names}, "derived": derived, "columns": self.summed[:-1]}
         )
@@ -238,24 +232,19 @@ def layout_from_options(axes: Sequence[Any], text: str) -> Layout:
     """The layout of an existing file from its axes and its options text; ``ValueError`` if they make no sense."""
     try:
         options = json.loads(text)
-        derived = tuple(
-            Derived(**{**d, "axes": tuple(d["axes"]), "shape": tuple(map(int, d["shape"]))}) for d in options["derived"]
-        )
+        texts = ("name", "units", "long_name", "definition")
+        derived = tuple(Derived(**{text: d[text] for text in texts}, axes=tuple(d["axes"])) for d in options["derived"])
         faces, meshes = int(options["faces"]), int(options["meshes"])
         # No real study reaches these bounds: a damaged text must not make a reader allocate without end.
         if not 0 <= faces < 10**7:
             raise ValueError(f"{faces} faces")
-        cor_grid, planar = int(options["cor_grid"]), options["planar"]
-        if not 0 <= cor_grid <= 1000 or planar not in MODELS[1:]:
-            raise ValueError(f"cor_grid {cor_grid}, planar {planar!r}")
         has, sampled, samples = tuple(options["has"]), tuple(map(int, options["sampled"])), int(options["samples"])
         if not set(has) <= set(NEEDS) or not 0 <= samples < 10**6 or len(set(sampled)) < len(sampled):
             raise ValueError(f"has {has}, {samples} samples of candidates {sampled[:5]}")
         patches = bool(options["patches"])
         added = tuple(tuple(map(_place, some)) for some in options.get("added", ()))
         stored = tuple(map(str, options["columns"]))
-        return Layout(tuple(axes), faces, meshes, patches, derived, cor_grid, planar, has, samples, sampled, added,
-                      stored)  # fmt: skip
+        return Layout(tuple(axes), faces, meshes, patches, derived, has, samples, sampled, added, stored)
     except (KeyError, TypeError, AttributeError) as error:
         raise ValueError(f"its layout attribute is damaged ({error})") from error
 

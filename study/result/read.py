@@ -13,13 +13,13 @@ import numpy as np
 import xarray as xr
 
 from softjaw.study.flags import OF_FILE, Flag
-from softjaw.study.quantities import BY_KEY, FINGERS, MODELS, REALISATION, TABLE, Quantity
+from softjaw.study.quantities import BY_KEY, FINGERS, MODELS, REALISATION, TABLE, Axis, Quantity
 from softjaw.study.result.intervals import with_intervals
 from softjaw.study.result.layout import DONE, VERSION
-from softjaw.study.result.store import Result, StoredAxis, open_result
+from softjaw.study.result.store import Result, open_result
 
 XYZ = ("x", "y", "z")
-FIELDS = ("fingers/cor_wrench", "wrenches/wrench", "wall/place")  # too large to be read with the rest
+FIELDS = ("wrenches/wrench", "wall/place")  # too large to be read with the rest
 
 
 def open(file: str | Path) -> xr.Dataset:
@@ -95,7 +95,7 @@ def read_patch(file: str | Path, **at: int | slice) -> xr.Dataset:
 
 
 def read_field(file: str | Path, path: str, **at: int | slice) -> xr.DataArray:
-    """One of the large datasets that `open` leaves out: ``wall/place``, ``fingers/cor_wrench``, ``wrenches/wrench``.
+    """One of the large datasets that `open` leaves out: ``wall/place``, ``wrenches/wrench``.
 
     Parameters
     ----------
@@ -129,9 +129,7 @@ def dataset(result: Result) -> xr.Dataset:
     listed = [q for q in layout.quantities if q.group not in ("patch", "status") and q.key not in FIELDS]
     variables = {q.variable: _variable(result, q) for q in listed}
     for d in layout.derived:
-        if not d.shape:
-            about = {"units": d.units, "long_name": d.long_name, "definition": d.definition}
-            variables[d.name] = xr.Variable(_scales(d), result.derived(d.name), about)
+        variables[d.name] = xr.Variable(d.dims, result.derived(d.name), d.attributes)
     for name in ("attempts", "message"):
         values = result.messages if name == "message" else result.read(f"status/{name}")
         variables[name] = xr.Variable(layout.names, values, _about(BY_KEY[f"status/{name}"]))
@@ -149,10 +147,10 @@ def dataset(result: Result) -> xr.Dataset:
     return with_intervals(ds) if REALISATION in ds.dims else ds
 
 
-def axes_of(ds: xr.Dataset) -> tuple[StoredAxis, ...]:
+def axes_of(ds: xr.Dataset) -> tuple[Axis, ...]:
     """The axes of the cases: swept keys, station, angle and normal force."""
     return tuple(
-        StoredAxis(str(name), ds[name].values, ds[name].units, ds[name].long_name, ds[name].attrs.get("options", ()))
+        Axis(str(name), ds[name].values, ds[name].units, ds[name].long_name, ds[name].attrs.get("options", ()))
         for name in ds.status.dims
     )
 
@@ -191,15 +189,11 @@ def _variable(result: Result, q: Quantity) -> xr.Variable:
         values = np.stack([result.read(f"{q.name}/{model}") for model in MODELS], axis=-1)
     else:
         values = result.read(f"{q.name}/{q.name}" if q.group == "maps" else q.key)
-    lead = (*names[:-3], q.among, names[-1]) if q.among else names
+    lead = (*names[:-3], "sampled", names[-1]) if q.sampled else names
     # What few candidates have alone has other axes than the states.
-    if not q.among and values.dtype.kind == "f":
+    if not q.sampled and values.dtype.kind == "f":
         values[result.status != DONE] = np.nan
     return xr.Variable((*lead, *q.dims), values, _about(q))
-
-
-def _scales(derived: Any) -> tuple[str, ...]:
-    return tuple(name.replace(".", "_") for name in derived.axes)
 
 
 def _about(q: Quantity) -> dict[str, Any]:
@@ -231,7 +225,7 @@ def _attributes(result: Result) -> dict[str, Any]:
         "scene": result.scene, "scene_file": scene.get("file", ""),
         "overrides": tuple(filter(None, str(scene.get("overrides", "")).split("\n"))),
         "petsc_options": scene.get("petsc_options", ""), "definitions": result.definitions, "report": result.report,
-        "provenance": result.sessions, "planar": layout.planar, "has": layout.has, "meshes": layout.meshes,
+        "provenance": result.sessions, "has": layout.has, "meshes": layout.meshes,
         "patches": "patch/pressure" in {c.key for c in layout.columns}, "poses": not result.axes[-3].units,
         "derived": tuple(d.name for d in layout.derived),
         "object_rotation": np.asarray(scene.get("object_rotation", np.eye(3))),

@@ -117,12 +117,9 @@ def _places(old: Layout, new: Layout) -> dict[str, Any]:
     stations = np.searchsorted(now, before)
     if not np.array_equal(now[np.minimum(stations, len(now) - 1)], before):
         raise ValueError("a station of the file is not among those of its scene")
-    places = {"station": stations}
     angles = new.shape[-2]
-    for name, numbers in old.chosen.items():
-        moved = [int(stations[n // angles]) * angles + n % angles for n in numbers]
-        places[name] = np.array([new.chosen[name].index(n) for n in moved], int)
-    return places
+    moved = [int(stations[n // angles]) * angles + n % angles for n in old.sampled]
+    return {"station": stations, "sampled": np.array([new.sampled.index(n) for n in moved], int)}
 
 
 def _spread(values: np.ndarray, dataset: Dataset, places: dict[str, Any]) -> np.ndarray:
@@ -340,7 +337,7 @@ def groups(layout: Layout) -> dict[str, dict[str, Any]]:
     for q in layout.quantities:
         if q.group != "maps":
             continue
-        several = {"signal": MODELS[0], "auxiliary_signals": list(layout.models[1:])}
+        several = {"signal": MODELS[0], "auxiliary_signals": list(MODELS[1:])}
         signal = several if q.by_model else {"signal": q.name}
         attributes[q.name] = {**plot, **signal, "title": q.label, "definition": q.definition}
     attributes["status"] = {**plot, "signal": "code", "title": "state of the cases"}

@@ -12,12 +12,12 @@ import time
 from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from softjaw.study.messages import OTHER_FILE, StudyError
-from softjaw.study.quantities import STATES
+from softjaw.study.quantities import STATES, Axis
 from softjaw.study.result import checksums
 from softjaw.study.result.hdf5 import opened, text_of
 from softjaw.study.result.layout import (
@@ -35,16 +35,6 @@ from softjaw.study.result.lock import holder
 from softjaw.study.units import shown_text
 
 LARGEST_VALUE = 1e100  # no value of a study in SI units comes near it, and its square can be computed
-
-
-class StoredAxis(NamedTuple):
-    """One axis of the maps, as read from a file."""
-
-    name: str
-    values: np.ndarray
-    units: str
-    long_name: str
-    options: tuple[str, ...] = ()  # texts that the values stand for
 
 
 class Result:
@@ -231,7 +221,7 @@ class Result:
             raise KeyError(f"{path} is not a dataset of this file; it has {', '.join(sorted(self._known))}")
         return self.file.checked(expected.path, expected.shape, expected.dtype)
 
-    def _axis(self, name: str) -> StoredAxis:
+    def _axis(self, name: str) -> Axis:
         path = f"{ROOT}/axes/{name}"
         dataset, attributes = self.file.plain(path), self.file.attributes(path)
         if dataset.ndim != 1 or dataset.dtype != np.dtype("<f8"):
@@ -245,7 +235,7 @@ class Result:
         options = tuple(text_of(text) for text in np.ravel(attributes.get("options", ())))
         if options and len(options) != len(values):
             raise ValueError(f"axis '{name}' has {len(values)} values and {len(options)} options")
-        return StoredAxis(name, values, units, label, options)
+        return Axis(name, values, units, label, options)
 
     def _text(self, name: str) -> Any:
         dataset = self.file.plain(f"{ROOT}/{name}")

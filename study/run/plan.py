@@ -100,8 +100,6 @@ def make_plan(
         scene.accuracy.meshes,
         patches,
         tuple(derived(scene)),
-        0,
-        "pcm",
         has(scene),
         scene.limit_surface.samples,
         scene.sampled,

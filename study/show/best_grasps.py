@@ -11,7 +11,7 @@ import xarray as xr
 from softjaw.friction.patch import NEGLIGIBLE
 from softjaw.study.case.result import TIE
 from softjaw.study.flags import LOST, OF_FILE, Flag, flags_in
-from softjaw.study.quantities import BY_KEY, FORCE_RANGE, MAIN, STATES, map_row
+from softjaw.study.quantities import BY_KEY, FORCE_RANGE, MAIN, MODELS, STATES, map_row
 from softjaw.study.ranking import Sure, at_level, judged, passed_over, rank_values, ranked, score_of, sure, task_keys
 from softjaw.study.result.layout import DONE, MISSING
 from softjaw.study.result.read import axes_of, dataset, values_of
@@ -136,15 +136,14 @@ def _map_columns(ds: xr.Dataset, maps: Collection[str]) -> list[Column]:
         columns.append(Column(name, q.unit, q.symbol, error, drop=least * (least > 1)))
         columns += [Column(error, ds[error].units, people=False)] if error else []
         if name == "e_n" and maps is not BRIEF:
-            columns.append(Column(f"e_n_{ds.attrs['planar']}", q.unit, drop=len(maps)))
+            columns.append(Column(f"e_n_{MODELS[1]}", q.unit, drop=len(maps)))
     extra = [name for name in ("misalignment", "pad_elements") if name in ds and maps is MAIN]
     return [*columns, *(Column(name, ds[name].units, drop=99) for name in extra)]
 
 
 def _of_model(ds: xr.Dataset, column: str) -> tuple[str, str]:
     """Name of a column's map and the friction model that it is of."""
-    planar = ds.attrs["planar"]
-    return ("e_n", planar) if column == f"e_n_{planar}" else (column, "ccm")
+    return ("e_n", MODELS[1]) if column == f"e_n_{MODELS[1]}" else (column, MODELS[0])
 
 
 def safe_range(ds: xr.Dataset, index: Index) -> str:

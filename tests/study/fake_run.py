@@ -28,17 +28,16 @@ def fake_plan(digest="scene", stations=6, derived=True, wide=-1, rounds=(), apar
 
     Stations that rounds have added [mm] stand among those of the study; values follow from the place alone.
     """
-    from softjaw.study.quantities import WIDE
+    from softjaw.study.quantities import WIDE, Axis
     from softjaw.study.result.layout import Derived, Header, Layout
-    from softjaw.study.result.store import StoredAxis
     from softjaw.study.run.plan import Plan
 
     own = np.linspace(0, 0.1, stations).tolist()
     places = sorted([*own, *(1e-3 * mm for added in rounds for mm in added)])
     axes = (
-        StoredAxis("station", np.array(places), "m", "station along the object's axis"),
-        StoredAxis("angle", np.array([0, np.pi / 2]), "rad", "angle about the object's axis"),
-        StoredAxis("normal_force", np.array([1.0, 2.0, 5.0]), "N", "normal force per finger"),
+        Axis("station", np.array(places), "m", "station along the object's axis"),
+        Axis("angle", np.array([0, np.pi / 2]), "rad", "angle about the object's axis"),
+        Axis("normal_force", np.array([1.0, 2.0, 5.0]), "N", "normal force per finger"),
     )
     slope = (Derived("slope", "m/N", "slope", "e_n over force", ("station",)),) if derived else ()
     units = []

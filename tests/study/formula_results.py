@@ -7,9 +7,9 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+from softjaw.study.quantities import Axis
 from softjaw.study.result.layout import Derived, Header, Layout
 from softjaw.study.result.skeleton import create
-from softjaw.study.result.store import StoredAxis
 from tests.study.sealing import sealed
 
 OBJECT = """
@@ -37,9 +37,9 @@ def linear(station, angle, force):
 
 
 def grid_axes(stations=STATIONS, angles=ANGLES, forces=FORCES, sweep=(), poses=False):
-    place = StoredAxis("station", np.asarray(stations, float), "" if poses else "m", "station")
-    turn = StoredAxis("angle", np.asarray(angles, float), "rad", "angle")
-    return (*sweep, place, turn, StoredAxis("normal_force", np.asarray(forces, float), "N", "force"))
+    place = Axis("station", np.asarray(stations, float), "" if poses else "m", "station")
+    turn = Axis("angle", np.asarray(angles, float), "rad", "angle")
+    return (*sweep, place, turn, Axis("normal_force", np.asarray(forces, float), "N", "force"))
 
 
 def quartic(x, y, t):

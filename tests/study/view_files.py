@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from softjaw.study.case.result import CaseResult
+from softjaw.study.quantities import Axis
 from softjaw.study.result.layout import Header, Layout
-from softjaw.study.result.store import StoredAxis
 from softjaw.study.result.write import ResultWriter, record
 from tests.study.formula_results import OBJECT, fresh
 
@@ -31,9 +31,9 @@ FAILED = (2, 1, 1)
 
 def axes():
     return (
-        StoredAxis("station", np.array([-0.02, 0.0, 0.02]), "m", "station"),
-        StoredAxis("angle", np.array([0, math.pi / 2]), "rad", "angle"),
-        StoredAxis("normal_force", np.array([1.0, 5.0]), "N", "normal force"),
+        Axis("station", np.array([-0.02, 0.0, 0.02]), "m", "station"),
+        Axis("angle", np.array([0, math.pi / 2]), "rad", "angle"),
+        Axis("normal_force", np.array([1.0, 5.0]), "N", "normal force"),
     )
 
 

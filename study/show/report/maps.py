@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from softjaw.study.page import Block, label, plot
-from softjaw.study.quantities import DONE, EFFECTS, FAILED, FIRST, MISSING, NO_GRASP, PARTS, STATES, TABLE
+from softjaw.study.quantities import DONE, EFFECTS, FAILED, FIRST, MISSING, MODELS, NO_GRASP, PARTS, STATES, TABLE
 from softjaw.study.ranking import largest
 from softjaw.study.show import plots
 from softjaw.study.show.grasps import (
@@ -98,7 +98,7 @@ def maps(ds: xr.Dataset, index: Index) -> list[Block]:
 
 def _maps(ds: xr.Dataset, index: Index, x: int, y: int, over: int, panels: list[int]) -> Block:
     """Panels over two axes, a row for each of ``panels`` along a third one, CCM beside the planar model."""
-    models, axes = ("ccm", ds.attrs["planar"]), [str(axis) for axis in ds.status.dims]
+    models, axes = MODELS[:2], [str(axis) for axis in ds.status.dims]
     levels = [f"{spoken(axes[over])} {axis_text(ds, axes[over], p)}" for p in panels]
     titles = [f"{plots.MODELS[m][0]}, {level}" for level in levels for m in models]
     height = max(110, min(26 * ds.status.shape[y] + 60, 240))

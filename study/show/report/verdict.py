@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from softjaw.study.flags import BORNE, LOST
-from softjaw.study.quantities import DONE, FAILED, MISSING, MODEL_NAMES, NO_GRASP, STATES
+from softjaw.study.quantities import DONE, FAILED, MISSING, MODEL_NAMES, MODELS, NO_GRASP, STATES
 from softjaw.study.ranking import largest
 from softjaw.study.show.best_grasps import answer, best, certainty, safe_range, spoken_line, value_text
 from softjaw.study.show.grasps import (
@@ -104,7 +104,7 @@ def _wall(ds: xr.Dataset, index: Index) -> list[str]:
 
 def _planar(ds: xr.Dataset, index: Index) -> list[str]:
     """What the planar model that the scene prefers would claim."""
-    claims, planar = [], ds.attrs["planar"]
+    claims, planar = [], MODELS[1]
     for name in ("quality", "e_n"):
         change = 100 * (at(ds, name, index, planar) / (at(ds, name, index) or np.nan) - 1)
         if np.isfinite(change):

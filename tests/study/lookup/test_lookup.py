@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from softjaw.study.lookup import GraspMap
 from softjaw.study.lookup.point import INSIDE, JUMP, NO_RESULT, OUTSIDE, SNAP
-from softjaw.study.result.store import StoredAxis
+from softjaw.study.quantities import Axis
 from tests.study.formula_results import (
     ANGLES,
     FORCES,
@@ -244,8 +244,8 @@ def test_explicit_poses_go_by_number_and_force(tmp_path):
 
 def test_a_sweep_is_asked_at_one_of_its_points(tmp_path):
     sweep = (
-        StoredAxis("semi_axis_b", np.array([0.01, 0.025]), "m", "object.semi_axis_b_mm"),
-        StoredAxis("material", np.array([0.0, 1.0]), "", "gripper.material", ("blatz_ko", "neo_hooke")),
+        Axis("semi_axis_b", np.array([0.01, 0.025]), "m", "object.semi_axis_b_mm"),
+        Axis("material", np.array([0.0, 1.0]), "", "gripper.material", ("blatz_ko", "neo_hooke")),
     )
 
     def formula(b, material, station, angle, force):

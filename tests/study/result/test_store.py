@@ -16,11 +16,11 @@ import softjaw
 from softjaw.study import quantities
 from softjaw.study.case.result import CaseResult
 from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, StudyError
-from softjaw.study.quantities import BY_KEY, MODELS, NEEDS, TABLE
+from softjaw.study.quantities import BY_KEY, MODELS, NEEDS, TABLE, Axis
 from softjaw.study.result.layout import VERSION, Derived, Header, Layout, layout_from_options
 from softjaw.study.result.lock import Lock, holder
 from softjaw.study.result.skeleton import axes_of, create, groups, text_bytes, view_slice
-from softjaw.study.result.store import StoredAxis, open_result, torn_rows
+from softjaw.study.result.store import open_result, torn_rows
 from softjaw.study.result.write import ResultWriter, blank, record, verify
 from tests.study.fake_run import fake_result
 
@@ -28,7 +28,7 @@ HEADER = Header("abc", 'a = "µ"\n', "Flasche", labels=("left", "ötken"))
 
 
 def axis(name, n, units=""):
-    return StoredAxis(name, np.arange(n, dtype=float), units, f"the {name}")
+    return Axis(name, np.arange(n, dtype=float), units, f"the {name}")
 
 
 def small(**options):
@@ -159,7 +159,7 @@ def test_a_scene_that_asks_for_one_thing_alone_has_lengths_for_all_its_datasets(
 
 
 def test_every_dataset_says_what_it_is(tmp_path):
-    layout = small(meshes=2, cor_grid=3, has=NEEDS[1:], samples=7, sampled=(3,))
+    layout = small(meshes=2, has=NEEDS[1:], samples=7, sampled=(3,))
     create(tmp_path / "whole.hdf", layout, HEADER)
     seen = set()
 
@@ -199,7 +199,7 @@ def test_viewers_open_at_stations_and_angles_at_the_highest_force(sizes, expecte
 
 def test_an_axis_of_two_values_has_a_name_only_beside_an_uneven_one():
     even = small()
-    uneven = Layout((*even.axes[:-1], even.axes[-1]._replace(values=np.array([1.0, 2.0, 5.0]))), 4)
+    uneven = Layout((*even.axes[:-1], replace(even.axes[-1], values=np.array([1.0, 2.0, 5.0]))), 4)
     assert axes_of(even, range(3))["axes"] == ["station", ".", "normal_force"]
     assert axes_of(uneven, range(3))["axes"] == ["station", "angle", "normal_force"]
     assert axes_of(uneven, (0, 1))["axes"] == ["station", "."]
@@ -387,5 +387,3 @@ def test_a_run_that_was_overtaken_while_it_locked_withdraws(tmp_path):
     with pytest.raises(StudyError):
         lock.confirm()
     lock.release()
-
-

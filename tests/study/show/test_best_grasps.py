@@ -39,7 +39,7 @@ def study(quality, flags=0.0, labels=None, status=DONE, needs=()):
             "angle": (np.arange(shape[1]) * np.pi / 2, "rad"), "normal_force": (FORCES, "N")}  # fmt: skip
     coordinates = {name: (name, v, {"units": u, "long_name": name}) for name, (v, u) in axes.items()}
     coordinates |= {"label": (over[:2], given), "model": list(MODELS)}
-    return xr.Dataset(maps, coordinates, {"planar": "pcm", "poses": bool(labels), "derived": (), "scene": ""})
+    return xr.Dataset(maps, coordinates, {"poses": bool(labels), "derived": (), "scene": ""})
 
 
 def cells(table, name):

@@ -12,7 +12,8 @@ import pytest
 import softjaw
 from softjaw.study.cli import main
 from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, RANK, USAGE, StudyError
-from softjaw.study.result.store import StoredAxis, open_result
+from softjaw.study.quantities import Axis
+from softjaw.study.result.store import open_result
 from softjaw.study.show.compare import compare, compare_text
 from softjaw.study.table import as_csv, as_json
 from tests.study.formula_results import (
@@ -141,7 +142,7 @@ def test_programs_get_every_common_case_in_si(pair):
         (grid_axes([1.0]), "station"),
         (grid_axes(forces=[3.0]), "normal_force"),
         (grid_axes([0, 1], [0], poses=True), "station"),
-        (grid_axes(sweep=(StoredAxis("mu", np.array([0.5]), "", "friction.mu"),)), "axes"),
+        (grid_axes(sweep=(Axis("mu", np.array([0.5]), "", "friction.mu"),)), "axes"),
     ],
 )
 def test_maps_that_share_nothing_are_refused(pair, tmp_path, axes, name):
@@ -158,7 +159,7 @@ def test_poses_are_shown_by_label_and_sweeps_of_words_by_word(tmp_path):
     assert " neck " in compare_text(found)
 
     def swept(words):
-        axis = StoredAxis("material", np.arange(len(words), dtype=float), "", "gripper.material", tuple(words))
+        axis = Axis("material", np.arange(len(words), dtype=float), "", "gripper.material", tuple(words))
         name = "-".join(words)
         return make(tmp_path / f"{name}.hdf", lambda *x: 0.01 + x[0] + 0 * sum(x), grid_axes(sweep=(axis,)))
 

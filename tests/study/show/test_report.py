@@ -17,9 +17,10 @@ from softjaw.study.case.result import CaseResult
 from softjaw.study.flags import Flag
 from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, StudyError
 from softjaw.study.page import answer, box, bullets, details, heading, image, page, table, text, verbatim
+from softjaw.study.quantities import Axis
 from softjaw.study.result.layout import Header, Layout
 from softjaw.study.result.read import dataset
-from softjaw.study.result.store import StoredAxis, open_result
+from softjaw.study.result.store import open_result
 from softjaw.study.result.write import ResultWriter, record
 from softjaw.study.show import best_grasps
 from softjaw.study.show.best_grasps import best
@@ -43,7 +44,7 @@ VOID = {"meta", "img", "br", "link", "input", "hr"}
 
 
 def axis(name, values, units, long_name=""):
-    return StoredAxis(name, np.asarray(values, float), units, long_name or f"the {name}")
+    return Axis(name, np.asarray(values, float), units, long_name or f"the {name}")
 
 
 def axes(stations=(0, 0.01, 0.02, 0.03), angles=(0, 0.5, 1.0), forces=(1.0, 5.0), sweep=(), station_units="m"):
@@ -268,7 +269,7 @@ def test_a_chosen_candidate_stands_beside_the_best_one(tmp_path):
 
 SMALL = axes(stations=(0.01,), angles=(0.0,), forces=(3.0,))
 POSES = axes(stations=(0, 1), angles=(0.0,), forces=(1.0, 2.0), station_units="")
-TEXTS = (axis("material", (0, 1), "", "gripper.material")._replace(options=("blatz_ko", "neo_hookean")),)
+TEXTS = (replace(axis("material", (0, 1), "", "gripper.material"), options=("blatz_ko", "neo_hookean")),)
 
 
 @pytest.mark.parametrize(
