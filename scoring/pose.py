@@ -18,7 +18,7 @@ areas ``R_i`` below those edges and normal forces that sum to 1 at most, the thr
     J ((|K_1| R_2 + R_1 |K_2|) / 15 + sum |n_1 x n_2| / 20)
 
 over these pairs of sides of ``S_1, S_2`` (integrals of ``(1 - l)^4 l`` and of ``9 l_1^2 l_2^2``). Facing contacts give
-7/12 and 1/30 of `scoring.volume`.
+7/12 and 1/30 of `scoring.closed_form`.
 """
 
 from __future__ import annotations
