@@ -20,7 +20,7 @@ SHOWN = {"matplotlib", "pyvista", "vtkmodules", "plotly", "jinja2"}
 ALLOWED = {
     "friction": {"softjaw.friction"} | NUMERICS,
     "lsfit": {"softjaw.lsfit", "clarabel"} | NUMERICS,
-    "scoring": {"softjaw.scoring"} | NUMERICS,
+    "scoring": {"softjaw.scoring", "clarabel"} | NUMERICS,
     "fem": {"softjaw.fem", "softjaw.friction", "skfem", "petsc4py", "pyvista", "trimesh", "vtkmodules"} | NUMERICS,
     "study": {"h5py", "jinja2", "matplotlib", "mpi4py", "plotly", "pydantic", "pydantic_core", "pyvista", "rich"}
     | {"vtkmodules", "xarray", "threadpoolctl", "(computed)"}
