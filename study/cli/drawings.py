@@ -19,7 +19,7 @@ ENDINGS = {"screenshot": (".png",), "html": (".html", ".htm")}
 
 def choice(options: Namespace) -> tuple[int | None, tuple[float | None, float | None]]:
     """Candidate, and station [m] and angle [rad], as far as they were given."""
-    station, angle = options.at
+    station, angle = (*options.at, None, None)[:2]
     return options.candidate, (in_si("station_mm", station), in_si("angle_deg", angle))
 
 

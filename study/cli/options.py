@@ -9,7 +9,7 @@ import textwrap
 from collections.abc import Sequence
 from typing import Any
 
-from softjaw.study.cli import values
+from softjaw.study.cli.values import POSITIVE, bound, direction, format_of, named, number, several, whole
 from softjaw.study.messages import MEANING, first_rank
 from softjaw.study.quantities import RANKED_BY
 
@@ -30,49 +30,144 @@ FORMATS = {  # of export: what stands in the file
     "physx": "the fingers of one grasp for PhysX and Isaac Sim (USD, .usda)",
     "vtk": "maps on the object and all pads with their pressure, for ParaView (.vtm)",
 }
-NO_DRAKE = (
-    "Drake has no parameter for it: its point contact has no torsional friction, and its hydroelastic contact finds a"
-    " pressure field, and with it e_n, of its own; expected"
-)
-APPROACHES = ("x", "minus-x", "y", "minus-y")
-SURFACES = ("three_motions", "axis_aligned", "full", "quartic")
-COMMANDS = {  # by what they are for, in the order of use: name, what it does, an example of its words, its module
+
+def _option(*names: str, **settings: Any) -> tuple[tuple[str, ...], dict[str, Any]]:
+    """Names of an option, and its settings in argparse's words; those of the same ``dest`` exclude each other."""
+    return names, settings
+
+
+MODELS = ("ccm", "pcm", "pcm_projected")
+NORMAL_FORCE = "normal force [N], solved or between two (default: the lowest that holds the object, else the largest)"
+OPTIONS = {
+    "scene": _option("scene", metavar="SCENE", help="scene file (TOML)"),
+    "set": _option("--set", metavar="KEY=VALUE", action="append", default=[], dest="overrides",
+                   help="replace one value of the scene, as in object.radius_mm=20; repeatable"),
+    "ranks": _option("-n", type=several(whole(1), "whole numbers, such as 16,64"), default=(1,), dest="ranks",
+                     metavar="RANKS", help="ranks (default 1); 16,64,256: replay a finished study on each"),
+    "repeat": _option("--repeat", type=whole(1), default=1, metavar="K", help="replay K times as many candidates"),
+    "result": _option("-o", metavar="FILE", dest="output",
+                      help="result file (default: results/<scene>.hdf, of cost results/<scene>-cost.hdf)"),
+    "retry": _option("--retry-failed", action="store_true", help="solve failed cases again"),
+    "file": _option("file", metavar="FILE", help="result file (.hdf)"),
+    "files": _option("files", metavar="FILE", nargs=2, help="result files (.hdf): a and b"),
+    "every": _option("--every", type=number("at least 0.1 s", 0.1), default=2.0, metavar="S",
+                     help="seconds between updates (default 2)"),
+    "json": _option("--json", action="store_const", const="json", dest="form", help="as JSON, SI units"),
+    "csv": _option("--csv", action="store_const", const="csv", dest="form", help="as CSV, SI units"),
+    "format": _option("--format", type=format_of, choices=tuple(FORMATS), dest="form", metavar="FORMAT",
+                      help="one of those below"),
+    "force": _option("--force", type=POSITIVE, metavar="N", help=NORMAL_FORCE),
+    "level": _option("--force", type=number(), metavar="N", help="force level nearest to N [N]"),
+    "by": _option("--by", choices=RANKED_BY, help="what ranks grasps; force: the least that holds (default payload)"),
+    "top": _option("--top", type=whole(0), default=10, metavar="K", help="how many rows, 0: all (default 10)"),
+    "most": _option("--top", type=whole(0), metavar="K", help="how many grasps, the best first, 0: all (default: 1 for"
+                    " a simulator, which gets a file for each, else all)"),
+    "compared": _option("--quantity", default="e_n", metavar="NAME", help="map that is listed by case (default e_n)"),
+    "model": _option("--model", choices=MODELS, default="ccm", help="friction model (default ccm)"),
+    "candidate": _option("--candidate", type=int, metavar="N", help="candidate, counted over stations and angles"),
+    "at": _option("--at", type=several(number(), "a station, or station,angle as in 75,90", 1, 2), default=(),
+                  metavar="MM,DEG", help="candidate nearest to this station and angle; --at=-5 for negative numbers"),
+    "page": _option("-o", metavar="HTML", dest="output", help="page to write (default: beside the file)"),
+    "quantity": _option("--quantity", metavar="NAME", help="map on the object (default: payload)"),
+    "motion": _option("--motion", choices=("x", "y", "turn"), default="x",
+                      help="slip that friction is drawn for (default: along x of the contact)"),
+    "screenshot": _option("--screenshot", metavar="PNG", help="write a picture; needs no screen"),
+    "html": _option("--html", metavar="HTML", help="write the view as one page that needs nothing else"),
+    "min": _option("--min", type=bound, metavar="NAME=VALUE", action="append", default=[], dest="least",
+                   help="leave out grasps with less, in the unit of 'softjaw show', as payload=200; repeatable"),
+    "written": _option("-o", metavar="FILE", dest="output", help="file to write (default: standard output)"),
+    "approach": _option("--approach", choices=("x", "minus-x", "y", "minus-y"), action="append", dest="approaches",
+                        help="palm to fingertips: along or against the long (x) or short (y) side of finger 1's pad;"
+                        " repeatable (default minus-x)"),
+    "closing": _option("--closing", choices=("x", "y"), help="axis of the gripper's frame from finger 1 to finger 2; z"
+                       " approaches (default x for graspgen, else y)"),
+    "depth": _option("--depth", type=number("a number, 0 or above", 0.0), default=0.0, metavar="MM",
+                     help="from the origin of the gripper's frame to the middle of the pads (default 0)"),
+    "wider": _option("--wider", type=number("a number, 0 or above", 0.0), default=20.0, metavar="MM",
+                     help="how far the gripper opens beyond first touch (default 20)"),
+    "joints": _option("--joints", type=several(named, "names, such as a,b"), default=("finger_joint1", "finger_joint2"),
+                      metavar="A,B",
+                      help="joints of the fingers, each at half the opening (default finger_joint1,finger_joint2)"),
+    "frames": _option("--frames", type=several(named, "two names, such as a,b", 2, 2), default=("gripper", "object"),
+                      metavar="A,B", help="names of the gripper's and the object's frame (default gripper,object)"),
+    "kind": _option("kind", choices=tuple(KINDS), help="what to start from"),
+    "name": _option("-o", metavar="NAME", dest="name",
+                    help="name of both files, also with a folder (default: the kind, or the name of the mesh)"),
+    "mesh": _option("--mesh", metavar="FILE", help="mesh of the object: .stl, .obj, .ply, .off, .glb, .gltf or .3mf"),
+    "mesh unit": _option("--unit", choices=("mm", "cm", "m", "inch"), help="unit of the mesh (default of glTF: m)"),
+    "axis": _option("--axis", choices=("x", "y", "z"), help="axis along which grasps lie (default: the longest)"),
+    "replace": _option("--force", action="store_true", help="replace existing files"),
+    "field": _option("file", metavar="FILE",
+                     help="CSV with one face per line, or VTU / VTP; columns: docs/pressure-fields.md"),
+    "pad": _option("scene", metavar="SCENE", nargs="?", help="with --deformed: scene file (TOML), whose pad is solved"),
+    "deformed": _option("--deformed", action="store_true", help="FILE holds points of the pad's deformed contact face"
+                        " (CSV with x, y, z), or of a contour along its width (y, z), seen from the backing plate"),
+    "mu": _option("--mu", type=POSITIVE, help="friction coefficient (default 0.8; with --deformed that of the scene)"),
+    "side": _option("--long-side", type=direction, metavar="X,Y,Z", help="direction of the contact frame's x axis, as"
+                    " --long-side=-1,0,0 (default: the longer direction of the patch)"),
+    "unit": _option("--unit", choices=("m", "cm", "mm"), help="unit of lengths and areas, where the file gives none"),
+    "pressure unit": _option("--pressure-unit", choices=("pa", "kpa", "mpa"), help="unit of the pressure, likewise"),
+    "pressure": _option("--pressure-name", metavar="NAME", help="column or array of the pressure (default: pressure)"),
+    "flip": _option("--flip-normals", action="store_true", help="turn all normals; they point into the object"),
+    "other": _option("--other", metavar="FILE", help="the other contact of the grasp, in the same coordinates"),
+    "distance": _option("--distance", type=POSITIVE, metavar="MM", help="distance of two such contacts, face to face"),
+    "arms": _option("--object-length", type=POSITIVE, metavar="MM",
+                    help="divides torques of forces (default: the distance)"),
+    "torques": _option("--contact-length", type=POSITIVE, metavar="MM",
+                       help="divides torques about normals (default: rho)"),
+    "surface": _option("--surface", choices=("three_motions", "axis_aligned", "full", "quartic"), default="quartic",
+                       help="limit surface that is scored (default: quartic)"),
+    "sections": _option("-o", metavar="PICTURE", dest="picture", help="picture of the limit surface (.png or .svg)"),
+}  # fmt: skip
+GRIPPER = ("approach", "closing", "depth", "wider", "joints", "frames")
+COMMANDS = {  # by what they are for, in the order of use: name, what it does, an example, its module, its options
     "prepare": (
-        ("init", "write a commented scene and a batch script to start from", "init bottle", "cli.quick"),
-        ("check", "find every error of a scene, or say what would be run", "check jobs/bottle-rigid.toml", "cli.quick"),
+        ("init", "write a commented scene and a batch script to start from", "init bottle", "cli.quick",
+         ("kind", "name", "mesh", "mesh unit", "axis", "replace")),
+        ("check", "find every error of a scene, or say what would be run", "check jobs/bottle-rigid.toml", "cli.quick",
+         ("scene", "set")),
         ("plan", "cases, units, disk, memory and time, before anything is spent", "plan jobs/bottle-rigid.toml -n 16",
-         "cli.quick"),
+         "cli.quick", ("scene", "set", "ranks", "repeat", "result")),
         ("cost", "what accuracy costs in time: errors and seconds on several meshes",
-         "cost jobs/bottle-rigid.toml -o results/bottle-rigid-cost.hdf", "cli.running"),
+         "cost jobs/bottle-rigid.toml -o results/bottle-rigid-cost.hdf", "cli.running", ("scene", "set", "result")),
     ),
     "solve": (
         ("run", "solve a scene into a result file; run again to resume",
-         "run jobs/smoke.toml -o results/smoke.hdf -- -contact_snes_monitor", "cli.running"),
-        ("watch", "live view of a run, in another terminal", "watch results/bottle-rigid.hdf --every 5", "cli.results"),
+         "run jobs/smoke.toml -o results/smoke.hdf -- -contact_snes_monitor", "cli.running",
+         ("scene", "set", "result", "retry")),
+        ("watch", "live view of a run, in another terminal; Ctrl-C ends the view alone",
+         "watch results/bottle-rigid.hdf --every 5", "cli.results", ("file", "every")),
         ("status", "what a result file holds so far, also while it grows", "status results/bottle-rigid.hdf",
-         "show.status"),
+         "show.status", ("file", "json", "csv")),
     ),
     "look at results": (
         ("show", "the best grasps as a table", "show results/bottle-rigid.hdf --force 4 --top 3 --json",
-         "cli.results"),
+         "cli.results", ("file", "json", "csv", "force", "by", "top")),
         ("report", "one self-contained page: maps, definitions, provenance",
-         "report results/bottle-rigid.hdf -o results/bottle-rigid.html", "cli.drawings"),
+         "report results/bottle-rigid.hdf -o results/bottle-rigid.html", "cli.drawings",
+         ("file", "candidate", "at", "page")),
         ("view", "the map on the object in 3-D: window, page, picture",
-         "view results/bottle-rigid.hdf --force 4 --screenshot view.png", "cli.drawings"),
+         "view results/bottle-rigid.hdf --force 4 --screenshot view.png", "cli.drawings",
+         ("file", "candidate", "at", "level", "quantity", "motion", "screenshot", "html")),
         ("compare", "two maps side by side: settings and cases that differ",
-         "compare results/soft.hdf results/stiff.hdf --quantity e_n", "cli.results"),
+         "compare results/soft.hdf results/stiff.hdf --quantity e_n", "cli.results",
+         ("files", "json", "csv", "compared", "top", "model")),
     ),
     "use the numbers": (
         ("export", "grasps and their friction for planners and simulators",
-         "export results/smoke.hdf --format mjcf -o results/smoke.xml", "cli.exporting"),
+         "export results/smoke.hdf --format mjcf -o results/smoke.xml", "cli.exporting",
+         ("file", "json", "csv", "format", "force", "by", "model", "most", "min", "written", *GRIPPER)),
         ("patch", "judge a pressure field from elsewhere: friction, score",
-         "patch jobs/cylinder-pressure.csv --mu 0.8 --distance 60", "patch.answer_text"),
+         "patch jobs/cylinder-pressure.csv --mu 0.8 --distance 60", "patch.answer_text",
+         ("field", "pad", "deformed", "mu", "side", "unit", "pressure unit", "pressure", "flip", "other", "distance",
+          "arms", "torques", "surface", "sections", "json")),
     ),
     "this program": (
-        ("schema", "JSON schema of a scene, for editors", "schema > scene.schema.json", "cli.quick"),
-        ("doctor", "check that this machine has what softjaw needs", "doctor", "doctor"),
+        ("schema", "JSON schema of a scene, for editors", "schema > scene.schema.json", "cli.quick", ()),
+        ("doctor", "check that this machine has what softjaw needs", "doctor", "doctor", ()),
     ),
 }  # fmt: skip
+LISTS = {"init": ("kinds", KINDS), "export": ("formats", FORMATS)}  # below the help of a command
 
 
 class Parser(argparse.ArgumentParser):
@@ -143,166 +238,29 @@ def program() -> Program:
         epilog="example:\n  mpirun -n 8 softjaw run jobs/bottle-rigid.toml",
     )
     listed = parser.add_subparsers(metavar="COMMAND", required=True, parser_class=Parser)
-    made = {}
-    for name, text, example, module in (command for group in COMMANDS.values() for command in group):
-        ranks = "mpirun -n 8 " if name == "run" else ""
-        made[name] = listed.add_parser(
-            name, help=text, description=f"{text[0].upper()}{text[1:]}.",
-            epilog=f"example:\n  {ranks}softjaw {example}", formatter_class=argparse.RawDescriptionHelpFormatter,
-        )  # fmt: skip
-        made[name].set_defaults(command=name, module=module)
-    for name, add_options in (("init", _add_init_options), ("watch", _add_watch_options),
-                              ("view", _add_view_options),
-                              ("patch", _add_patch_options)):  # fmt: skip
-        add_options(made[name])
-    _add_scene_options(made)
-    _add_result_options(made)
+    for name, text, example, module, options in (command for group in COMMANDS.values() for command in group):
+        examples = [f"{'mpirun -n 8 ' * (name == 'run')}softjaw {example}"]
+        examples += ["softjaw init mesh --mesh jobs/objects/flask.stl --unit mm -o scenes/flask"] * (name == "init")
+        parts = ["\n".join(["example:", *(f"  {line}" for line in examples)])]
+        for title, entries in [LISTS[name]] if name in LISTS else []:
+            parts.append("\n".join([f"{title}:", *(f"  {entry:<12} {what}" for entry, what in entries.items())]))
+        made = listed.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}.",
+                                 epilog="\n\n".join(parts),
+                                 formatter_class=argparse.RawDescriptionHelpFormatter)  # fmt: skip
+        made.set_defaults(command=name, module=module)
+        _add_options(made, options)
     return parser
 
 
-def _add_watch_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("file", metavar="FILE", help="result file (.hdf)")
-    parser.add_argument(
-        "--every", type=values.seconds, default=2.0, metavar="S", help="seconds between updates (default 2)"
-    )
-    ending = "Ends with the run, and with its exit code: 0, 6 where cases failed, 75 where some are not computed."
-    parser.description = textwrap.fill(f"{parser.description} {ending} Ctrl-C ends the view, not the run.", 78)
-
-
-def _add_init_options(parser: argparse.ArgumentParser) -> None:
-    add = parser.add_argument
-    kinds = "kinds:\n" + "\n".join(f"  {name:<9} {text}" for name, text in KINDS.items())
-    add("kind", choices=tuple(KINDS), help="what to start from")
-    add("-o", metavar="NAME", dest="name", help="name of both files, also with a folder (default: the kind, or the "
-        "name of the mesh)")  # fmt: skip
-    add("--mesh", metavar="FILE", help="mesh of the object: .stl, .obj, .ply, .off, .glb, .gltf or .3mf")
-    add("--unit", choices=("mm", "cm", "m", "inch"), help="unit of the mesh's coordinates (default of glTF: m)")
-    add("--axis", choices=("x", "y", "z"), help="axis of the mesh along which grasps are spread (default: the longest)")
-    add("--force", action="store_true", help="replace existing files")
-    more = "softjaw init mesh --mesh jobs/objects/flask.stl --unit mm -o scenes/flask"
-    parser.epilog = f"{parser.epilog}\n  {more}\n\n{kinds}"
-
-
-def _add_scene_options(made: dict[str, Any]) -> None:
-    """What the commands take that read a scene."""
-    for parser in (made["check"], made["plan"], made["cost"], made["run"]):
-        parser.add_argument("scene", metavar="SCENE", help="scene file (TOML)")
-        parser.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], dest="overrides",
-                            help="replace one value of the scene, as in object.radius_mm=20; repeatable")  # fmt: skip
-    add = made["plan"].add_argument
-    add("-n", type=values.counts, default=(1,), metavar="RANKS", dest="ranks", help="ranks (default 1); several, as in "
-        "16,64,256, replay the times of a finished study on each")  # fmt: skip
-    add("--repeat", type=values.whole(1), default=1, metavar="K", help="replay a study of K times as many candidates")
-    for parser in (made["plan"], made["cost"], made["run"]):
-        parser.add_argument("-o", metavar="FILE", dest="output", help="result file (default: results/<scene>.hdf, "
-                            "of cost results/<scene>-cost.hdf)")  # fmt: skip
-    made["run"].add_argument("--retry-failed", action="store_true", help="solve failed cases again")
-
-
-def _add_result_options(made: dict[str, Any]) -> None:
-    """What the commands take that look at result files."""
-    for name in ("status", "show", "report", "export"):
-        made[name].add_argument("file", metavar="FILE", help="result file (.hdf)")
-    made["compare"].add_argument("files", metavar="FILE", nargs=2, help="result files (.hdf): a and b")
-    for name in ("status", "show", "compare", "export"):
-        form = made[name].add_mutually_exclusive_group(required=name == "export")
-        form.add_argument("--json", action="store_const", const="json", dest="form", help="as JSON, SI units")
-        form.add_argument("--csv", action="store_const", const="csv", dest="form", help="as CSV, SI units")
-        if name == "export":
-            form.add_argument("--format", type=_format, choices=tuple(FORMATS), dest="form", metavar="FORMAT",
-                              help="one of those below")  # fmt: skip
-    for name in ("show", "export"):
-        made[name].add_argument("--force", type=values.positive, metavar="N", help="normal force [N], solved or "
-                                "between two solved ones (default: the lowest that holds the object, else the largest)"
-                                )  # fmt: skip
-        made[name].add_argument("--by", choices=RANKED_BY, help="what grasps are ranked by, "
-                                "force: the least that holds object.mass_g (default payload)")  # fmt: skip
-    made["compare"].add_argument("--quantity", default="e_n", metavar="NAME", help="map that is listed by case "
-                                 "(default e_n)")  # fmt: skip
-    for name, listed in (("show", "how many grasps"), ("compare", "largest differences")):
-        many = f"{listed}, 0: all (default 10)"
-        made[name].add_argument("--top", type=values.whole(0), default=10, metavar="K", help=many)
-    for name in ("compare", "export"):
-        made[name].add_argument("--model", choices=("ccm", "pcm", "pcm_projected"), default="ccm",
-                                help="friction model (default ccm)")  # fmt: skip
-    _add_export_options(made["export"])
-    _add_choice(made["report"])
-    made["report"].add_argument("-o", metavar="HTML", dest="output", help="page to write (default: beside the file)")
-
-
-def _add_export_options(parser: argparse.ArgumentParser) -> None:
-    add = parser.add_argument
-    add("--top", type=values.whole(0), metavar="K", help="how many grasps, the best first, 0: all (default: 1 for a "
-        "simulator, else all; a simulator gets a file for each)")  # fmt: skip
-    add("--min", type=values.bound, metavar="NAME=VALUE", action="append", default=[], dest="least", help="leave out "
-        "grasps with less, in the unit of 'softjaw show': payload=200 is 200 g; repeatable")  # fmt: skip
-    add("-o", metavar="FILE", dest="output", help="file to write (default: standard output)")
-    add = parser.add_argument_group("the gripper, for isaac_grasp, graspgen and moveit").add_argument
-    add("--approach", choices=APPROACHES, action="append", dest="approaches", help="from palm to fingertips: along "
-        "the long side (x) or the short side (y) of finger 1's pad, or against it; repeatable (default minus-x)"
-        )  # fmt: skip
-    add("--closing", choices=("x", "y"), help="axis of the gripper's frame from finger 1 to finger 2; z approaches "
-        "(default x for graspgen, else y)")  # fmt: skip
-    add("--depth", type=values.not_negative, default=0.0, metavar="MM", help="from the origin of the gripper's frame "
-        "to the middle of the pads (default 0)")  # fmt: skip
-    add("--wider", type=values.not_negative, default=20.0, metavar="MM", help="how far the gripper opens beyond first "
-        "touch (default 20)")  # fmt: skip
-    add("--joints", type=values.names, default=("finger_joint1", "finger_joint2"), metavar="A,B", help="joints of the "
-        "fingers, each at half the opening (default finger_joint1,finger_joint2)")  # fmt: skip
-    add("--frames", type=values.pair, default=("gripper", "object"), metavar="A,B", help="names of the gripper's and "
-        "the object's frame (default gripper,object)")  # fmt: skip
-    listed = "\n".join(f"  {name:<12} {text}" for name, text in FORMATS.items())
-    parser.epilog = f"{parser.epilog}\n\nformats:\n{listed}"
-
-
-def _add_patch_options(parser: argparse.ArgumentParser) -> None:
-    add = parser.add_argument
-    add("file", metavar="FILE", help="CSV with one face per line, or VTU / VTP; columns: docs/pressure-fields.md")
-    add("scene", metavar="SCENE", nargs="?", help="with --deformed: scene file (TOML), whose pad is solved")
-    add(
-        "--deformed",
-        action="store_true",
-        help="FILE holds points of the pad's deformed contact face (CSV with x, y, "
-        "z), or of a contour along its width (y, z), seen from the backing plate",
-    )
-    add("--mu", type=values.positive, help="friction coefficient (default 0.8; with --deformed that of the scene)")
-    add("--long-side", type=values.direction, metavar="X,Y,Z", help="direction of the contact frame's x axis, the "
-        "pad's long side; write --long-side=-1,0,0 for negative numbers (default: the longer direction of the patch)"
-        )  # fmt: skip
-    add("--unit", choices=("m", "cm", "mm"), help="unit of lengths and areas, where the file gives none")
-    add("--pressure-unit", choices=("pa", "kpa", "mpa"), help="unit of the pressure, where the file gives none")
-    add("--pressure-name", metavar="NAME", help="column or data array that holds the pressure (default: pressure)")
-    add("--flip-normals", action="store_true", help="turn all normals; they point into the object, as the finger does")
-    add("--other", metavar="FILE", help="the other contact of the grasp, in the same coordinates, units and options")
-    add("--distance", type=values.positive, metavar="MM", help="distance of two such contacts that face each other")
-    add("--object-length", type=values.positive, metavar="MM", help="divides torques of forces (default: the distance)")
-    add("--contact-length", type=values.positive, metavar="MM", help="divides torques about the normals (default: rho)")
-    add("--surface", choices=SURFACES, default="quartic", help="limit surface that is scored (default: quartic)")
-    add("-o", metavar="PICTURE", dest="picture", help="also write sections of the limit surface (.png or .svg)")
-    add("--json", action="store_true", help="as JSON, SI units")
-
-
-def _add_choice(parser: argparse.ArgumentParser) -> None:
-    """Options that choose a candidate."""
-    add = parser.add_argument
-    add("--candidate", type=int, metavar="N", help="candidate, counted over stations and angles")
-    add("--at", type=values.place, default=(None, None), metavar="MM,DEG", help="candidate nearest to this station "
-        "[mm] and, if given, angle [deg]; write --at=-5 for negative numbers")  # fmt: skip
-
-
-def _add_view_options(parser: argparse.ArgumentParser) -> None:
-    add = parser.add_argument
-    add("file", metavar="FILE", help="result file (.hdf)")
-    _add_choice(parser)
-    add("--force", type=values.finite, metavar="N", help="force level nearest to N [N]")
-    add("--quantity", metavar="NAME", help="map on the object (default: payload)")
-    add("--motion", choices=("x", "y", "turn"), default="x",
-        help="slip that the friction is drawn for (default: along x of the contact)")  # fmt: skip
-    add("--screenshot", metavar="PNG", help="write a picture; needs no screen")
-    add("--html", metavar="HTML", help="write the view as one page that needs nothing else")
-
-
-def _format(text: str) -> str:
-    if text == "drake":
-        raise argparse.ArgumentTypeError(f"{NO_DRAKE} {', '.join(FORMATS)}")
-    return text
+def _add_options(parser: argparse.ArgumentParser, options: Sequence[str]) -> None:
+    """Give a command its options of `OPTIONS`, in this order."""
+    form = gripper = None
+    for option in options:
+        names, settings = OPTIONS[option]
+        place: Any = parser
+        if settings.get("dest") == "form":
+            place = form = form or parser.add_mutually_exclusive_group(required="format" in options)
+        elif option in GRIPPER:
+            title = "the gripper, for isaac_grasp, graspgen and moveit"
+            place = gripper = gripper or parser.add_argument_group(title)
+        place.add_argument(*names, **settings)

@@ -1,95 +1,88 @@
-"""Types of the command line's options: numbers in their ranges, directions, and names."""
+"""Types of the command line's options: numbers in their ranges, lists, names."""
 
 from __future__ import annotations
 
-import argparse
 import math
+from argparse import ArgumentTypeError
 from collections.abc import Callable
+from typing import Any
+
+MILLION = 10**6
+NO_DRAKE = (
+    "Drake has no parameter for it: its point contact has no torsional friction, and its hydroelastic contact finds a"
+    " pressure field, and with it e_n, of its own; expected another format"
+)
+
+
+def number(expected: str = "a number", least: float = -math.inf) -> Callable[[str], float]:
+    """A type of finite numbers from ``least``; ``expected`` says what they are."""
+
+    def value(text: str) -> float:
+        try:
+            given = float(text)
+        except ValueError:
+            given = math.nan
+        if not (math.isfinite(given) and given >= least):
+            raise ArgumentTypeError(f"found {text}, expected {expected}")
+        return given
+
+    return value
+
+
+POSITIVE = number("a number above 0", math.ulp(0.0))
 
 
 def whole(least: int) -> Callable[[str], int]:
     """A type of whole numbers from ``least`` to a million."""
 
     def count(text: str) -> int:
-        if not least <= (value := int(text)) <= 10**6:
-            raise argparse.ArgumentTypeError(f"found {text}, expected {least} to 1000000")
-        return value
+        if not (text.strip().lstrip("+-").isdigit() and least <= int(text) <= MILLION):
+            raise ArgumentTypeError(f"found {text}, expected a whole number from {least} to {MILLION}")
+        return int(text)
 
     return count
 
 
-def bound(text: str) -> tuple[str, float]:
-    """A name and a number with an equals sign between them."""
-    name, _, value = text.partition("=")
-    try:
-        return name, finite(value)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"found {text}, expected a map and a number, such as payload=200") from None
+def several(
+    kind: Callable[[str], Any], expected: str, least: int = 1, most: int = MILLION
+) -> Callable[[str], tuple[Any, ...]]:
+    """A type of ``least`` to ``most`` values of a kind with commas between them."""
 
+    def parts(text: str) -> tuple[Any, ...]:
+        try:
+            given = tuple(map(kind, text.split(",")))
+        except ArgumentTypeError:
+            given = ()
+        if not least <= len(given) <= most:
+            raise ArgumentTypeError(f"found {text}, expected {expected}")
+        return given
 
-def names(text: str) -> tuple[str, ...]:
-    """Names with commas between them, none of them empty."""
-    parts = tuple(name.strip() for name in text.split(","))
-    if not all(parts):
-        raise argparse.ArgumentTypeError(f"found {text}, expected names with commas between them")
     return parts
 
 
-def pair(text: str) -> tuple[str, ...]:
-    """Two names with a comma between them."""
-    if len(two := names(text)) != 2:
-        raise argparse.ArgumentTypeError(f"found {text}, expected two names with a comma between them")
-    return two
+def named(text: str) -> str:
+    """A name that is not empty."""
+    if not text.strip():
+        raise ArgumentTypeError("found no name")
+    return text.strip()
 
 
-def place(text: str) -> tuple[float, float | None]:
-    """A station and perhaps an angle, with a comma between them."""
-    station, comma, angle = text.partition(",")
-    try:
-        return finite(station), finite(angle) if comma else None
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"found {text}, expected a station, or station,angle as in 75,90") from None
+def bound(text: str) -> tuple[str, float]:
+    """A name and a number with an equals sign between them."""
+    key, _, value = text.partition("=")
+    return key, number("a map and a number, such as payload=200")(value)
 
 
-def not_negative(text: str) -> float:
-    """A number, 0 or above."""
-    if not 0 <= (value := float(text)) < math.inf:
-        raise argparse.ArgumentTypeError(f"found {text}, expected a number, 0 or above")
-    return value
-
-
-def counts(text: str) -> tuple[int, ...]:
-    """Whole numbers above 0 with commas between them."""
-    return tuple(map(whole(1), text.split(",")))
-
-
-def seconds(text: str) -> float:
-    """A time [s] of at least 0.1 s."""
-    if not 0.1 <= (value := float(text)) < math.inf:
-        raise argparse.ArgumentTypeError(f"found {text}, expected at least 0.1 s")
-    return value
-
-
-def finite(text: str) -> float:
-    """A number that is neither infinite nor NaN."""
-    if not math.isfinite(value := float(text)):
-        raise argparse.ArgumentTypeError(f"found {text}, expected a number")
-    return value
-
-
-def positive(text: str) -> float:
-    """A number above 0."""
-    if not 0 < (value := float(text)) < math.inf:
-        raise argparse.ArgumentTypeError(f"found {text}, expected a number above 0")
-    return value
-
-
-def direction(text: str) -> list[float]:
+def direction(text: str) -> tuple[float, ...]:
     """Three numbers with commas between them, not all of them 0."""
-    try:
-        vector = [float(part) for part in text.split(",")]
-    except ValueError:
-        vector = []
-    if len(vector) != 3 or not all(map(math.isfinite, vector)) or not any(vector):
-        raise argparse.ArgumentTypeError(f"found {text}, expected three numbers such as 1,0,0, not all of them 0")
+    vector = several(number(), "three numbers, such as 1,0,0", 3, 3)(text)
+    if not any(vector):
+        raise ArgumentTypeError(f"found {text}, expected a direction, such as 1,0,0")
     return vector
+
+
+def format_of(text: str) -> str:
+    """A format of `export`; another one than those is refused by argparse, Drake with the reason."""
+    if text == "drake":
+        raise ArgumentTypeError(NO_DRAKE)
+    return text

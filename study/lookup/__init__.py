@@ -25,7 +25,6 @@ from softjaw.study.lookup.interpolation import (
     claims,
     corners,
     error,
-    place,
     plain,
 )
 from softjaw.study.lookup.point import INSIDE, JUMP, NO_RESULT, OUTSIDE, SNAP, GraspPoint
@@ -91,10 +90,8 @@ class GraspMap:
         self.done = self._grid(self.source.status == DONE)
         self.snapped = self.done & (self._grid(self.source.read("flags")) & Flag.SNAPPED > 0)
         self.kind = self._kinds()
-        self._whole = self._whole_cells()
         self._tables: dict[tuple[str, str], FloatArray] = {}
         self._bends: dict[tuple[str, str], FloatArray] = {}
-        self._lists: dict[tuple[str, str], list[float]] = {}
 
     @property
     def quantities(self) -> dict[str, tuple[str, str]]:
@@ -159,34 +156,11 @@ class GraspMap:
     def value(
         self, name: str, station: ArrayLike, angle: ArrayLike, force: ArrayLike, model: str = "ccm"
     ) -> FloatArray | float:
-        """One quantity at a station [m], angle [rad] and force [N]; NaN where there is none. Built to be fast.
+        """One quantity at a station [m], angle [rad] and force [N]; NaN where there is none.
 
         With explicit poses ``station`` is the candidate's number and the angle does not count. Arrays give arrays.
         """
-        try:
-            table = self._lists[name, model]
-        except KeyError:
-            table = self._lists[name, model] = self.table(name, model).tolist()
-        if (
-            not isinstance(station, float | int)
-            or not isinstance(angle, float | int)
-            or not isinstance(force, float | int)
-        ):
-            return self.point(station, angle, force).value(name, model)
-        along, two, three = self.axes
-        a, b, c = place(along.quick, station), place(two.quick, angle), place(three.quick, force)
-        if a is None or b is None or c is None:
-            return math.nan
-        (i, r), (j, s), (k, t) = a, b, c
-        p = self.shape[2]
-        n = (i * self.shape[1] + j) * p + k
-        if not self._whole[n]:
-            return self.point(station, angle, force).value(name, model)
-        m, q = n + p, n + self.shape[1] * p
-        u, z, y = q + p, 1.0 - t, 1.0 - s
-        low = y * (z * table[n] + t * table[n + 1]) + s * (z * table[m] + t * table[m + 1])
-        high = y * (z * table[q] + t * table[q + 1]) + s * (z * table[u] + t * table[u + 1])
-        return (1.0 - r) * low + r * high
+        return self.point(station, angle, force).value(name, model)
 
     def error(
         self, name: str, station: ArrayLike, angle: ArrayLike, force: ArrayLike, model: str = "ccm"
@@ -260,12 +234,6 @@ class GraspMap:
             for finger in range(values.shape[-1]):
                 kinds = kinds * (most + 1) + values[..., finger]
         return kinds
-
-    def _whole_cells(self) -> list[bool]:
-        """Whether all corners of the cell above each node are solved and of one kind, with no snap-in, flat."""
-        kind = np.where(self.done, 2 * self.kind + self.snapped, -1)
-        corner = np.stack([np.roll(kind, (-i, -j, -k), (0, 1, 2)) for i, j, k in np.ndindex(2, 2, 2)])
-        return ((corner == corner[0]).all(axis=0) & (kind >= 0)).ravel().tolist()
 
 
 def _one(si: Any, other: Any, unit: str, name: str, default: Any = None) -> Any:

@@ -10,10 +10,8 @@ have kinks, which three nodes see or miss by chance: an estimate is the largest 
 from __future__ import annotations
 
 import math
-from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,6 +22,9 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 CLAIM_FACTOR = 2.0  # between estimate and claim: with less, less than 95 % of the errors stay within it
 CLOSING_GAP_RATIO = 1.5  # a gap that closes a circle may be this much wider than the others
+
+
+UPPER = np.array(list(np.ndindex(2, 2, 2)))  # which corners of a cell are its upper ones, along each axis
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,11 +50,6 @@ class Nodes:
     def slack(self) -> float:
         """How far beside the ends a coordinate still counts as on them."""
         return NEGLIGIBLE * max(abs(float(self.x[0])), abs(float(self.x[-1])))
-
-    @cached_property
-    def quick(self) -> tuple[list[float], list[float], int, float, float, bool]:
-        """The same for `place`, which is for one point and has no time for arrays."""
-        return self.x.tolist(), (1 / np.diff(self.x)).tolist(), len(self.x) - 2, self.slack, self.period, self.exact
 
 
 def plain(name: str, units: str, values: ArrayLike, exact: bool = False) -> Nodes:
@@ -126,24 +122,9 @@ def corners(axes: Sequence[Nodes], points: FloatArray) -> Corners:
         s = np.where(s < NEGLIGIBLE, 0.0, np.where(s > 1 - NEGLIGIBLE, 1.0, s))
         inside[:, a] &= (s == 0) | (s == 1) | (not nodes.exact)
         cell[:, a], share[:, a] = i, s
-    upper = np.array(list(np.ndindex(2, 2, 2)))
-    at = cell[:, None] + upper
+    at = cell[:, None] + UPPER
     index = (at[..., 0] * len(axes[1].x) + at[..., 1]) * len(axes[2].x) + at[..., 2]
-    return Corners(index, np.where(upper, share[:, None], 1 - share[:, None]).prod(-1), share, inside, swap)
-
-
-def place(quick: tuple, v: float) -> tuple[int, float] | None:
-    """Cell and share of one coordinate, None outside; for `Nodes.quick`."""
-    x, inverse, last, slack, period, exact = quick
-    if period:
-        v -= (v - x[0] + slack) // period * period
-    i = bisect_right(x, v) - 1
-    if not 0 <= i <= last:
-        if not x[0] - slack <= v <= x[-1] + slack:
-            return None
-        return (0, 0.0) if i < 0 else (last, 1.0)
-    share = (v - x[i]) * inverse[i]
-    return None if exact and NEGLIGIBLE < share < 1 - NEGLIGIBLE else (i, share)
+    return Corners(index, np.where(UPPER, share[:, None], 1 - share[:, None]).prod(-1), share, inside, swap)
 
 
 def blend(table: FloatArray, at: Corners) -> FloatArray:
@@ -194,10 +175,9 @@ def claims(bend: FloatArray, shape: tuple[int, ...]) -> FloatArray:
 
 def error(bend: FloatArray, at: Corners) -> FloatArray:
     """Error of `blend` at ``m`` points from `bends` ``(3, nodes)``, ``(m,)``."""
-    upper = np.array(list(np.ndindex(2, 2, 2)))
     total = np.zeros(len(at.index))
     for a in range(3):
-        lower, higher = np.flatnonzero(upper[:, a] == 0), np.flatnonzero(upper[:, a])
+        lower, higher = np.flatnonzero(UPPER[:, a] == 0), np.flatnonzero(UPPER[:, a])
         weight = at.weight[:, lower] + at.weight[:, higher]
         lines = np.where(weight > 0, bend[a][at.index[:, lower]] * weight, 0.0).sum(axis=1)
         total += np.where(at.share[:, a] % 1.0 > 0, at.share[:, a] * (1 - at.share[:, a]) * lines, 0.0)

@@ -80,7 +80,7 @@ def patch(options: Namespace) -> str:
     if options.picture:
         write_picture(patches, options.surface, Path(options.picture))
     record = as_record(patches, grasp)
-    return json.dumps(plain(record), indent=2, allow_nan=False) if options.json else record_text(record)
+    return json.dumps(plain(record), indent=2, allow_nan=False) if options.form else record_text(record)
 
 
 def _scene_of(options: Namespace) -> Scene:
