@@ -13,7 +13,7 @@ import sys
 import tempfile
 from argparse import Namespace
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from subprocess import CompletedProcess
 
@@ -28,6 +28,7 @@ LAUNCHED = ("OMPI_", "PMIX_", "PMI_", "PRTE_", "HYDRA_")  # variables by which a
 NOT_IN_TIME = 124  # exit code, as of timeout(1)
 NEEDED_SPACE = 1e9  # bytes; the largest shipped study writes about 0.2 GB
 SYSTEM_PACKAGES = "python3-petsc4py python3-h5py python3-h5py-mpi python3-mpi4py openmpi-bin"
+USE_MUMPS = "use a PETSc that was configured with MUMPS; Debian's and conda-forge's are"
 INSTALL = f"run 'make setup', or: apt-get install --no-install-recommends {SYSTEM_PACKAGES}"
 
 
@@ -150,46 +151,6 @@ def ask(code: str, *, prefix: tuple[str, ...] = (), limit: float = 60.0) -> Comp
 # --- checks -----------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Finding:
-    """What one check found; ``cure`` is empty when all is well, ``code`` is the exit code that a trouble deserves."""
-
-    text: str
-    cure: str = ""
-    code: int = USAGE
-
-    @property
-    def line(self) -> str:
-        """The finding and its cure as one line."""
-        return f"{self.text}; cure: {self.cure}" if self.cure else self.text
-
-
-def check_python() -> Finding:
-    """Which Python this is; pip has refused one that is too old."""
-    return Finding(f"{sys.version.split()[0]} at {sys.executable}")
-
-
-def check_packages() -> Finding:
-    """The packages that pip brings import."""
-    names = "numpy scipy skfem numba clarabel pydantic matplotlib"
-    answer = ask(f"import {names.replace(' ', ', ')}; print('scipy', scipy.__version__, 'numba', numba.__version__)")
-    if answer.returncode != 0:
-        return Finding(trouble(answer), "run 'make setup', or: .venv/bin/pip install -e .")
-    return Finding(answer.stdout)
-
-
-def check_numpy() -> Finding:
-    """The compiled system packages were built for the numpy that is imported."""
-    answer = ask("import numpy; print(numpy.__version__); import h5py; from softjaw.fem.petsc import PETSc")
-    version = answer.stdout or "not importable"
-    if "dtype size changed" in answer.stderr or "compiled using NumPy 1" in answer.stderr:
-        older = "numpy>=1.26,<2" if version.startswith("2") else "numpy>=2"
-        return Finding(f"{version} does not fit the system's h5py and petsc4py", f".venv/bin/pip install '{older}'")
-    if not answer.stdout:
-        return Finding(f"numpy: {trouble(answer)}", ".venv/bin/pip install -e .")
-    return Finding(f"{version}, fits h5py and petsc4py" if answer.returncode == 0 else version)
-
-
 SADDLE = """
 import numpy as np
 from softjaw.fem.petsc import PETSc
@@ -207,79 +168,23 @@ ksp.solve(b, x)
 assert np.allclose(x.getArray(), [1.0, 2.0, 3.0]), f"MUMPS gave {x.getArray()} for (1, 2, 3)"
 print(".".join(map(str, PETSc.Sys.getVersion())), "with real scalars; MUMPS solves a saddle-point system")
 """
-
-
-def check_petsc() -> Finding:
-    """petsc4py is found, has real scalars, and MUMPS factorises a matrix with a zero on its diagonal."""
-    answer = ask(SADDLE)
-    if answer.returncode == 0:
-        return Finding(answer.stdout)
-    if "complex scalars" in answer.stderr:
-        return Finding(trouble(answer), "apt-get install python3-petsc4py-real and unset PETSC_DIR and PETSC_ARCH")
-    if "MUMPS" in answer.stderr or "mumps" in answer.stderr:
-        return Finding(trouble(answer), "use a PETSc that was configured with MUMPS; Debian's and conda-forge's are")
-    return Finding(trouble(answer), INSTALL)
-
-
-def check_blas() -> Finding:
-    """The BLAS beneath PETSc is an optimised one; only Debian's way of choosing it is looked at."""
-    link = Path("/etc/alternatives").glob("libblas.so.3-*")
-    chosen = next((str(path.resolve()) for path in link), "")
-    if "/blas/libblas" in chosen:
-        text = "the reference BLAS makes factorisations four times slower"
-        return Finding(text, "apt-get install libopenblas0-serial")
-    return Finding(Path(chosen).parent.name if chosen else "not chosen by Debian's alternatives")
-
-
-def check_h5py() -> Finding:
-    """The h5py that ranks load has parallel HDF5 beneath it."""
-    answer = ask(
-        "import h5py, sys; c = h5py.get_config(); v = h5py.version;"
-        "print(int(c.mpi), int(h5py.__file__.startswith(sys.prefix)), v.version, 'on HDF5', v.hdf5_version)"
-    )
-    if answer.returncode != 0:
-        return Finding(trouble(answer), INSTALL)
-    parallel, bundled, version = answer.stdout.split(" ", 2)
-    if parallel == "1":
-        return Finding(f"{version} with MPI")
-    cure = ".venv/bin/pip uninstall h5py (that build hides the system's)" if bundled == "1" else INSTALL
-    return Finding(f"{version} without MPI", cure)
-
-
-def check_mpi() -> Finding:
-    """Two ranks start, find each other and write one file together."""
-    if shutil.which("mpirun") is None:
-        return Finding("mpirun is not on the search path", INSTALL)
-    with tempfile.TemporaryDirectory() as folder:
-        code = (
-            "from mpi4py import MPI; import h5py; comm = MPI.COMM_WORLD\n"
-            "if comm.size == 1: raise SystemExit('every rank is alone')\n"
-            f"with h5py.File({folder + '/ranks.hdf'!r}, 'w', driver='mpio', comm=comm) as f:\n"
-            "    f.create_dataset('rank', (comm.size,), 'i8')[comm.rank] = comm.rank + 1\n"
-            "comm.Barrier()\n"
-            f"with h5py.File({folder + '/ranks.hdf'!r}, driver='mpio', comm=comm) as f: total = f['rank'][:].sum()\n"
-            "if comm.rank == 0: print(total, MPI.Get_library_version().split(',')[0].split(chr(10))[0])"
-        )
-        answer = ask(code, prefix=tuple(mpirun(2)), limit=90.0)
-    if "every rank is alone" in answer.stderr:
-        return Finding("mpirun and mpi4py belong to different MPI libraries", "put mpi4py's own mpirun first in PATH")
-    if answer.returncode != 0:
-        return Finding(f"two ranks: {trouble(answer)}", f"see whether 'mpirun -n 2 true' works; {INSTALL}")
-    total, library = answer.stdout.splitlines()[-1].split(" ", 1)
-    if total != "3":
-        return Finding("two ranks lost data in one file", f"set TMPDIR to a disk with MPI-IO, {folder} has none")
-    return Finding(f"{library}, two ranks write one file")
-
-
-def check_threads() -> Finding:
-    """One thread per rank."""
-    wrong = [f"{name}={os.environ[name]}" for name in THREADS if os.environ.get(name, "1") != "1"]
-    if wrong:
-        text = f"{', '.join(wrong)}: ranks slow each other, and last digits depend on the number"
-        return Finding(text, "export OMP_NUM_THREADS=1")
-    return Finding("one per rank")
-
-
+PARALLEL = """
+import h5py, sys
+text = f"{h5py.version.version} on HDF5 {h5py.version.hdf5_version}"
+bundled = " (of pip)" if h5py.__file__.startswith(sys.prefix) else ""
+print(text, "with MPI") if h5py.get_config().mpi else sys.exit(f"{text} without MPI{bundled}")
+"""
+TOGETHER = """
+from mpi4py import MPI; import h5py, os, tempfile
+comm = MPI.COMM_WORLD
+assert comm.size == 2, "every rank is alone"
+path = comm.bcast(tempfile.mktemp(".hdf"))
+with h5py.File(path, "w", driver="mpio", comm=comm) as f: f.create_dataset("rank", (2,), "i8")[comm.rank] = comm.rank
+comm.Barrier()
+with h5py.File(path, driver="mpio", comm=comm) as f: assert f["rank"][:].sum() == 1, "two ranks lost data in one file"
+comm.Barrier()
+if comm.rank == 0: os.remove(path); print(*MPI.get_vendor(), "two ranks write one file")
+"""
 DRAWING = """
 import pyvista
 plotter = pyvista.Plotter(off_screen=True, window_size=(64, 64))
@@ -288,14 +193,58 @@ picture = plotter.screenshot(None, return_img=True)
 assert picture.std() > 1, "the picture is empty"
 print("pyvista", pyvista.__version__, "through", plotter.render_window.GetClassName())
 """
+# What is run, and for what its errors hold the cure; the last one is for all other errors.
+PROBES: dict[str, tuple[str, dict[str, str]]] = {
+    "packages": ("import numpy, scipy, skfem, numba, clarabel, pydantic, matplotlib; print('scipy', scipy.__version__,"
+                 " 'numba', numba.__version__)", {"": "run 'make setup', or: .venv/bin/pip install -e ."}),
+    "numpy": ("import numpy, h5py; from softjaw.fem.petsc import PETSc;"
+              "print(numpy.__version__, 'fits h5py and petsc4py')",
+              {"dtype size changed": "take the numpy that the system's h5py and petsc4py were built with:"
+               " .venv/bin/pip install 'numpy>=1.26,<2', or 'numpy>=2'", "": ".venv/bin/pip install -e ."}),
+    "petsc": (SADDLE, {"complex scalars": "apt-get install python3-petsc4py-real; unset PETSC_DIR PETSC_ARCH",
+                       "MUMPS": USE_MUMPS, "mumps": USE_MUMPS, "": INSTALL}),
+    "h5py": (PARALLEL, {"(of pip)": ".venv/bin/pip uninstall h5py (it hides the system's)", "": INSTALL}),
+    "mpi": (TOGETHER, {"every rank is alone": "put the mpirun of mpi4py's own MPI library first in PATH",
+                       "lost data": "set TMPDIR to a disk with MPI-IO",
+                       "": f"see whether 'mpirun -n 2 true' works; {INSTALL}"}),
+    "pictures": (DRAWING, {"": "apt-get install libosmesa6 (or libegl1 libegl-mesa0)"}),
+}  # fmt: skip
+Finding = tuple[str, str, int]  # what a check found; its cure, empty when all is well; the exit code of a trouble
 
 
-def check_pictures() -> Finding:
-    """A sphere is drawn without a screen; a missing OpenGL library ends the process that tries."""
-    answer = ask(DRAWING)
+def probed(name: str) -> Finding:
+    """What a probe prints last, or its error with the cure of it."""
+    code, cures = PROBES[name]
+    try:
+        answer = ask(code, prefix=tuple(mpirun(2)) if name == "mpi" else (), limit=90.0)
+    except FileNotFoundError:
+        return "mpirun is not on the search path", INSTALL, USAGE
     if answer.returncode == 0:
-        return Finding(answer.stdout.splitlines()[-1])
-    return Finding(f"no 3-D pictures: {trouble(answer)}", "apt-get install libosmesa6 (or libegl1 libegl-mesa0)")
+        return answer.stdout.splitlines()[-1], "", DONE
+    mark = next(mark for mark in cures if mark in answer.stderr)
+    # Below an error of several ranks stands what mpirun says of it.
+    line = next((line for line in answer.stderr.splitlines() if mark and mark in line), trouble(answer))
+    return line.strip(), cures[mark], USAGE
+
+
+def check_python() -> Finding:
+    """Which Python this is; pip has refused one that is too old."""
+    return f"{sys.version.split()[0]} at {sys.executable}", "", DONE
+
+
+def check_blas() -> Finding:
+    """The BLAS beneath PETSc is an optimised one; only Debian's way of choosing it is looked at."""
+    link = Path("/etc/alternatives").glob("libblas.so.3-*")
+    chosen = next((path.resolve() for path in link), None)
+    if chosen and "/blas/libblas" in str(chosen):
+        return f"{chosen} makes factorisations four times slower", "apt-get install libopenblas0-serial", USAGE
+    return chosen.parent.name if chosen else "not chosen by Debian's alternatives", "", DONE
+
+
+def check_threads() -> Finding:
+    """One thread per rank: ranks slow each other, and last digits depend on the number."""
+    wrong = [f"{name}={os.environ[name]}" for name in THREADS if os.environ.get(name, "1") != "1"]
+    return (", ".join(wrong), "export OMP_NUM_THREADS=1", USAGE) if wrong else ("one per rank", "", DONE)
 
 
 def check_cache() -> Finding:
@@ -304,21 +253,18 @@ def check_cache() -> Finding:
     home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     for folder in [Path(wanted)] if wanted else [Path(__file__).parent.parent / "fem", home]:
         if can_write(folder) and not compiled_loops_pass():
-            return Finding(f"compiled loops are kept in {folder}")
-    cure = "export NUMBA_CACHE_DIR=<a folder you may write to>"
-    return Finding("compiled loops cannot be kept, every start compiles anew", cure, CANNOT_WRITE)
+            return f"compiled loops are kept in {folder}", "", DONE
+    return "every start compiles anew", "export NUMBA_CACHE_DIR=<a folder you may write to>", CANNOT_WRITE
 
 
 def check_disk() -> Finding:
     """Results can be written here, and there is room for them."""
-    here = Path.cwd()
-    if not can_write(here):
-        return Finding(f"{here} is not writable", "start softjaw in a folder of your own", CANNOT_WRITE)
-    free = shutil.disk_usage(here).free
-    if free < NEEDED_SPACE:
-        text = f"{free / 1e9:.1f} GB free in {here}"
-        return Finding(text, f"free at least {NEEDED_SPACE / 1e9:.0f} GB", CANNOT_WRITE)
-    return Finding(f"{free / 1e9:.0f} GB free in {here}")
+    folder = Path.cwd()
+    if not can_write(folder):
+        return f"{folder} is not writable", "start softjaw in a folder of your own", CANNOT_WRITE
+    free = shutil.disk_usage(folder).free
+    cure = f"free at least {NEEDED_SPACE / 1e9:.0f} GB" if free < NEEDED_SPACE else ""
+    return f"{free / 1e9:.1f} GB free in {folder}", cure, CANNOT_WRITE if cure else DONE
 
 
 def can_write(folder: Path) -> bool:
@@ -333,14 +279,9 @@ def can_write(folder: Path) -> bool:
 
 CHECKS: dict[str, Callable[[], Finding]] = {
     "python": check_python,
-    "packages": check_packages,
-    "numpy": check_numpy,
-    "petsc": check_petsc,
+    **{name: partial(probed, name) for name in PROBES},
     "blas": check_blas,
-    "h5py": check_h5py,
-    "mpi": check_mpi,
     "threads": check_threads,
-    "pictures": check_pictures,
     "cache": check_cache,
     "disk": check_disk,
 }
@@ -351,9 +292,9 @@ def doctor(_options: Namespace | None = None) -> int:
     codes = []
     for name, check in CHECKS.items():
         try:
-            finding = check()
+            text, cure, code = check()
         except Exception as error:  # a check that fails itself must not hide the ones after it
-            finding = Finding(f"{type(error).__name__}: {error}", "report this line; it is a bug of the doctor's")
-        print(f"{'TROUBLE' if finding.cure else 'fine':8}{name:10}{finding.line}", flush=True)
-        codes.append(finding.code if finding.cure else DONE)
+            text, cure, code = f"{type(error).__name__}: {error}", "report this line; it is a bug", USAGE
+        print(f"{'TROUBLE' if cure else 'fine':8}{name:10}{text}{'; cure: ' * bool(cure)}{cure}", flush=True)
+        codes.append(code)
     return USAGE if USAGE in codes else max(codes)
