@@ -94,6 +94,7 @@ REASONS = {value: name for name, value in vars(PETSc.SNES.ConvergedReason).items
 OUT_OF_MEMORY = (-5, -7, -13)  # INFOG(1) of MUMPS
 WITHIN, FAST = 1e5, 0.05  # see NonlinearSolver
 STALLED = 5  # iterations without a fall to less than a part `FAST`: good ones need fewer
+ITERATIONS_TO_RECOVER = 8  # before a growth of the residual counts: solves that converge pass 20 times the first one
 PRINTING = re.compile("monitor|view|converged_reason")
 
 
@@ -244,8 +245,12 @@ class NonlinearSolver:
                 else:
                     database.delValue(key)
 
-    def solve(self, x: FloatArray, tolerance: float, iterations: int | None = None) -> tuple[FloatArray, int]:
+    def solve(
+        self, x: FloatArray, tolerance: float, iterations: int | None = None, growth: float = math.inf
+    ) -> tuple[FloatArray, int]:
         """Solve from ``x`` until the residual's norm is below ``tolerance``; returns the solution and the iterations.
+
+        From `ITERATIONS_TO_RECOVER` on it gives up where the norm is more than ``growth`` times the first one.
 
         Raises
         ------
@@ -263,7 +268,7 @@ class NonlinearSolver:
         # relative and step tolerances are off, so a solve ends by the force out of balance alone
         snes.setTolerances(atol=tolerance, max_it=iterations or limit)
         self._x.array[:] = x
-        self._norms, self._goal, self._limit = [], tolerance, iterations or limit
+        self._norms, self._goal, self._limit, self._growth = [], tolerance, iterations or limit, growth
         try:
             with self._options_in_effect():  # MUMPS reads its own when it first analyses the matrix
                 snes.solve(None, self._x)
@@ -378,6 +383,10 @@ class NonlinearSolver:
 
     def _on_tangent(self, snes, x, matrix, _preconditioner) -> None:
         self._norms.append(snes.getFunctionNorm())
+        if len(self._norms) > ITERATIONS_TO_RECOVER and self._norms[-1] > self._growth * self._norms[0]:
+            # the solver ends behind this step, which the factors at hand are good enough for
+            snes.setConvergedReason(PETSc.SNES.ConvergedReason.DIVERGED_DTOL)
+            return
         # a matrix that nobody touches is not factorised again
         if not self._keeps(x.array_r):
             self._timed(lambda: self._fill(x.array_r, matrix))

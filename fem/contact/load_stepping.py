@@ -43,6 +43,7 @@ SHORTEST_FORETOLD = 0.025  # foretold closing displacement of a step that is not
 FOLD = 0.25  # growth of the largest strain in one step; good steps of practice keep to 0.15
 FOLDING, FOLDS = 0.1, 3.0  # the same, and over the growth of the force's logarithm, where 0.2 is usual
 ASTRAY = "the state at {force:.4g} N differs from the state on the coarser mesh"
+DIVERGED = 10.0  # residual over that of a start on another mesh, beyond which no state is near it
 STRAINED = 0.5  # largest strain from which on a state is checked for stability
 
 
@@ -108,8 +109,13 @@ class Stepping:
     off: float = 0.0  # residual over the force on the meshed part where the last state is near enough only
     closed: bool = False  # whether displacement control was needed
 
-    def solve(self, x: FloatArray, control: Control, work: Work, most: int | None = None) -> FloatArray:
-        """One Newton solve; its tolerance is relative to the force on the meshed part of the pad."""
+    def solve(
+        self, x: FloatArray, control: Control, work: Work, most: int | None = None, growth: float = np.inf
+    ) -> FloatArray:
+        """One Newton solve; its tolerance is relative to the force on the meshed part of the pad.
+
+        ``growth`` of the residual ends it, as in `fem.petsc.NonlinearSolver.solve`.
+        """
         self.problem.control = control
         scale = control.force if control.force is not None else self.problem.force_scale(control.closing)
         scale, floor = scale * self.problem.share, self.problem.rounding
@@ -118,7 +124,7 @@ class Stepping:
         self.off = 0.0
         try:
             # a tolerance below what rounding leaves would never be met
-            x, iterations = self.solver.solve(x, max(self.settings.residual * scale, floor), most)
+            x, iterations = self.solver.solve(x, max(self.settings.residual * scale, floor), most, growth)
             work.iterations += iterations
         except ConvergenceError as error:
             x, self.off = error.end or (x, np.inf)
@@ -165,7 +171,7 @@ class Stepping:
         ConvergenceError
             Where there is none near it.
         """
-        return self.solve(start, Control(force=force), work, self.most)
+        return self.solve(start, Control(force=force), work, self.most, DIVERGED)
 
     def displacement_control(
         self,
@@ -328,7 +334,7 @@ class Following(Stepping):
     def from_near(self, start: FloatArray, force: float, work: Work) -> FloatArray:
         """As `Stepping.from_near`; refused where a path from first contact need not lead to the state."""
         # Newton iterations from the state of a coarser mesh; good starts take 4 to 7
-        x = self.solve(start, Control(force=force), work, self.most or 12)
+        x = self.solve(start, Control(force=force), work, self.most or 12, DIVERGED)
         folds = self.problem.largest_strain(x) - self.problem.largest_strain(start) > FOLD
         # with a part of the tangent alone nothing tells whether the state is stable
         here = None if self.problem.complementarity else self._place(x, force, None)

@@ -6,11 +6,13 @@ from functools import cache
 import numpy as np
 import pytest
 
+from softjaw.fem.assembly import Pattern
 from softjaw.fem.contact.press import Press
 from softjaw.fem.errors import ConvergenceError
 from softjaw.fem.pad.interpolation import interpolated
 from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.pad.shape import PadShape
+from softjaw.fem.petsc import NonlinearSolver
 from tests.fem.contact.test_press import BALL, FOAM, OVAL, SIZE, VI, pad_of, relative
 
 FORCES = [1.0, 3.0, 10.0]
@@ -99,6 +101,39 @@ def test_a_force_without_a_state_fails_alone_and_within_its_iterations():
     assert press.solver.left >= -25
     assert press.MOST_ITERATIONS - press.solver.left > 25
     assert press.at(3.0, [start]).unknowns.tobytes() == before.tobytes()
+
+
+class CubeRoot:
+    """Newton's method on ``x^(1/3)`` goes from x to -2 x, so the residual grows by 2^(1/3) in every iteration."""
+
+    size, non_negative, complementarity = 1, slice(0, 0), False
+
+    def __init__(self):
+        self.pattern, self.asked = Pattern(1, np.zeros(1, np.int32), np.zeros(1, np.int32)), 0
+
+    def residual(self, x):
+        return np.cbrt(x)
+
+    def tangent(self, x):
+        self.asked += 1
+        self.pattern.values[:] = 1.0 / (3.0 * np.cbrt(x) ** 2)
+
+    def shorten(self, x, step):
+        return 1.0
+
+
+@pytest.mark.parametrize(("growth", "iterations"), [(np.inf, 25), (5.0, 8), (2.0 ** (9.5 / 3.0), 10)])
+def test_a_solve_that_diverges_ends_once_the_residual_has_grown(growth, iterations):
+    problem = CubeRoot()
+    solver = NonlinearSolver(problem)
+    with pytest.raises(ConvergenceError):
+        solver.solve(np.ones(1), 1e-10, growth=growth)
+    assert problem.asked == iterations
+    solver.left = 3
+    with pytest.raises(ConvergenceError):  # the next solve has the limits of its own
+        solver.solve(np.ones(1), 1e-10)
+    assert problem.asked == iterations + 25
+    solver.destroy()
 
 
 def test_bounds_on_the_pressures_start_from_the_coarser_mesh_alike():
