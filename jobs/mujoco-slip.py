@@ -2,8 +2,9 @@
 
     python jobs/mujoco-slip.py results/slip.hdf
 
-Every model is the one that `softjaw export --format mjcf` writes. Its object is held fast, the finger gets the freedom
-to slide and to turn about its contact normal, and a load in its contact frame is raised from nothing until it moves.
+Every model is the one that `softjaw export --format mjcf` writes. Its object is held fast without weight, the finger is
+pressed along its contact normal and gets the freedom to slide and to turn about it, and a load in its contact frame is
+raised from nothing until it moves.
 Needs ``pip install mujoco``.
 """
 
@@ -15,6 +16,7 @@ from collections.abc import Iterator
 import mujoco
 import numpy as np
 
+from softjaw.study.export.body import Body, body_of
 from softjaw.study.export.mjcf import as_mjcf
 from softjaw.study.export.point_contact import cell
 from softjaw.study.export.selection import GripperFrame, RankedGrasp, Selection, grasps
@@ -33,10 +35,14 @@ MOVES = (1e-4, 1e-4, 1e-2)  # speeds [m/s, m/s, rad/s] from which a finger slips
 FREE = (("x", "mjJNT_SLIDE", (1, 0, 0)), ("y", "mjJNT_SLIDE", (0, 1, 0)), ("turn", "mjJNT_HINGE", (0, 0, 1)))
 
 
-def fixture(text: str, finger: int) -> mujoco.MjModel:
+def fixture(grasp: RankedGrasp, body: Body, finger: int) -> mujoco.MjModel:
     """The exported model with a fast object, and a finger that can slide along x and y and turn about its normal."""
-    spec = mujoco.MjSpec.from_string(text)
+    spec = mujoco.MjSpec.from_string(as_mjcf(grasp, body))
     spec.delete(spec.joint("object"))
+    spec.delete(spec.equality("drive"))
+    spec.option.gravity = [0, 0, 0]
+    spec.joint(f"close{finger}").axis = [0, 0, 1]
+    spec.actuator(f"press{finger}").biasprm[0] = cell(grasp).contacts[finger - 1].F_N
     for name, kind, axis in FREE:
         spec.body(f"finger{finger}").add_joint(name=name, type=getattr(mujoco.mjtJoint, kind), axis=axis)
     return spec.compile()
@@ -63,9 +69,9 @@ def predicted(grasp: RankedGrasp, finger: int, shares: tuple[int, ...]) -> np.nd
     return w * contact.F_N * np.array([contact.mu_x, contact.mu_y, contact.r])
 
 
-def ratios(grasp: RankedGrasp, finger: int = 1, steps: int = STEPS) -> list[float]:
+def ratios(grasp: RankedGrasp, body: Body, finger: int = 1, steps: int = STEPS) -> list[float]:
     """Simulated over predicted load of every one of `LOADS`."""
-    model = fixture(as_mjcf(grasp), finger)
+    model = fixture(grasp, body, finger)
     return [slip(model, predicted(grasp, finger, shares), steps) for shares in LOADS.values()]
 
 
@@ -77,7 +83,7 @@ def rows(file: str, count: int = 5) -> Iterator[list[str]]:
             contact = cell(grasp).contacts[0]
             place = grasp.place.rpartition(",")[0]
             axes = [contact.mu_x * contact.F_N, contact.mu_y * contact.F_N, 1e3 * contact.r * contact.F_N]
-            found = [f"{value:.3f}" for value in ratios(grasp)]
+            found = [f"{value:.3f}" for value in ratios(grasp, body_of(ds, grasp.case))]
             yield [place, f"{force:g}", *(f"{value:.3f}" for value in axes), *found]
 
 

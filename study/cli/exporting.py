@@ -7,6 +7,7 @@ from argparse import Namespace
 from pathlib import Path
 from typing import Any
 
+from softjaw.study.export.body import body_of
 from softjaw.study.export.cases import as_csv, as_json
 from softjaw.study.export.mjcf import as_mjcf
 from softjaw.study.export.physx import as_usd
@@ -46,7 +47,7 @@ def export(options: Namespace) -> str:
         raise StudyError(USAGE, f"{options.file}: no grasp is left to write; 'softjaw show' lists all")
     if options.form in PLANNERS:
         return _written(options, [PLANNERS[options.form](ranked, gripper, ds)])
-    return _written(options, [SIMULATORS[options.form](grasp) for grasp in ranked])
+    return _written(options, [SIMULATORS[options.form](grasp, body_of(ds, grasp.case)) for grasp in ranked])
 
 
 def _vtk(options: Namespace, ds: Any) -> Path:

@@ -21,18 +21,34 @@ Four things belong to it.
   the frame of the closed pads, x across and y along their long side. Where the tangents are not the contact's axes, and
   for a gripper that turns, the smaller slide in both places is on the safe side.
 
-The file is a scene that runs: two fingers on rails that press with F_N, and an object of two plates at the contact
-frames, which floats. Its mass is that of the scene, else 0.1 kg; the fingers' is 0.02 kg.
+The file is a scene that runs. The object has its surface, mass, centre of mass and inertia (`study.export.body`), and
+gravity pulls as the scene says. Both fingers slide along the closing axis. An equality keeps their strokes equal, as
+the drive of a parallel gripper does: a load along the closing axis shifts force from one finger to the other, and their
+sum stays. The balls press on plates in the contact planes; the surface itself is there to be seen, and for a table or
+walls that are added to the model, which meet its convex hull.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from softjaw.study.export.point_contact import OBJECT_MASS, PAD_MASS, RADIUS, Cell, PointContact, cell, heading, numbers
+from softjaw.study.export.body import Body, places, weight
+from softjaw.study.export.point_contact import (
+    PAD_MASS,
+    RADIUS,
+    Cell,
+    PointContact,
+    carried,
+    cell,
+    heading,
+    numbers,
+)
 from softjaw.study.export.selection import FloatArray, RankedGrasp, quaternion
 
 ALONG = 1e-6  # sine between a tangent and an axis of the contact below which they are one
+STIFF = 'solref="0.004 1" solimp="0.9999 0.9999 0.001"'
+HIDDEN = 'contype="0" conaffinity="0" group="3"'  # viewers do not draw this group unless they are asked
+SEEN = 'contype="0" conaffinity="0" rgba="0.3 0.4 0.5 0.6"'
 PLATE = 5e-3  # half the thickness of the object's plates [m], far more than a ball sinks in
 
 
@@ -57,26 +73,23 @@ def friction(contact: PointContact) -> tuple[float, float, float]:
     return (contact.mu_y, contact.mu_x, contact.r) if along_x < ALONG else (contact.mu, contact.mu, contact.r)
 
 
-def as_mjcf(grasp: RankedGrasp) -> str:
-    """A MuJoCo model of one grasp."""
-    contacts = cell(grasp)
-    known = grasp.mass if np.isfinite(grasp.mass) else OBJECT_MASS
-    middle = -contacts.rotation.T @ contacts.origin
-    width = float(np.linalg.norm(contacts.contacts[0].origin - contacts.contacts[1].origin))
-    body = f'mass="{numbers(known)}" diaginertia="{numbers(*[known * width**2 / 10] * 3)}"'  # of a ball of this width
+def as_mjcf(grasp: RankedGrasp, body: Body) -> str:
+    """A MuJoCo model of one grasp of an object, with gravity."""
+    contacts = cell(grasp, body.down)
     return "\n".join(
         [
             f'<mujoco model="{grasp.name}">',
-            *(f"  <!-- {line} -->" for line in heading(grasp)),
-            '  <option timestep="0.001" gravity="0 0 0" cone="elliptic" impratio="100" noslip_iterations="50"/>',
+            *(f"  <!-- {line} -->" for line in heading(grasp, body)),
+            f'  <option timestep="0.001" gravity="{numbers(*contacts.rotation @ weight(1.0, body))}" cone="elliptic"'
+            ' impratio="100" noslip_iterations="50"/>',
+            "  <asset>",
+            f'    <mesh name="object" inertia="shell" vertex="{places(body.points)}" face="{places(body.triangles)}"/>',
+            "  </asset>",
             "  <worldbody>",
-            "    <!-- the object, in the frame of its own file -->",
-            f'    <body name="object" {_pose(contacts.rotation, contacts.origin)}>',
-            '      <freejoint name="object"/>',
-            f'      <inertial pos="{numbers(*middle)}" {body}/>',
-            *(_plate(f, contact, contacts) for f, contact in enumerate(contacts.contacts, 1)),
+            *_object(contacts, carried(grasp, body)),
+            '    <body name="hand">',
+            *(line for f in (1, 2) for line in _finger(f, contacts, body.pad)),
             "    </body>",
-            *(line for f, contact in enumerate(contacts.contacts, 1) for line in _finger(f, contact)),
             "  </worldbody>",
             "  <contact>",
             *(
@@ -85,16 +98,32 @@ def as_mjcf(grasp: RankedGrasp) -> str:
                 for f, contact in enumerate(contacts.contacts, 1)
             ),
             "  </contact>",
-            "  <actuator>  <!-- a force of F_N at control 0, and of F_N plus the control otherwise -->",
+            "  <equality>  <!-- the drive: equal strokes, and the sum of both forces stays -->",
+            f'    <joint name="drive" joint1="close1" joint2="close2" {STIFF}/>',
+            "  </equality>",
+            "  <actuator>  <!-- the normal force at control 0, and more or less of it otherwise -->",
             *(
                 f'    <general name="press{f}" joint="close{f}" gainprm="1" biastype="affine" '
-                f'biasprm="{numbers(contact.F_N)} 0 0"/>'
-                for f, contact in enumerate(contacts.contacts, 1)
+                f'biasprm="{numbers(grasp.force)} 0 0"/>'
+                for f in (1, 2)
             ),
             "  </actuator>",
             "</mujoco>",
         ]
     )
+
+
+def _object(contacts: Cell, body: Body) -> list[str]:
+    """The object with its surface, in the frame of its own file."""
+    inertia = numbers(*body.inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]])
+    return [
+        f'    <body name="object" {_pose(contacts.rotation, contacts.origin)}>',
+        '      <freejoint name="object"/>',
+        f'      <inertial pos="{numbers(*body.centre)}" mass="{numbers(body.mass)}" fullinertia="{inertia}"/>',
+        '      <geom name="object" type="mesh" mesh="object"/>',
+        *(_plate(f, contact, contacts) for f, contact in enumerate(contacts.contacts, 1)),
+        "    </body>",
+    ]
 
 
 def _pose(rotation: FloatArray, origin: FloatArray) -> str:
@@ -103,21 +132,24 @@ def _pose(rotation: FloatArray, origin: FloatArray) -> str:
 
 
 def _plate(f: int, contact: PointContact, contacts: Cell) -> str:
-    """The object's side of a contact, in the object's own frame: a plate whose face is the contact plane."""
+    """The object's side of a contact, in the object's own frame: a hidden plate whose face is the contact plane."""
     centre = contact.origin + PLATE * contact.rotation[:, 2]
     placed = _pose(contacts.rotation.T @ contact.rotation, contacts.rotation.T @ (centre - contacts.origin))
     size = numbers(2 * RADIUS, 2 * RADIUS, PLATE)
-    return f'      <geom name="plate{f}" type="box" size="{size}" {placed} contype="0" conaffinity="0"/>'
+    return f'      <geom name="plate{f}" type="box" size="{size}" {placed} {HIDDEN}/>'
 
 
-def _finger(f: int, contact: PointContact) -> list[str]:
-    """A ball on a rail along the contact normal."""
-    geom = f'type="sphere" size="{RADIUS}" pos="0 0 {-RADIUS}" mass="{PAD_MASS}" contype="0" conaffinity="0"'
+def _finger(f: int, contacts: Cell, pad: FloatArray) -> list[str]:
+    """A hidden ball on a rail along the closing axis, and the undeformed pad that it stands for."""
+    contact = contacts.contacts[f - 1]
+    rail = contact.rotation.T @ contacts.closing * (1.0 if f == 1 else -1.0)
+    middle = contact.pad_origin - pad[2] / 2 * contact.pad_rotation[:, 2] - contact.origin
+    placed = _pose(contact.rotation.T @ contact.pad_rotation, contact.rotation.T @ middle)
     return [
-        f"    <!-- finger {f}, in its contact frame: z is the normal, into the object -->",
-        f'    <body name="finger{f}" {_pose(contact.rotation, contact.origin)}>',
-        f'      <joint name="close{f}" type="slide" axis="0 0 1"/>',
-        f'      <geom name="pad{f}" {geom}/>',
-        "    </body>",
+        f"      <!-- finger {f}, in its contact frame: z is the normal, into the object -->",
+        f'      <body name="finger{f}" {_pose(contact.rotation, contact.origin)}>',
+        f'        <joint name="close{f}" type="slide" axis="{numbers(*rail)}"/>',
+        f'        <geom name="pad{f}" type="sphere" size="{RADIUS}" pos="0 0 {-RADIUS}" mass="{PAD_MASS}" {HIDDEN}/>',
+        f'        <geom name="foam{f}" type="box" size="{numbers(*pad / 2)}" {placed} mass="0" {SEEN}/>',
+        "      </body>",
     ]
-

@@ -21,6 +21,7 @@ other material: give the object no more friction than the pads.
 
 from __future__ import annotations
 
+from softjaw.study.export.body import Body
 from softjaw.study.export.point_contact import RADIUS, PointContact, cell, heading, numbers
 from softjaw.study.export.selection import FloatArray, RankedGrasp, quaternion
 
@@ -30,7 +31,7 @@ def torsional_radius(contact: PointContact) -> float:
     return contact.r / contact.mu
 
 
-def as_usd(grasp: RankedGrasp) -> str:
+def as_usd(grasp: RankedGrasp, body: Body) -> str:
     """A stage of both fingers at one grasp, with the frame of the object's own file, as USD in text form (.usda)."""
     contacts = cell(grasp)
     return "\n".join(
@@ -42,7 +43,7 @@ def as_usd(grasp: RankedGrasp) -> str:
             "    kilogramsPerUnit = 1",
             '    upAxis = "Z"',
             ")",
-            *(f"# {line}" for line in heading(grasp)),
+            *(f"# {line}" for line in heading(grasp, body)),
             "",
             'def Xform "grasp"',
             "{",

@@ -14,21 +14,28 @@ from, over F_N. They hold at one normal force: a pad that is pressed harder has 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
+from softjaw.study.export.body import DENSITY, Body
 from softjaw.study.export.selection import FloatArray, RankedGrasp
 from softjaw.study.messages import USAGE, StudyError
 
 RADIUS = 0.01  # of the ball that stands for a pad [m]: any will do, because it touches at one point
-PAD_MASS, OBJECT_MASS = 0.02, 0.1  # [kg]: a result file need not know them, and friction does not depend on them
+PAD_MASS = 0.02  # [kg]: friction does not depend on it
+SHARE = 0.9  # of the payload, the most that an object without a mass weighs
+DOWN = np.array([0.0, 0.0, -1.0])
 
 
 @dataclass(frozen=True, eq=False)
 class PointContact:
-    """One finger: its contact frame (axes x, y, N as columns, N into the object), and its friction over ``F_N`` [N]."""
+    """One finger: its contact frame (axes x, y, N as columns, N into the object), and its friction over ``F_N`` [N].
+
+    ``pad_rotation`` and ``pad_origin`` place the pad's own frame, whose z axis is the approach.
+    """
 
     rotation: FloatArray
     origin: FloatArray
@@ -36,6 +43,8 @@ class PointContact:
     mu_y: float
     r: float
     F_N: float
+    pad_rotation: FloatArray
+    pad_origin: FloatArray
 
     @property
     def mu(self) -> float:
@@ -47,16 +56,18 @@ class PointContact:
 class Cell:
     """A grasp as the small scene that simulators get: both contacts, and the frame of the object's own file.
 
-    All of it stands in the frame of the closed pads: origin midway between their faces, x from finger 1 to finger 2, y
-    along their long side.
+    Its origin is midway between the pads' faces, and its axes are the closing axis and the long and the short side of
+    the pads, in the order in which gravity (``down``, in the frame of the object's own file) is nearest to -z.
+    ``closing (3,)`` points from finger 1 to finger 2.
     """
 
     contacts: tuple[PointContact, PointContact]
     rotation: FloatArray
     origin: FloatArray
+    closing: FloatArray
 
 
-def cell(grasp: RankedGrasp) -> Cell:
+def cell(grasp: RankedGrasp, down: FloatArray = DOWN) -> Cell:
     """The scene of a grasp.
 
     Raises
@@ -66,10 +77,18 @@ def cell(grasp: RankedGrasp) -> Cell:
     """
     pads = grasp.case["fingers"]
     across, along = pads[0]["pose_rotation"][:, 2], pads[0]["pose_rotation"][:, 0]
-    W = np.column_stack([across, along, np.cross(across, along)])
+    W = _upright(np.column_stack([across, along, np.cross(across, along)]), np.asarray(down, float))
     middle = (pads[0]["pose_origin"] + pads[1]["pose_origin"]) / 2
     first, second = (_contact(finger, W, middle) for finger in pads)
-    return Cell((first, second), W.T, -W.T @ middle)
+    return Cell((first, second), W.T, -W.T @ middle, np.round(W.T @ across))
+
+
+def _upright(pads: FloatArray, down: FloatArray) -> FloatArray:
+    """Axes of the pads as columns, turned so that ``down`` is nearest to -z, and then the closing axis to x."""
+    turned = pads @ Rotation.create_group("O").as_matrix().round()
+    # Rounded, so that of equal ones the first counts on every machine.
+    low, along = np.round(turned[..., 2] @ down, 6), np.round(turned[..., 0] @ pads[:, 0], 6)
+    return np.asarray(turned[np.lexsort((-along, low))[0]])
 
 
 def _contact(finger: dict[str, Any], W: FloatArray, middle: FloatArray) -> PointContact:
@@ -79,7 +98,16 @@ def _contact(finger: dict[str, Any], W: FloatArray, middle: FloatArray) -> Point
     # Between two solved forces the axes lie on straight lines, which leave the rotations: the nearest one is taken.
     U, _, V = np.linalg.svd(W.T @ finger["frame_axes"].T)
     f_x, f_y, tau_z = (float(finger[name]) / F_N for name in ("f_x_max", "f_y_max", "tau_z_max"))
-    return PointContact(U @ V, W.T @ (finger["frame_origin"] - middle), f_x, f_y, tau_z, F_N)
+    pad = W.T @ finger["pose_rotation"], W.T @ (finger["pose_origin"] - middle)
+    return PointContact(U @ V, W.T @ (finger["frame_origin"] - middle), f_x, f_y, tau_z, F_N, *pad)
+
+
+def carried(grasp: RankedGrasp, body: Body) -> Body:
+    """The object with the mass that it has in a simulator: the scene's, else no more than a share of the payload."""
+    most, held = SHARE * grasp.maps["payload"], body.mass
+    if body.weighed or not most < held:  # also where the payload is unknown
+        return body
+    return replace(body, mass=most, inertia=body.inertia * most / held)
 
 
 def numbers(*values: float) -> str:
@@ -91,7 +119,17 @@ def numbers(*values: float) -> str:
     return " ".join(repr(float(value) + 0.0) for value in values)
 
 
-def heading(grasp: RankedGrasp) -> list[str]:
-    """What the comment at the top of a file says of its grasp."""
-    lines = ["Made by softjaw from one grasp of a result file; lengths in m, forces in N.", *grasp.remark.splitlines()]
+def heading(grasp: RankedGrasp, body: Body) -> list[str]:
+    """What the comment at the top of a file says of its grasp and of the mass of its object."""
+    mass = carried(grasp, body).mass
+    if body.weighed:
+        why = "of the scene"
+    else:
+        why = f"{SHARE:g} of the payload" if mass < body.mass else f"of {DENSITY:g} kg/m^3, for want of object.mass_g"
+    lines = [
+        "Made by softjaw from one grasp of a result file; lengths in m, forces in N.",
+        *grasp.remark.splitlines(),
+        f"mass of the object: {1e3 * mass:.4g} g, {why}",
+        "friction: the ellipsoid from three motions; the payload follows from all sampled motions",
+    ]
     return [line.replace("--", "- -") for line in lines]  # two dashes would end a comment of XML

@@ -22,10 +22,12 @@ torsional friction works with ODE alone; other engines of Gazebo leave the eleme
 from __future__ import annotations
 
 import math
+import warnings
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from softjaw.study.export.body import Body
 from softjaw.study.export.point_contact import PAD_MASS, RADIUS, PointContact, cell, heading, numbers
 from softjaw.study.export.selection import FloatArray, RankedGrasp
 
@@ -38,13 +40,13 @@ def patch_radius(contact: PointContact) -> float:
     return contact.r / (BALL * contact.mu)
 
 
-def as_sdf(grasp: RankedGrasp) -> str:
+def as_sdf(grasp: RankedGrasp, body: Body) -> str:
     """A model of both fingers at one grasp, with the frame of the object's own file."""
     contacts = cell(grasp)
     return "\n".join(
         [
             '<?xml version="1.0"?>',
-            *(f"<!-- {line} -->" for line in heading(grasp)),
+            *(f"<!-- {line} -->" for line in heading(grasp, body)),
             f'<sdf version="{VERSION}">',
             f'  <model name="{grasp.name}">',
             f'    <frame name="object"><pose>{_pose(contacts.rotation, contacts.origin)}</pose></frame>',
@@ -57,7 +59,9 @@ def as_sdf(grasp: RankedGrasp) -> str:
 
 def _pose(rotation: FloatArray, origin: FloatArray) -> str:
     """Place and roll, pitch, yaw about fixed axes."""
-    return numbers(*origin, *np.asarray(Rotation.from_matrix(rotation).as_euler("xyz")))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # at a pitch of 90 degrees any yaw will do, and it is 0
+        return numbers(*origin, *np.asarray(Rotation.from_matrix(rotation).as_euler("xyz")))
 
 
 def _finger(f: int, contact: PointContact) -> list[str]:

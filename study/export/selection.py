@@ -26,10 +26,10 @@ from softjaw.study.export.cases import cases
 from softjaw.study.flags import LOST, flag_words, flags_in
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.quantities import FORCE_RANGE, LEAST_FORCE, MAIN
-from softjaw.study.ranking import at_level, judged, ranked, score_of, task_keys
+from softjaw.study.ranking import at_level, judged, ranked, score_of
 from softjaw.study.result.read import axes_of, maps_in
 from softjaw.study.result.store import place_text
-from softjaw.study.units import in_si, shown, shown_text
+from softjaw.study.units import shown, shown_text
 
 FloatArray = NDArray[np.float64]
 APPROACHES = {"x": (0, 1.0), "minus-x": (0, -1.0), "y": (1, 1.0), "minus-y": (1, -1.0)}  # axis of finger 1's pad, sign
@@ -74,7 +74,7 @@ class RankedGrasp:
 
     ``place`` is the case in words. ``rotation`` ``(3, 3)`` has the gripper's axes as columns, ``origin`` ``(3,)`` [m]
     is where it stands. ``merit`` is what the grasp is ranked by over the largest of all that are written: 1 for the
-    best, 0 where there is nothing. ``mass`` of the object [kg] is NaN where the scene has none.
+    best, 0 where there is nothing.
     """
 
     name: str
@@ -84,7 +84,6 @@ class RankedGrasp:
     origin: FloatArray
     merit: float
     force: float
-    mass: float
     units: dict[str, str]
 
     @property
@@ -184,15 +183,14 @@ def grasps(ds: xr.Dataset, choice: Selection, gripper: GripperFrame) -> list[Ran
     cases, places, by = chosen(ds, choice)
     values = [case["maps"][by] if by != LEAST_FORCE else 1.0 / case["maps"]["force_low"] for case in cases]
     score = np.nan_to_num([max(float(value), 0.0) for value in values])
-    best, mass = max(score, default=0.0), in_si("mass_g", task_keys(ds, "object").get("mass_g"))
-    mass, units = np.nan if mass is None else mass, maps_in(ds)
+    best, units = max(score, default=0.0), maps_in(ds)
     made = []
     for i, (case, place) in enumerate(zip(cases, places, strict=True)):
         merit = float(score[i] / best) if best > 0 else 0.0
         for approach in gripper.approach:
             R, o = gripper_frame(case, approach, gripper.closing, gripper.depth)
             name = f"grasp_{i}" + (f"_{approach.replace('-', '_')}" if len(gripper.approach) > 1 else "")
-            made.append(RankedGrasp(name, place, case, R, o, merit, case["place"]["normal_force"], mass, units))
+            made.append(RankedGrasp(name, place, case, R, o, merit, case["place"]["normal_force"], units))
     return made
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from softjaw.study.case.poses import axis_poses
+from softjaw.study.export.body import body_of
 from softjaw.study.export.selection import GripperFrame, Selection, grasps
 from softjaw.study.result.read import open as open_result
 from tests.study.formula_results import grid_axes, make
@@ -79,6 +80,12 @@ def all_grasps(path, force):
     """Its grasps at a force, in the order of the stations."""
     found = grasps(opened(path), Selection(force=force), GripperFrame(closing="x"))
     return sorted(found, key=lambda grasp: grasp.case["place"]["station"])
+
+
+@lru_cache
+def body(path):
+    """Its object."""
+    return body_of(opened(path), all_grasps(path, 4.0)[0].case)
 
 
 def slipping(simulator):

@@ -12,10 +12,9 @@ import pytest
 
 from softjaw.study.cli import main
 from softjaw.study.cli.exporting import PLANNERS, SIMULATORS, TABLES
-from softjaw.study.cli.options import APPROACHES, FORMATS
-from softjaw.study.export import selection as module
+from softjaw.study.cli.options import FORMATS
 from softjaw.study.export.planners import CLOSING
-from softjaw.study.export.selection import GripperFrame, Selection, grasps
+from softjaw.study.export.selection import APPROACHES, GripperFrame, Selection, grasps
 from softjaw.study.export.yaml import yaml_text
 from softjaw.study.flags import Flag
 from softjaw.study.messages import CANNOT_WRITE, USAGE
@@ -111,7 +110,6 @@ def station_of(position):
 
 def test_every_format_of_the_command_has_a_writer_and_the_other_way_round():
     assert set(FORMATS) == {*TABLES, *PLANNERS, *SIMULATORS, "vtk"}
-    assert tuple(module.APPROACHES) == APPROACHES
     assert set(CLOSING) == set(PLANNERS)
 
 
@@ -119,8 +117,8 @@ def test_every_format_of_the_command_has_a_writer_and_the_other_way_round():
 def test_the_gripper_stands_over_its_pads(path, closing):
     """Where the file's pads are, seen from the gripper: finger 1 behind, finger 2 ahead along its closing axis."""
     depth = 0.1
-    found = grasps(opened(path), Selection(force=4.0), GripperFrame(APPROACHES, closing, depth))
-    for grasp, approach in zip(found, 5 * APPROACHES, strict=True):
+    found = grasps(opened(path), Selection(force=4.0), GripperFrame(tuple(APPROACHES), closing, depth))
+    for grasp, approach in zip(found, 5 * tuple(APPROACHES), strict=True):
         R, o, _ = geometry(station_of(grasp.case["fingers"][0]["pose_origin"]))
         one, two = (grasp.rotation.T @ (origin - grasp.origin) for origin in o)
         ahead = np.array([RADIUS, 0, 0] if closing == "x" else [0, RADIUS, 0])

@@ -14,7 +14,7 @@ from softjaw.study.export.physx import as_usd
 from softjaw.study.export.point_contact import cell
 from softjaw.study.export.sdf import as_sdf
 from softjaw.study.messages import StudyError
-from tests.study.export.grasp_results import E_N, FORCES, MU_X, MU_Y, all_grasps, geometry, slipping, write
+from tests.study.export.grasp_results import E_N, FORCES, MU_X, MU_Y, all_grasps, body, geometry, slipping, write
 
 ONE = 1e-12
 
@@ -48,25 +48,28 @@ def test_a_cell_has_the_contact_frames_of_the_file(path):
             assert (contact.mu_x, contact.mu_y) == pytest.approx((MU_X[i], MU_Y[i]))
             assert contact.r == pytest.approx(E_N[i] * min(MU_X[i], MU_Y[i]))
             assert contact.F_N == 4.0
-        # x of the cell runs from finger 1 to finger 2, y along the long side of both
-        assert found.contacts[0].origin[0] < 0 < found.contacts[1].origin[0]
-        assert found.rotation @ R[0][:, 0] == pytest.approx([0, 1, 0], abs=ONE)
+        # its axes are those of the pads, and its z axis is within 55 degrees of the object's
+        assert np.abs(found.rotation @ R[0]).max(axis=0) == pytest.approx([1, 1, 1], abs=ONE)
+        assert found.closing == pytest.approx(found.rotation @ R[0][:, 2], abs=ONE)
+        assert found.rotation[2, 2] > 1 / math.sqrt(3)
 
 
 def test_tangents_are_those_of_mujoco_and_other_axes_get_the_smaller_slide(path):
     assert tangents(np.array([0.0, 1.0, 0.0])) == pytest.approx(np.array([[0, 0, 1.0], [1, 0, 0]]))
-    contact = cell(all_grasps(path, 4.0)[0]).contacts[0]
+    pad = geometry(0)[0][0]  # its long side is y of a cell in which its short side is z
+    contact = cell(all_grasps(path, 4.0)[0], -np.cross(pad[:, 2], pad[:, 0])).contacts[0]
     quarter, eighth = (np.array([[1, 0, 0], [0, c, -s], [0, s, c]]) for c, s in ((0, 1), (0.8, 0.6)))
     assert friction(contact)[:2] == (contact.mu_x, contact.mu_y)
     for turn, expected in ((quarter, (contact.mu_y, contact.mu_x)), (eighth, (contact.mu, contact.mu))):
-        turned = type(contact)(turn @ contact.rotation, contact.origin, contact.mu_x, contact.mu_y, contact.r, 1.0)
+        turned = type(contact)(turn @ contact.rotation, contact.origin, contact.mu_x, contact.mu_y, contact.r, 1.0,
+                               contact.pad_rotation, contact.pad_origin)  # fmt: skip
         assert friction(turned)[:2] == expected
 
 
 def test_gazebo_slips_at_the_torque_of_the_file_by_its_own_formula(path):
     """T = 3 pi / 16 a c N; mu along fdir1, which is the contact's x axis."""
     for i, grasp in enumerate(all_grasps(path, 16.0)):
-        root = ElementTree.fromstring(as_sdf(grasp))
+        root = ElementTree.fromstring(as_sdf(grasp, body(path)))
         assert root.get("version") == "1.7"
         for f, link in enumerate(root.iter("link"), start=1):
             surface = link.find("collision/surface/friction")
@@ -99,7 +102,7 @@ def rpy(roll, pitch, yaw):
 def test_physx_slips_at_the_torque_of_the_file_by_its_own_formula(path):
     """T = mu N max(r_min, sqrt(r d)), whatever the penetration d."""
     for i, grasp in enumerate(all_grasps(path, 16.0)):
-        text = as_usd(grasp)
+        text = as_usd(grasp, body(path))
         values = {line.split(" = ")[0].split()[-1]: line.split(" = ")[1] for line in text.splitlines() if " = " in line}
         mu, r_min, r = (
             float(values[name])
@@ -133,7 +136,7 @@ def test_usd_reads_the_stage(path):
 
     grasp = all_grasps(path, 4.0)[3]
     stage = Usd.Stage.CreateInMemory()
-    assert stage.GetRootLayer().ImportFromString(as_usd(grasp))
+    assert stage.GetRootLayer().ImportFromString(as_usd(grasp, body(path)))
     assert UsdGeom.GetStageMetersPerUnit(stage) == 1.0
     for f, contact in enumerate(cell(grasp).contacts, start=1):
         pad = stage.GetPrimAtPath(f"/grasp/finger{f}/pad{f}")
@@ -149,14 +152,14 @@ def test_a_finger_without_load_has_no_ratio(path):
     grasp = deepcopy(all_grasps(path, 4.0)[0])
     grasp.case["fingers"][1]["F_N"] = np.float64(0.0)
     with pytest.raises(StudyError, match="0 N"):
-        as_mjcf(grasp)
+        as_mjcf(grasp, body(path))
 
 
 @pytest.mark.parametrize(("i", "force"), [(1, 1.0), (4, 16.0)])
 def test_mujoco_slips_where_the_file_says(path, slip, i, force):
     """Two grasps; those of the long test are all."""
     found = all_grasps(path, force)[i]
-    assert slip.ratios(found, 1 + i % 2, steps=1000) == pytest.approx([1.0] * len(slip.LOADS), rel=0.01)
+    assert slip.ratios(found, body(path), 1 + i % 2, steps=1000) == pytest.approx([1.0] * len(slip.LOADS), rel=0.01)
 
 
 @pytest.mark.long
@@ -164,7 +167,7 @@ def test_mujoco_slips_where_the_file_says(path, slip, i, force):
 def test_mujoco_slips_where_the_file_says_at_every_grasp(path, slip, force):
     for grasp in all_grasps(path, force):
         for finger in (1, 2):
-            assert slip.ratios(grasp, finger) == pytest.approx([1.0] * len(slip.LOADS), rel=0.005)
+            assert slip.ratios(grasp, body(path), finger) == pytest.approx([1.0] * len(slip.LOADS), rel=0.005)
 
 
 def test_mujoco_holds_a_load_below_the_limit_without_creeping(path, slip):
@@ -175,7 +178,7 @@ def test_mujoco_holds_a_load_below_the_limit_without_creeping(path, slip):
     load = 0.95 * slip.predicted(grasp, 1, (0, 0, 1))
     turned = {}
     for name in ("as written", "without noslip"):
-        model = slip.fixture(as_mjcf(grasp), 1)
+        model = slip.fixture(grasp, body(path), 1)
         if name == "without noslip":
             model.opt.noslip_iterations = 0
         data = mujoco.MjData(model)
@@ -189,17 +192,19 @@ def test_mujoco_holds_a_load_below_the_limit_without_creeping(path, slip):
 
 
 def test_mujoco_turns_an_object_between_both_fingers_at_twice_the_torque(path, slip):
-    """The scene as it is written: fingers on rails, an object that floats; a torque about the closing axis, x."""
+    """The scene as it is written: fingers on rails, an object that floats; a torque about the closing axis."""
     import mujoco
 
     grasp = all_grasps(path, 4.0)[0]  # its contacts are antipodal
-    model = mujoco.MjModel.from_xml_string(as_mjcf(grasp))
+    model = mujoco.MjModel.from_xml_string(as_mjcf(grasp, body(path)))
+    model.opt.gravity[:] = 0
     data = mujoco.MjData(model)
     mujoco.mj_step(model, data, 300)
+    closing = cell(grasp, body(path).down).closing
     limit, steps = 2 * 4.0 * E_N[0] * min(MU_X[0], MU_Y[0]), 1000
     for i in range(steps):
-        data.body("object").xfrc_applied[3] = (at := 1.5 * (i + 1) / steps) * limit
+        data.body("object").xfrc_applied[3:] = (at := 1.5 * (i + 1) / steps) * limit * closing
         mujoco.mj_step(model, data)
         if abs(data.qvel[3:6]).max() > 1e-2:
             break
-    assert at == pytest.approx(1.0, rel=0.01)
+    assert at == pytest.approx(1.0, rel=0.02)  # its inertia delays the turn that is waited for

@@ -1,0 +1,113 @@
+"""The object of a result as simulators take it: its surface, mass, centre of mass and inertia.
+
+Everything is in the frame of the object's own file, in SI units. The inertia is that of a full body of even density
+with the object's mass; of a surface that is not closed its convex hull is taken.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from softjaw.study.case.build import build_object, centre_of_mass, own_frame, surface_triangles
+from softjaw.study.messages import OTHER_FILE, StudyError
+from softjaw.study.result.read import axes_of
+from softjaw.study.scene import SceneError
+from softjaw.study.scene.model import parse_scene
+from softjaw.study.units import GRAVITY
+
+FloatArray = NDArray[np.float64]
+DENSITY = 1000.0  # of an object without `object.mass_g` [kg/m^3], as simulators have it
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """An object: ``points (k, 3)`` [m], ``triangles (m, 3)``, ``mass`` [kg], ``centre (3,)`` of mass [m].
+
+    ``inertia (3, 3)`` is about the centre of mass [kg m^2]. ``weighed`` says whether the scene gives the mass, and
+    ``down (3,)`` is the direction of the weight, -z where the scene asks for every one. ``pad (3,)`` has the length,
+    width and thickness of the pads that hold it [m].
+    """
+
+    points: FloatArray
+    triangles: NDArray[np.int64]
+    mass: float
+    weighed: bool
+    centre: FloatArray
+    inertia: FloatArray
+    down: FloatArray
+    pad: FloatArray
+
+
+def body_of(ds: xr.Dataset, case: dict[str, Any]) -> Body:
+    """The object of a case (`study.export.cases`).
+
+    Raises
+    ------
+    StudyError
+        The object cannot be built, as when its mesh is not there any more.
+    """
+    index = [int(np.flatnonzero(axis.values == case["place"][axis.name])[0]) for axis in axes_of(ds)[:-3]]
+    try:
+        scene = parse_scene(ds.attrs["scene"], check_files=False)
+        scene = scene.with_values({key: v[i] for (key, v), i in zip(scene.sweep.items(), index, strict=False)})
+        shape = scene.object
+        built, frame = build_object(shape), own_frame(shape)
+        points, triangles = surface_triangles(shape)
+    except (SceneError, ValueError, OSError) as error:
+        raise StudyError(OTHER_FILE, f"{ds.attrs['file']}: its object cannot be built: {error}") from error
+    centre = frame.to_object(centre_of_mass(scene, built)[None])[0]
+    points = frame.to_object(np.asarray(points, float))
+    volume, inertia = solid(points[triangles] if getattr(built, "closed", True) else _hull(points))
+    mass = DENSITY * volume if shape.mass is None else shape.mass
+    down, pad = np.array(scene.task.direction or (0.0, 0.0, -1.0)), np.array(scene.gripper.pad_size)
+    return Body(points, triangles, mass, shape.mass is not None, centre, inertia * mass / volume, down, pad)
+
+
+def weight(mass: float, body: Body) -> FloatArray:
+    """Weight ``(3,)`` [N] of a mass [kg] in the direction in which the body's own pulls."""
+    return mass * GRAVITY * body.down / np.linalg.norm(body.down)
+
+
+def solid(corners: FloatArray) -> tuple[float, FloatArray]:
+    """Volume [m^3] of the body inside closed triangles ``(m, 3, 3)`` [m], and its inertia ``(3, 3)`` over density.
+
+    The inertia [m^5] is about the centroid; both are sums over tetrahedra from a point within.
+
+    >>> corners = np.array([[0.0, 0, 0], [6, 0, 0], [0, 6, 0], [0, 0, 6]])
+    >>> volume, inertia = solid(corners[[[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]])
+    >>> round(volume, 9), round(inertia[0, 0], 9)
+    (36.0, 97.2)
+    """
+    x = corners - 0.5 * (corners.min(axis=(0, 1)) + corners.max(axis=(0, 1)))
+    v = np.einsum("ka,ka->k", x[:, 0], np.cross(x[:, 1], x[:, 2])) / 6
+    total, volume = x.sum(axis=1), float(v.sum())
+    first = v @ total / 4
+    second = (np.einsum("k,kia,kib->ab", v, x, x) + np.einsum("k,ka,kb->ab", v, total, total)) / 20
+    second -= np.outer(first, first) / volume
+    return volume, np.trace(second) * np.eye(3) - second
+
+
+def _hull(points: FloatArray) -> FloatArray:
+    """Triangles ``(m, 3, 3)`` of the convex hull, turned outwards."""
+    from scipy.spatial import ConvexHull  # few objects are not closed
+
+    hull = ConvexHull(points)
+    corners = points[hull.simplices]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    inward = np.einsum("ka,ka->k", normal, hull.equations[:, :3]) < 0
+    corners[inward] = corners[inward][:, ::-1]
+    return np.asarray(corners)
+
+
+def places(values: NDArray[Any]) -> str:
+    """Coordinates or numbers of points as a file lists them, to 0.1 um on an object of 1 m.
+
+    >>> places(np.array([[0.1, 1 / 3], [2, 30000000]]))
+    '0.1 0.3333333 2 3e+07'
+    """
+    return " ".join(str(v) if isinstance(v, int) else f"{v:.7g}" for v in np.ravel(values).tolist())
