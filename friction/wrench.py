@@ -12,7 +12,6 @@ model         normal of a face     load of a face   arm of a face
 ccm           its own              p a              its position (x, y, z)
 pcm           contact normal       p a              (x, y, 0): the paper's planar model
 pcm_projected contact normal       p a abs(n_z)     (x, y, 0)
-unrolled      contact normal       p a              arc lengths (x, y, 0), given by the caller
 ============= ==================== ================ ==========================================
 
 Reference: Xu, Alt, Zhang, Steinbach, "Grasping Posture Estimation for a Two-Finger Parallel Gripper with Soft Material
@@ -29,9 +28,9 @@ from numba import njit
 from numpy.typing import ArrayLike
 
 from softjaw.friction.motion import SLIDE_X, SLIDE_Y, TURN_Z
-from softjaw.friction.patch import CANCEL, ContactPatch, FloatArray
+from softjaw.friction.patch import CANCEL, ContactPatch, FloatArray, NoContactError
 
-MODELS = ("ccm", "pcm", "pcm_projected", "unrolled")
+MODELS = ("ccm", "pcm", "pcm_projected")
 SEARCH_WIDTH = 1e-3  # at which the search for the direction of the largest force ends [rad]
 
 
@@ -87,9 +86,7 @@ class FrictionLimits:
         return self.f_x / self.S, self.f_y / self.S, self.tau_z / self.S
 
 
-def friction_wrench(
-    patch: ContactPatch, twist: ArrayLike, mu: float, model: str = "ccm", unrolled: ArrayLike | None = None
-) -> FloatArray:
+def friction_wrench(patch: ContactPatch, twist: ArrayLike, mu: float, model: str = "ccm") -> FloatArray:
     """Total friction wrench on the patch for each slip motion, Eqs. (6)-(8), in the load convention.
 
     Every face resists with ``mu p a`` against the part of its velocity that lies in its own plane. A face at rest, or
@@ -104,9 +101,7 @@ def friction_wrench(
     mu : float
         Coulomb friction coefficient [-].
     model : str
-        ``ccm``, ``pcm``, ``pcm_projected`` or ``unrolled``.
-    unrolled : (n, 2) array, optional
-        Arc-length coordinates of the faces, for the model of that name [m].
+        ``ccm``, ``pcm`` or ``pcm_projected``.
 
     Returns
     -------
@@ -120,27 +115,23 @@ def friction_wrench(
     >>> float(friction_wrench(patch, TURN_Z, mu=0.5).round(12)[0, 5])
     0.1
     """
-    return checked_mu(mu) * _sums(patch, twist, model, unrolled)[0][:, :6]
+    return checked_mu(mu) * _sums(patch, twist, model)[0][:, :6]
 
 
-def friction_support(
-    patch: ContactPatch, twist: ArrayLike, mu: float, model: str = "ccm", unrolled: ArrayLike | None = None
-) -> FloatArray:
+def friction_support(patch: ContactPatch, twist: ArrayLike, mu: float, model: str = "ccm") -> FloatArray:
     """Power ``H(t) = w(t) . t = mu sum p a |P v|`` that friction takes from each motion, ``(m,)`` [W].
 
     ``H`` is the support function of the limit surface. Its values at the unit motions are the exact maxima of force
     and torque (principle of maximum dissipation), so those need no search. Parameters as in `friction_wrench`.
     """
-    sums, scale = _sums(patch, twist, model, unrolled)
+    sums, scale = _sums(patch, twist, model)
     return checked_mu(mu) * scale * sums[:, 6]
 
 
-def friction_limits(
-    patch: ContactPatch, mu: float, model: str = "ccm", unrolled: ArrayLike | None = None
-) -> FrictionLimits:
+def friction_limits(patch: ContactPatch, mu: float, model: str = "ccm") -> FrictionLimits:
     """Largest forces along x and y and largest torque about z, from three motions; see `friction_wrench`."""
     # for mu = 1, so that e_n, a length of the patch, does not change in its last bits with mu
-    f_x, f_y, tau_z = friction_support(patch, np.stack([SLIDE_X, SLIDE_Y, TURN_Z]), 1.0, model, unrolled).tolist()
+    f_x, f_y, tau_z = friction_support(patch, np.stack([SLIDE_X, SLIDE_Y, TURN_Z]), 1.0, model).tolist()
     faces = patch.loaded
     S, F_N = float(faces.load.sum()), float((faces.load * faces.normal[:, 2]).sum())
     largest = max(f_x, f_y, _largest_force(patch) if model == "ccm" else 0.0)
@@ -164,9 +155,7 @@ def _largest_force(patch: ContactPatch) -> float:
     return largest
 
 
-def model_faces(
-    patch: ContactPatch, model: str, unrolled: ArrayLike | None = None
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+def model_faces(patch: ContactPatch, model: str) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Arms ``(3, n)``, unit normals ``(3, n)`` and loads ``(n,)`` of the loaded faces, as the model sees them.
 
     Parameters as in `friction_wrench`; faces that carry no force are left out.
@@ -180,13 +169,6 @@ def model_faces(
         return arm, normal, load
     if model == "pcm_projected":  # abs: a face of an overhang presses, whichever way it looks
         load = load * np.abs(normal[2])
-    if model == "unrolled":
-        arc = np.asarray(unrolled, float)
-        if arc.shape != (len(keep), 2) or not np.isfinite(arc).all():
-            raise ValueError(
-                f"unrolled must hold finite arc lengths of shape {(len(keep), 2)}, found shape {arc.shape}"
-            )
-        arm[:2] = arc[keep].T
     arm[2] = 0.0
     normal[:] = np.array([[0.0], [0.0], [1.0]])
     return arm, normal, load
@@ -199,11 +181,9 @@ def checked_mu(mu: float) -> float:
     return float(mu)
 
 
-def _sums(
-    patch: ContactPatch, twist: ArrayLike, model: str, unrolled: ArrayLike | None
-) -> tuple[FloatArray, FloatArray]:
+def _sums(patch: ContactPatch, twist: ArrayLike, model: str) -> tuple[FloatArray, FloatArray]:
     """Kernel sums ``(m, 7)`` for motions scaled by ``1 / scale``, and ``scale (m,)``."""
-    arm, normal, load = model_faces(patch, model, unrolled)
+    arm, normal, load = model_faces(patch, model)
     t = _six(twist)
     # Powers of two: they keep the squares of tiny and huge velocities in range and round nothing.
     reach = np.abs(arm).max()
@@ -278,3 +258,64 @@ def friction_sums(arm, normal, load, twist, out):  # pragma: no cover - compiled
             t2 += x * fy - y * fx
             H += s * q
         out[k, 0], out[k, 1], out[k, 2], out[k, 3], out[k, 4], out[k, 5], out[k, 6] = f0, f1, f2, t0, t1, t2, H
+
+
+def pure_torque(patch: ContactPatch, mu: float, model: str = "ccm", tolerance: float = 1e-9) -> float:
+    """Torque limit at zero net force: the least ``H(v_x, v_y, 1)`` over all sliding velocities.
+
+    `FrictionLimits.tau_z` is the largest torque about the origin whatever force comes with it; on asymmetric patches
+    this one is smaller. The function is convex and has kinks at face centres (flat patch: its minimiser is the median
+    of the faces, weighted with their loads), so it is minimised by shrinking ellipses, which need no smoothness and
+    bound the error left.
+
+    Parameters
+    ----------
+    patch : ContactPatch
+        ``n`` faces in the contact frame.
+    mu : float
+        Coulomb friction coefficient [-].
+    model : str
+        ``ccm``, ``pcm`` or ``pcm_projected``.
+    tolerance : float
+        Bound of the error, relative to the torque about the origin [-].
+
+    Returns
+    -------
+    float
+        Torque [N m].
+    """
+    mu = checked_mu(mu)
+    arm, normal, load = model_faces(patch, model)
+    size = 2.0 ** np.frexp(np.abs(arm).max())[1]  # lengths are divided by a power of two, which rounds nothing
+    arm, radius = arm / size, _radius(patch) / size
+    twist, sums = np.array([[0.0, 0.0, 0.0, 0.0, 0.0, 1.0]]), np.empty((1, 7))
+    # the first ellipse is a circle that must hold the minimiser
+    v, P, best, limit = np.zeros(2), np.eye(2) * radius**2, np.inf, 0.0
+    for cut in range(2000):
+        twist[0, :2] = v
+        friction_sums(arm, normal, load, twist, sums)
+        T, g = sums[0, 6], sums[0, :2]
+        best, limit = min(best, T), limit if cut else tolerance * T
+        width = np.sqrt(max(g @ P @ g, 0.0))
+        # the function is convex: nowhere in the ellipse is it below the tangent plane's lowest point
+        if T - width >= best - limit:
+            return float(mu * size * best)
+        v, P = _smaller_ellipse(v, P, g / width, (T - best) / width)
+    raise ArithmeticError(f"pure torque not found to {tolerance:g} after {cut + 1} cuts: ask for a larger tolerance")
+
+
+def _radius(patch: ContactPatch) -> float:
+    """Radius around the origin that holds every centre of rotation no worse than the origin itself [m]."""
+    r, upright = np.linalg.norm(patch.centroid, axis=1), np.abs(patch.normal[:, 2])
+    # farther out every face costs at least its upright share of the distance, more than at the origin
+    weight = patch.load @ upright
+    if weight <= CANCEL * patch.load.sum():
+        raise NoContactError("all faces stand parallel to the contact normal: bring the patch into its contact frame")
+    return float(patch.load @ (r * (1 + upright)) / weight)
+
+
+def _smaller_ellipse(v: FloatArray, P: FloatArray, g: FloatArray, depth: float) -> tuple[FloatArray, FloatArray]:
+    """Least ellipse around the part of ``(x - v)' P^-1 (x - v) <= 1`` where ``g . (x - v) <= -depth`` (g' P g = 1)."""
+    Pg = P @ g
+    tau, delta, sigma = (1 + 2 * depth) / 3, 4 / 3 * (1 - depth**2), 2 * (1 + 2 * depth) / (3 * (1 + depth))
+    return v - tau * Pg, delta * (P - sigma * np.outer(Pg, Pg))

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import ConvexHull
 
-from softjaw.lsfit.geometry import directions
+from softjaw.lsfit.form import directions
 from softjaw.lsfit.samples import checked_wrenches, sample_rank
 from softjaw.lsfit.surface import (
     OUT_OF_SPAN,

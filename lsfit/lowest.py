@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, cKDTree
 
-from softjaw.lsfit.form import derivative, exponents, hessian_tensor, monomials
-from softjaw.lsfit.geometry import directions, half_sphere_monomials
+from softjaw.lsfit.form import derivative, directions, exponents, half_sphere_monomials, hessian_tensor, monomials
 from softjaw.lsfit.surface import ZERO_SHARE, OpenBodyError, UndecidedError
 
 FloatArray = NDArray[np.float64]
@@ -92,19 +91,6 @@ def _descended(u: FloatArray, slope: FloatArray, value: FloatArray, Q: FloatArra
     length = np.linalg.norm(step, axis=1)
     new = u + step * np.minimum(1, longest / np.maximum(length, 1e-300))[:, None]
     return new / np.linalg.norm(new, axis=1, keepdims=True)
-
-
-def lowest_eigenvalues(H: FloatArray) -> FloatArray:
-    """Smallest eigenvalues of symmetric matrices, ``(m, d, d) -> (m,)``; in 3-D from the roots of the cubic."""
-    if H.shape[1] != 3:
-        return np.linalg.eigvalsh(H)[:, 0]
-    mean = (H[:, 0, 0] + H[:, 1, 1] + H[:, 2, 2]) / 3
-    a, b, c = H[:, 0, 0] - mean, H[:, 1, 1] - mean, H[:, 2, 2] - mean
-    f, g, h = H[:, 1, 2], H[:, 0, 2], H[:, 0, 1]
-    p = np.sqrt((a * a + b * b + c * c + 2 * (f * f + g * g + h * h)) / 6) + 1e-300
-    det = (a * (b * c - f * f) - h * (h * c - f * g) + g * (h * f - b * g)) / (2 * p**3)
-    # rounding carries the cosine beyond 1 where two eigenvalues are equal
-    return mean + 2 * p * np.cos((np.arccos(np.clip(det, -1, 1)) + 2 * np.pi) / 3)
 
 
 def _count(dimension: int) -> int:

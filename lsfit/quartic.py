@@ -10,8 +10,19 @@ from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from softjaw.lsfit.ellipsoid import TiltedEllipsoid
-from softjaw.lsfit.form import derivative, exponents, hessian_tensor, monomials, places, substitute
-from softjaw.lsfit.geometry import directions, half_sphere_monomials, quartic_shadow, quartic_volume, round_frame
+from softjaw.lsfit.form import (
+    derivative,
+    directions,
+    exponents,
+    half_sphere_monomials,
+    hessian_tensor,
+    monomials,
+    places,
+    quartic_shadow,
+    quartic_volume,
+    round_frame,
+    substitute,
+)
 from softjaw.lsfit.lowest import refuse_open
 from softjaw.lsfit.surface import FitError, FitFlag, LimitSurface, checked_factors, rows, supported_shadow
 

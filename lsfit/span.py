@@ -15,10 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softjaw.lsfit.ellipsoid import TiltedEllipsoid, full_ellipsoid
-from softjaw.lsfit.fit_error import FitErrors, fit_error
 from softjaw.lsfit.quartic import Quartic
 from softjaw.lsfit.quartic_fit import convex_quartic
-from softjaw.lsfit.samples import FLAT_RATIO, THIN_RATIO
+from softjaw.lsfit.samples import FLAT_RATIO, THIN_RATIO, FitErrors, fit_error
 from softjaw.lsfit.surface import FitFlag, Image
 
 FloatArray = NDArray[np.float64]

@@ -72,7 +72,7 @@ def score(
     ----------
     contact1, contact2 : (3,) sequence
         Semi-axes ``(f_x, f_y, tau_z)`` of an ellipsoid, per unit normal force [-, -, m]; ``(mu, mu, mu e_n)`` is the
-        simplified surface of Eq. (12), see `simplified_contact`. Other bodies go to `grasp_score`.
+        simplified surface of Eq. (12). Other bodies go to `grasp_score`.
     distance : float
         Distance of the contacts [m].
     object_length : float
@@ -112,11 +112,6 @@ def _lacking(*contacts: Sequence[float]) -> ScoreFlag:
         if f_x <= least or f_y <= least:
             flag |= ScoreFlag.NO_FORCE
     return flag
-
-
-def simplified_contact(mu: float, e_n: float) -> tuple[float, float, float]:
-    """Semi-axes ``mu (1, 1, e_n)`` of Eq. (12), the simplified limit surface, too large for curved contacts."""
-    return mu, mu, mu * e_n
 
 
 def _scaled(name: str, contact: Iterable[float], length: float) -> tuple[float, float, float]:

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from softjaw.study.case.result import TIE
 from softjaw.study.flags import BORNE, LOST, Flag, flags_in
 from softjaw.study.quantities import DONE, LEAST_FORCE, REALISATION
-from softjaw.study.result.between import at_force
-from softjaw.study.result.intervals import half_width
+from softjaw.study.result.between import at_force, half_width
 from softjaw.study.result.read import mesh_error, values_of
 
 FloatArray = NDArray[np.float64]

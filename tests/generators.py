@@ -10,7 +10,6 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-from scipy.special import ellipeinc
 
 from softjaw.friction.patch import ContactPatch
 from softjaw.friction.wrench import REST
@@ -110,22 +109,6 @@ def lcg_patch(seed, N, slope=0.8):
     x, y, sx, sy = 2 * x - 1, 2 * y - 1, slope * (2 * sx - 1), slope * (2 * sy - 1)
     r = np.column_stack([x, y, -(sx * x + sy * y) / 2])
     return _patch(r, 0.01 * (0.5 + a), np.column_stack([sx, sy, 1 + 0 * x]), 2 * p)
-
-
-def arc_lengths(gen, args):
-    """Unrolled coordinates ``(n, 2)`` of the faces of a generator's patch: lengths along its surface from the top."""
-    if gen == "cap_polar":
-        t, phi = _grid(_mid(0, args["alpha"], args["nth"]), _mid(0, 2 * np.pi, args["nphi"]))
-        return args["R"] * t[:, None] * np.column_stack([np.cos(phi), np.sin(phi)])
-    along = _mid(-args["L"] / 2, args["L"] / 2, args["nx"])
-    if gen == "wedge":
-        u, x = _grid(_mid(0, args["W"], args["nw"]), along)
-        return np.vstack([np.column_stack([x, side * u]) for side in (1, -1)])
-    if gen == "ellcyl_grid":
-        t, x = _grid(_mid(-args["tmax"], args["tmax"], args["nt"]), along)
-        return np.column_stack([x, args["b"] * ellipeinc(t, 1 - (args["a"] / args["b"]) ** 2)])
-    phi, x = _grid(_mid(-args["alpha"], args["alpha"], args["nphi"]), along)
-    return np.column_stack([x, args["R"] * phi])
 
 
 PATCHES = {

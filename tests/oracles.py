@@ -9,7 +9,6 @@ from softjaw.friction.wrench import friction_limits, friction_wrench
 from softjaw.lsfit.body import hull_volume
 from softjaw.lsfit.ellipsoid import nearest_solution
 from softjaw.lsfit.form import hessian_tensor
-from softjaw.lsfit.lowest import lowest_eigenvalues
 from softjaw.lsfit.quartic_fit import normal_equations, placed, round_samples
 from softjaw.lsfit.samples import normalised_samples
 from softjaw.lsfit.sos import ball_coefficients
@@ -46,7 +45,7 @@ def smallest_curvature(v, d, turns=100):
     def hessian(u):
         return ((u[:, :, None] * u[:, None, :]).reshape(-1, d * d) @ Q).reshape(-1, d, d)
 
-    u = u[np.argsort(lowest_eigenvalues(hessian(u)))[:40]]
+    u = u[np.argsort(np.linalg.eigvalsh(hessian(u))[:, 0])[:40]]
     for _ in range(turns):
         values, vectors = np.linalg.eigh(hessian(u))
         u = vectors[:, :, 0]

@@ -16,14 +16,12 @@ from jobs.graspit import graspit_vertices
 from softjaw.friction.frame import FrameFlag, contact_frame, contact_length, in_frame
 from softjaw.friction.motion import cor_grid, cor_twists, fibonacci_twists
 from softjaw.friction.patch import ContactPatch
-from softjaw.friction.torque import pure_torque
-from softjaw.friction.wrench import friction_limits, friction_support, friction_wrench
+from softjaw.friction.wrench import friction_limits, friction_support, friction_wrench, pure_torque
 from softjaw.lsfit.ellipsoid import Ellipsoid, axis_aligned_ellipsoid, full_ellipsoid, three_motion_ellipsoid
-from softjaw.lsfit.fit_error import fit_error
 from softjaw.lsfit.form import exponents, monomials
 from softjaw.lsfit.quartic import Quartic
 from softjaw.lsfit.quartic_fit import convex_quartic
-from softjaw.lsfit.samples import normalised_samples, sample_rank, six_samples
+from softjaw.lsfit.samples import fit_error, normalised_samples, sample_rank, six_samples
 from softjaw.lsfit.surface import FitFlag, shadow_area
 from softjaw.lsfit.zhou import zhou_ellipsoid, zhou_quartic
 from softjaw.scoring.bodies import PolytopeBody, fibonacci_vertices
@@ -33,7 +31,6 @@ from softjaw.scoring.epsilon import epsilon
 from softjaw.scoring.pose import pose_volume
 from softjaw.scoring.quality import score
 from tests.generators import (
-    arc_lengths,
     build,
     bump,
     cyl_mesh,
@@ -48,7 +45,7 @@ from tests.oracles import body_volume, least_squares_quartic
 
 TABLE = json.loads((Path(__file__).parent / "data" / "friction_table.json").read_text())["cases"]
 CASES = {case["id"]: case for case in TABLE}
-MODEL = {"ccm": "ccm", "pcm_flat": "pcm", "pcm_projected": "pcm_projected", "pcm_unrolled": "unrolled"}
+MODEL = {"ccm": "ccm", "pcm_flat": "pcm", "pcm_projected": "pcm_projected"}
 X_HINT = [0.0, 0.0, 1.0]  # of the contacts of a grasp, to be projected on their tangent planes
 
 
@@ -59,8 +56,7 @@ def maxima(inputs, names, patch=None):
     patch, mu = build(inputs["patch"]) if patch is None else patch, inputs["mu"]
     found = {}
     for model in inputs.get("models", ["ccm"]):
-        unrolled = arc_lengths(inputs["patch"]["gen"], inputs["patch"]["args"]) if model == "pcm_unrolled" else None
-        limits = friction_limits(patch, mu, MODEL[model], unrolled)
+        limits = friction_limits(patch, mu, MODEL[model])
         prefix = "" if model == "ccm" else f"{model}."
         found |= {f"{prefix}fx": limits.f_x, f"{prefix}fy": limits.f_y, f"{prefix}tau": limits.tau_z}
         found |= {f"{prefix}FN_sum": limits.S, f"{prefix}FN_proj": limits.F_N, f"{prefix}en": limits.e_n}
@@ -240,9 +236,8 @@ def end_to_end(inputs, _):
     sizes = inputs["d"], inputs["object_length"], rho
     found = {}
     for name, model in MODEL.items():
-        if model != "unrolled":
-            contact = friction_limits(patch, mu, model).per_unit_force
-            found[f"score_{name}"] = score(contact, contact, *sizes).quality
+        contact = friction_limits(patch, mu, model).per_unit_force
+        found[f"score_{name}"] = score(contact, contact, *sizes).quality
     S = friction_limits(patch, mu).S
     coarse, fine = (
         normalised_samples(friction_wrench(patch, twist, mu), twist, S, rho)[0]

@@ -22,11 +22,11 @@ from softjaw.fem.errors import MeshError
 from softjaw.fem.objects.facing_sheet import COARSE, FacingSheet, facing_sheet
 from softjaw.fem.objects.gap import FloatArray, Gap, IntArray, NoContactError, Pose, Surface
 from softjaw.fem.objects.mesh_file import read_triangles
+from softjaw.fem.objects.mesh_holes import centroid
 from softjaw.fem.objects.smooth_triangles import CREASE_ANGLE, SmoothTriangles, smooth_triangles
 from softjaw.fem.objects.spline_grid import coefficients, evaluate
 from softjaw.fem.objects.triangle_tree import TriangleTree
 from softjaw.fem.objects.triangles import cleaned, decimated, pieces_of
-from softjaw.fem.objects.volume import centroid
 
 __all__ = ["MeshError", "MeshObject", "MeshRegion"]
 MARGIN_CELLS = 3  # least number of cells sampled beyond the box
@@ -170,7 +170,7 @@ class MeshObject:
         grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
         samples = sheet.sampled(pose.to_object(grid.reshape(-1, 3)).reshape(grid.shape), step)
         first = np.array([axis[0] for axis in axes])
-        return MeshRegion(sheet, pose, box[0], box[1], step, first, samples, coefficients(samples))
+        return MeshRegion(sheet, pose, box[0], box[1], step, first, coefficients(samples))
 
     def _step(self, size: FloatArray, element: float | None) -> float:
         """Step of the grid over a box of this size [m]."""
@@ -238,7 +238,6 @@ class MeshRegion:
     upper: FloatArray
     grid_step: float
     first: FloatArray
-    samples: FloatArray
     coefficients: FloatArray
 
     def gap(self, x: FloatArray) -> Gap:
@@ -254,18 +253,6 @@ class MeshRegion:
         g[inside], normal[inside], hessian[inside] = self._spline(y[inside])
         g[~inside], normal[~inside] = self.sheet.signed(x[~inside])
         return g, normal, hessian
-
-    @cached_property
-    def centre_error(self) -> float:
-        """Largest difference [m] to the distance itself at centres of cells within two steps of the surface."""
-        near = np.argwhere(np.abs(self.samples[:-1, :-1, :-1]) < 2 * self.grid_step)
-        # centres of cells are furthest from all samples, so the spline is at its worst there
-        # cells at whose centres the interpolation is compared with the distance itself
-        y = self.first + self.grid_step * (near[:: 1 + len(near) // 4_000] + 0.5)
-        y = y[self._covers(y)]
-        if not len(y):
-            return np.nan
-        return float(np.abs(self._spline(y)[0] - self.sheet.signed(self.pose.to_object(y))[0]).max())
 
     def _covers(self, y: FloatArray) -> np.ndarray:
         """Whether points of the pad's frame lie in the box, ``(n,)``."""

@@ -10,7 +10,7 @@ import xarray as xr
 
 from jobs.figures.contacts import WIDTH
 from softjaw.friction.motion import cor_grid, fibonacci_twists
-from softjaw.lsfit.fit_error import fit_error
+from softjaw.lsfit.samples import fit_error
 from softjaw.study import pictures
 from softjaw.study.case.limit_surface import fitted
 from softjaw.study.quantities import FINGERS

@@ -17,8 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from softjaw.fem.objects.gap import Pose
 from softjaw.friction.frame import Frame, contact_frame, contact_length, in_frame
 from softjaw.friction.patch import NEGLIGIBLE, ContactPatch
-from softjaw.friction.torque import pure_torque
-from softjaw.friction.wrench import FrictionLimits, friction_limits
+from softjaw.friction.wrench import FrictionLimits, friction_limits, pure_torque
 from softjaw.lsfit.ellipsoid import Ellipsoid, three_motion_ellipsoid
 from softjaw.scoring.contact import SoftContact
 from softjaw.study.case.result import UNDECIDED

@@ -23,10 +23,9 @@ from softjaw.lsfit.ellipsoid import (
     full_ellipsoid,
     three_motion_ellipsoid,
 )
-from softjaw.lsfit.fit_error import FitErrors, fit_error, overclaim
 from softjaw.lsfit.quartic import Quartic
 from softjaw.lsfit.quartic_fit import convex_quartic
-from softjaw.lsfit.samples import normalised_samples, six_samples, sphere_motions
+from softjaw.lsfit.samples import FitErrors, fit_error, normalised_samples, overclaim, six_samples, sphere_motions
 from softjaw.lsfit.span import span_ellipsoid, span_quartic
 from softjaw.lsfit.surface import FitError, LimitSurface
 from softjaw.lsfit.zhou import zhou_ellipsoid, zhou_quartic

@@ -12,7 +12,7 @@ from softjaw.fem.contact.path import Pressed
 from softjaw.fem.errors import CheckError
 from softjaw.fem.shell.element import Shell
 from softjaw.fem.shell.thin_walled import Grasp, ThinWalled, WallMesh, object_factors
-from softjaw.fem.shell.wall_stress import faces
+from softjaw.fem.shell.wall_model import faces
 from softjaw.study.case.build import outer_surface
 from softjaw.study.case.geometry import material_of
 from softjaw.study.case.result import UNDECIDED, surely_below

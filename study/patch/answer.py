@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from softjaw.friction.frame import FrameFlag, behind, principal_direction, wound
 from softjaw.friction.patch import FloatArray, NoContactError
-from softjaw.friction.torque import pure_torque
+from softjaw.friction.wrench import pure_torque
 from softjaw.lsfit.body import ExactSurface
 from softjaw.study.case.contact import ANTIPODAL, Contact, angles, pose_flags
 from softjaw.study.case.evaluate import ECCENTRICITIES, exact_score, soft

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from softjaw.friction.patch import ContactPatch, FloatArray
 from softjaw.friction.wrench import FrictionLimits
 from softjaw.friction.wrench import friction_wrench as wrench_in_frame
-from softjaw.lsfit.fit_error import FitErrors
+from softjaw.lsfit.samples import FitErrors
 from softjaw.lsfit.surface import FitError, LimitSurface
 from softjaw.scoring.quality import Score, grasp_score
 from softjaw.study.case.contact import Contact

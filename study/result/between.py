@@ -1,4 +1,4 @@
-"""A dataset at a force between two solved ones, and which cases are of one kind, so that a line may join them."""
+"""A dataset at a force between two solved ones, cases that a line may join, and intervals from samples of inputs."""
 
 from __future__ import annotations
 
@@ -12,6 +12,12 @@ from softjaw.study.quantities import BOTH_ENDS, DONE, MISSING
 
 if TYPE_CHECKING:  # plans rank too, and answer before xarray would be loaded
     import xarray as xr
+
+
+import xarray as xr
+
+from softjaw.study.quantities import MODELS, REALISATION, TABLE
+from softjaw.study.scene.samples import UPPER
 
 KINDS = {"pieces": 7, "holes": 7, "rims": 1}  # what a kind of contact is told by, and the largest number that counts
 
@@ -62,3 +68,36 @@ def _apart(low: xr.Dataset, high: xr.Dataset) -> NDArray[np.bool_]:
         lower, upper = (contact_kinds(name, ds[f"finger_{name}"].values) for ds in (low, high))
         apart |= (lower != upper).any(axis=-1)
     return np.asarray(apart, bool)
+
+
+UNCERTAIN_MAPS = tuple(q.name for q in TABLE if q.group == "maps" and q.error and q.rank)
+
+
+def half_width(values: xr.DataArray) -> xr.DataArray:
+    """Half of the range of 95 % of some samples; NaN where one of them has no value.
+
+    >>> import xarray as xr
+    >>> float(half_width(xr.DataArray(list(range(40)), dims=REALISATION)))
+    19.0
+    """
+    # hazen: of n samples that take the middles of n intervals of equal probability, as the scene's do
+    low, high = (values.quantile(q, REALISATION, method="hazen", skipna=False) for q in (1 - UPPER, UPPER))
+    return (high.drop_vars("quantile") - low.drop_vars("quantile")) / 2
+
+
+def with_intervals(ds: xr.Dataset) -> xr.Dataset:
+    """The cases with the scene's own inputs; samples of the uncertain ones become an interval of each main map.
+
+    ``NAME_interval`` is its half-width (CCM), ``NAME_samples`` has the values, whose last dimension is `REALISATION`.
+    """
+    given, samples = ds.isel({REALISATION: 0}, drop=True), ds.isel({REALISATION: slice(1, None)})
+    names = [name for name in UNCERTAIN_MAPS if name in ds]
+    for name in names:
+        values = samples[name].sel(model=MODELS[0], drop=True) if "model" in samples[name].dims else samples[name]
+        values = values.transpose(*given.status.dims, REALISATION)
+        about = {"units": ds[name].attrs["units"], "long_name": f"half-width of the 95 % interval of {name}"}
+        text = f"Half of the range in which {name} (CCM) of 95 % of the samples of the uncertain inputs lies."
+        given[f"{name}_interval"] = half_width(values).assign_attrs(about, definition=text)
+        given[f"{name}_samples"] = values
+    given.attrs["derived"] = (*ds.attrs["derived"], *(f"{name}_interval" for name in names))
+    return given

@@ -14,7 +14,7 @@ import xarray as xr
 
 from softjaw.study.flags import OF_FILE, Flag
 from softjaw.study.quantities import BY_KEY, FINGERS, MODELS, REALISATION, TABLE, Axis, Quantity
-from softjaw.study.result.intervals import with_intervals
+from softjaw.study.result.between import with_intervals
 from softjaw.study.result.layout import DONE, VERSION
 from softjaw.study.result.store import Result, open_result
 

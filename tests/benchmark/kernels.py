@@ -9,8 +9,7 @@ import numpy as np
 
 from softjaw.friction.frame import contact_frame
 from softjaw.friction.motion import cor_grid, fibonacci_twists
-from softjaw.friction.torque import pure_torque
-from softjaw.friction.wrench import friction_limits, friction_wrench
+from softjaw.friction.wrench import friction_limits, friction_wrench, pure_torque
 from softjaw.lsfit.ellipsoid import Ellipsoid, full_ellipsoid
 from softjaw.lsfit.quartic_fit import convex_quartic
 from softjaw.lsfit.samples import normalised_samples, six_samples

@@ -26,6 +26,7 @@ from softjaw.fem.objects.outer_surface import Section, Turned, of_sections
 from softjaw.fem.objects.profile import straight_runs
 from softjaw.fem.objects.revolution import Revolution
 from softjaw.fem.objects.shapes import Box, EllipticCylinder, Sphere
+from softjaw.fem.objects.spline_grid import PADDING
 from softjaw.fem.objects.spline_surface import spline_surface
 from softjaw.fem.objects.stacked import Stacked
 from softjaw.fem.objects.traced_outline import Rays, cast, centroids, folded
@@ -174,7 +175,7 @@ def test_a_box_of_whole_steps_has_as_many_cells(seed):
     lower = rng.uniform(-0.05, 0.05, 3)
     mesh = MeshObject(*shifted(CUBE, 0.1), grid_step=moved(step, seed))
     region = mesh.near(Pose(np.eye(3), np.zeros(3)), lower, moved(lower + step * many, seed))
-    assert region.samples.shape == tuple(4 * -(-(many + 6) // 4) + 1)
+    assert region.coefficients.shape == tuple(4 * -(-(many + 6) // 4) + 1 + 2 * PADDING)
 
 
 # --- cuts through meshes ----------------------------------------------------------------------------------------------

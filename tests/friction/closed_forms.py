@@ -18,7 +18,6 @@ from scipy.special import ellipe
 from softjaw.friction.patch import ContactPatch
 from tests.generators import (
     PRESSURES,
-    arc_lengths,
     cap_polar,
     cylinder_grid,
     disc_polar,
@@ -42,7 +41,6 @@ class Form:
     tau_z: float
     order: float = 2.0
     model: str = "ccm"
-    arcs: Callable[[int], np.ndarray] | None = None
 
 
 def mean_distance(a: float, b: float) -> float:
@@ -96,17 +94,13 @@ def rectangle(a: float, b: float) -> Form:
 
 
 def cylinder(model: str, alpha: float = ALPHA, L: float = 2.0) -> Form:
-    """Unit cylinder along x; the unrolled arms make it the rectangle of its surface."""
+    """Unit cylinder along x."""
     args = {"R": 1.0, "alpha": alpha, "L": L}
     S, F_N = 2 * alpha * L, 2 * sin(alpha) * L
     curved = model == "ccm"
-    tau = S * mean_distance(L, 2 * alpha) if model == "unrolled" else cylinder_torque(1, 1, alpha, L, not curved)
-
-    def arcs(n: int) -> np.ndarray:
-        return arc_lengths("cylinder_grid", {**args, "nphi": n, "nx": n})
-
+    tau = cylinder_torque(1, 1, alpha, L, not curved)
     patch = lambda n: cylinder_grid(**args, nphi=n, nx=n)  # noqa: E731
-    return Form(patch, S, F_N, S, F_N if curved else S, tau, 2.0, model, arcs if model == "unrolled" else None)
+    return Form(patch, S, F_N, S, F_N if curved else S, tau, 2.0, model)
 
 
 def roof(model: str, tilt: float = 0.6, W: float = 1.0, L: float = 2.0) -> Form:
@@ -115,15 +109,10 @@ def roof(model: str, tilt: float = 0.6, W: float = 1.0, L: float = 2.0) -> Form:
     arm = {
         "ccm": c * mean_distance(L, 2 * W),
         "pcm": mean_distance(L, 2 * W * c),
-        "unrolled": mean_distance(L, 2 * W),
     }[model]
-
-    def arcs(n: int) -> np.ndarray:
-        return arc_lengths("wedge", {"W": W, "L": L, "nw": n, "nx": 2 * n})
-
     patch = lambda n: wedge(tilt, W, L, n, 2 * n)  # noqa: E731
     f_y = c * S if model == "ccm" else S
-    return Form(patch, S, c * S, S, f_y, arm * S, 2.0, model, arcs if model == "unrolled" else None)
+    return Form(patch, S, c * S, S, f_y, arm * S, 2.0, model)
 
 
 def ring(R: float) -> Form:
@@ -152,8 +141,6 @@ FORMS = {
     ),
     "cylinder": cylinder("ccm"),
     "cylinder, flat": cylinder("pcm"),
-    "cylinder, unrolled": cylinder("unrolled"),
     "wedge": roof("ccm"),
     "wedge, flat": roof("pcm"),
-    "wedge, unrolled": roof("unrolled"),
 }

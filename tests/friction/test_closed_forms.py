@@ -14,8 +14,7 @@ NAMES = ("S", "F_N", "f_x", "f_y", "tau_z")
 
 
 def relative_errors(form, n):
-    arcs = form.arcs and form.arcs(n)
-    limits = friction_limits(form.patch(n), 1.0, form.model, arcs)
+    limits = friction_limits(form.patch(n), 1.0, form.model)
     return np.array([abs(getattr(limits, name) / getattr(form, name) - 1) for name in NAMES])
 
 

@@ -13,8 +13,7 @@ from scipy.spatial.transform import Rotation
 from softjaw.friction.frame import FrameFlag, contact_frame, in_frame, wound
 from softjaw.friction.motion import SLIDE_X, TURN_Z
 from softjaw.friction.patch import ContactPatch, NoContactError
-from softjaw.friction.torque import pure_torque
-from softjaw.friction.wrench import friction_limits, friction_wrench
+from softjaw.friction.wrench import friction_limits, friction_wrench, pure_torque
 from tests.generators import cap_polar, cyl_mesh, cylinder_grid, grid_mesh, mesh_patch, points_patch
 from tests.turns import TURNS
 

@@ -8,8 +8,7 @@ import pytest
 from scipy.optimize import minimize
 
 from softjaw.friction.patch import NoContactError
-from softjaw.friction.torque import pure_torque
-from softjaw.friction.wrench import friction_limits, friction_support, friction_wrench
+from softjaw.friction.wrench import friction_limits, friction_support, friction_wrench, pure_torque
 from tests.generators import build, lcg_patch, moved, points_patch, rect_grid
 
 TRIANGLE = [[1, 0], [-0.5, math.sqrt(0.75)], [-0.5, -math.sqrt(0.75)]]

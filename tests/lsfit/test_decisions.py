@@ -19,13 +19,11 @@ from softjaw.lsfit.ellipsoid import (
     full_ellipsoid,
     three_motion_ellipsoid,
 )
-from softjaw.lsfit.fit_error import fit_error
-from softjaw.lsfit.form import exponents, substitute
-from softjaw.lsfit.geometry import directions
+from softjaw.lsfit.form import directions, exponents, substitute
 from softjaw.lsfit.lowest import Closed, closed
 from softjaw.lsfit.quartic import Quartic
 from softjaw.lsfit.quartic_fit import convex_quartic
-from softjaw.lsfit.samples import sample_rank, six_samples, sphere_motions
+from softjaw.lsfit.samples import fit_error, sample_rank, six_samples, sphere_motions
 from softjaw.lsfit.surface import FitError, FitFlag, Image
 from tests.generators import cylinder_grid, disc_polar, lcg_patch, points_patch
 from tests.oracles import least_squares_quartic, samples

@@ -11,10 +11,9 @@ from scipy.optimize import brentq
 from softjaw.friction.wrench import friction_limits, friction_wrench
 from softjaw.lsfit.body import ExactSurface
 from softjaw.lsfit.ellipsoid import Ellipsoid, axis_aligned_ellipsoid, full_ellipsoid
-from softjaw.lsfit.fit_error import fit_error
-from softjaw.lsfit.geometry import directions
+from softjaw.lsfit.form import directions
 from softjaw.lsfit.quartic_fit import convex_quartic
-from softjaw.lsfit.samples import normalised_samples
+from softjaw.lsfit.samples import fit_error, normalised_samples
 from softjaw.lsfit.sos import (
     MIN_EIGENVALUE,
     ball_coefficients,

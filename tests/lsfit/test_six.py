@@ -5,11 +5,10 @@ import pytest
 
 from softjaw.friction.wrench import friction_support, friction_wrench
 from softjaw.lsfit.ellipsoid import full_ellipsoid
-from softjaw.lsfit.fit_error import fit_error
 from softjaw.lsfit.form import exponents, monomials
 from softjaw.lsfit.quartic import Quartic
 from softjaw.lsfit.quartic_fit import convex_quartic
-from softjaw.lsfit.samples import sample_rank, six_samples, sphere_motions
+from softjaw.lsfit.samples import fit_error, sample_rank, six_samples, sphere_motions
 from softjaw.lsfit.sos import ball_gram, gram_map
 from softjaw.lsfit.span import span_ellipsoid, span_quartic, span_samples
 from softjaw.lsfit.surface import FitFlag

@@ -7,11 +7,9 @@ import pytest
 
 from softjaw.friction.motion import fibonacci_twists
 from softjaw.lsfit.ellipsoid import Ellipsoid, TiltedEllipsoid
-from softjaw.lsfit.fit_error import fit_error, overclaim
-from softjaw.lsfit.form import exponents, monomials
-from softjaw.lsfit.geometry import directions, quartic_volume
+from softjaw.lsfit.form import directions, exponents, monomials, quartic_volume
 from softjaw.lsfit.quartic import Quartic
-from softjaw.lsfit.samples import normalised_samples, sample_rank
+from softjaw.lsfit.samples import fit_error, normalised_samples, overclaim, sample_rank
 from softjaw.lsfit.surface import FitFlag, Image, OpenBodyError, UndecidedError, shadow_area, supported_shadow
 
 AXES = np.array([1.0, 0.7, 0.1])

@@ -8,8 +8,7 @@ import pytest
 from softjaw.friction.motion import SLIDE_X, SLIDE_Y
 from softjaw.friction.wrench import friction_wrench
 from softjaw.lsfit.ellipsoid import TiltedEllipsoid
-from softjaw.lsfit.fit_error import fit_error
-from softjaw.lsfit.samples import normalised_samples, six_samples, sphere_motions
+from softjaw.lsfit.samples import fit_error, normalised_samples, six_samples, sphere_motions
 from softjaw.lsfit.surface import FitFlag
 from softjaw.lsfit.zhou import CollapsedFitError, zhou_ellipsoid, zhou_quartic
 from tests.generators import cylinder_grid, disc_polar, lcg_patch, points_patch, rect_grid

@@ -9,7 +9,7 @@ from scipy.spatial import ConvexHull
 
 from softjaw.scoring.bodies import fibonacci_vertices, polytope_volume
 from softjaw.scoring.closed_form import epsilon_l1, epsilon_linf, volume_l1, volume_linf
-from softjaw.scoring.quality import ScoreFlag, score, simplified_contact
+from softjaw.scoring.quality import ScoreFlag, score
 
 A, B = (0.8, 0.6, 0.15), (0.5, 0.9, 0.25)
 
@@ -108,7 +108,7 @@ def test_a_contact_without_torque_scores_nothing_and_says_so():
     assert (found.quality, found.quality_l1, found.epsilon, found.epsilon_l1) == (0, 0, 0, 0)
     assert found.flag == ScoreFlag.NO_TORQUE
     assert score((1, 1, 0), (1, 1, 0.01), 0.06, 0.06, 0.05).flag == ScoreFlag.NO_TORQUE
-    slippery = score(simplified_contact(0.0, 0.01), simplified_contact(0.0, 0.01), 0.06, 0.06, 0.05)
+    slippery = score((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.06, 0.06, 0.05)
     assert (slippery.quality, slippery.epsilon) == (0, 0)
     assert slippery.flag == ScoreFlag.NO_TORQUE | ScoreFlag.NO_FORCE
 

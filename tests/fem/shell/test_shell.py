@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from softjaw.fem.shell.element import Shell, ShellMesh, grid_elements, patch
-from softjaw.fem.shell.wall_model import LinearShell
-from softjaw.fem.shell.wall_stress import middles
+from softjaw.fem.shell.wall_model import LinearShell, middles
 
 E, NU, THICKNESS = 2e9, 0.38, 0.02
 RNG = np.random.default_rng(7)

@@ -3,13 +3,12 @@
 import numpy as np
 import pytest
 
+from softjaw.fem.materials import WallMaterial
 from softjaw.fem.objects.outer_surface import of_revolution
 from softjaw.fem.objects.revolution import Revolution
 from softjaw.fem.shell.thin_walled import supported
-from softjaw.fem.shell.wall_material import WallMaterial
 from softjaw.fem.shell.wall_mesh import MeshSize, body_mesh
-from softjaw.fem.shell.wall_model import LinearShell
-from softjaw.fem.shell.wall_stress import faces
+from softjaw.fem.shell.wall_model import LinearShell, faces
 
 R, E, F = 0.03, 2e9, 1e-4  # of the middle surface [m], [Pa]; load [N]
 PLANES = [(True, True), (False, True), (True, False), (False, False)]
