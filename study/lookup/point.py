@@ -6,12 +6,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from softjaw.friction.patch import NEGLIGIBLE
 from softjaw.study.flags import flags_in
-from softjaw.study.lookup.interpolation import Corners, FloatArray
-from softjaw.study.lookup.source import Source
+from softjaw.study.lookup.interpolation import Corners, FloatArray, blend, corners, plain
 from softjaw.study.quantities import BOTH_ENDS, BY_KEY, DONE, FAILED, FORCE_RANGE, MAIN, MISSING
 from softjaw.study.quantities import STATES as OF_CASES
 from softjaw.study.units import shown_text
@@ -120,8 +117,17 @@ class GraspPoint:
         ``x = rotation x_pad + origin`` in the frame of the object's own file; between cases the nearest rotation to
         their mean. NaN at angles outside of the solved ones, where values are those of an image by symmetry.
         """
-        R, x = pad_poses(self.map.source, self.place, self.map.by_poses)
-        outside = self.states != INSIDE
+        source, (stations, angles, _) = self.map.source, self.map.axes
+        # As they stand: no angle is folded to an image of itself.
+        turns = angles if self.map.by_poses else plain("angle", "rad", source.axes[1].values)
+        at = corners((stations, turns, plain("force", "N", [0.0])), self.place * [1.0, 1.0, 0.0])
+        solved = (source.status == DONE).argmax(axis=-1)  # a pose is the same at every force
+        cases = np.ix_(stations.take, turns.take)
+        tables = (source.read(f"fingers/{name}")[(*cases, solved[cases])] for name in ("pose_rotation", "pose_origin"))
+        R, x = (blend(np.repeat(table.reshape(-1, *table.shape[2:]), 2, axis=0), at) for table in tables)
+        outside = (self.states != INSIDE) | ~at.inside.all(axis=1)
+        U, _, V = np.linalg.svd(R[~outside])
+        R[~outside] = U @ V
         R[outside], x[outside] = np.nan, np.nan
         return R.reshape(*self.shape, 2, 3, 3), x.reshape(*self.shape, 2, 3)
 
@@ -248,45 +254,3 @@ class GraspPoint:
             at = np.unravel_index(n, self.map.shape)
             cases.append((tuple(int(x.take[k]) for x, k in zip(self.map.axes, at, strict=True)), int(n)))
         return cases
-
-
-def pad_poses(source: Source, place: FloatArray, by_poses: bool) -> tuple[FloatArray, FloatArray]:
-    """Rotations ``(m, 2, 3, 3)`` and origins ``(m, 2, 3)`` [m] of both pads at first touch; NaN outside of the map.
-
-    They are taken as they stand: no angle is folded to an image of itself.
-
-    Parameters
-    ----------
-    source : Source
-    place : (m, 3) array
-        Station [m] or number of the pose, angle [rad], force [N].
-    by_poses : bool
-        Whether the first is a number.
-    """
-    stations = np.arange(source.status.shape[0]) if by_poses else source.axes[0].values
-    i, r = _neighbours(stations, place[:, 0])
-    j, t = _neighbours(source.axes[1].values, 0.0 * place[:, 1] + source.axes[1].values[0] if by_poses else place[:, 1])
-    solved = (source.status == DONE).argmax(axis=-1)  # a pose is the same at every force
-    R, x = np.zeros((len(place), 2, 3, 3)), np.zeros((len(place), 2, 3))
-    for a, along in enumerate((1 - r, r)):
-        for b, about in enumerate((1 - t, t)):
-            weight, at = along * about, (i[a], j[b], solved[i[a], j[b]])
-            for name, pose in (("pose_rotation", R), ("pose_origin", x)):
-                values = source.read(f"fingers/{name}")[at]
-                share = weight.reshape(-1, *[1] * (values.ndim - 1))
-                pose += np.where(share == 0, 0.0, share * values)  # a corner that does not count may have no value
-    whole = np.isfinite(R).all(axis=(1, 2, 3))
-    U, _, V = np.linalg.svd(R[whole])
-    R[whole] = U @ V
-    return R, x
-
-
-def _neighbours(values: FloatArray, x: FloatArray) -> tuple[NDArray[np.int64], FloatArray]:
-    """Positions ``(2, m)`` of the values below and above ``x (m,)``, and the share of the upper one; NaN outside."""
-    order = np.argsort(values)
-    v = np.asarray(values, float)[order]
-    near = np.clip(x, v[0], v[-1])
-    low = np.clip(np.searchsorted(v, near, side="right") - 1, 0, max(len(v) - 2, 0))
-    high = np.minimum(low + 1, len(v) - 1)
-    share = (near - v[low]) / np.where(high > low, v[high] - v[low], 1.0)
-    return np.stack([order[low], order[high]]), np.where(np.abs(x - near) > NEGLIGIBLE, np.nan, share)

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from softjaw.friction.frame import FrameFlag, behind, principal_direction, wound
-from softjaw.friction.patch import FloatArray, NoContactError
 from softjaw.friction.wrench import pure_torque
-from softjaw.lsfit.body import ExactSurface
 from softjaw.study.case.contact import ANTIPODAL, Contact, angles, pose_flags
 from softjaw.study.case.evaluate import ECCENTRICITIES, exact_score, soft
-from softjaw.study.case.limit_surface import STANDS_IN, SurfaceFit, fit_surfaces
+from softjaw.study.case.limit_surface import STANDS_IN, fit_surfaces
 from softjaw.study.case.result import UNDECIDED
 from softjaw.study.flags import Flag, flags_in, raised
 from softjaw.study.messages import USAGE, Problem, StudyError
@@ -43,59 +40,27 @@ DEFINITIONS = {
     "S": "sum of pressure times area over the patch",
     "F_N": "its part along the contact normal: the force of the gripper",
     "rho": "longer side of the rectangle round the loaded faces in the contact frame",
-    "ccm, pcm, pcm_projected": "curved contact model: every face resists in its own plane; planar contact model: all"
-    " faces in one plane, scaled by S (as in the paper); the same scaled by F_N",
+    "ccm, pcm, pcm_projected": "curved contact model, where every face resists in its own plane; planar contact model,"
+    " where all lie in one, scaled by S (as in the paper); the same scaled by F_N",
     "f_x_max, f_y_max, tau_z_max": "largest friction along x and y, and about the contact normal through the origin",
     "tau_pure": "largest friction torque while no net force is transmitted",
     "e_n": "tau_z_max / (mu S)",
-    "e_n_ratio": "tau_z_max / max f_t, with the largest force in the contact plane, in any direction",
+    "e_n_ratio": "tau_z_max / max f_t, with the largest friction force in the contact plane, in any direction",
     "e_n_projected": "tau_z_max / (mu F_N)",
     "limit surface": "all loads (f_x, f_y, tau_z) that friction can carry, here per newton of S",
-    "E_rad, E_dir": "mean error of a fitted surface's radius, and mean angle between its normal and the sliding motion",
+    "E_rad, E_dir": "mean error of a fitted surface's radius; mean angle between its normal and the sliding motion",
     "quality": "volume of the grasp wrench space of both contacts (L-infinity, S = 1 each)",
-    "epsilon": "radius of the largest ball round 0 in it, for a centre of mass halfway between the contacts; lower and"
-    " upper bound, which a quartic leaves apart",
+    "epsilon": "radius of the largest ball round 0 in it, about the midpoint of the contacts: lower and upper bound",
 }
 SCORES = ("quality", "epsilon")
 OF_FRAME = Flag.CYCLE | Flag.HOLE | Flag.NO_CORNERS | Flag.OVERHANG
 
 
-@dataclass(frozen=True, eq=False)
 class EvaluatedPatch:
     """A patch from a file and all that friction can carry there.
 
-    Parameters
-    ----------
-    read : ReadPatch
-        The patch in the file's coordinates.
-    contact : Contact
-        With its contact frame and friction limits.
-    x_given : bool
-        Whether the user gave the direction of x.
-    fits : mapping
-        For each friction model the fitted surfaces by kind.
-    exact : mapping
-        For each friction model the limit surface itself, per unit of S.
-    """
-
-    read: ReadPatch
-    contact: Contact
-    x_given: bool
-    fits: Mapping[str, Mapping[str, SurfaceFit]]
-    exact: Mapping[str, ExactSurface]
-
-    @property
-    def rank(self) -> int:
-        """Dimension of the loads that the contact can carry, 3 if nothing is missing."""
-        return self.exact["ccm"].rank
-
-    def surface(self, model: str, kind: str) -> Any:
-        """A limit surface in ``(f_x, f_y, tau_z)`` per unit of S; ``kind`` is ``exact`` or one of `SURFACES`."""
-        return self.exact[model] if kind == "exact" else self.fits[model][kind].body(self.contact.mu)
-
-
-def evaluate_patch(read: ReadPatch, mu: float, long_side: FloatArray | None = None) -> EvaluatedPatch:
-    """Frame, friction and limit surfaces of a patch.
+    ``contact`` has its contact frame and friction limits, ``fits`` for each friction model the fitted surfaces by kind,
+    ``exact`` for each the limit surface itself, per unit of S.
 
     Parameters
     ----------
@@ -111,32 +76,36 @@ def evaluate_patch(read: ReadPatch, mu: float, long_side: FloatArray | None = No
     StudyError
         If the normals point to opposite sides, or ``long_side`` along them.
     """
-    x_hint = principal_direction(read.patch) if long_side is None else long_side
-    try:
-        contact = Contact(read.patch, mu, x_hint=x_hint)
-    except NoContactError as error:
-        raise StudyError(USAGE, f"{read.file}: {error}") from error
-    except ValueError as error:
-        raise StudyError(USAGE, f"{read.file}: --long-side: {str(error).replace('x_hint', 'the direction')}") from error
-    if contact.frame.flag & FrameFlag.ORIENTATION:
-        turned = _minority(behind(read.patch.normal, contact.frame.axes[2]))
-        found = f"normals in {_count(read, turned)} that oppose their neighbours"
-        remedy = "orient them to one side before export (ParaView: Generate Surface Normals with Consistency)"
-        refuse([Problem(read.file, None, "normal", found, "normals that all point to the same side", remedy)])
 
-    fits = {m: fit_surfaces(contact, m, list(SURFACES), "least_squares", FITTED_ON) for m in MODELS}
-    return EvaluatedPatch(read, contact, long_side is not None, fits, {m: exact_surface(contact, m) for m in MODELS})
+    def __init__(self, read: ReadPatch, mu: float, long_side: ArrayLike | None = None) -> None:
+        self.read, self.x_given = read, long_side is not None
+        x = principal_direction(read.patch) if long_side is None else long_side
+        try:
+            self.contact = Contact(read.patch, mu, x_hint=x)
+        except ValueError as error:
+            raise StudyError(USAGE, f"{read.file}: {str(error).replace('x_hint', '--long-side')}") from error
+        frame = self.contact.frame
+        if frame.flag & FrameFlag.ORIENTATION:
+            found = f"normals in {self.count(behind(read.patch.normal, frame.axes[2]))} that oppose their neighbours"
+            remedy = "orient them to one side before export (ParaView: Generate Surface Normals with Consistency)"
+            refuse([Problem(read.file, None, "normal", found, "normals that all point to the same side", remedy)])
+        self.fits = {m: fit_surfaces(self.contact, m, list(SURFACES), "least_squares", FITTED_ON) for m in MODELS}
+        self.exact = {m: exact_surface(self.contact, m) for m in MODELS}
 
+    @property
+    def rank(self) -> int:
+        """Dimension of the loads that the contact can carry, 3 if nothing is missing."""
+        return self.exact["ccm"].rank
 
-def _minority(chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """The chosen ones, or the others where the chosen ones are more than half."""
-    return ~chosen if 2 * chosen.sum() > len(chosen) else chosen
+    def surface(self, model: str, kind: str) -> Any:
+        """A limit surface in ``(f_x, f_y, tau_z)`` per unit of S; ``kind`` is ``exact`` or one of `SURFACES`."""
+        return self.exact[model] if kind == "exact" else self.fits[model][kind].body(self.contact.mu)
 
-
-def _count(read: ReadPatch, chosen: NDArray[np.bool_]) -> str:
-    """How many of the loaded faces ``(n,)`` are chosen, and where the first of them stands in the file."""
-    first = f", the first in {read.place(int(np.argmax(chosen)))}" if chosen.any() else ""
-    return f"{int(chosen.sum())} of {len(chosen)} loaded faces{first}"
+    def count(self, chosen: NDArray[np.bool_]) -> str:
+        """How many of the loaded faces ``(n,)`` are chosen, or not where these are fewer, and the first one's place."""
+        few = ~chosen if 2 * chosen.sum() > len(chosen) else chosen
+        first = f", the first in {self.read.place(int(np.argmax(few)))}" if few.any() else ""
+        return f"{int(few.sum())} of {len(few)} loaded faces{first}"
 
 
 # --- grasp ------------------------------------------------------------------------------------------------------------
@@ -167,11 +136,10 @@ def grasp_record(
     """
     both = first, second or first
     contacts = first.contact, second.contact if second else opposite(first.contact, float(distance or 0.0))
-    if second is not None:
-        try:
-            check_facing(contacts, (first.read.file, second.read.file))
-        except ValueError as error:
-            raise StudyError(USAGE, f"--other: {error}") from error
+    try:
+        check_facing(contacts, [patch.read.file for patch in both])
+    except ValueError as error:
+        raise StudyError(USAGE, f"--other: {error}") from error
     d, *lengths = grasp_lengths(contacts, object_length, contact_length)
     score = {m: exact_score(soft(contacts, [p.surface(m, kind) for p in both]), *lengths) for m in MODELS}
     return {
@@ -204,19 +172,12 @@ def _patch_record(evaluated: EvaluatedPatch) -> dict[str, Any]:
         values["tau_pure"] = pure_torque(contact.local, contact.mu, model)
         friction[model] = {name: values[name] for name in FRICTION}
     return {
-        "file": evaluated.read.file,
-        "faces": evaluated.read.faces,
-        "loaded_faces": len(patch.area),
-        "area": patch.area.sum(),
-        "pressure": patch.pressure.max(),
-        "S": contact.limits["ccm"].S,
-        "F_N": contact.limits["ccm"].F_N,
-        "rho": contact.rho,
-        "frame": {name: getattr(frame, name) for name in names} | {"flag": int(frame.flag)},
-        "rank": evaluated.rank,
-        "friction": friction,
-        "limit_surface": {model: _surfaces_record(evaluated, model) for model in MODELS},
-    }
+        "file": evaluated.read.file, "faces": evaluated.read.faces, "loaded_faces": len(patch.area),
+        "area": patch.area.sum(), "pressure": patch.pressure.max(), "S": contact.limits["ccm"].S,
+        "F_N": contact.limits["ccm"].F_N, "rho": contact.rho,
+        "frame": {name: getattr(frame, name) for name in names} | {"flag": int(frame.flag)}, "rank": evaluated.rank,
+        "friction": friction, "limit_surface": {model: _surfaces_record(evaluated, model) for model in MODELS},
+    }  # fmt: skip
 
 
 def _surfaces_record(evaluated: EvaluatedPatch, model: str) -> dict[str, Any]:
@@ -258,7 +219,7 @@ def _patch_notes(evaluated: EvaluatedPatch) -> list[str]:
         share = f": {frame.overhang_count}, with {100 * frame.overhang_share:.2g} % of S"
         notes.append(flag.sentence + share * (flag == Flag.OVERHANG))
     if frame.flag & FrameFlag.WINDING:
-        against = _count(evaluated.read, _minority(wound(evaluated.read.patch) < 0))
+        against = evaluated.count(wound(evaluated.read.patch) < 0)
         notes.append(f"the corners of {against}, are wound against their normals; the normals were taken as they are")
     for model, fits in evaluated.fits.items():
         if failed := [kind for kind, fit in fits.items() if fit.certificate == STANDS_IN]:

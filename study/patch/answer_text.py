@@ -6,7 +6,6 @@ import json
 from argparse import Namespace
 from collections.abc import Sequence
 from pathlib import Path
-from textwrap import wrap
 from typing import Any
 
 import numpy as np
@@ -21,14 +20,13 @@ from softjaw.study.patch.answer import (
     UNITS,
     EvaluatedPatch,
     as_record,
-    evaluate_patch,
     grasp_record,
 )
 from softjaw.study.patch.contacts import read_patch
 from softjaw.study.patch.patch_reader import Reading
 from softjaw.study.quantities import MODELS
 from softjaw.study.scene import Scene, SceneError, load_scene
-from softjaw.study.table import Column, Row, Table, as_text, number, plain, with_unit
+from softjaw.study.table import Column, Row, Table, as_text, number, plain, with_unit, wrapped
 from softjaw.study.units import shown, shown_unit
 
 PICTURES = (".png", ".svg")
@@ -71,7 +69,7 @@ def patch(options: Namespace) -> str:
         raise StudyError(USAGE, f"SCENE: {text}; add --deformed if the file holds a deformed face")
     else:
         read = [read_patch(file, reading) for file in (options.file, options.other) if file]
-    patches = [evaluate_patch(patch, mu, long_side) for patch in read]
+    patches = [EvaluatedPatch(patch, mu, long_side) for patch in read]
     grasp = None
     if scored:
         lengths = (options.distance, options.object_length, options.contact_length)
@@ -102,11 +100,10 @@ def record_text(record: dict[str, Any]) -> str:
     """A block for each patch, one for the grasp, notes and definitions."""
     grasp = record["grasp"]
     blocks = [_patch_block(patch, record["mu"]) for patch in record["patches"]]
-    blocks.append(_grasp_block(grasp) if grasp else ["no grasp is scored: add --distance MM for two such contacts that "
-                                                     "face each other, or --other FILE"])  # fmt: skip
-    blocks.append([line for text in record["notes"] for line in _wrapped(f"note: {text}")])
-    words = {word: text for word, text in DEFINITIONS.items() if grasp or word not in SCORES}
-    blocks.append([line for word, text in words.items() for line in _wrapped(f"{word}: {text}")])
+    blocks.append(_grasp_block(grasp) if grasp else ["no grasp is scored: add --distance MM, or --other FILE"])
+    blocks.append([wrapped(f"note: {text}", LINE, more="  ") for text in record["notes"]])
+    blocks.append([wrapped(f"{word}: {text}", LINE, more="  ") for word, text in DEFINITIONS.items()
+                   if grasp or word not in SCORES])  # fmt: skip
     return "\n\n".join("\n".join(lines) for lines in blocks if lines)
 
 
@@ -156,10 +153,6 @@ def _grasp_block(grasp: dict[str, Any]) -> list[str]:
     rows.append({"score": "epsilon"} | {model: _between(*score["epsilon"]) for model, score in scores.items()})
     lengths = f"  contacts {apart} apart, torques over object length {arms} and contact length {torques}"
     return [as_text(Table("", columns, rows), LINE), lengths]
-
-
-def _wrapped(text: str) -> list[str]:
-    return wrap(text, LINE, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
 
 
 def _vector(v: FloatArray) -> str:

@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import softjaw as sj
-from softjaw.study.patch.answer import as_record, evaluate_patch, grasp_record
+from softjaw.study.patch.answer import EvaluatedPatch, as_record, grasp_record
 from softjaw.study.patch.contacts import read_patch
 from softjaw.study.patch.patch_reader import Reading
 from tests.study.launching import ROOT
@@ -20,7 +20,7 @@ FLAT = sj.ContactPatch([[0.01, 0, 0], [-0.01, 0, 0]], [1e-4] * 2, [[0, 0, 1]] * 
 
 
 def test_they_are_the_numbers_of_the_command():
-    judged = evaluate_patch(read_patch(str(EXAMPLE), Reading()), 0.8)
+    judged = EvaluatedPatch(read_patch(str(EXAMPLE), Reading()), 0.8)
     [patch] = as_record([judged], None)["patches"]
     for model, limits in sj.friction_limits(PATCH, mu=0.8).items():
         found = patch["friction"][model]
@@ -55,7 +55,7 @@ def test_the_second_patch_may_be_given():
 
 @pytest.mark.long
 def test_the_quality_is_that_of_the_command_with_every_surface():
-    judged = evaluate_patch(read_patch(str(EXAMPLE), Reading()), 0.8)
+    judged = EvaluatedPatch(read_patch(str(EXAMPLE), Reading()), 0.8)
     for kind in ("three_motions", "quartic", "exact"):
         known = grasp_record(judged, None, kind, 0.06)["score"]
         for model, score in known.items():

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 from softjaw.friction.frame import FrameFlag, principal_direction
 from softjaw.friction.patch import ContactPatch
 from softjaw.study.cli import main
-from softjaw.study.patch.answer import SURFACES, evaluate_patch
+from softjaw.study.patch.answer import SURFACES, EvaluatedPatch
 from softjaw.study.patch.answer_text import PLANES, section
 from softjaw.study.patch.contacts import check_facing, read_patch
 from softjaw.study.patch.faces import corner_geometry
@@ -212,7 +212,7 @@ def test_the_picture_shows_sections_through_the_largest_loads(tmp_path, told):
     picture = tmp_path / "sections.svg"
     limits = told(EXAMPLE, "-o", picture)["patches"][0]["friction"]["ccm"]
     assert picture.read_text().count("<path") > 20
-    patch = evaluate_patch(read_patch(str(EXAMPLE), Reading()), MU)
+    patch = EvaluatedPatch(read_patch(str(EXAMPLE), Reading()), MU)
     largest = [limits[f"{name}_max"] / patch.contact.limits["ccm"].S for name in ("f_x", "f_y", "tau_z")]
     for name in ("exact", "three_motions"):
         for plane in PLANES:
