@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
+
+from mpi4py import MPI
 
 from softjaw.study import pipeline
 from softjaw.study.case.build import told
@@ -12,10 +15,12 @@ from softjaw.study.case.candidates import with_sampled_grasps
 from softjaw.study.case.model import check_petsc, check_poses
 from softjaw.study.result import derived
 from softjaw.study.result.read import dataset
+from softjaw.study.run.objects import run_objects
 from softjaw.study.run.plan import make_plan
 from softjaw.study.run.refine import Rounds, added_cases, next_round, refined
 from softjaw.study.run.session import Growth, Work, on_rank0, run_study
 from softjaw.study.scene import Scene
+from softjaw.study.scene.folder import ObjectFolder
 from softjaw.study.show.best_grasps import summary
 from softjaw.study.show.report.verdict import plain_report
 
@@ -56,6 +61,32 @@ def solve_scene(
     plan = on_rank0(comm, prepare, scene, scene_file, overrides)
     growth = _growth(scene, plan, comm)
     return run_study(plan, work(scene), path, comm, retry_failed=retry_failed, growth=growth)
+
+
+def solve_objects(folder: ObjectFolder, out: Path, comm: Any, *, retry_failed: bool = False) -> int:
+    """Solve all objects of a folder into files of ``out`` and an index; collective over ``comm``.
+
+    Returns
+    -------
+    int
+        As for `solve_scene`; 0 also where an object has no grasp.
+
+    Raises
+    ------
+    StudyError, SceneError
+        On every rank: what is wrong for all objects alike, or ``out`` cannot be used.
+    """
+
+    def study(scene: Scene, overrides: tuple[str, ...]) -> tuple[Any, Work, Growth]:
+        scene = with_sampled_grasps(scene)
+        plan = make_plan(scene, folder.scene_file, overrides, ordered=True)
+        check_poses(scene, [unit.scene for unit in plan.units])
+        return plan, work(scene), _growth(scene, plan, MPI.COMM_SELF)
+
+    common = on_rank0(comm, folder.check)
+    on_rank0(comm, check_petsc, dict(common.petsc))
+    each = replace(work(common), finalise=None, summary=None)
+    return run_objects(folder, out, study, each, comm, retry_failed=retry_failed)
 
 
 def _growth(scene: Scene, plan: Any, comm: Any) -> Growth:

@@ -44,6 +44,10 @@ class StudyError(Exception):
         return self.message
 
 
+class NoGraspError(StudyError):
+    """An object that can be read, and that no grasp fits."""
+
+
 @dataclass(frozen=True)
 class Problem:
     """One thing wrong with an input, with its place; ``line`` is None where no line can be named."""

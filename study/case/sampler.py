@@ -24,7 +24,7 @@ from softjaw.study.case.contact import slips
 from softjaw.study.case.fit import Jaws, fit_of, jaws_of
 from softjaw.study.case.poses import across, pad_axes
 from softjaw.study.case.task import Task, task_of
-from softjaw.study.messages import USAGE, StudyError
+from softjaw.study.messages import USAGE, NoGraspError
 from softjaw.study.quantities import MISSING, SLIPS, STATES
 from softjaw.study.scene import Scene
 from softjaw.study.scene.grasps import OF_EVERY_KIND, Candidates, GraspPose
@@ -268,7 +268,7 @@ def with_sampled_grasps(scene: Scene) -> Scene:
 
     Raises
     ------
-    StudyError
+    NoGraspError
         Where no grasp fits between the pads.
     """
     given, surface, obj = scene.candidates, surface_triangles(scene.object), build_object(scene.object)
@@ -278,7 +278,7 @@ def with_sampled_grasps(scene: Scene) -> Scene:
     poses = tuple(_as_pose(grasp, placed) for grasp in found if not grasp.state)
     if not poses:
         states = [STATES[state] for state in sorted({grasp.state for grasp in found})] or ["the pads miss the object"]
-        raise StudyError(
+        raise NoGraspError(
             USAGE,
             f"candidates.sampled: found no grasp between the pads ({', '.join(states)}); expected at least one: give"
             " poses, another pad, or a larger gripper.max_opening_mm",

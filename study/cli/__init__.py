@@ -18,6 +18,7 @@ from softjaw.study.run.limits import is_out_of_memory, no_room, require_room
 
 UNWRITABLE = {errno.EPIPE, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}  # what standard output can answer
 SOLVING = ("run", "cost")
+OF_SCENES, OF_FOLDERS = ("check", "plan", "run"), ("watch", "status", "show", "report", "export")  # of many objects
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -66,8 +67,11 @@ def command(options: Namespace) -> int:
         require_room()
     if options.command == "run":
         os.environ["H5PY_ALWAYS_USE_MPI"] = "1"  # before h5py is imported: its own guess misses srun and single runs
-    if options.command in SOLVING:  # a wrong scene is refused before the solvers are loaded
+    options.folder = _module("cli.quick").objects_of(options) if options.command in OF_SCENES else None
+    if options.command in SOLVING and not options.folder:  # a wrong scene is refused before the solvers are loaded
         options.scene_read = _module("cli.quick").scene_of(options)
+    if options.folder or (options.command in OF_FOLDERS and _module("result.index").index_path(options.file)):
+        options.module = "cli.folder"
     answer = getattr(_module(options.module), options.command)(options)
     if isinstance(answer, str):
         say(answer)

@@ -14,6 +14,7 @@ from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.run.plan import make_plan, plan_text
 from softjaw.study.run.scaling import scaling_text
 from softjaw.study.scene import Scene, SceneError, load_scene, start
+from softjaw.study.scene.folder import ObjectFolder, folder_of
 from softjaw.study.scene.objects import Mesh
 from softjaw.study.show.overview import scene_text
 from softjaw.study.table import hanging, terminal_width
@@ -78,6 +79,14 @@ def scene_of(options: Namespace) -> Scene:
     """The scene that the command line names, with what it changes."""
     try:
         return load_scene(Path(options.scene), [*options.overrides, *petsc_overrides(options.petsc)])
+    except SceneError as error:
+        raise StudyError(USAGE, str(error)) from error
+
+
+def objects_of(options: Namespace) -> ObjectFolder | None:
+    """The objects of a scene that names many; None for a scene of one."""
+    try:
+        return folder_of(options.scene, [*options.overrides, *petsc_overrides(options.petsc)])
     except SceneError as error:
         raise StudyError(USAGE, str(error)) from error
 

@@ -15,6 +15,7 @@ import xarray as xr
 from softjaw.study.flags import OF_FILE, Flag
 from softjaw.study.quantities import BY_KEY, FINGERS, MODELS, REALISATION, TABLE, Axis, Quantity
 from softjaw.study.result.between import with_intervals
+from softjaw.study.result.index import index_path, open_index
 from softjaw.study.result.layout import DONE, VERSION
 from softjaw.study.result.store import Result, open_result
 
@@ -31,7 +32,7 @@ def open(file: str | Path) -> xr.Dataset:
     Parameters
     ----------
     file : path
-        Result file (``.hdf``), finished or not.
+        Result file (``.hdf``), finished or not; or a folder of objects, whose index is a row for each ``object``.
 
     Returns
     -------
@@ -51,6 +52,8 @@ def open(file: str | Path) -> xr.Dataset:
     >>> ds["e_n"].attrs["units"], ds["e_n"].sel(model="ccm").interp(normal_force=1.5).dims
     ('m', ('station', 'angle'))
     """
+    if index := index_path(file):
+        return open_index(index)
     with open_result(file) as result:
         return dataset(result)
 

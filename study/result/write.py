@@ -45,6 +45,10 @@ class ResultWriter:
         self._sessions = self._file[f"{ROOT}/provenance/sessions"]
         self.session = 0
 
+    def layout_of(self, _row: int) -> Layout:
+        """Layout of the file that a row is stored in."""
+        return self.layout
+
     def codes(self) -> np.ndarray:
         """State of every row, ``(rows,)``."""
         return self._code[()].ravel()

@@ -114,7 +114,7 @@ class PathSolver:
                 break
             except (Exception, TimeLimitError) as error:  # whatever a case dies of is its result
                 _close(cases)
-                self._fail(unit, pending, _sentence(error, stopper.limit), time.perf_counter() - clock)
+                self._fail(unit, pending, sentence(error, stopper.limit), time.perf_counter() - clock)
                 cases, clock = self._cases(unit, pending), time.perf_counter()
                 continue
             finally:
@@ -141,7 +141,7 @@ class PathSolver:
                     self._writer.fail(row, result.message, seconds=math.nan if c else seconds)
                 continue
             mine = self._image(result, unit, c) if self._image else result
-            values = record(self._writer.layout, _with_work(mine, c, seconds))
+            values = record(self._writer.layout_of(row), _with_work(mine, c, seconds))
             with self._state.writing():
                 self._writer.write(row, values)
 
@@ -202,7 +202,8 @@ def _with_work(result: CaseResult, c: int, seconds: float) -> CaseResult:
     return replace(result, values={"work/seconds_total": seconds, **result.values})
 
 
-def _sentence(error: BaseException, limit: float) -> str:
+def sentence(error: BaseException, limit: float) -> str:
+    """Why a case, or whatever else was bounded by a time ``limit`` [s], has no result."""
     if isinstance(error, TimeLimitError):
         return TOO_SLOW.format(limit=limit)
     if isinstance(error, StopIteration):

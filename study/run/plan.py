@@ -183,7 +183,7 @@ def plan_text(plan: Plan, scene: Any, path: Path, ranks: int) -> str:
     symmetric = f", {shared} candidates are images of others by symmetry" if shared else ""
     shapes = layout.rows * 24 * AROUND * ALONG / 1e6 if "wall" in layout.has else 0.0
     space = f"{layout.nbytes / 1e6:.1f} MB in {path}" + f", {shapes:.1f} MB of it deformed walls" * bool(shapes)
-    free = _free(path)
+    free = free_bytes(path)
     rows = {
         "cases": f"{layout.rows} = {' x '.join(map(str, layout.shape))} ({', '.join(layout.names)})",
         "units": f"{len(plan.units)} load paths of {forces} forces{symmetric}",
@@ -268,7 +268,8 @@ def measured_seconds(layout: Layout, path: Path) -> Any:
         return seconds.ravel() if seconds.shape == layout.shape else None
 
 
-def _free(path: Path) -> int:
+def free_bytes(path: Path) -> int:
+    """Free space of the disk on which a file will be made [bytes]; -1 where that is not known."""
     # The folder of the result is made later: the nearest one that exists tells the disk.
     for folder in path.absolute().parents:
         if folder.is_dir():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -62,11 +62,15 @@ class Claims:
             yield position
 
     def _add_one(self, counter: int) -> int:
+        return self._counted(self._window, counter)
+
+    @staticmethod
+    def _counted(window: Any, counter: int) -> int:
         """What a counter had before this rank added one."""
         before = np.zeros(1, np.int64)
-        self._window.Fetch_and_op(np.ones(1, np.int64), before, 0, counter, MPI.SUM)
+        window.Fetch_and_op(np.ones(1, np.int64), before, 0, counter, MPI.SUM)
         # Only after this the answer has arrived.
-        self._window.Flush(0)
+        window.Flush(0)
         return int(before[0])
 
     def stop(self) -> None:
@@ -92,6 +96,53 @@ class Claims:
         self._window.Free()
         if self._own:
             self.node.Free()
+
+
+class ObjectClaims(Claims):
+    """Positions of several objects, one after the other: a rank stays with an object as long as it has positions.
+
+    It takes an object that nobody on its node has begun, then helps with the one that has most positions left. Between
+    nodes the objects are dealt out in turn.
+
+    Parameters
+    ----------
+    comm : communicator
+        All ranks of the run.
+    sizes : sequence of int
+        Number of positions of every object.
+    """
+
+    def __init__(self, comm: Any, sizes: Sequence[int]) -> None:
+        super().__init__(comm, len(sizes))
+        self._sizes = np.array(sizes, np.int64)
+        self._mine = np.arange(self._first, len(sizes), self._step)
+        self._of_objects, self._taken = _shared(self.node, max(len(sizes), 1), np.int64)
+        if self.node.rank == 0:
+            self._taken[:] = 0
+        self.node.Barrier()
+        self._of_objects.Lock_all()
+
+    def __iter__(self) -> Iterator[int]:
+        """Positions of this rank, until there are none left or somebody called `stop`."""
+        for number in super().__iter__():
+            yield from self._of(number)
+        while self._mine.size and not self.stopped:
+            left = self._sizes[self._mine] - self._taken[self._mine]
+            if left.max() <= 0:
+                return
+            yield from self._of(int(self._mine[left.argmax()]))
+
+    def _of(self, number: int) -> Iterator[int]:
+        first = int(self._sizes[:number].sum())
+        while not self.stopped and (i := self._counted(self._of_objects, number)) < self._sizes[number]:
+            yield first + i
+
+    def free(self) -> None:
+        """Give the counters back."""
+        self._of_objects.Unlock_all()
+        self._taken = np.zeros(0, np.int64)
+        self._of_objects.Free()
+        super().free()
 
 
 class LostRanks:

@@ -10,7 +10,7 @@ import math
 import os
 import sys
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -22,7 +22,7 @@ from mpi4py import MPI
 from softjaw.study.messages import CANNOT_WRITE, DONE, SOME_FAILED, STOPPED, StudyError, make_folders
 from softjaw.study.quantities import DONE as CASE_DONE
 from softjaw.study.result import provenance
-from softjaw.study.result.layout import FAILED, MISSING
+from softjaw.study.result.layout import FAILED, MISSING, Layout
 from softjaw.study.result.lock import Lock, OpenedFile
 from softjaw.study.result.skeleton import create, rewrite
 from softjaw.study.result.store import Result, open_result, torn_rows
@@ -33,7 +33,7 @@ from softjaw.study.run.plan import Plan
 from softjaw.study.run.progress import Progress
 from softjaw.study.run.refine import Rounds, round_text
 from softjaw.study.run.schedule import Claims, LostRanks
-from softjaw.study.run.shares import shares
+from softjaw.study.run.shares import Share, shares
 
 T = TypeVar("T")
 
@@ -112,17 +112,8 @@ def run_study(
     StudyError
         On every rank: the file is in use, belongs to another scene or cannot be written.
     """
-    # Host and process: two runs on one file system must not have the same name.
-    owner = f"host {os.uname().nodename}, process {os.getpid()}, {comm.size} rank{'s' * (comm.size > 1)}"
-    lock = Lock(path, owner)
-    try:
-        on_rank0(comm, _take, lock, path)
-        if comm.rank:
-            lock.join()
-        # Only when all ranks hold the lock does nobody slip in between.
-        comm.Barrier()
-        on_rank0(comm, lock.confirm)
-        rounds = on_rank0(comm, _rounds_in, path, plan) if growth else ()
+    with locked(path, comm):
+        rounds = on_rank0(comm, rounds_in, path, plan) if growth else ()
         if growth and rounds:
             plan, work = growth.study(rounds)
         code = _solve(plan, work, path, comm, retry_failed)
@@ -134,6 +125,30 @@ def run_study(
             on_rank0(comm, partial(rewrite, packed=True), path, plan.layout, plan.header)
         if comm.rank == 0:
             print_summary(work, path)
+    return code
+
+
+@contextlib.contextmanager
+def locked(path: Path, comm: Any) -> Iterator[None]:
+    """Have a file for the ranks of ``comm`` alone; collective.
+
+    Raises
+    ------
+    StudyError
+        On every rank: the file is in use, or its folder cannot be written.
+    """
+    # Host and process: two runs on one file system must not have the same name.
+    owner = f"host {os.uname().nodename}, process {os.getpid()}, {comm.size} rank{'s' * (comm.size > 1)}"
+    lock = Lock(path, owner)
+    try:
+        on_rank0(comm, _take, lock, path)
+        if comm.rank:
+            lock.join()
+        # Only when all ranks hold the lock does nobody slip in between.
+        comm.Barrier()
+        on_rank0(comm, lock.confirm)
+        yield
+        if comm.rank == 0:
             # Removed while it is held: without it another run could take a file that is about to vanish.
             lock.remove()
         # Nobody lets go before the file of the lock is gone.
@@ -141,12 +156,11 @@ def run_study(
     finally:
         # Whatever happened: a process that lives on must not keep others out.
         lock.release()
-    return code
 
 
 def _solve(plan: Plan, work: Work, path: Path, comm: Any, retry_failed: bool) -> int:
     """Solve what is missing of a plan in its file, which is made if need be; the exit code."""
-    created, torn = on_rank0(comm, _prepare, path, plan)
+    created, torn = on_rank0(comm, file_of, path, plan)
     writer = ResultWriter(path, plan.layout, comm)
     # Decided by one rank: all must agree on what is missing, whatever is written meanwhile.
     codes = on_rank0(comm, settle, writer, plan.units, torn, retry_failed)
@@ -156,7 +170,7 @@ def _solve(plan: Plan, work: Work, path: Path, comm: Any, retry_failed: bool) ->
     return session.solve()
 
 
-def _rounds_in(path: Path, plan: Plan) -> Rounds:
+def rounds_in(path: Path, plan: Plan) -> Rounds:
     """The rounds of a file that was made from this scene; none where `verify` will refuse it."""
     with contextlib.suppress(StudyError), open_result(path) as result:
         if result.digest == plan.header.digest:
@@ -181,7 +195,8 @@ def _take(lock: Lock, path: Path) -> None:
         print(f"warning: {lock.warning}", file=sys.stderr, flush=True)
 
 
-def _prepare(path: Path, plan: Plan) -> tuple[bool, list[int]]:
+def file_of(path: Path, plan: Plan) -> tuple[bool, list[int]]:
+    """Make the file of a plan if it is not there, or refuse another one's; whether it was made, and its torn rows."""
     if not path.exists():
         # By one process: ranks that make datasets together would have to do it in step.
         create(path, plan.layout, plan.header)
@@ -200,19 +215,29 @@ def _begins(path: Path, codes: np.ndarray, torn: int, ranks: int, created: bool)
 class Session:
     """The ranks that solve the cases which ``codes`` calls missing; creating and solving are collective over ``comm``.
 
-    ``plan``, ``work``: as for `run_study`.
+    ``plan``, ``work``: as for `run_study`. ``signal`` names the signal that ended it, if one did.
     """
+
+    signal = ""
 
     def __init__(self, plan: Plan, work: Work, writer: ResultWriter, comm: Any, codes: np.ndarray) -> None:
         self._work, self._writer, self._comm, self._codes = work, writer, comm, codes
         self._state = OpenedFile(writer.path)
-        self._todo = shares(plan.units, codes, comm.size)
+        self._todo = self._divided(plan, codes)
         hosts = len(set(comm.allgather(MPI.Get_processor_name())))
         if comm.rank == 0:
             writer.begin_session(**provenance.session(comm.size, hosts, MPI.Get_library_version()))
         # Every rank needs it: the one that ends a hanging run writes how the session ended.
         writer.session = comm.bcast(writer.session)
         self._progress = _progress(plan, codes, comm.size) if comm.rank == 0 else None
+
+    def _divided(self, plan: Plan, codes: np.ndarray) -> list[Share]:
+        """What is missing, in the order of work."""
+        return shares(plan.units, codes, self._comm.size)
+
+    def _claims(self) -> Claims:
+        """Who solves which of it."""
+        return Claims(self._comm, len(self._todo))
 
     def solve(self) -> int:
         """Solve, wait for all ranks, close the file; the exit code.
@@ -222,7 +247,7 @@ class Session:
         StudyError
             The file cannot be written any more; with several ranks all of them are ended at once instead.
         """
-        claims = Claims(self._comm, len(self._todo))
+        claims = self._claims()
         lost = LostRanks(claims.node, self._work.time_limit)
         try:
             arrived, name = self._solve_share(claims, lost)
@@ -234,12 +259,12 @@ class Session:
         if not arrived:  # the rank that hangs can neither close the file nor be waited for
             self._finish(self._writer, name)
             print_summary(self._work, self._writer.path)
-            self._comm.Abort(self._code())
+            self._comm.Abort(code_of(self._writer.codes()))
         # A signal may reach some ranks only; any name is larger than no name.
-        name = max(self._comm.allgather(name))
+        self.signal = name = max(self._comm.allgather(name))
         lost.free()
         claims.free()
-        code = self._code()
+        code = code_of(self._writer.codes())
         self._writer.close()
         if self._progress:
             self._progress.clear()
@@ -278,32 +303,46 @@ class Session:
         if self._progress and self._progress.due():
             self._progress.update(self._writer.codes())
 
-    def _code(self) -> int:
-        codes = self._writer.codes()
-        return STOPPED if np.any(codes == MISSING) else SOME_FAILED if np.any(codes == FAILED) else DONE
-
     def _finish_alone(self, name: str) -> None:
         """Finish by a process that has the file for itself, so that nothing it does there has to be done by all."""
-        writer = ResultWriter(self._writer.path, self._writer.layout, MPI.COMM_SELF)
-        writer.session = self._writer.session
-        self._finish(writer, name)
-        writer.close()
+        finish_alone(self._work, self._writer.path, self._writer.layout, self._writer.session, name)
 
     def _finish(self, writer: ResultWriter, name: str) -> None:
-        """Fill the derived datasets if nothing is missing, and write how this session ended; by one rank."""
-        codes = writer.codes()
-        missing, failed = int(np.sum(codes == MISSING)), int(np.sum(codes == FAILED))
-        # Derived values of half a study would look like those of a whole one.
-        if self._work.finalise is not None and not missing:
-            self._work.finalise(writer)
-        writer.update_session(
-            stop=provenance.timestamp(),
-            reason=f"stopped by {name or 'another rank'}" if missing else "complete",
-            # Once more: libraries that were loaded for the solves are known only now.
-            versions=provenance.versions(MPI.Get_library_version()),
-            done=int(np.sum(codes == CASE_DONE)),
-            failed=failed,
-        )
+        """Finish by one rank that has the file together with others."""
+        finish(self._work, writer, name)
+
+
+def finish_alone(work: Work, path: Path, layout: Layout, session: int, name: str) -> int:
+    """`finish` by a process that has the file for itself; the exit code."""
+    writer = ResultWriter(path, layout, MPI.COMM_SELF)
+    writer.session = session
+    try:
+        finish(work, writer, name)
+        return code_of(writer.codes())
+    finally:
+        writer.close()
+
+
+def finish(work: Work, writer: ResultWriter, name: str) -> None:
+    """Fill the derived datasets if nothing is missing, and write how this session ended; by one rank."""
+    codes = writer.codes()
+    missing, failed = int(np.sum(codes == MISSING)), int(np.sum(codes == FAILED))
+    # Derived values of half a study would look like those of a whole one.
+    if work.finalise is not None and not missing:
+        work.finalise(writer)
+    writer.update_session(
+        stop=provenance.timestamp(),
+        reason=f"stopped by {name or 'another rank'}" if missing else "complete",
+        # Once more: libraries that were loaded for the solves are known only now.
+        versions=provenance.versions(MPI.Get_library_version()),
+        done=int(np.sum(codes == CASE_DONE)),
+        failed=failed,
+    )
+
+
+def code_of(codes: np.ndarray) -> int:
+    """The exit code of a run that ends with these states."""
+    return STOPPED if np.any(codes == MISSING) else SOME_FAILED if np.any(codes == FAILED) else DONE
 
 
 def print_summary(work: Work, path: Path) -> None:

@@ -230,7 +230,7 @@ class Scene(SceneSection):
             del data["uncertainty"]
         if isinstance(self.object, Mesh):
             # By content: a mesh that was moved or copied is the same one.
-            data["object"]["mesh"] = _file_digest(self.object.mesh)
+            data["object"]["mesh"] = file_digest(self.object.mesh)
         if self.candidates.poses:
             data["candidates"] = [(p.point_mm, p.approach, p.long_side) for p in self.candidates.poses]
         else:
@@ -357,7 +357,7 @@ def _stamped_digest(file: str, _stamp: tuple[int, int]) -> str:
         return hashlib.file_digest(content, "sha256").hexdigest()
 
 
-def _file_digest(file: str) -> str:
+def file_digest(file: str) -> str:
     """SHA-256 of a file's bytes, computed again when the file changes."""
     status = Path(file).stat()
     return _stamped_digest(file, (status.st_mtime_ns, status.st_size))
@@ -387,7 +387,7 @@ def _scene(
     if isinstance(data.get("sweep"), dict):
         data["sweep"] = flat(data["sweep"])  # dotted keys mean the same with and without quotes
     given: dict[KeyPath, Place] = {}
-    problems = _put_overrides(data, overrides, given)
+    problems = put_overrides(data, overrides, given)
     # Before the checks, which want to see what depends on the file's name and on the sweep.
     _fill_in(data, path)
     try:
@@ -425,7 +425,7 @@ def _fill_in(data: dict[str, Any], path: Path) -> None:
             table.setdefault(name, values[0])
 
 
-def _put_overrides(data: dict[str, Any], overrides: Sequence[str], given: dict[KeyPath, Place]) -> list[Problem]:
+def put_overrides(data: dict[str, Any], overrides: Sequence[str], given: dict[KeyPath, Place]) -> list[Problem]:
     """Put ``section.key=value`` texts into ``data``; ``given`` gets the text behind every key."""
     problems = []
     for text in overrides:

@@ -1,0 +1,94 @@
+"""Commands on a folder of objects: the same words as for one, with a pattern as mesh or a folder as file."""
+
+from __future__ import annotations
+
+import sys
+from argparse import Namespace
+from pathlib import Path
+from typing import Any
+
+from softjaw.study.messages import USAGE, StudyError
+from softjaw.study.result.index import index_path
+from softjaw.study.scene import SceneError
+from softjaw.study.scene.folder import ObjectFolder
+from softjaw.study.show import objects
+from softjaw.study.table import as_csv, as_json, as_text, hanging, terminal_width
+
+FORMS = {"json": as_json, "csv": as_csv}
+
+
+def run(options: Namespace) -> int:
+    """Solve all objects of a scene; the same exit code on every rank."""
+    from mpi4py import MPI
+
+    from softjaw.study.launch import solve_objects
+    from softjaw.study.run.progress import Unbreakable
+
+    sys.stdout = Unbreakable(sys.stdout)
+    out = target(options)
+    code = _refused(lambda: solve_objects(options.folder, out, MPI.COMM_WORLD, retry_failed=options.retry_failed))
+    if MPI.COMM_WORLD.rank == 0:
+        print(objects.summary(out / "index.hdf", terminal_width()), flush=True)
+    return int(code)
+
+
+def check(options: Namespace) -> str:
+    """Say which objects a scene names, and that its other keys have no error."""
+    from softjaw.study.show.tables.overview import scene_text
+
+    folder: ObjectFolder = options.folder
+    scene = _refused(folder.check)
+    text = hanging(scene_text(scene, options.scene), terminal_width())
+    names = ", ".join(listed.name for listed in folder.objects[:5]) + ", ..." * (len(folder.objects) > 5)
+    return f"{text}\n  objects     {len(folder.objects)}: {names}; the mesh above stands for all of them"
+
+
+def plan(options: Namespace) -> str:
+    """Say what a run of all objects will take, by a few of them."""
+    from softjaw.study.run.plan_objects import objects_text
+
+    _refused(options.folder.check)
+    return hanging(objects_text(options.folder, target(options), options.ranks[0]), terminal_width())
+
+
+def target(options: Namespace) -> Path:
+    """The folder of the results; by default the scene's name."""
+    out = Path(options.output or Path("results") / Path(options.scene).stem)
+    if out.suffix == ".hdf" or out.is_file():
+        raise StudyError(USAGE, f"-o: found '{out}', expected a folder, for a scene of many objects")
+    return out
+
+
+def _refused(act: Any) -> Any:
+    try:
+        return act()
+    except SceneError as error:
+        raise StudyError(USAGE, str(error)) from error
+
+
+# --- results ----------------------------------------------------------------------------------------------------------
+
+
+def _index(options: Namespace) -> Path:
+    path = index_path(options.file)
+    assert path is not None
+    return path
+
+
+def watch(options: Namespace) -> int:
+    """Follow a run until it ends."""
+    return objects.watch(_index(options), options.every)
+
+
+def status(options: Namespace) -> str:
+    """Say how many objects are in which state, and why some have no grasp."""
+    path = _index(options)
+    if options.form:
+        return FORMS[options.form](objects.index_table(path))
+    return objects.status_text(path, terminal_width())
+
+
+def show(options: Namespace) -> str:
+    """Print the objects with their best grasps."""
+    table = objects.index_table(_index(options), options.top)
+    return FORMS[options.form](table) if options.form else as_text(table, terminal_width())

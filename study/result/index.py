@@ -1,0 +1,138 @@
+"""The index of a folder of objects: one HDF5 table with a row for each object, what it holds best or why it has nothing.
+
+It is written as a whole and renamed into place, so that a reader finds the old one or the new one. Every column is a
+dataset over ``object``; xarray opens it as `open_index` does.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import h5py
+import numpy as np
+
+from softjaw.study.messages import OTHER_FILE, StudyError, beside
+from softjaw.study.result.hdf5 import StoredFile, opened
+from softjaw.study.result.layout import PROGRAM
+from softjaw.study.scene.folder import INDEX
+from softjaw.study.table import Row
+
+DONE, SOME_FAILED, NO_GRASP, FAILED, REFUSED, STOPPED, MISSING = STATES = (
+    "complete", "some cases failed", "no grasp", "failed", "refused", "not complete", "not begun",
+)  # fmt: skip
+ENDED = (DONE, SOME_FAILED, NO_GRASP, FAILED, REFUSED)  # states of objects that a run is through with
+SOLVED = (DONE, SOME_FAILED)
+INDEX_VERSION = 1
+
+
+class IndexColumn(NamedTuple):
+    """A column of the index: its type, its SI unit and what it is."""
+
+    name: str
+    kind: type
+    unit: str
+    definition: str
+
+
+COLUMNS = tuple(
+    IndexColumn(*column)
+    for column in (
+        ("state", str, "", "one of: " + ", ".join(STATES)),
+        ("payload", float, "kg", "mass that the best grasp holds in the worst direction, curved contact model"),
+        ("payload_error", float, "1", "relative error of that payload by the mesh"),
+        ("opening", float, "m", "distance of the pads' faces at first touch, best grasp"),
+        ("force", float, "N", "normal force per finger of the best grasp"),
+        ("e_n", float, "m", "eccentricity parameter of the best grasp, curved contact model"),
+        ("quality", float, "1", "quality of the best grasp, curved contact model"),
+        ("best", int, "", "number of the best grasp's candidate in the object's file, from 0; -1 where there is none"),
+        ("grasps", int, "", "solved candidates that hold and do no harm at that force"),
+        ("cases", int, "", "cases of the object: candidates x forces x points of a sweep"),
+        ("done", int, "", "cases that are solved"),
+        ("failed", int, "", "cases that failed"),
+        ("mass", float, "kg", "mass of the object that its scene gives"),
+        ("seconds", float, "s", "time in the object's cases, on all ranks"),
+        ("preparing", float, "s", "time until its grasps were sampled and planned, on one rank"),
+        ("reason", str, "", "why there is no grasp, or why cases failed"),
+        ("file", str, "", "result file, relative to the index"),
+        ("mesh", str, "", "mesh of the object"),
+        ("key", str, "", "SHA-256 of the object's scene and mesh"),
+    )
+)
+BLANK: dict[type, Any] = {str: "", float: math.nan, int: -1}
+
+
+def index_path(file: str | Path) -> Path | None:
+    """The index that a folder or a file's name means; None for any other file."""
+    path = Path(file)
+    if path.is_dir():
+        return path / f"{INDEX}.hdf"
+    return path if path.name == f"{INDEX}.hdf" else None
+
+
+def blank_row(name: str, **values: Any) -> Row:
+    """A row with nothing but what is given."""
+    return {"object": name, **{c.name: BLANK[c.kind] for c in COLUMNS}, "state": MISSING, **values}
+
+
+def write_index(path: Path, rows: Sequence[Row], **attributes: Any) -> None:
+    """Write the whole table; by one process.
+
+    Raises
+    ------
+    StudyError
+        It cannot be written.
+    """
+    with beside(path) as part, h5py.File(part, "w") as file:
+        file.attrs.update({"program": PROGRAM, "index_version": INDEX_VERSION, **attributes})
+        names = file.create_dataset("object", data=_texts([row["object"] for row in rows]))
+        names.make_scale("object")
+        for column in COLUMNS:
+            values = [row[column.name] for row in rows]
+            data = _texts(values) if column.kind is str else np.array(values, "f8" if column.kind is float else "i8")
+            made = file.create_dataset(column.name, data=data)
+            made.attrs.update({"units": column.unit, "long_name": column.name, "definition": column.definition})
+            made.dims[0].attach_scale(names)
+
+
+def _texts(values: Sequence[str]) -> Any:
+    return np.array(values, h5py.string_dtype())
+
+
+def read_index(path: Path) -> tuple[list[Row], dict[str, Any]]:
+    """Rows and attributes of an index.
+
+    Raises
+    ------
+    StudyError
+        It cannot be read.
+    """
+    file: StoredFile = opened(path, "index of objects", _checked)
+    try:
+        values: dict[str, list[Any]] = {"object": file.texts("object")}
+        for c in COLUMNS:
+            values[c.name] = file.texts(c.name) if c.kind is str else file.values(file.plain(c.name)).tolist()
+        if len({len(column) for column in values.values()}) != 1:
+            raise StudyError(OTHER_FILE, f"{path}: damaged (columns of different lengths); run the scene again")
+        return [dict(zip(values, row, strict=True)) for row in zip(*values.values(), strict=True)], file.attributes()
+    finally:
+        file.close()
+
+
+def _checked(file: StoredFile) -> StoredFile:
+    if file.attributes().get("index_version") != str(INDEX_VERSION):
+        raise ValueError(f"its index has another version than {INDEX_VERSION}")
+    return file
+
+
+def open_index(path: Path) -> Any:
+    """The index as an ``xarray.Dataset`` over ``object``."""
+    import xarray as xr
+
+    rows, attributes = read_index(path)
+    about = {c.name: {"units": c.unit, "long_name": c.name, "definition": c.definition} for c in COLUMNS}
+    variables = {c.name: ("object", [row[c.name] for row in rows], about[c.name]) for c in COLUMNS}
+    attributes["file"] = str(path)
+    return xr.Dataset(variables, {"object": [row["object"] for row in rows]}, attributes)

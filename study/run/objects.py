@@ -1,0 +1,274 @@
+"""A folder of objects in one run: ranks divide objects, grasp candidates and forces together.
+
+Objects are taken in batches, whose files are open at once. Ranks first divide the objects of a batch, to sample and
+plan their grasps, then all their cases: a rank takes an object that nobody has begun, as the mesh that it has read
+serves all of its candidates, and helps with the one where most is left when there is none. What idles is the end of
+both steps of a batch: less than the sampling of an object, and less than a load path or a force. Every file is an
+ordinary one, with the same bits as a run of its own.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections import Counter
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from softjaw.study import messages, quantities
+from softjaw.study.case.result import TimeLimitError
+from softjaw.study.flags import LOST, flag_words
+from softjaw.study.messages import NoGraspError, StudyError, shortened
+from softjaw.study.ranking import judged, ranked, shown_level
+from softjaw.study.result import index
+from softjaw.study.result.read import dataset, values_of
+from softjaw.study.result.skeleton import rewrite
+from softjaw.study.result.store import open_result
+from softjaw.study.run.batch import Files, ObjectsSession, Part, settled
+from softjaw.study.run.limits import AbandonedError, Stopper, limited_memory
+from softjaw.study.run.load_path import sentence
+from softjaw.study.run.plan import Plan
+from softjaw.study.run.schedule import Claims
+from softjaw.study.run.session import Growth, Work, file_of, finish_alone, locked, on_rank0, rounds_in
+from softjaw.study.scene import Scene, SceneError
+from softjaw.study.scene.folder import INDEX, ObjectFolder, key_of
+from softjaw.study.table import Row
+from softjaw.study.units import in_si
+
+BATCH_PER_RANK, MOST_OPEN_FILES = 4, 128  # objects of a batch: for each rank, and at most
+REASON_LETTERS = 400
+Study = Callable[[Scene, tuple[str, ...]], tuple[Plan, Work, Growth]]
+
+
+def run_objects(
+    folder: ObjectFolder, out: Path, study: Study, work: Work, comm: Any, *, retry_failed: bool = False
+) -> int:
+    """Solve all objects of a folder into files of ``out`` and an index; the exit code; collective over ``comm``.
+
+    ``study(scene, overrides)`` plans one object on one rank, for a communicator of that rank alone; ``work`` is how
+    the cases of any object are solved.
+
+    Raises
+    ------
+    StudyError, SceneError
+        On every rank: what is wrong for all objects alike, ``out`` is in use, of another scene, or cannot be written.
+    """
+    with locked(out / f"{INDEX}.hdf", comm):
+        run = _ObjectsRun(folder, out, study, work, comm, retry_failed)
+        batch = min(max(BATCH_PER_RANK * comm.size, BATCH_PER_RANK), MOST_OPEN_FILES)
+        while todo := run.todo()[:batch]:
+            if not run.solve(todo):
+                break
+        return run.code()
+
+
+class _ObjectsRun:
+    """What all ranks know of a run: a row of the index for every object; ``_mine`` is what this rank has planned."""
+
+    def __init__(
+        self, folder: ObjectFolder, out: Path, study: Study, work: Work, comm: Any, retry_failed: bool
+    ) -> None:
+        self._folder, self._out, self._study, self._work, self._comm = folder, out, study, work, comm
+        self._retry = retry_failed
+        self._rows = on_rank0(comm, _rows_of, folder, out, retry_failed)
+        self._mine: dict[int, tuple[Plan, Work, Growth]] = {}
+        self._tried: set[int] = set()
+
+    def todo(self) -> list[int]:
+        """Numbers of the objects that this run has still to take."""
+        return [n for n, row in enumerate(self._rows) if row["state"] not in index.ENDED and n not in self._tried]
+
+    def code(self) -> int:
+        """The exit code."""
+        states = {row["state"] for row in self._rows}
+        if states & {index.MISSING, index.STOPPED}:
+            return messages.STOPPED
+        return messages.SOME_FAILED if states - {index.DONE, index.NO_GRASP} else messages.DONE
+
+    def solve(self, batch: list[int]) -> bool:
+        """Solve a batch; whether no signal came."""
+        self._tried |= set(batch)
+        for n in batch:
+            self._rows[n] = self._rows[n] | {"state": index.STOPPED}
+        self._store(f"objects {self._ended + 1} to {self._ended + len(batch)} of {len(self._rows)}")
+        answers, stopped = self._divide(batch, self._prepared)
+        failed = {n: answer for n, answer in answers.items() if not isinstance(answer, Part)}
+        for n, (state, reason) in failed.items():
+            self._rows[n] = self._rows[n] | {"state": state, "reason": shortened(reason, REASON_LETTERS)}
+        parts = [answer for answer in answers.values() if isinstance(answer, Part)]
+        names = {part.number: part.seconds for part in parts}
+        while parts and not stopped:
+            stopped = self._cases(parts)
+            mine = [part for part in parts if part.number in self._mine]
+            parts = [] if stopped else self._gathered(grown for part in mine if (grown := self._grown(part)))
+        for n, row in self._gathered(self._ending(n, seconds) for n, seconds in names.items() if n in self._mine):
+            self._rows[n] = row
+        self._mine.clear()
+        self._store()
+        return not stopped
+
+    # --- planning -----------------------------------------------------------------------------------------------------
+
+    def _divide(self, numbers: list[int], function: Callable[[int], Any]) -> tuple[dict[int, Any], bool]:
+        """What ``function`` gives for each object, or its state and why not; and whether a signal came."""
+        claims = Claims(self._comm, len(numbers))
+        stopper = Stopper(claims.stop, self._work.time_limit)
+        answers, fatal = dict[int, Any](), None
+        with stopper, limited_memory(self._work.memory, claims.node.size):
+            for position in claims:
+                n = numbers[position]
+                try:
+                    with stopper.case():
+                        answers[n] = function(n)
+                except AbandonedError:
+                    break
+                except (Exception, TimeLimitError) as error:  # whatever an object dies of is its row
+                    if isinstance(error, StudyError) and error.code in (messages.CANNOT_WRITE, messages.IN_USE):
+                        fatal = error
+                        claims.stop()
+                    answers[n] = _why(error, stopper.limit)
+            request = self._comm.Ibarrier()
+            while not request.Test():
+                time.sleep(0.02)  # leaves the core to ranks that still plan
+        claims.free()
+        gathered = self._comm.allgather((answers, stopper.name, fatal))
+        for *_, error in gathered:
+            if error is not None:
+                raise error
+        together = {n: answer for some, *_ in gathered for n, answer in some.items()}
+        return dict(sorted(together.items())), any(name for _, name, _ in gathered)
+
+    def _prepared(self, n: int) -> Part:
+        begin, listed = time.perf_counter(), self._folder.objects[n]
+        overrides, path = self._folder.overrides_of(listed), self._out / f"{listed.name}.hdf"
+        plan, work, growth = self._study(self._folder.scene(listed), overrides)
+        if rounds := rounds_in(path, plan):
+            plan, work = growth.study(rounds)
+        _, torn = file_of(path, plan)
+        self._mine[n] = plan, work, growth
+        return Part(n, path, plan, tuple(torn), time.perf_counter() - begin)
+
+    # --- solving ------------------------------------------------------------------------------------------------------
+
+    def _cases(self, parts: list[Part]) -> bool:
+        """Solve what is missing of some objects; whether a signal came."""
+        files = Files(self._out, parts, self._comm)
+        codes = on_rank0(self._comm, settled, files, parts, self._retry)
+        session = ObjectsSession(files.units(parts), parts[0].plan, self._work, files, self._comm, codes)
+        code = session.solve()
+        for part, number in zip(parts, files.session, strict=True):
+            if part.number in self._mine:
+                _, work, _ = self._mine[part.number]
+                finish_alone(work, part.path, part.plan.layout, number, session.signal)
+        # Nobody reads a file that is being finished.
+        self._comm.Barrier()
+        return code == messages.STOPPED
+
+    def _grown(self, part: Part) -> Part | None:
+        """The object with its next round of further grasps in its file; None where it has enough."""
+        plan, _, growth = self._mine[part.number]
+        with open_result(part.path) as result:
+            added = growth.more(result)
+        if not added:
+            return None
+        plan, work = growth.study((*plan.layout.added, added))
+        rewrite(part.path, plan.layout, plan.header)
+        self._mine[part.number] = plan, work, growth
+        return replace(part, plan=plan, torn=())
+
+    def _ending(self, n: int, seconds: float) -> tuple[int, Row]:
+        """The row of an object as its file stands, which is packed if nothing is missing there."""
+        path, (plan, _, _) = self._out / f"{self._folder.objects[n].name}.hdf", self._mine[n]
+        with open_result(path) as result:
+            row = self._rows[n] | row_of(result) | {"preparing": seconds}
+        if row["state"] != index.STOPPED:
+            rewrite(path, plan.layout, plan.header, packed=True)
+        return n, row
+
+    def _gathered(self, items: Iterable[Any]) -> list[Any]:
+        """What all ranks give together, in the order of the objects' numbers."""
+        together = [item for some in self._comm.allgather(list(items)) for item in some]
+        return sorted(together, key=lambda item: item.number if isinstance(item, Part) else item[0])
+
+    # --- the index ----------------------------------------------------------------------------------------------------
+
+    @property
+    def _ended(self) -> int:
+        return sum(row["state"] in index.ENDED for row in self._rows)
+
+    def _store(self, text: str = "") -> None:
+        if text and self._comm.rank == 0:
+            print(text, flush=True)
+        about = {"scene_file": self._folder.scene_file, "overrides": "\n".join(self._folder.overrides)}
+        on_rank0(self._comm, partial(index.write_index, **about), self._out / f"{INDEX}.hdf", self._rows)
+
+
+def _rows_of(folder: ObjectFolder, out: Path, retry_failed: bool) -> list[Row]:
+    """A row for every object: what an earlier run has stored, or nothing yet; by one process."""
+    path = out / f"{INDEX}.hdf"
+    known = {row["object"]: row for row in index.read_index(path)[0]} if path.exists() else {}
+    again = {index.FAILED, index.REFUSED, index.NO_GRASP, index.SOME_FAILED} if retry_failed else set()
+    rows = []
+    for listed in folder.objects:
+        row = index.blank_row(listed.name, file=f"{listed.name}.hdf", mesh=os.path.relpath(listed.mesh, out))
+        before = known.get(listed.name, row)
+        try:
+            scene = folder.scene(listed)
+        except SceneError as error:
+            rows.append(row | {"state": index.REFUSED, "reason": shortened(str(error.problems[0]), REASON_LETTERS)})
+            continue
+        key, mass = key_of(scene), scene.object.mass_g
+        if before["key"] not in ("", key) and (out / row["file"]).exists():
+            text = f"{path}: object '{listed.name}' was solved from another scene or mesh"
+            raise StudyError(messages.OTHER_FILE, f"{text}; choose another folder with -o, or move this one away")
+        if before["key"] == key:
+            row = before | ({"state": index.MISSING} if before["state"] in again else {})
+        rows.append(row | {"key": key, "mass": np.nan if mass is None else in_si("mass_g", mass)})
+    return rows
+
+
+def _why(error: BaseException, limit: float) -> tuple[str, str]:
+    """State of an object that could not be planned, and why."""
+    if isinstance(error, NoGraspError):
+        return index.NO_GRASP, error.message
+    if isinstance(error, SceneError):
+        return index.REFUSED, str(error.problems[0])
+    if isinstance(error, StudyError):
+        return index.REFUSED if error.code == messages.USAGE else index.FAILED, error.message
+    return index.FAILED, sentence(error, limit)
+
+
+def row_of(result: Any) -> Row:
+    """What the index says of an open result file."""
+    ds = dataset(result)
+    status, flags = ds.status.values, judged(ds)
+    done, failed = (status == quantities.DONE), (status == quantities.FAILED)
+    row: Row = {"cases": int(status.size), "done": int(done.sum()), "failed": int(failed.sum())}
+    row |= {"seconds": float(np.nansum(ds["work_seconds_total"].values)), "reason": _reason(ds, flags, done)}
+    if (status == quantities.MISSING).any():
+        return row | {"state": index.STOPPED, "reason": ""}
+    usable = done & (flags & LOST == 0)
+    if not usable.any():
+        return row | {"state": index.FAILED if failed.any() and not done.any() else index.NO_GRASP}
+    k = shown_level(ds, flags)[0]
+    best = int(ranked(ds, k)[0])
+    at = (*np.unravel_index(best, status.shape[:-1]), k)
+    maps = {name: name for name in ("payload", "opening", "e_n", "quality", "payload_error") if name in ds}
+    row |= {name: float(values_of(ds, name)[at]) for name in maps}
+    row |= {"force": float(ds.normal_force.values[k]), "best": best, "grasps": int(usable[..., k].sum())}
+    return row | {"state": index.SOME_FAILED if failed.any() else index.DONE}
+
+
+def _reason(ds: Any, flags: np.ndarray, done: np.ndarray) -> str:
+    """The most frequent message of what failed or is no grasp, or what speaks against all that is solved."""
+    messages_ = [str(text) for text in ds["message"].values[~done] if text]
+    if messages_:
+        text, count = Counter(messages_).most_common(1)[0]
+        return shortened(f"{count} of {done.size} cases: {text}", REASON_LETTERS)
+    lost = done.any() and not (done & (flags & LOST == 0)).any()
+    return flag_words(int(np.bitwise_or.reduce(flags[done])) & int(LOST)) if lost else ""

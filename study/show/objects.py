@@ -1,0 +1,116 @@
+"""What the index of a folder of objects says: a table of all objects, counts with reasons, and a run as it goes."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from softjaw.study.messages import DONE as ENDED
+from softjaw.study.messages import SOME_FAILED, STOPPED, StudyError
+from softjaw.study.quantities import MISSING
+from softjaw.study.result import index
+from softjaw.study.result.lock import holder
+from softjaw.study.result.store import open_result
+from softjaw.study.run.progress import duration
+from softjaw.study.table import Column, Row, Table, as_text, wrapped
+
+REASON_WIDTH = 34  # characters
+SHOWN = (
+    Column("object", wrap=20),
+    Column("payload", "kg", error="payload_error"),
+    Column("payload_error", "1", people=False),
+    Column("opening", "m", drop=1),
+    Column("force", "N"),
+    Column("e_n", "m", drop=2),
+    Column("quality", "1", people=False),
+    Column("best", people=False),
+    Column("grasps", drop=3),
+    Column("cases", people=False),
+    Column("done", people=False),
+    Column("failed", people=False),
+    Column("mass", "kg", people=False),
+    Column("seconds", "s", drop=4),
+    Column("preparing", "s", people=False),
+    Column("state", wrap=12),
+    Column("reason", wrap=REASON_WIDTH, drop=5),
+    Column("file", people=False),
+    Column("mesh", people=False),
+)
+
+
+def index_table(path: Path, top: int = 0) -> Table:
+    """The objects of an index, those with the largest payload first, then those without one; ``top`` (0: all)."""
+    rows, about = index.read_index(path)
+    rows = [{key: math.nan if value == -1 else value for key, value in row.items()} for row in rows]
+    order = sorted(rows, key=lambda row: (-np.nan_to_num(row["payload"], nan=-1.0), row["object"]))
+    facts = {"folder": str(path.parent), "scene_file": about.get("scene_file", ""), **_counts(rows)}
+    return Table(f"{path.parent}: {counts_text(rows)}", SHOWN, order[: top or None], (), facts, "objects")
+
+
+def _counts(rows: list[Row]) -> dict[str, Any]:
+    counts = Counter(row["state"] for row in rows)
+    return {state.replace(" ", "_"): counts[state] for state in index.STATES if counts[state]}
+
+
+def counts_text(rows: list[Row]) -> str:
+    """How many objects there are in each state."""
+    counts = _counts(rows)
+    return f"{len(rows)} objects, " + ", ".join(f"{n} {state.replace('_', ' ')}" for state, n in counts.items())
+
+
+def status_text(path: Path, width: int) -> str:
+    """Counts, cases and time, what runs now, and the reasons of objects without a grasp."""
+    rows, _ = index.read_index(path)
+    runner = holder(path)
+    cases, seconds = (sum(max(np.nan_to_num(row[key]), 0) for row in rows) for key in ("done", "seconds"))
+    lines = [f"{path}: {counts_text(rows)}", f"  {cases:.0f} cases solved, {duration(seconds)} on all ranks"]
+    lines += [f"running now: {runner}"] if runner else []
+    left = code_of(rows) == STOPPED and not runner
+    lines += ["run the same command again to resume"] if left else []
+    named = [f"{row['object']}: {row['state']}: {row['reason']}" for row in rows if row["reason"]]
+    return "\n".join([*lines, *(wrapped(line, width, "  ", "    ") for line in named)])
+
+
+def code_of(rows: list[Row]) -> int:
+    """The exit code of a run that ends with these rows."""
+    states = {row["state"] for row in rows}
+    if states & {index.MISSING, index.STOPPED}:
+        return STOPPED
+    return SOME_FAILED if states - {index.DONE, index.NO_GRASP} else ENDED
+
+
+def summary(path: Path, width: int, top: int = 10) -> str:
+    """What a run says at its end: the objects with the largest payload, and why others have none."""
+    return f"{as_text(index_table(path, top), width)}\n{status_text(path, width)}"
+
+
+def watch(path: Path, every: float, sleep: Callable[[float], None] = time.sleep) -> int:
+    """Print a line for every change of the objects that are done until the run ends; its exit code."""
+    before = ""
+    while True:
+        runner = holder(path)  # asked first: what a run writes before it ends is then read below
+        rows, _ = index.read_index(path)
+        under_way = [cases for row in rows if row["state"] == index.STOPPED and (cases := _cases(path, row))]
+        done, whole = (sum(some) for some in zip(*under_way, strict=True)) if under_way else (0, 0)
+        now = f"; {done}/{whole} cases of {len(under_way)} objects that are solved now" if whole else ""
+        if (line := f"{counts_text(rows)}{now}") != before:
+            print(f"[{time.strftime('%H:%M:%S')}] {line}", flush=True)
+            before = line
+        if not runner:
+            return code_of(rows)
+        sleep(every)
+
+
+def _cases(path: Path, row: Row) -> tuple[int, int] | None:
+    """Cases of an object's file that have an end, and all; None where there is no file yet."""
+    try:
+        with open_result(path.parent / row["file"], unchecked=True) as result:
+            return int(np.sum(result.codes != MISSING)), result.codes.size
+    except StudyError:
+        return None
