@@ -40,6 +40,7 @@ DOORS = {
         "study/result/skeleton.py",
         "study/result/write.py",
         "study/result/hdf5.py",
+        "study/result/index.py",
     },
     "pyvista": PICTURES | {"study/patch/vtk_faces.py"},
     "vtkmodules": PICTURES | {"study/patch/vtk_faces.py"},

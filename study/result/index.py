@@ -1,4 +1,4 @@
-"""The index of a folder of objects: one HDF5 table with a row for each object, what it holds best or why it has nothing.
+"""The index of a folder of objects: one HDF5 table with a row for each, what holds it best or why nothing does.
 
 It is written as a whole and renamed into place, so that a reader finds the old one or the new one. Every column is a
 dataset over ``object``; xarray opens it as `open_index` does.
@@ -7,7 +7,7 @@ dataset over ``object``; xarray opens it as `open_index` does.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -77,7 +77,7 @@ def blank_row(name: str, **values: Any) -> Row:
     return {"object": name, **{c.name: BLANK[c.kind] for c in COLUMNS}, "state": MISSING, **values}
 
 
-def write_index(path: Path, rows: Sequence[Row], **attributes: Any) -> None:
+def write_index(path: Path, rows: Sequence[Row], attributes: Mapping[str, Any]) -> None:
     """Write the whole table; by one process.
 
     Raises

@@ -49,8 +49,8 @@ class Files:
     def units(self, parts: Sequence[Part]) -> list[list[Any]]:
         """Units of work of every object, with rows as they are counted here."""
         return [
-            [replace(u, rows=tuple(tuple(int(first) + row for row in rows) for rows in u.rows)) for u in part.plan.units]
-            for first, part in zip(self._first[:-1], parts, strict=True)
+            [replace(u, rows=tuple(tuple(first + row for row in rows) for rows in u.rows)) for u in part.plan.units]
+            for first, part in zip(self._first[:-1].tolist(), parts, strict=True)
         ]
 
     @property

@@ -14,7 +14,6 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -137,9 +136,8 @@ class _ObjectsRun:
                 time.sleep(0.02)  # leaves the core to ranks that still plan
         claims.free()
         gathered = self._comm.allgather((answers, stopper.name, fatal))
-        for *_, error in gathered:
-            if error is not None:
-                raise error
+        if fatals := [refusal for *_, refusal in gathered if refusal is not None]:
+            raise fatals[0]
         together = {n: answer for some, *_ in gathered for n, answer in some.items()}
         return dict(sorted(together.items())), any(name for _, name, _ in gathered)
 
@@ -205,7 +203,7 @@ class _ObjectsRun:
         if text and self._comm.rank == 0:
             print(text, flush=True)
         about = {"scene_file": self._folder.scene_file, "overrides": "\n".join(self._folder.overrides)}
-        on_rank0(self._comm, partial(index.write_index, **about), self._out / f"{INDEX}.hdf", self._rows)
+        on_rank0(self._comm, index.write_index, self._out / f"{INDEX}.hdf", self._rows, about)
 
 
 def _rows_of(folder: ObjectFolder, out: Path, retry_failed: bool) -> list[Row]:
@@ -257,7 +255,7 @@ def row_of(result: Any) -> Row:
         return row | {"state": index.FAILED if failed.any() and not done.any() else index.NO_GRASP}
     k = shown_level(ds, flags)[0]
     best = int(ranked(ds, k)[0])
-    at = (*np.unravel_index(best, status.shape[:-1]), k)
+    at = (*(int(i) for i in np.unravel_index(best, status.shape[:-1])), k)
     maps = {name: name for name in ("payload", "opening", "e_n", "quality", "payload_error") if name in ds}
     row |= {name: float(values_of(ds, name)[at]) for name in maps}
     row |= {"force": float(ds.normal_force.values[k]), "best": best, "grasps": int(usable[..., k].sum())}

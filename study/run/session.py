@@ -215,12 +215,12 @@ def _begins(path: Path, codes: np.ndarray, torn: int, ranks: int, created: bool)
 class Session:
     """The ranks that solve the cases which ``codes`` calls missing; creating and solving are collective over ``comm``.
 
-    ``plan``, ``work``: as for `run_study`. ``signal`` names the signal that ended it, if one did.
+    ``plan``, ``work``: as for `run_study`; ``writer`` is a `ResultWriter` or stands for one. ``signal`` names the signal that ended it, if one did.
     """
 
     signal = ""
 
-    def __init__(self, plan: Plan, work: Work, writer: ResultWriter, comm: Any, codes: np.ndarray) -> None:
+    def __init__(self, plan: Plan, work: Work, writer: Any, comm: Any, codes: np.ndarray) -> None:
         self._work, self._writer, self._comm, self._codes = work, writer, comm, codes
         self._state = OpenedFile(writer.path)
         self._todo = self._divided(plan, codes)

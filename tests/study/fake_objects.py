@@ -1,0 +1,102 @@
+"""A folder of objects whose cases are a formula, to be started under mpirun: ``fake_objects.py SCENE OUT [options]``.
+
+An object called ``none`` has no grasp, one called ``bug`` fails while it is planned, ``grows`` gets further stations.
+"""
+
+from __future__ import annotations
+
+import os
+
+os.environ.update(H5PY_ALWAYS_USE_MPI="1", OMP_NUM_THREADS="1")
+
+import argparse
+import signal
+import sys
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).parent.parent.parent))
+
+from tests.study import fake_run
+
+
+@dataclass(frozen=True)
+class FakeUnit:
+    """A unit of the fake study, as ranks send it to each other."""
+
+    index: int
+    rows: Any
+    cost: float
+    first: int
+    state: int
+    reason: str
+    hopeless: bool
+    apart: bool
+
+
+def plan_of(name, rounds=()):
+    """The plan of an object; the length of its name makes objects differ."""
+    plan = fake_run.fake_plan(name, 2 + len(name), rounds=rounds, apart=True)
+    units = (FakeUnit(**{**vars(unit), "first": unit.first + 1000 * len(name)}) for unit in plan.units)
+    return replace(plan, units=tuple(units))
+
+
+def study(scene, _overrides):
+    """Plan, work and growth of an object."""
+    from softjaw.study.messages import USAGE, NoGraspError
+    from softjaw.study.run.session import Growth, Work
+
+    name = scene.object.name
+    if name == "none":
+        raise NoGraspError(USAGE, "nothing fits")
+    work = Work(lambda *_: (), finalise=fake_run.finalise)
+    grown = fake_run.fake_growth(name, 2 + len(name), work) if name == "grows" else None
+    growth = Growth(lambda rounds: (plan_of(name, rounds), work), grown.more if grown else lambda _: ())
+    return plan_of(name if name != "bug" else 1 / 0), work, growth
+
+
+def main(arguments=None):
+    """Run it; its exit code."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("scene")
+    parser.add_argument("out", type=Path)
+    for name in ("kill-after", "stop-after"):
+        parser.add_argument(f"--{name}", type=int, default=-1)  # cases of this rank
+    parser.add_argument("--retry-failed", action="store_true")
+    parser.add_argument("--delay", type=float, default=0.0)
+    options = parser.parse_args(arguments)
+    from mpi4py import MPI
+
+    from softjaw.study.messages import StudyError, complain
+    from softjaw.study.run.objects import run_objects
+    from softjaw.study.run.session import Work
+    from softjaw.study.scene.folder import folder_of
+
+    solved = 0
+    nothing = SimpleNamespace(hang=-1, stuck=-1, greedy=-1, unplug=-1, remove=-1, kill=-1, raises=-1, fail=7001)
+    cases = fake_run.fake_path(SimpleNamespace(**vars(nothing), delay=options.delay))
+
+    def solve_unit(unit, wanted):
+        nonlocal solved
+        for case in cases(unit, wanted):
+            solved += 1
+            if solved == options.kill_after:
+                os.kill(os.getpid(), signal.SIGKILL)
+            if solved == options.stop_after:
+                os.kill(os.getpid(), signal.SIGUSR1)
+                time.sleep(0.01)
+            yield case
+
+    try:
+        folder = folder_of(options.scene, [])
+        work = Work(solve_unit, time_limit=600.0)
+        return run_objects(folder, options.out, study, work, MPI.COMM_WORLD, retry_failed=options.retry_failed)
+    except StudyError as error:
+        return complain(error)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

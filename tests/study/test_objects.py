@@ -1,0 +1,142 @@
+"""A folder of objects: which there are, one run over all of them, and what the index says."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+import softjaw
+from softjaw.study.messages import DONE, OTHER_FILE, SOME_FAILED, STOPPED, USAGE, StudyError
+from softjaw.study.result.index import open_index
+from softjaw.study.scene.folder import folder_of
+from tests.study import fake_objects
+from tests.study.launching import contents, differing, here, launch, softjaw as command
+
+SCRIPT = Path(__file__).parent / "fake_objects.py"
+NAMES = ("a", "bug", "grows", "longest", "none")
+SCENE = """
+[object]
+shape = "mesh"
+mesh = "meshes/*.stl"
+unit = "m"
+[candidates]
+sampled = 2
+[load]
+normal_force_n = [2]
+"""
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory):
+    """A scene of five meshes and one that is none."""
+    folder = tmp_path_factory.mktemp("objects")
+    (folder / "meshes").mkdir()
+    for i, name in enumerate(NAMES):
+        trimesh.creation.box((0.03, 0.04, 0.05 + 0.001 * i)).export(folder / f"meshes/{name}.stl")
+    (folder / "meshes/empty.stl").write_bytes(b"")
+    (folder / "scene.toml").write_text(SCENE)
+    return folder / "scene.toml"
+
+
+@pytest.fixture(scope="module")
+def solved(scene):
+    """All objects solved by one process."""
+    code, _, errors = here(fake_objects.main, scene, out := scene.parent / "one")
+    assert code == SOME_FAILED, errors
+    return out
+
+
+def rows(out):
+    ds = open_index(out / "index.hdf")
+    return {str(name): ds.sel(object=name) for name in ds.object.values}
+
+
+def same(out, expected):
+    """Whether all files of objects are alike byte for byte, and the index but for times."""
+    files = sorted(path.name for path in expected.glob("*.hdf") if path.stem != "index")
+    assert sorted(path.name for path in out.glob("*.hdf") if path.stem != "index") == files
+    assert {name: differing(out / name, contents(expected / name)) for name in files} == dict.fromkeys(files, [])
+    first, other = (softjaw.open(folder).drop_vars(["seconds", "preparing", "mesh"]) for folder in (out, expected))
+    assert first.identical(other.assign_attrs(file=first.attrs["file"]))
+
+
+def test_a_pattern_and_a_table_list_objects_with_a_name_of_their_own(scene):
+    assert [listed.name for listed in folder_of(str(scene), []).objects] == sorted([*NAMES, "empty"])
+    table = scene.parent / "some.csv"
+    table.write_text("mesh, unit, mass_g\nmeshes/a.stl, m, 120\nmeshes/longest.stl, cm,\n")
+    folder = folder_of(str(scene), [f"object.mesh={table}"])
+    first, second = (folder.scene(listed).object for listed in folder.objects)
+    assert (first.name, first.unit, first.mass_g) == ("a", "m", 120.0)
+    assert (second.name, second.unit, second.mass_g) == ("longest", "cm", None)
+    assert folder_of(str(scene), ["object.mesh=meshes/a.stl"]) is None
+
+
+@pytest.mark.parametrize("mesh", ["nothing/*.stl", "missing.csv", "scene.toml*"])
+def test_a_pattern_without_meshes_is_refused(scene, mesh):
+    with pytest.raises(StudyError) as refusal:
+        folder_of(str(scene), [f"object.mesh={mesh}"])
+    assert refusal.value.code == USAGE
+
+
+def test_every_object_is_a_row_and_none_stops_the_others(solved):
+    found = rows(solved)
+    states = {name: str(row.state.values) for name, row in found.items()}
+    assert states == {"a": "complete", "bug": "failed", "empty": "refused", "grows": "complete",
+                      "longest": "some cases failed", "none": "no grasp"}  # fmt: skip
+    assert all(found[name].reason.values.item() for name in ("bug", "empty", "longest", "none"))
+    assert sorted(path.stem for path in solved.glob("*.hdf")) == ["a", "grows", "index", "longest"]
+    for name in ("a", "grows", "longest"):
+        ds = softjaw.open(solved / f"{name}.hdf")
+        held = np.nan_to_num(ds.payload.sel(model="ccm").values[..., -1])
+        assert float(found[name].payload) == held.max()
+        assert int(found[name].cases) == ds.status.size
+        assert ds.attrs["provenance"][-1]["reason"] == "complete"
+
+
+def test_again_nothing_is_solved_and_another_mesh_is_refused(scene, solved):
+    before = {path: path.stat().st_mtime_ns for path in solved.glob("*.hdf") if path.stem != "index"}
+    assert here(fake_objects.main, scene, solved)[0] == SOME_FAILED
+    assert {path: path.stat().st_mtime_ns for path in before} == before
+    mesh = scene.parent / "meshes/a.stl"
+    content = mesh.read_bytes()
+    trimesh.creation.box((0.02, 0.02, 0.02)).export(mesh)
+    try:
+        assert here(fake_objects.main, scene, solved)[0] == OTHER_FILE
+    finally:
+        mesh.write_bytes(content)
+
+
+def test_a_signal_stops_in_order_and_the_run_resumes(scene, solved):
+    out = scene.parent / "stopped"
+    assert here(fake_objects.main, scene, out, "--stop-after", 40)[0] == STOPPED
+    ds = open_index(out / "index.hdf")
+    assert "not complete" in ds.state.values
+    assert here(fake_objects.main, scene, out)[0] == SOME_FAILED
+    same(out, solved)
+
+
+def test_index_answers_commands(solved):
+    assert command(0, "status", solved)[0] == DONE
+    code, text, _ = command(0, "show", solved, "--csv")
+    assert (code, len(text.splitlines())) == (DONE, 7)
+    assert command(0, "watch", solved / "index.hdf")[0] == SOME_FAILED
+
+
+@pytest.mark.ranks
+def test_two_ranks_give_the_same_bits(scene, solved):
+    out = scene.parent / "two"
+    assert launch(2, SCRIPT, scene, out)[0] == SOME_FAILED
+    same(out, solved)
+
+
+@pytest.mark.long
+@pytest.mark.ranks
+@pytest.mark.parametrize("count", [3, 11, 25])
+def test_a_kill_amid_any_object_loses_nothing_that_is_finished(scene, solved, count):
+    out = scene.parent / f"killed{count}"
+    assert launch(2, SCRIPT, scene, out, "--kill-after", count, "--delay", 0.01)[0] != SOME_FAILED
+    assert launch(2, SCRIPT, scene, out)[0] == SOME_FAILED
+    same(out, solved)
