@@ -215,7 +215,8 @@ def _begins(path: Path, codes: np.ndarray, torn: int, ranks: int, created: bool)
 class Session:
     """The ranks that solve the cases which ``codes`` calls missing; creating and solving are collective over ``comm``.
 
-    ``plan``, ``work``: as for `run_study`; ``writer`` is a `ResultWriter` or stands for one. ``signal`` names the signal that ended it, if one did.
+    ``plan``, ``work``: as for `run_study`; ``writer`` is a `ResultWriter` or stands for one. ``signal`` names the
+    signal that ended it, if one did.
     """
 
     signal = ""

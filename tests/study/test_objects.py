@@ -13,7 +13,8 @@ from softjaw.study.messages import DONE, OTHER_FILE, SOME_FAILED, STOPPED, USAGE
 from softjaw.study.result.index import open_index
 from softjaw.study.scene.folder import folder_of
 from tests.study import fake_objects
-from tests.study.launching import contents, differing, here, launch, softjaw as command
+from tests.study.launching import contents, differing, here, launch
+from tests.study.launching import softjaw as command
 
 SCRIPT = Path(__file__).parent / "fake_objects.py"
 NAMES = ("a", "bug", "grows", "longest", "none")
@@ -58,7 +59,7 @@ def same(out, expected):
     """Whether all files of objects are alike byte for byte, and the index but for times."""
     files = sorted(path.name for path in expected.glob("*.hdf") if path.stem != "index")
     assert sorted(path.name for path in out.glob("*.hdf") if path.stem != "index") == files
-    assert {name: differing(out / name, contents(expected / name)) for name in files} == dict.fromkeys(files, [])
+    assert {name: differing(out / name, contents(expected / name)) for name in files} == {name: [] for name in files}
     first, other = (softjaw.open(folder).drop_vars(["seconds", "preparing", "mesh"]) for folder in (out, expected))
     assert first.identical(other.assign_attrs(file=first.attrs["file"]))
 
