@@ -96,7 +96,7 @@ def test_many_spoilt_files_are_read_or_refused_in_time_and_in_little_memory(tmp_
     path.write_bytes(reader.content)
     reader.read(path)  # and everything is imported
 
-    @settings(max_examples=120 if kind in SLOW else 300, derandomize=True, **CHECKS)
+    @settings(max_examples=40 if kind in SLOW else 100, derandomize=True, **CHECKS)
     @given(found=edits(reader.kinds), early=st.booleans())
     def judged(found, early):
         # what HDF5 trusts stands in the first part of a large file

@@ -116,7 +116,7 @@ def test_errors_on_the_paper_s_grid_are_those_of_the_reference():
 # --- the scenes themselves, on coarse meshes ---------------------------------------------------------------------
 
 PAD = ("gripper.elements=[12, 6, 4]", "accuracy.meshes=1")
-WALL = ("accuracy.wall_element_mm=3")
+WALL = ("accuracy.wall_element_mm=3",)
 PLACES = ("candidates.stations_mm=[33.8, 68.9, 104, 150]", "load.normal_force_n=[3, 13]")
 COARSE = {  # file: scene and overrides
     "fig4-curvature": ("fig4-curvature", ("gripper.elements=[8, 12, 4]",)),

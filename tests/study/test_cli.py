@@ -177,8 +177,8 @@ def test_quick_answers_load_neither_mpi_nor_petsc(command, scene, finished):
 @pytest.mark.parametrize("command", QUICK)
 def test_quick_answers_take_hardly_longer_than_loading_their_libraries(command, scene, finished):
     words = ["-m", "softjaw", *map(str, QUICK[command](scene, finished))]
-    libraries = ["-c", "import h5py, numpy, softjaw.study.scene"]
-    assert processor_seconds(sys.executable, *words) < 2.0 * processor_seconds(sys.executable, *libraries)
+    libraries = ["-c", f"import h5py, numpy, softjaw.study.scene{', xarray' if command == 'show' else ''}"]
+    assert processor_seconds(sys.executable, *words) < 2.5 * processor_seconds(sys.executable, *libraries)
 
 
 def test_bad_usage_is_told_by_the_first_rank_only(monkeypatch, capsys):
@@ -217,7 +217,7 @@ RUNNABLE = [  # all but those that take minutes and are tested elsewhere
 def solved(tmp_path_factory):
     """A finished study of seconds, which stands in for all results that the examples name."""
     path = tmp_path_factory.mktemp("solved") / "smoke.hdf"
-    code, output, errors = launch(0, "-m", "softjaw", "run", ROOT / "jobs" / "smoke.toml", "-o", path)
+    code, output, errors = launch(0, "-m", "softjaw", "run", ROOT / "jobs" / "smoke.toml", "-o", path, "--set", "load.normal_force_n=[2, 4]")
     assert code == 0, output + errors
     return path
 
