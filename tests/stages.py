@@ -22,7 +22,7 @@ from softjaw.study.doctor import launch_environment
 from tests.blas import NEEDS, usable
 
 ROOT = Path(__file__).parents[1]
-NUMERICAL = ("tests/friction", "tests/lsfit", "tests/scoring", "tests/fem", "tests/test_blas.py")
+NUMERICAL = ("tests/friction", "tests/lsfit", "tests/scoring", "tests/fem", "tests/test_stages.py")
 CANNOT_RUN = 77  # exit code of a program that lacks something, as in automake
 SIDE_BY_SIDE = ("-n", "2", "--dist", "loadfile")
 MINUTE = 60

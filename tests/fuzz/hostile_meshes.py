@@ -19,8 +19,7 @@ def doublings(count=DEEP):
     """Objects of a 3MF file, each of which has the one before twice."""
     pair = '<component objectid="{0}"/><component objectid="{0}"/>'
     return "".join(
-        f'<object id="{i + 1}" type="model"><components>{pair.format(i)}</components></object>'
-        for i in range(1, count)
+        f'<object id="{i + 1}" type="model"><components>{pair.format(i)}</components></object>' for i in range(1, count)
     )
 
 

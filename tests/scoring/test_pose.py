@@ -86,15 +86,6 @@ def test_polytopes_have_the_volume_of_their_hull_in_six_dimensions(pose):
     assert found.l1 == pytest.approx(hulls[1], rel=1e-6)
 
 
-@pytest.mark.parametrize("seed", range(6))
-def test_polytopes_anywhere(seed):
-    rng = np.random.default_rng(seed)
-    contacts = anywhere(rng, *(PolytopeBody(fibonacci_vertices(rng.uniform(0.1, 1, 3), 8)) for _ in "12"))
-    found, hulls = pose_volume(*contacts, 0.8, 0.3), hull_volumes(contacts, 0.8, 0.3)
-    assert found.linf == pytest.approx(hulls[0], rel=1e-9)
-    assert found.l1 == pytest.approx(hulls[1], rel=1e-6)
-
-
 @pytest.mark.parametrize("kind", ["ellipsoid", "graspit"])
 @pytest.mark.parametrize("turn", [0.0, 0.7])
 def test_facing_contacts_have_the_closed_form_however_they_are_turned_about_their_line(kind, turn):

@@ -10,6 +10,7 @@ import numpy as np
 from softjaw.study.quantities import Axis
 from softjaw.study.result.layout import Derived, Header, Layout
 from softjaw.study.result.skeleton import create
+from softjaw.study.result.write import ResultWriter, record
 from tests.study.sealing import sealed
 
 OBJECT = """
@@ -57,6 +58,19 @@ def fresh(path: Path, layout: Layout, header: Header) -> None:
         create(path, layout, header)
         SKELETONS[kind] = path.read_bytes()
     path.write_bytes(SKELETONS[kind])
+
+
+def written(path: Path, layout: Layout, case, scene=SCENE, title="made", labels=()) -> Path:
+    """A file whose case at an index is ``case(index)``: a result, None where it is missing, or why it failed."""
+    fresh(path, layout, Header("d" * 64, scene, title, "made.toml", labels=labels))
+    writer = ResultWriter(path, layout, None)
+    for row, index in enumerate(np.ndindex(layout.shape)):
+        if isinstance(made := case(index), str):
+            writer.fail(row, made)
+        elif made is not None:
+            writer.write(row, record(layout, made))
+    writer.close()
+    return path
 
 
 def make(

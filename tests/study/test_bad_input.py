@@ -15,22 +15,10 @@ from softjaw.study.doctor import launch_environment
 from softjaw.study.quantities import DONE, FAILED
 from softjaw.study.result.store import open_result
 from tests.study.launching import ROOT, softjaw
+from tests.study.scenes import BALL, QUICK, mesh_of, text_of
 
-SCENE = """[object]
-shape = "sphere"
-radius_mm = 30
-
-[gripper]
-elements = [4, 4, 2]
-
-[candidates]
-stations_mm = [0]
-angles_deg = [0]
-
-[load]
-normal_force_n = [2]
-"""
-MESH = SCENE.replace('shape = "sphere"\nradius_mm = 30', 'shape = "mesh"\nmesh = "body.stl"\nunit = "mm"')
+SCENE = text_of(BALL, elements="[4, 4, 2]")
+MESH = text_of(mesh_of("body.stl"), stations="[50]", elements="[4, 4, 2]")
 FLASK = ROOT / "jobs" / "objects" / "flask.stl"
 
 
@@ -38,7 +26,7 @@ FLASK = ROOT / "jobs" / "objects" / "flask.stl"
 def folder(tmp_path):
     """A folder with a scene of a ball and one of a mesh that is the shipped flask."""
     (tmp_path / "scene.toml").write_text(SCENE)
-    (tmp_path / "mesh.toml").write_text(MESH.replace("[0]", "[50]", 1))
+    (tmp_path / "mesh.toml").write_text(MESH)
     shutil.copy(FLASK, tmp_path / "body.stl")
     return tmp_path
 
@@ -121,8 +109,7 @@ def test_cases_that_cannot_be_solved_fail_with_their_reasons_and_the_others_go_o
     """A small ball sinks into the pad for ever; beside the middle a ball has one plane of symmetry, not two."""
     study = (
         "sweep.object.radius_mm=[5, 30]", 'effects.model_size="quarter"', "candidates.stations_mm=[0, 3]",
-        "load.normal_force_n=[2, 20, 30]", "gripper.elements=[8, 4, 2]", "accuracy.meshes=1",
-        'effects.friction_pressure_coupling="none"',
+        "load.normal_force_n=[2, 20, 30]", "gripper.elements=[8, 4, 2]", *QUICK,
     )  # fmt: skip
     code, _, errors = run(0, folder, *[word for value in study for word in ("--set", value)])
     assert code == 6, errors

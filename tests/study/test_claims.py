@@ -11,19 +11,9 @@ import numpy as np
 import pytest
 
 from softjaw.study.scene import load_scene
+from tests.study.scenes import results_of
 
 BOTTLE = "jobs/bottle-rigid.toml"
-
-
-def solved(*overrides, file=BOTTLE):
-    """Results of all cases of a scene, in the order of its units and forces."""
-    from softjaw.study import pipeline
-    from softjaw.study.case.candidates import units
-
-    found = []
-    for unit in units(load_scene(file, list(overrides)), lambda point: point.axis_symmetry):
-        found += [result for _, result in pipeline.solve_unit(unit)]
-    return found
 
 
 def of(found, name):
@@ -38,7 +28,7 @@ def test_both_definitions_of_e_n_and_the_projected_one():
         (BOTTLE, ["candidates.stations_mm=[104.4118, 144.1176]", "load.normal_force_n=[1, 4, 13]"]),
         ("jobs/fig4-curvature.toml", []),
     ):
-        found = solved(*overrides, file=file)
+        found = results_of(load_scene(file, overrides))
         over = of(found, "maps/e_n_ratio") / of(found, "maps/e_n") - 1.0
         projected = of(found, "maps/e_n_projected") / of(found, "maps/e_n") - 1.0
         assert over.min() > -1e-9

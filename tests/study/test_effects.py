@@ -13,16 +13,15 @@ import pytest
 from softjaw.fem.errors import ConvergenceError
 from softjaw.study import pipeline
 from softjaw.study.case import effects, model
-from softjaw.study.case.build import build_object
-from softjaw.study.case.candidates import units
 from softjaw.study.case.effects import FORCED, LITTLE, MUCH, ROWS, UNDECIDED, EffectChoice, neglected_traction
 from softjaw.study.case.effects import STIFF_PLATE as STIFF
 from softjaw.study.case.result import CaseFailure
 from softjaw.study.case.solver import COARSE, Solved
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import EFFECTS, REASONS
-from softjaw.study.scene import SceneError, load_scene, parse_scene
-from tests.study.test_pipeline import CONE, OVAL, PLATE, cases, e_n, solved
+from softjaw.study.scene import SceneError, load_scene
+from tests.study.scenes import CONE, OVAL, scene_of, units_of
+from tests.study.test_pipeline import PLATE, cases, e_n, solved
 from tests.study.test_walls import CUP
 from tests.study.test_walls import solved as on_wall
 
@@ -30,14 +29,9 @@ ROOT = Path(__file__).resolve().parents[2]
 COUPLED = 'effects.friction_pressure_coupling="tangential"'
 
 
-def scene_of(*overrides):
-    text = f"[object]\n{PLATE}\n[gripper]\nelements = [4, 4, 2]\n[candidates]\nstations_mm = [0]\nangles_deg = [0]\n"
-    return parse_scene(text + "[load]\nnormal_force_n = [1]\n", "scene.toml", overrides)
-
-
 def pressed(moved, pressure):
     """A pad's front moved as a whole by a vector [m], under an even pressure [Pa], on a plane."""
-    pad = model.pad(scene_of().gripper, (False, False), "weighted", False, False)
+    pad = model.pad(scene_of(PLATE, elements="[4, 4, 2]").gripper, (False, False), "weighted", False, False)
     start = np.einsum("qa,fai->fqi", pad.face_N, pad.nodes[pad.face_nodes])
     normal = np.broadcast_to([0.0, 0.0, -1.0], start.shape)
     points = SimpleNamespace(position=start + moved, normal=normal, load=pressure * pad.face_area)
@@ -87,7 +81,7 @@ class Prepared:
     """
 
     def __init__(self, changes, payloads=None, lost=()):
-        self.scene, self.walled, self.lost = scene_of("accuracy.meshes=2"), False, lost
+        self.scene, self.walled, self.lost = scene_of(PLATE, "accuracy.meshes=2", elements="[4, 4, 2]"), False, lost
         self.forces = tuple(range(1, len(changes) + 1))
         self.changes = changes, payloads or [0.0] * len(changes)
 
@@ -250,7 +244,7 @@ def cpu_times(file, overrides, monkeypatch):
     def known(choice, solver):
         vars(choice).update(chosen.pop() | {"solver": solver})
 
-    for unit in units(scene, lambda point: build_object(point.object).axis_symmetry):
+    for unit in units_of(scene):
         for k, way in ((0, measured), (2, known)):
             monkeypatch.setattr(EffectChoice, "__init__", way)
             start = time.process_time()
@@ -297,17 +291,6 @@ def test_a_steel_sheet_is_rigid_and_a_plastic_one_bends():
     assert sheet_level(*STEEL, 'effects.sheet="elastic"')[::2] == ("elastic plate", "forced by the scene")
 
 
-@pytest.mark.parametrize("size", [(20, 10), (18, 9), (20, 9.5), (12, 6), (22, 10), (20, 11)])
-def test_pads_up_to_the_size_of_the_default_support_are_solved(size):
-    """Every node of their sheets is held; such a sheet is rigid, whatever it is made of."""
-    pad = [f"gripper.pad_{side}_mm={length}" for side, length in zip(("length", "width"), size, strict=True)]
-    name, compliance, reason = sheet_level(*pad, *PLASTIC, "gripper.pad_thickness_mm=6")
-    if size[0] <= 20 and size[1] <= 10:
-        assert (name, compliance, reason) == ("rigid", 0.0, "indicator below the target")
-    else:
-        assert compliance > 0.0
-
-
 def test_what_is_neglected_stays_below_the_target():
     """The rigid sheet_level of steel is good to far less than 2 % of e_n, that of the plastic sheet is not."""
     np.testing.assert_array_equal(e_n(OVAL, *STEEL), e_n(OVAL, *STEEL, RIGID))
@@ -345,10 +328,9 @@ def test_a_mount_that_tilts_spreads_the_contact_on_a_slope_and_a_stiff_one_chang
 
 
 def test_a_plate_that_tilts_cannot_be_elastic():
-    text = f"[object]\n{OVAL}\n[candidates]\nstations_mm = [0]\nangles_deg = [0]\n[load]\nnormal_force_n = [2]"
-    parse_scene(text, overrides=["gripper.tilt_stiffness_nm_per_rad=1"])
+    assert scene_of(OVAL, "gripper.tilt_stiffness_nm_per_rad=1")
     with pytest.raises(SceneError, match="tilt_stiffness_nm_per_rad"):
-        parse_scene(text, overrides=["gripper.tilt_stiffness_nm_per_rad=1", 'effects.sheet="elastic"'])
+        scene_of(OVAL, "gripper.tilt_stiffness_nm_per_rad=1", 'effects.sheet="elastic"')
 
 
 # --- friction that acts back on the pressure --------------------------------------------------------------------------

@@ -1,21 +1,22 @@
-"""Flags: every bit that any code can set has a word and a sentence, and every message and reader tells it."""
+"""Flags and units: every bit has a word and a sentence; exact factors, and one choice for what people read."""
 
 from __future__ import annotations
 
 import ast
+import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from softjaw.friction.frame import FrameFlag
 from softjaw.scoring.quality import ScoreFlag
-from softjaw.study import pipeline
-from softjaw.study.case import candidates as grasps
 from softjaw.study.flags import OF_FILE, Flag, flag_definitions, flag_sentences, flag_words, flags_in, raised
 from softjaw.study.quantities import map_row
 from softjaw.study.result.datasets import MESSAGE_BYTES
-from softjaw.study.scene import parse_scene
 from softjaw.study.show.best_grasps import LABEL_WIDTH
+from softjaw.study.units import SHOWN, UNITS, in_si, shown, shown_text, shown_unit
+from tests.study.scenes import OVAL, results_of, scene_of
 
 ROOT = Path(__file__).parents[2]
 TABLE = sum(Flag)  # all bits that have a row
@@ -68,31 +69,44 @@ def test_a_value_is_told_bit_by_bit(value):
     assert [part for part in flag_sentences(value).split("; ") if part] == [flag.sentence for flag in flags_in(value)]
 
 
-CYLINDER = """
-[object]
-shape = "elliptic_cylinder"
-semi_axis_a_mm = 25
-semi_axis_b_mm = 25
-length_mm = 100
-[gripper]
-elements = [4, 4, 2]
-[candidates]
-stations_mm = [0]
-angles_deg = [0]
-[load]
-normal_force_n = [1]
-"""
-
-
-@pytest.fixture(scope="module")
-def solved():
-    """One coarse case of the pipeline, and its unit."""
-    given = parse_scene(CYLINDER)
-    unit = grasps.units(given, lambda point: point.axis_symmetry)[0]
-    return unit, next(iter(pipeline.solve_unit(unit)))[1]
-
-
-def test_the_message_of_a_case_tells_its_flags(solved):
-    _, case = solved
+def test_the_message_of_a_case_tells_its_flags():
+    round_one = OVAL.replace("semi_axis_b_mm = 20", "semi_axis_b_mm = 25")
+    [case] = results_of(scene_of(round_one, forces="[1]", elements="[4, 4, 2]"))
     assert case.values["maps/flags"] & Flag.COARSE
     assert case.message == flag_sentences(case.values["maps/flags"])
+
+
+STUDY = Path(__file__).parents[2] / "study"
+# Folders whose modules take their factors from the table; the others follow as they are rebuilt.
+KEPT = ("result", "lookup", "scene", "show/tables", "table.py", "quantities.py", "flags.py")
+FILES = sorted(f for f in (p.relative_to(STUDY).as_posix() for p in STUDY.rglob("*.py")) if f.startswith(KEPT))
+FACTORS = {1e3, 1e-3, 180 / math.pi, math.pi / 180}
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "si"),
+    [("a_mm", 25, 0.025), ("a_inch", 1, 0.0254), ("a_cm", 3, 0.03), ("e_gpa", 2, 2e9), ("p_kpa", 40, 4e4),
+     ("m_g", 50, 0.05), ("t_deg", 180, math.pi), ("mu", 0.8, 0.8),
+     ("springs_n_per_mm", 2, 2000)],
+)  # fmt: skip
+def test_values_of_a_scene_are_rounded_once(key, value, si):
+    assert in_si(key, value) == si
+
+
+def test_all_units_of_a_kind_share_their_si_unit_and_what_people_read_comes_back():
+    for unit in UNITS.values():
+        assert unit.si in ("m", "kg", "N", "Pa", "rad", "N/m")
+    for si, unit in SHOWN.items():
+        assert unit.si == si
+        assert shown(unit.size, si) == pytest.approx(1.0, rel=1e-15)
+    assert shown(np.array([1.0, 2.0]), "Pa") == pytest.approx([1e-3, 2e-3], rel=1e-15)
+    assert {shown_unit(si) for si in ("Pa", "m", "rad")} == {"kPa", "mm", "deg"}
+    assert shown_text(math.pi, "rad") == "180 deg"
+
+
+@pytest.mark.parametrize("file", FILES)
+def test_nobody_else_multiplies_by_a_thousand(file):
+    for node in ast.walk(ast.parse((STUDY / file).read_text())):
+        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mult | ast.Div):
+            values = {part.value for part in (node.left, node.right) if isinstance(part, ast.Constant)}
+            assert not FACTORS & {v for v in values if isinstance(v, int | float)}, (file, node.lineno)

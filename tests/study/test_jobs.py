@@ -14,8 +14,12 @@ JOBS = {path.stem: path for path in sorted((ROOT / "jobs").glob("*.toml"))}
 COARSE = ("--set", "gripper.elements=[8, 4, 2]")
 # What makes one quick load path of each scene.
 ONE = {
-    "bottle-rigid": ("candidates.stations=2", "candidates.stations_mm=[60, 75]", "candidates.angles_deg=[0]",
-                     "candidates.refine=false"),
+    "bottle-rigid": (
+        "candidates.stations=2",
+        "candidates.stations_mm=[60, 75]",
+        "candidates.angles_deg=[0]",
+        "candidates.refine=false",
+    ),
     "box-poses": (),
     "flask-mesh": ("candidates.stations_mm=[30]", "candidates.angles_deg=[0]"),
 }

@@ -13,30 +13,14 @@ from softjaw.fem.contact.press import Press
 from softjaw.fem.errors import ConvergenceError
 from softjaw.friction.patch import ContactPatch
 from softjaw.study import pipeline
-from softjaw.study.case.build import build_object
-from softjaw.study.case.candidates import units
 from softjaw.study.case.result import CaseFailure
 from softjaw.study.case.topology import joined
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import misses
-from softjaw.study.scene import parse_scene
+from tests.study.scenes import CONE, NO_COUPLING, pose_of, scene_of, units_of
 
 # Fingers that are no images of each other, so that there are two coarse paths.
-SCENE = """
-[object]
-shape = "revolution"
-profile_mm = [[0, 30], [50, 30], [100, 20], [150, 12]]
-[gripper]
-elements = [8, 4, 2]
-[candidates]
-poses = [{point_mm = [0, 0, 75], approach = [1, 0, 0.02], long_side = [0, 0, 1]}]
-[load]
-normal_force_n = [1, 2, 5]
-[accuracy]
-meshes = 2
-[effects]
-friction_pressure_coupling = "none"
-"""
+POSE = pose_of((0, 0, 75), (1, 0, 0.02))
 WALL = ("object.wall_mm=0.8", "effects.object='nonlinear_shell'", "accuracy.wall_element_mm=5",
         "load.normal_force_n=[1, 2, 3]", "gripper.elements=[6, 4, 2]")  # fmt: skip
 BOTH = pytest.mark.parametrize("overrides", [(), WALL], ids=["rigid", "wall"])
@@ -44,8 +28,7 @@ ROUGH = ("effects.friction_pressure_coupling='tangential'",)
 
 
 def unit_of(*overrides):
-    scene = parse_scene(SCENE, "scene.toml", overrides)
-    [unit] = units(scene, lambda point: build_object(point.object).axis_symmetry)
+    [unit] = units_of(scene_of(CONE, "accuracy.meshes=2", NO_COUPLING, *overrides, where=POSE, forces="[1, 2, 5]"))
     return unit
 
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import softjaw as sj
-from softjaw.fem.objects.gap import Pose
 from softjaw.friction.motion import fibonacci_twists
 from softjaw.friction.patch import ContactPatch
 from softjaw.friction.wrench import friction_wrench
@@ -15,17 +14,14 @@ from softjaw.lsfit.form import exponents, monomials
 from softjaw.lsfit.quartic import Quartic
 from softjaw.lsfit.samples import sphere_motions
 from softjaw.lsfit.surface import FitError
-from softjaw.scoring.bodies import PolytopeBody
 from softjaw.scoring.contact import SoftContact
-from softjaw.scoring.payload import payload
 from softjaw.scoring.pose import pose_volume
 from softjaw.study.case import limit_surface
-from softjaw.study.case.contact import Contact
-from softjaw.study.case.limit_surface import AS_FITTED, ELLIPSOID, INDEPENDENT, PROGRAMME, STANDS_IN, sampled_wrenches
+from softjaw.study.case.limit_surface import AS_FITTED, ELLIPSOID, INDEPENDENT, PROGRAMME, STANDS_IN
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import MODELS
-from softjaw.study.units import GRAVITY
-from tests.study.test_pipeline import BOX, CONE, CURVED, FLAT, MU, OVAL, PLATE, cases, solved
+from tests.study.scenes import OVAL
+from tests.study.test_pipeline import CURVED, FLAT, MU, PLATE, cases, solved
 
 WEIGHT = 9.80665
 EXTENTS = [0.05, 0.04, 0.12]  # of OVAL [m]
@@ -194,7 +190,6 @@ def test_the_payload_is_friction_over_gravity_where_the_weight_hangs_between_the
     assert not above["maps/flags"] & Flag.NOT_BORNE
 
 
-
 def test_a_quartic_of_six_components_predicts_all_of_the_friction():
     """Power of the friction for motions that it was not fitted to; a curved patch resists all six."""
     patch = sj.read_pressure("jobs/cylinder-pressure.csv")
@@ -208,41 +203,3 @@ def test_a_quartic_of_six_components_predicts_all_of_the_friction():
     assert fit.fit_error.Erad < 0.01
     with pytest.raises(ValueError, match="wrench"):
         sj.fit_quartic(patch, mu=0.8, wrench="4-D")
-
-
-# --- payload ----------------------------------------------------------------------------------------------------------
-
-
-SHAPES = [(CONE, "[60]", "[0]"), (BOX, "[20]", "[7]"), (OVAL, "[10]", "[30]")]
-
-
-def grasp(shape, station, angle):
-    """Contacts of a case as payloads take them, their pressure, and the mass that the case says is held."""
-    [(_, [result])] = solved(shape, "task.centre_of_mass_mm=[0, 0, 0]", stations=station, angles=angle, forces="[4]")
-    values, patch, contacts = result.values, result.patch, []
-    for f in range(2):
-        faces = ContactPatch(patch["centroid"][f], patch["area"][f], patch["normal"][f], patch["pressure"][f])
-        pose = Pose(np.array(values["fingers/pose_rotation"][f]), np.array(values["fingers/pose_origin"][f]))
-        contacts.append(Contact(faces, MU, pose))
-    wrenches = [MU * sampled_wrenches(c, "ccm", 500)[1][:500, [0, 1, 5]] for c in contacts]
-    soft = [c.soft(PolytopeBody(np.vstack([w, -w]))) for c, w in zip(contacts, wrenches, strict=True)]
-    return soft, [c.pressure_wrench for c in contacts], values["maps/payload"][0] * GRAVITY
-
-
-@pytest.mark.parametrize(
-    "directions", [pytest.param(100, id="some"), pytest.param(100_000, marks=pytest.mark.long, id="very many")]
-)
-@pytest.mark.parametrize(("shape", "station", "angle"), SHAPES, ids=["cone", "box", "oval"])
-def test_no_direction_is_worse_than_the_worst(shape, station, angle, directions):
-    soft, pressure, force = grasp(shape, station, angle)
-    found = payload(soft, pressure, np.zeros(3))
-    # stored faces have no corners, so the contact frame of a coarse patch may begin elsewhere
-    assert found.force == pytest.approx(force, rel=5e-2)
-    rng = np.random.default_rng(0)
-    tries = rng.normal(size=(directions, 3))
-    held = np.array([payload(soft, pressure, np.zeros(3), d).force for d in tries])
-    assert found.borne == (force > 0)
-    assert found.force <= held.min() * (1 + 1e-6)
-    assert payload(soft, pressure, np.zeros(3), found.direction).force == pytest.approx(found.upper, rel=2e-3)
-    if directions > 1000 and found.borne:
-        assert held.min() <= found.upper * 1.01

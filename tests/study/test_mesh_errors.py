@@ -10,11 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from softjaw.study import pipeline
-from softjaw.study.case.build import build_object
-from softjaw.study.case.candidates import units
 from softjaw.study.case.result import CaseFailure
 from softjaw.study.scene import parse_scene
+from tests.study.scenes import results_of
 
 ROOT = Path(__file__).parents[2]
 CASES = json.loads((ROOT / "tests" / "data" / "mesh_references.json").read_text())
@@ -48,8 +46,7 @@ def solved(own, *settings):
     place.append(f"load.normal_force_n={own['force_n']}")
     place.append('effects.friction_pressure_coupling="none"')  # as the references
     scene = parse_scene(SCENES[own["object"]], ROOT / "jobs" / "bottle-rigid.toml", [*place, *settings])
-    [unit] = units(scene, lambda point: build_object(point.object).axis_symmetry)
-    found = [result for _, result in pipeline.solve_unit(unit)]
+    found = results_of(scene)
     assert not any(isinstance(result, CaseFailure) for result in found)
     e_n = np.array([result.values["maps/e_n"][0] for result in found])
     return e_n / (1e-3 * np.array(own["e_n_mm"])) - 1, [result.values for result in found]

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from softjaw.study import pipeline
-from softjaw.study.case.build import build_object
-from softjaw.study.case.candidates import units
 from softjaw.study.scene import load_scene
 from tests.study.launching import ROOT
+from tests.study.scenes import units_of
 
 WAIST = 67.5  # station in the middle of the waist [mm], where the bottle is its own mirror image
 
@@ -24,8 +23,8 @@ def grasps(first, last, count, forces="[1, 2]"):
         f"load.normal_force_n={forces}",
     )  # fmt: skip
     scene = load_scene(ROOT / "jobs" / "bottle-rigid.toml", overrides)
-    made = units(scene, lambda point: build_object(point.object).axis_symmetry)
-    return np.linspace(first, last, count), [[result for _, result in pipeline.solve_unit(unit)] for unit in made]
+    made = [[result for _, result in pipeline.solve_unit(unit)] for unit in units_of(scene)]
+    return np.linspace(first, last, count), made
 
 
 def values(results, name, force):

@@ -16,7 +16,6 @@ from softjaw.fem.errors import ConvergenceError
 from softjaw.study import pipeline
 from softjaw.study.case import pressing
 from softjaw.study.case.build import build_object
-from softjaw.study.case.candidates import units
 from softjaw.study.case.errors import OF_MESHES
 from softjaw.study.case.model import contact_rules
 from softjaw.study.case.result import CaseFailure
@@ -25,35 +24,18 @@ from softjaw.study.doctor import launch_environment
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import MODELS
 from softjaw.study.scene import parse_scene
+from tests.study.scenes import BALL, CONE, OVAL, QUICK, results_of, scene_of, units_of
 
 CURVED, FLAT, PROJECTED = range(len(MODELS))
 MU = 0.8
 PLATE = 'shape = "plane"\nthickness_mm = 40'
-OVAL = 'shape = "elliptic_cylinder"\nsemi_axis_a_mm = 25\nsemi_axis_b_mm = 20\nlength_mm = 120'
-BALL = 'shape = "sphere"\nradius_mm = 30'
-CONE = 'shape = "revolution"\nprofile_mm = [[0, 30], [50, 30], [100, 20], [150, 12]]'
-BOX = 'shape = "box"\nsize_mm = [50, 40, 120]\nedge_radius_mm = 4'
 
 
 @lru_cache(maxsize=64)
 def solved(shape, *overrides, stations="[0]", angles="[0]", forces="[2, 5]", elements="[8, 4, 2]"):
-    """Units of a scene with the results of each; friction that acts back is left to tests of its own."""
-    text = f"""[object]
-{shape}
-[gripper]
-elements = {elements}
-[candidates]
-stations_mm = {stations}
-angles_deg = {angles}
-[load]
-normal_force_n = {forces}
-[accuracy]
-meshes = 1
-[effects]
-friction_pressure_coupling = "none"
-"""
-    scene = parse_scene(text, "scene.toml", overrides)
-    made = units(scene, lambda point: build_object(point.object).axis_symmetry)
+    """Units of a scene with the results of each."""
+    place = {"stations": stations, "angles": angles, "forces": forces, "elements": elements}
+    made = units_of(scene_of(shape, *QUICK, *overrides, **place))
     return [(unit, [result for _, result in pipeline.solve_unit(unit)]) for unit in made]
 
 
@@ -207,15 +189,6 @@ def test_the_part_of_the_pad_that_is_meshed_does_not_matter():
     ]
 
 
-def test_an_explicit_pose_is_the_same_grasp_as_station_and_angle():
-    text = f"[object]\n{BOX}\n[gripper]\nelements = [8, 4, 2]\n[load]\nnormal_force_n = [2, 5]\n"
-    text += "[accuracy]\nmeshes = 1\n[effects]\nfriction_pressure_coupling = \"none\"\n"
-    pose = "[[candidates.poses]]\npoint_mm = [7, 0, 10]\napproach = [-2, 0, 0]\nlong_side = [1, 0, 3]\n"
-    [unit] = units(parse_scene(text + pose, "poses.toml"), lambda _: 2)
-    for (_, result), expected in zip(pipeline.solve_unit(unit), cases(BOX, stations="[10]"), strict=True):
-        assert differing(result.values, expected, 1e-9, SCALES) == []
-
-
 def test_without_friction_nothing_is_held_and_a_flag_says_so():
     [(_, path)] = solved(OVAL, "friction.mu=0")
     for result, held in zip(path, cases(OVAL), strict=True):
@@ -307,9 +280,7 @@ def test_where_weighted_gaps_have_no_solution_nodal_ones_are_taken_and_flagged()
     path = Path(__file__).parents[2] / "jobs" / "bottle-rigid.toml"
     place = ["candidates.stations_mm=[161.76470588235293]", "load.normal_force_n=[7, 10, 13]"]
     place.append('accuracy.contact="weighted"')
-    scene = parse_scene(path.read_text(), path, place)
-    [unit] = units(scene, lambda point: point.object.axis_symmetry)
-    path = [result for _, result in pipeline.solve_unit(unit)]
+    path = results_of(parse_scene(path.read_text(), path, place))
     assert [bool(result.values["maps/flags"] & 512) for result in path] == [False, True, True]
     assert [Flag.NODAL.sentence in result.message for result in path] == [False, True, True]
 
@@ -324,14 +295,7 @@ def test_where_weighted_gaps_have_no_solution_nodal_ones_are_taken_and_flagged()
 )  # fmt: skip
 def test_which_gaps_are_tried(choice, element, walled, rules):
     overrides = [f'accuracy.contact="{choice}"', f'gripper.element="{element}"']
-    text = f"[object]\n{OVAL}\n[candidates]\nstations_mm = [0]\nangles_deg = [0]\n[load]\nnormal_force_n = [2]"
-    scene = parse_scene(text, "scene.toml", overrides)
-    assert contact_rules(scene, walled) == rules
-
-
-def test_nodal_gaps_that_were_chosen_raise_no_flag():
-    for values in cases(OVAL):
-        assert not int(values["maps/flags"]) & Flag.NODAL
+    assert contact_rules(scene_of(OVAL, *overrides), walled) == rules
 
 
 PRESSED_FLAT = """
@@ -383,27 +347,6 @@ def test_contacts_beside_each_other_are_flagged_although_their_normals_are_paral
     assert case.values["maps/flags"] & (Flag.NOT_ANTIPODAL | Flag.SLIPS) == expected
     if angle:
         assert case.values["maps/misalignment"] > np.radians(5)
-
-
-def test_pads_that_would_run_into_each_other_are_flagged():
-    """Two pads on a ball of 12 mm: together they closing displacement further than the ball is thick."""
-    ball = 'shape = "sphere"\nradius_mm = 6'
-    [(_, path)] = solved(ball, forces="[1, 20]", elements="[12, 6, 4]")
-    assert [bool(case.values["maps/flags"] & Flag.COLLISION) for case in path] == [False, True]
-    assert [2 * case.values["maps/closing"] > 0.012 for case in path] == [False, True]
-
-
-def test_a_stub_shorter_than_the_pads_carries_no_torque_beyond_its_ends():
-    """With the torque scales of the stub, 1.26 was the quality of an endless cylinder; the block is as high."""
-    short = OVAL.replace("length_mm = 120", "length_mm = 4")
-    block = 'shape = "box"\nsize_mm = [50, 40, 4]\nedge_radius_mm = 1'
-    scales = "score.contact_length_mm=50", "score.object_length_mm=50"
-    bodies = [cases(shape, *scales, forces="[5]", elements="[20, 4, 4]") for shape in (short, block, OVAL)]
-    (stub,), (flat,), (endless,) = bodies
-    for name, most in (("e_n", 0.3), ("quality", 0.25)):
-        of_stub, of_flat, of_endless = (values[f"maps/{name}"][CURVED] for values in (stub, flat, endless))
-        assert of_stub < most * of_endless
-        assert of_stub < of_flat
 
 
 def test_a_state_that_depends_on_the_load_path_is_flagged_from_the_jump_on(monkeypatch):

@@ -16,51 +16,22 @@ from softjaw.study.result.layout import DONE, MISSING
 from softjaw.study.result.store import open_result
 from softjaw.study.run.plan import make_plan
 from softjaw.study.run.shares import shares
-from softjaw.study.scene import parse_scene
 from tests.study.launching import ROOT, contents, differing, launch, softjaw, wait_for
+from tests.study.scenes import BOX, NO_COUPLING, scene_of
 
 pytestmark = pytest.mark.ranks
 
 # Two stations x three angles: 205 degrees is the image of 25, so there are four load paths of two forces.
-SCENE = """
-[object]
-shape = "box"
-size_mm = [50, 40, 120]
-edge_radius_mm = 8
-
-[gripper]
-elements = [8, 4, 2]
-
-[limit_surface]
-samples = 80
-wrench_samples = [2, 5]
-
-[candidates]
-stations_mm = [0, 30]
-angles_deg = [0, 5, 185]
-
-[load]
-normal_force_n = [1, 3]
-
-[accuracy]
-target = 0.01
-target_of = "e_n"
-
-[effects]
-friction_pressure_coupling = "none"
-"""
+ROUNDED = BOX.replace("edge_radius_mm = 4", "edge_radius_mm = 8")
+CHANGES = ("limit_surface.samples=80", "limit_surface.wrench_samples=[2, 5]", "accuracy.target=0.01",
+           "accuracy.target_of='e_n'", NO_COUPLING)  # fmt: skip
+PLACES = {"stations": "[0, 30]", "angles": "[0, 5, 185]", "forces": "[1, 3]"}
+SCENE = scene_of(ROUNDED, *CHANGES, **PLACES)
 CASES = 12
-BOX, CUP = (
-    """shape = "box"
-size_mm = [50, 40, 120]
-edge_radius_mm = 8
-""",
-    """shape = "revolution"
+CUP = '''shape = "revolution"
 profile_mm = [[0, 24], [4, 28], [30, 30], [60, 32], [80, 34]]
 wall_mm = 0.4
-wall_material = "PP"
-""",
-)
+wall_material = "PP"'''
 # The same program with a pause before every case, so that there is time to interrupt it.
 SLOWLY = """
 import os, sys, time
@@ -82,8 +53,8 @@ sys.exit(main())
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory):
     path = tmp_path_factory.mktemp("scene") / "box.toml"
-    path.write_text(SCENE)
-    path.with_name("cup.toml").write_text(SCENE.replace(BOX, CUP))
+    for shape, file in ((ROUNDED, path), (CUP, path.with_name("cup.toml"))):
+        file.write_text(scene_of(shape, *CHANGES, **PLACES).effective_toml())
     return path
 
 
@@ -107,7 +78,7 @@ def done(path):
 
 def test_two_ranks_divide_the_forces_of_a_candidate():
     """So that what follows compares forces that were solved beside each other with forces that were solved in turn."""
-    plan = make_plan(parse_scene(SCENE))
+    plan = make_plan(SCENE)
     divided = [own.unit.index for own in shares(plan.units, np.full(CASES, MISSING), 2)]
     assert len(divided) > len(set(divided)) == 4
 

@@ -21,6 +21,7 @@ from softjaw.study.run.plan import make_plan, measured_seconds
 from softjaw.study.run.refine import FINEST_SPACING_SHARE, chances, next_stations
 from softjaw.study.scene import load_scene, parse_scene
 from tests.study.launching import ROOT, command, contents, differing, launch, wait_for
+from tests.study.scenes import pose_of
 
 GIVEN = np.linspace(25.0, 175.0, 35)
 BEST_WITHIN = 0.02
@@ -195,21 +196,13 @@ max_opening_mm = 65
 [candidates]
 refine = BUDGET
 refine_within = 0.02
-[[candidates.poses]]
-label = "wide"
-point_mm = [0, 0, 8]
-approach = [1, 0, 0]
-long_side = [0, 0, 1]
-[[candidates.poses]]
-point_mm = [0, 0, -20]
-approach = [0, 1, 0]
-long_side = [1, 0, 0]
+PLACES
 [load]
 normal_force_n = [1, 2]
 [limit_surface]
 samples = 80
 wrench_samples = ["wide"]
-"""
+""".replace("PLACES\n", pose_of((0, 0, 8), label="wide") + pose_of((0, 0, -20), (0, 1, 0), (1, 0, 0)))
 
 
 def scene_with(budget, best_within=0.02):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import signal
 import subprocess
@@ -175,22 +174,6 @@ def test_another_scene_is_refused(tmp_path, whole, uninterrupted):
     assert code == 3
     assert errors.count("error: ") == 1
     assert differing(path, uninterrupted) == []
-
-
-@pytest.mark.parametrize(("what", "ranks"), [pytest.param("text", 0, marks=pytest.mark.long), ("truncated", 0)])
-def test_a_file_that_is_no_result_is_refused(tmp_path, whole, what, ranks):
-    path = tmp_path / f"{what}.hdf"
-
-    if what == "truncated":
-        shutil.copy(whole, path)
-        os.truncate(path, 100_000)
-    else:
-        path.write_text("my notes")
-    size = path.stat().st_size
-    code, _, errors, same = *study(ranks, path), size == path.stat().st_size
-    assert code == 3
-    assert errors.count("error: ") == 1
-    assert same
 
 
 @pytest.mark.parametrize("ranks", [0, pytest.param(2, marks=pytest.mark.long)])

@@ -1,4 +1,4 @@
-"""Who solves what: every unit once, the expensive ones first, and nothing new after a stop."""
+"""Who solves what: every unit once, the expensive ones first, nothing new after a stop; and the seconds of a plan."""
 
 from __future__ import annotations
 
@@ -11,13 +11,18 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from softjaw.fem.objects.shapes import Sphere
 from softjaw.study.doctor import launch_environment
 from softjaw.study.quantities import DONE, MISSING, WIDE, WORSE
+from softjaw.study.run.estimate import CASE, ELEMENT, FACE_GRID, FIRST_FORCE_FACTOR, HARD, estimated, heights
 from softjaw.study.run.load_path import settle
-from softjaw.study.run.plan import Plan, makespan, sensible_ranks, unit_seconds
+from softjaw.study.run.plan import Plan, make_plan, makespan, sensible_ranks, unit_seconds
 from softjaw.study.run.progress import Progress
 from softjaw.study.run.scaling import LoadPath, Machine, replay, replayed
 from softjaw.study.run.shares import by_cost, shares
+from softjaw.study.scene import load_scene
+from tests.study.launching import ROOT
+from tests.study.scenes import OVAL, QUICK, scene_of
 
 CLAIMS = """
 from mpi4py import MPI
@@ -242,3 +247,35 @@ def test_cases_of_earlier_sessions_do_not_count():
     run = Run(already=50)
     assert run.at(9.0, 51) == "51/100 done"
     assert run.at(19.0, 61) == "61/100 done, 1 s/case, 39 s left"
+
+
+# CPU seconds of all load paths as they were measured on one core, compiled code there and loaded.
+MEASURED = {"smoke": 1.24, "box-poses": 3.4, "flask-mesh": 57.0, "bottle-rigid": 86.0}
+
+
+def seconds(station=0, angle=0, forces="[1]"):
+    scene = scene_of(OVAL, *QUICK, stations=f"[{station}]", angles=f"[{angle}]", forces=forces)
+    return estimated(make_plan(scene).units)[0]
+
+
+def test_heights_over_a_pad_are_those_of_a_ball():
+    radius, side = 0.03, 0.02
+    low, high = heights(*Sphere(radius).surface(), (side, side))
+    x, y = (side * ((np.arange(n) + 0.5) / n - 0.5) for n in FACE_GRID)
+    cap = np.sqrt(radius**2 - x[:, None] ** 2 - y**2)
+    np.testing.assert_allclose(high, cap, atol=2e-4)
+    np.testing.assert_allclose(low, -cap, atol=2e-4)
+
+
+def test_a_grasp_costs_what_its_elements_and_forces_cost():
+    one = CASE + ELEMENT * 64  # of one finger, which stands for its image
+    assert seconds() == pytest.approx(FIRST_FORCE_FACTOR * (one - ELEMENT * 48), rel=1e-12)  # a quarter of it
+    assert seconds(angle=30) > seconds()  # no plane of symmetry across the long side
+    assert seconds(forces="[1, 2]") - seconds() == pytest.approx(seconds() / FIRST_FORCE_FACTOR, rel=1e-12)
+    assert seconds(forces="[1, 500]") - seconds() == pytest.approx(HARD * seconds() / FIRST_FORCE_FACTOR, rel=1e-12)
+
+
+@pytest.mark.parametrize("job", sorted(MEASURED))
+def test_the_scenes_that_come_along_are_within_a_factor_of_two(job):
+    found = sum(estimated(make_plan(load_scene(ROOT / "jobs" / f"{job}.toml")).units))
+    assert 0.5 < found / MEASURED[job] < 2.0

@@ -16,31 +16,20 @@ from softjaw.study.run.plan import make_plan
 from softjaw.study.scene import parse_scene
 from softjaw.study.scene.errors import SceneError
 from softjaw.study.scene.samples import latin_hypercube
+from tests.study.scenes import BALL, QUICK, pose_of, scene_of
 
-BALL = """
-[object]
-shape = "sphere"
-radius_mm = 30
-[gripper]
-elements = [8, 4, 3]
-[candidates]
-stations_mm = [0, 10]
-angles_deg = [0]
-[load]
-normal_force_n = [2]
-[accuracy]
-meshes = 1
-[effects]
-friction_pressure_coupling = "none"
-sheet = "rigid"
-[uncertainty]
-samples = 8
-spread = { "friction.mu" = 0.08, gripper.shear_modulus_kpa = 4 }
-"""
+RIGID = "effects.sheet='rigid'"
+SPREAD = ("uncertainty.samples=8", 'uncertainty.spread={ "friction.mu" = 0.08, gripper.shear_modulus_kpa = 4 }')
+PLACES = {"stations": "[0, 10]", "elements": "[8, 4, 3]"}
 
 
-def scene(*overrides):
-    return parse_scene(BALL, "ball.toml", overrides)
+def plain(*changes, **more):
+    """The scene without uncertain inputs."""
+    return scene_of(BALL, *QUICK, RIGID, *changes, **{**PLACES, **more})
+
+
+def scene(*changes, **more):
+    return plain(*SPREAD, *changes, **more)
 
 
 @pytest.fixture(scope="module")
@@ -78,10 +67,9 @@ def test_a_scene_is_solved_as_given_and_with_every_sample():
 
 
 def test_other_inputs_are_another_study_and_no_inputs_none():
-    plain = parse_scene(BALL.partition("[uncertainty]")[0])
-    assert plain.points == [{}]
-    assert [a.name for a in axes(plain)] == ["station", "angle", "normal_force"]
-    digests = {plain.digest, scene().digest, scene("uncertainty.samples=9").digest,
+    assert plain().points == [{}]
+    assert [a.name for a in axes(plain())] == ["station", "angle", "normal_force"]
+    digests = {plain().digest, scene().digest, scene("uncertainty.samples=9").digest,
                scene("uncertainty.spread.friction.mu=0.07").digest}  # fmt: skip
     assert len(digests) == 4
     assert parse_scene(scene().effective_toml()).uncertainty == scene().uncertainty
@@ -121,9 +109,7 @@ def test_a_shift_along_the_axis_is_another_station_and_poses_are_turned_too():
     for one, other in zip(shifted.poses, there.poses, strict=True):
         assert one.origin == pytest.approx(other.origin, abs=1e-15)
     assert (shifted.station, there.station) == (0.0, 0.01)
-    pose = "poses = [{point_mm = [0, 0, 0], approach = [-1, 0, 0], long_side = [0, 0, 1]}]"
-    as_pose = BALL.replace("stations_mm = [0, 10]\nangles_deg = [0]", pose)
-    turned = candidates(parse_scene(as_pose, "ball.toml", ["candidates.roll_deg=30"]))
+    turned = candidates(scene("candidates.roll_deg=30", where=pose_of(approach=(-1, 0, 0))))
     rolled = candidates(scene("candidates.roll_deg=30"))
     assert turned[0].poses[0].rotation == pytest.approx(rolled[0].poses[0].rotation, abs=1e-12)
 
@@ -141,16 +127,15 @@ def test_the_interval_of_an_input_is_its_spread(count):
 
 def test_maps_are_those_of_the_scene_as_given_with_what_the_samples_say(file, tmp_path):
     ds = softjaw.open(file)
-    plain = parse_scene(BALL.partition("[uncertainty]")[0])
-    assert softjaw.run(plain, tmp_path / "plain.hdf") == 0
+    assert softjaw.run(plain(), tmp_path / "plain.hdf") == 0
     given = softjaw.open(tmp_path / "plain.hdf")
     assert ds.e_n.dims == given.e_n.dims
     assert ds.quality.values.tobytes() == given.quality.values.tobytes()
     values = ds.quality_samples.values
     assert values.shape == (*given.status.shape, 8)
-    assert softjaw.press(plain.with_values(scene().points[3]), station=0.0, angle=0.0, force=2.0).value("quality") == (
-        pytest.approx(values[0, 0, 0, 2], rel=1e-12)
-    )
+    assert softjaw.press(plain().with_values(scene().points[3]), station=0.0, angle=0.0, force=2.0).value(
+        "quality"
+    ) == (pytest.approx(values[0, 0, 0, 2], rel=1e-12))
     low, high = np.quantile(values, [0.025, 0.975], axis=-1, method="hazen")
     assert ds.quality_interval.values == pytest.approx((high - low) / 2, rel=1e-12)
     # at the middle of a ball pads face each other: e_n does not depend on mu, and quality goes with its fifth power

@@ -9,13 +9,11 @@ import pytest
 
 from softjaw.study import pipeline
 from softjaw.study.case import wall
-from softjaw.study.case.build import build_object
-from softjaw.study.case.candidates import units
 from softjaw.study.case.effects import SMALL_INDENTATION
 from softjaw.study.case.result import CaseFailure
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import REASONS
-from softjaw.study.scene import parse_scene
+from tests.study.scenes import QUICK, scene_of, units_of
 from tests.study.test_pipeline import differing
 
 CUP = """shape = "revolution"
@@ -42,28 +40,19 @@ z_mm = 70
 a_mm = 24
 b_mm = 20
 """
-COARSE = """[accuracy]
-wall_element_mm = 4
-meshes = 1
-[effects]
-friction_pressure_coupling = "none"
-"""
+COARSE = ("accuracy.wall_element_mm=4", *QUICK)
 WHERE = "stations_mm = [40]\nangles_deg = [0]"
 
 
-def scene_of(shape, *overrides, where=WHERE, forces="[1, 2]", elements="[6, 4, 2]"):
-    text = f"[object]\n{shape}\n[gripper]\nelements = {elements}\n[candidates]\n{where}\n{COARSE}"
-    return parse_scene(text + f"[load]\nnormal_force_n = {forces}\n", "scene.toml", overrides)
-
-
-def units_of(*arguments, **choices):
-    return units(scene_of(*arguments, **choices), lambda point: build_object(point.object).axis_symmetry)
+def walled(shape, *changes, where=WHERE, forces="[1, 2]", elements="[6, 4, 2]"):
+    """Units of the scene of a wall."""
+    return units_of(scene_of(shape, *COARSE, *changes, where=where, forces=forces, elements=elements))
 
 
 @lru_cache(maxsize=32)
 def solved(*arguments, **choices):
     """Results of the first unit, force by force."""
-    return [result for _, result in pipeline.solve_unit(units_of(*arguments, **choices)[0])]
+    return [result for _, result in pipeline.solve_unit(walled(*arguments, **choices)[0])]
 
 
 def test_the_level_follows_the_indentation_and_says_so():
@@ -138,7 +127,7 @@ def test_a_tilted_approach_keeps_one_plane_and_one_along_the_axis_is_refused():
 
 def test_images_of_a_grasp_are_what_their_own_solution_would_be():
     where = "stations_mm = [40]\nangles_deg = [0, 37]"
-    unit = units_of(CUP, where=where)[0]
+    unit = walled(CUP, where=where)[0]
     assert len(unit.rows) == 2
     image = pipeline.image(solved(CUP, where=where)[-1], unit, 1)
     own = solved(CUP, where="stations_mm = [40]\nangles_deg = [37]")[-1]
@@ -149,7 +138,7 @@ def test_images_of_a_grasp_are_what_their_own_solution_would_be():
 
 def test_results_do_not_depend_on_what_was_solved_before():
     where = "stations_mm = [25, 40]\nangles_deg = [0]"
-    one, two = units_of(CUP, "effects.object='linear_shell'", where=where)
+    one, two = walled(CUP, "effects.object='linear_shell'", where=where)
 
     def run(order):
         wall.object_factors.cache_clear()
@@ -164,8 +153,7 @@ def test_results_do_not_depend_on_what_was_solved_before():
 def test_two_meshes_tell_the_error_and_a_sweep_reaches_the_wall():
     result = solved(CUP, "accuracy.meshes=2", forces="[2]", elements="[8, 8, 4]")[0]
     assert 0 < result.values["maps/e_n_error"] < 0.3
-    sweep = '[sweep]\n"object.wall_mm" = [0.4, 0.8]\n'
-    one, two = units_of(CUP, forces=f"[1]\n{sweep}")
+    one, two = walled(CUP, "sweep.object.wall_mm=[0.4, 0.8]", forces="[1]")
     indentations = [next(iter(pipeline.solve_unit(u)))[1].values["maps/indentation"] for u in (one, two)]
     assert indentations[0] > 2 * indentations[1]
 
@@ -188,7 +176,7 @@ def test_a_collapse_fails_the_case_and_those_above_with_the_reason(monkeypatch):
     from softjaw.fem.shell.opening import Opening
 
     monkeypatch.setattr(Opening, "__call__", lambda self, q: 1.0 - 1e3 * float(np.abs(q).max()))
-    path = [r for _, r in pipeline.solve_unit(units_of(CUP, "accuracy.meshes=1", forces="[0.2, 3, 4]")[0])]
+    path = [r for _, r in pipeline.solve_unit(walled(CUP, forces="[0.2, 3, 4]")[0])]
     assert not isinstance(path[0], CaseFailure)
     assert "the wall collapsed: its opposite sides meet at" in path[1].message
     assert "the last good force is 0.2 N" in path[1].message

@@ -8,9 +8,8 @@ import numpy as np
 
 from softjaw.study.case.result import CaseResult
 from softjaw.study.quantities import Axis
-from softjaw.study.result.layout import Header, Layout
-from softjaw.study.result.write import ResultWriter, record
-from tests.study.formula_results import OBJECT, fresh
+from softjaw.study.result.layout import Layout
+from tests.study.formula_results import OBJECT, written
 
 GRID = (4, 4)  # faces of a pad's front: elements = [2, 2, 2] of eight nodes
 SIZE = (0.05, 0.022, 0.015)
@@ -86,12 +85,10 @@ def solved(layout, index):
 def make(path, scene=SCENE, patches=True, failed=FAILED):
     """A file of 3 stations x 2 angles x 2 forces; one case has failed, (0, 0, 1) is missing."""
     layout = Layout(axes(), int(np.prod(GRID)), patches=patches)
-    fresh(path, layout, Header("d" * 64, scene, "<b>thing</b>", "scene.toml"))
-    writer = ResultWriter(path, layout, None)
-    for row, index in enumerate(np.ndindex(layout.shape)):
+
+    def case(index):
         if index == failed:
-            writer.fail(row, "no </script> convergence")
-        elif index != (0, 0, 1):
-            writer.write(row, record(layout, solved(layout, index)))
-    writer.close()
-    return path
+            return "no </script> convergence"
+        return None if index == (0, 0, 1) else solved(layout, index)
+
+    return written(path, layout, case, scene, "<b>thing</b>")

@@ -9,8 +9,6 @@ from softjaw.fem.materials import material
 from softjaw.fem.objects.shapes import EllipticCylinder
 from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.pad.shape import PadShape
-from softjaw.friction.frame import FrameFlag, contact_frame, in_frame
-from softjaw.friction.wrench import friction_limits
 from tests.fem import reference
 
 FOAM = material("blatz_ko", 0.040e6)
@@ -125,16 +123,3 @@ def test_nodal_contact_keeps_force_and_centre(element):
     force = (patch.load[:, None] * patch.normal).sum(axis=0)
     assert force == pytest.approx([0, 0, 10], rel=1e-9, abs=1e-9)
     assert np.abs((patch.load[:, None] * patch.centroid).sum(axis=0)[:2]).max() < 1e-12
-
-
-def test_the_contact_frame_of_a_symmetric_patch(whole):
-    """Its origin lies on the approach, its normal along it, whatever the mesh, and nothing is flagged."""
-    _, _, _, patch = whole
-    frame = contact_frame(patch, [1, 0, 0])
-    assert frame.flag == FrameFlag.CLEAN
-    assert np.abs(frame.axes - np.eye(3)).max() < 1e-9
-    assert np.abs(frame.origin[:2]).max() < 1e-12
-    limits = friction_limits(in_frame(patch, frame), 0.8)
-    assert limits.F_N == pytest.approx(10, rel=1e-3)
-    assert limits.f_x >= 0.8 * limits.F_N
-    assert limits.f_y <= 0.8 * limits.S

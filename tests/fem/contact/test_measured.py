@@ -10,7 +10,7 @@ from softjaw.fem.contact.press import Press
 from softjaw.fem.materials import material
 from softjaw.fem.objects.gap import NoContactError
 from softjaw.fem.objects.measured_face import cell_of, measured_face
-from softjaw.fem.objects.shapes import EllipticCylinder, Sphere
+from softjaw.fem.objects.shapes import EllipticCylinder
 from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.pad.shape import PadShape
 from softjaw.study.case.contact import Contact
@@ -18,8 +18,6 @@ from tests.fem import reference
 
 SIZE, FOAM, NOISE = (0.050, 0.022, 0.015), material("blatz_ko", 0.040e6), 1e-4
 CYLINDER = reference.placed(EllipticCylinder(0.025, 0.025, 0.2), reference.facing(0.025))
-OVAL = reference.placed(EllipticCylinder(0.020, 0.035, 0.2), reference.facing(0.020))
-BALL = reference.placed(Sphere(0.030), reference.facing(0.030))
 
 
 def pad_of(elements, contact="blended"):
@@ -32,16 +30,12 @@ def pressed(gap, force, elements):
     return pad, state
 
 
-def seen(pad, state, contour, noise, seed, across=101, along=41):
-    """Points of the deformed face, seen from the backing plate: of its middle line across, or of all of it."""
+def seen(pad, state):
+    """Points all over the deformed face, seen from the backing plate."""
     face = (state.contact_face - [0, 0, state.closing]).reshape(*pad.contact_grid, 3)
     lines = [np.arange(n) for n in face.shape[:2]]
-    at = [np.linspace(0, n - 1, many) for n, many in zip(face.shape, (along, across), strict=False)]
-    if contour:
-        at[0] = [(face.shape[0] - 1) / 2]
-    points = RegularGridInterpolator(lines, face)(np.stack(np.meshgrid(*at, indexing="ij"), -1)).reshape(-1, 3)
-    points += noise * np.random.default_rng(seed).normal(size=points.shape)
-    return points[:, 1:] if contour else points
+    at = [np.linspace(0, n - 1, many) for n, many in zip(face.shape, (41, 101), strict=False)]
+    return RegularGridInterpolator(lines, face)(np.stack(np.meshgrid(*at, indexing="ij"), -1)).reshape(-1, 3)
 
 
 def solved_again(points, elements):
@@ -111,7 +105,7 @@ def test_a_face_that_is_pressed_in_nowhere_touches_nothing():
 def test_an_exact_face_gives_back_its_pressures():
     """On the same mesh, without noise: what is left is the spline's own error."""
     pad, state = pressed(CYLINDER, 5.0, (6, 6, 2))
-    again = solved_again(seen(pad, state, contour=False, noise=0.0, seed=0), (6, 6, 2))
+    again = solved_again(seen(pad, state), (6, 6, 2))
     assert again.judged
     assert of_contact(again.state.pad, again.state) == pytest.approx(of_contact(pad, state), rel=0.02)
     assert again.state.closing == pytest.approx(state.closing, rel=0.03)
@@ -138,24 +132,3 @@ def test_a_lifted_face_has_the_derivatives_of_what_it_adds():
         (g1, n1, _), (g0, n0, _) = face.gap(X + d), face.gap(X - d)
         assert (g1 - g0) / 2e-6 == pytest.approx(gradient[:, k], abs=1e-8)
         assert (n1 - n0) / 2e-6 == pytest.approx(hessian[:, :, k], abs=1e-3)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(("gap", "force", "contour", "most_S", "most_e_n"), [
-    (CYLINDER, 6.0, True, 0.10, 0.05), (CYLINDER, 6.0, False, 0.10, 0.05), (OVAL, 6.0, True, 0.10, 0.05),
-    (BALL, 6.0, False, 0.10, 0.05), (CYLINDER, 2.0, True, 0.20, 0.05), (BALL, 2.0, False, 0.10, 0.10),
-], ids=lambda value: "" if callable(value) else str(value))  # fmt: skip
-def test_a_noisy_face_gives_e_n_within_5_percent_and_S_within_10(gap, force, contour, most_S, most_e_n):
-    """Noise of 0.1 mm, from a finer mesh than it is solved on.
-
-    At 2 N the cylinder is pressed in by no more than five times the noise: S within 20 %. The ball's contact lies then
-    in few points: e_n within 10 %.
-    """
-    pad, state = pressed(gap, force, (24, 14, 7))
-    S, e_n = of_contact(pad, state)
-    for seed in (1, 2, 3):
-        again = solved_again(seen(pad, state, contour, NOISE, seed), (20, 10, 6))
-        found = of_contact(again.state.pad, again.state)
-        print(f"S {found[0] / S - 1:+.2%}, e_n {found[1] / e_n - 1:+.2%}, closing {1e3 * state.closing:.3g} mm")
-        assert found[0] == pytest.approx(S, rel=most_S)
-        assert found[1] == pytest.approx(e_n, rel=most_e_n)

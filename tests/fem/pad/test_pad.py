@@ -71,16 +71,6 @@ def test_front_nodes_run_along_the_width_first(element, elements, symmetry):
     assert (np.diff(middle[..., 1], axis=2) > 0).all()
 
 
-def test_the_closing_moves_the_back_and_nothing_else(element):
-    pad = Pad(PadShape(SIZE, (2, 2, 2), element=element), FOAM)
-    x = np.zeros(pad.size)
-    x[pad.closing_dof] = 1e-3
-    u = pad.displacement(x)
-    back = np.isclose(pad.nodes[:, 2], -SIZE[2])
-    assert (u[back] == [0, 0, 1e-3]).all()
-    assert not u[~back].any()
-
-
 def test_grading():
     shape = PadShape(SIZE, (8, 6, 5), (4.0, 1.0, 3.0))
     x, y, z = (np.diff(shape.lines(axis, False)) for axis in range(3))

@@ -70,18 +70,6 @@ def test_a_part_of_a_tube_has_the_stresses_of_the_whole(planes):
     assert ring(0.003, planes) == pytest.approx(ring(0.003), rel=1e-6)
 
 
-def test_a_pinched_cylinder_with_diaphragms_meets_the_published_displacement():
-    """164.24 P / (E t) under the load (MacNeal and Harder, 1985)."""
-    thickness, length = R / 100.0, 2.0 * R
-    body = tube(thickness, length, 0.3, R * np.pi / 64, length / 32, PLANES[0])
-    mesh = body[0].mesh
-    rims = np.unique(mesh.number[:, [0, -1]])
-    body[1].reshape(-1, 6)[np.ix_(rims, [0, 1, 3, 4])] = True
-    weight = np.where(np.arange(len(mesh.s)) == len(mesh.s) // 2, 1.0, 0.0)
-    u = inward(body, squeezed(body, weight), len(mesh.s) // 2)
-    assert u == pytest.approx(164.24 * F / (E * thickness), rel=0.015)
-
-
 def test_a_clamped_tube_is_held_at_both_ends_and_a_standing_one_at_its_lower_rim():
     for support, rims in (("clamped", [0, -1]), ("standing", [0])):
         body = tube(5e-4, 0.04, 0.3, 0.006, 0.008, PLANES[3], support)

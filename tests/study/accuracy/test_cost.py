@@ -9,28 +9,16 @@ import pytest
 
 import softjaw
 from softjaw.study.accuracy.cost import cost_scene, mesh_sweep, settings_in
-from softjaw.study.case.candidates import axes, units
+from softjaw.study.case.candidates import axes
 from softjaw.study.cli import main
 from softjaw.study.messages import DONE
 from softjaw.study.scene import Scene, parse_scene
 from softjaw.study.scene.errors import SceneError
+from tests.study.scenes import BALL, text_of, units_of
 
 JOBS = Path(__file__).parents[3] / "jobs"
-BALL = """
-[object]
-shape = "sphere"
-radius_mm = 30
-[gripper]
-elements = [8, 4, 2]
-[candidates]
-stations_mm = [-10, -5, 0, 5, 10]
-angles_deg = [0, 90]
-[load]
-normal_force_n = [1, 2, 3, 4, 5]
-[effects]
-friction_pressure_coupling = "none"
-sheet = "rigid"
-"""
+SCENE = text_of(BALL, stations="[-10, -5, 0, 5, 10]", angles="[0, 90]", forces="[1, 2, 3, 4, 5]")
+SCENE += '[effects]\nfriction_pressure_coupling = "none"\nsheet = "rigid"\n'
 SHORT = ["candidates.stations_mm=[0, 10]", "load.normal_force_n=[2]", "gripper.elements=[6, 4, 2]"]
 
 
@@ -38,7 +26,7 @@ SHORT = ["candidates.stations_mm=[0, 10]", "load.normal_force_n=[2]", "gripper.e
 def file(tmp_path_factory):
     """Of the command itself."""
     folder = tmp_path_factory.mktemp("cost")
-    (folder / "ball.toml").write_text(BALL)
+    (folder / "ball.toml").write_text(SCENE)
     words = [word for change in SHORT for word in ("--set", change)]
     assert main(["cost", str(folder / "ball.toml"), "-o", str(folder / "c.hdf"), *words]) == DONE
     return folder / "c.hdf"
@@ -48,7 +36,7 @@ def file(tmp_path_factory):
 
 
 def test_a_few_cases_are_solved_on_coarser_and_finer_meshes_of_both_kinds():
-    scene = cost_scene(parse_scene(BALL))
+    scene = cost_scene(parse_scene(SCENE))
     assert scene.sweep == {
         "gripper.elements": ((4, 2, 2), (6, 2, 2), (8, 4, 2), (12, 6, 3)), "gripper.element": ("hex8", "hex27"),
     }  # fmt: skip
@@ -56,7 +44,7 @@ def test_a_few_cases_are_solved_on_coarser_and_finer_meshes_of_both_kinds():
     assert scene.candidates.angles_deg == (0,)
     assert scene.load.normal_force_n == (1, 3, 5)
     assert (scene.run.patches, scene.cases) == ("none", 8 * 9)
-    made = units(scene, lambda point: point.axis_symmetry)
+    made = units_of(scene)
     assert {(u.scene.gripper.elements, u.scene.gripper.element) for u in made} == {
         (n, kind) for n in scene.sweep["gripper.elements"] for kind in scene.sweep["gripper.element"]
     }
@@ -79,7 +67,7 @@ def test_what_makes_a_study_long_is_left_out_and_poses_are_spread():
 
 
 def test_the_scene_s_own_sweep_stays():
-    scene = cost_scene(parse_scene(BALL, "x.toml", ["sweep.accuracy.contact=['weighted', 'nodal']"]))
+    scene = cost_scene(parse_scene(SCENE, "x.toml", ["sweep.accuracy.contact=['weighted', 'nodal']"]))
     assert scene.sweep == {"accuracy.contact": ("weighted", "nodal")}
 
 
@@ -88,14 +76,14 @@ def test_the_scene_s_own_sweep_stays():
 )
 def test_lists_are_swept_where_each_is_one_that_the_key_takes(value):
     with pytest.raises(SceneError, match=r"gripper\.elements"):
-        parse_scene(BALL, "x.toml", ['run.patches="none"', f"sweep.gripper.elements={value}"])
+        parse_scene(SCENE, "x.toml", ['run.patches="none"', f"sweep.gripper.elements={value}"])
 
 
 def test_meshes_are_swept_only_where_no_faces_are_stored():
     both = ["sweep.gripper.elements=[[4, 2, 2], [8, 4, 2]]"]
     with pytest.raises(SceneError, match="patches"):
-        parse_scene(BALL, "x.toml", both)
-    scene = parse_scene(BALL, "x.toml", [*both, 'run.patches="none"'])
+        parse_scene(SCENE, "x.toml", both)
+    scene = parse_scene(SCENE, "x.toml", [*both, 'run.patches="none"'])
     assert axes(scene)[0].options == ("4 x 2 x 2", "8 x 4 x 2")
 
 

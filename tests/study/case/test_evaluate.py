@@ -22,11 +22,11 @@ from softjaw.study.case.task import Task
 from softjaw.study.case.topology import topology
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import MODELS, TABLE, misses
-from softjaw.study.scene import parse_scene
 from softjaw.study.scene.objects import SphereShape
 from softjaw.study.units import GRAVITY
 from tests.friction.closed_forms import cylinder_torque
 from tests.generators import cylinder_grid
+from tests.study.scenes import BOX, scene_of
 
 MU, R, ANGLE, LENGTH, PRESSURE, DISTANCE = 0.5, 0.03, math.pi / 3, 0.04, 2e4, 0.06
 S, F_N = 2 * R * ANGLE * LENGTH * PRESSURE, 2 * R * math.sin(ANGLE) * LENGTH * PRESSURE
@@ -91,15 +91,13 @@ def test_arms_are_scaled_along_the_axes_of_the_object(angle):
 
 
 def test_extents_scale_arms_each_along_its_axis_or_the_longest_along_all():
-    text = '[object]\nshape = "box"\nsize_mm = [50, 40, 120]\nedge_radius_mm = 4\n'
-    text += "[candidates]\nstations_mm = [0]\nangles_deg = [0]\n[load]\nnormal_force_n = [2]"
     for overrides, arms, torques in (
         ([], [0.05, 0.04, 0.12], 0.05),
         (['score.object_length_mm="longest"'], [0.12] * 3, 0.05),
         (["score.object_length_mm=80"], [0.08] * 3, 0.05),
         (['score.contact_length_mm="object"'], [0.05, 0.04, 0.12], 0.12),
     ):
-        scene = parse_scene(text, overrides=overrides)
+        scene = scene_of(BOX, *overrides)
         found = lengths(scene, build_object(scene.object))
         assert found[0] == pytest.approx(arms, rel=1e-12)
         assert found[1] == pytest.approx(torques, rel=1e-12)

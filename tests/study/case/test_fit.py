@@ -6,35 +6,21 @@ import numpy as np
 import pytest
 import trimesh
 
-from softjaw.study.case.candidates import decided, units
+from softjaw.study.case.candidates import decided
 from softjaw.study.case.fit import Jaws, extremes, fit_of
 from softjaw.study.quantities import COLLIDES, MISSING, WIDE
 from softjaw.study.run.plan import make_plan
 from softjaw.study.scene import SceneError, parse_scene
+from tests.study.scenes import OVAL, pose_of, text_of, units_of
 
 PAD = (0.05, 0.022, 0.015)
-ELLIPSE = """
-[object]
-shape = "elliptic_cylinder"
-semi_axis_a_mm = 25
-semi_axis_b_mm = 20
-length_mm = 80
-[gripper]
-{gripper}
-[load]
-normal_force_n = [1, 2]
-[candidates]
-"""
-GRID = ELLIPSE + "stations_mm = [-5, 10]\nangles_deg = [0, 90]\n"
-POSES = ELLIPSE + "".join(
-    f"[[candidates.poses]]\npoint_mm = [0, 0, 0]\napproach = {way}\nlong_side = [0, 0, 1]\n"
-    for way in ([1, 0, 0], [0, 1, 0])
-)
+ELLIPSE = OVAL.replace("120", "80")
+GRID = text_of(ELLIPSE, "stations_mm = [-5, 10]\nangles_deg = [0, 90]\n", forces="[1, 2]")
+POSES = text_of(ELLIPSE, pose_of() + pose_of(approach=(0, 1, 0)), forces="[1, 2]")
 
 
-def states(text, gripper="", overrides=()):
-    scene = parse_scene(text.format(gripper=gripper), overrides=list(overrides))
-    return [unit.state for unit in decided(units(scene, lambda point: point.axis_symmetry))]
+def states(text, *changes):
+    return [unit.state for unit in decided(units_of(parse_scene(text, overrides=changes)))]
 
 
 def test_extremes_of_triangles_are_at_their_corners_and_where_they_leave_the_rectangle():
@@ -60,17 +46,17 @@ def test_the_opening_round_a_ball_is_its_chord(shift):
 def test_candidates_of_every_kind_are_too_wide_where_they_are(scene):
     per = 2 if scene == GRID else 1
     assert states(scene) == [MISSING] * 2 * per
-    assert states(scene, "max_opening_mm = 45") == [WIDE, MISSING] * per
-    assert states(scene, "max_opening_mm = 39") == [WIDE, WIDE] * per
+    assert states(scene, "gripper.max_opening_mm=45") == [WIDE, MISSING] * per
+    assert states(scene, "gripper.max_opening_mm=39") == [WIDE, WIDE] * per
 
 
 def test_what_rounding_decides_is_solved():
-    assert states(POSES, "max_opening_mm = 40") == [WIDE, MISSING]
-    assert states(POSES, "max_opening_mm = 39.999999999") == [WIDE, MISSING]
+    assert states(POSES, "gripper.max_opening_mm=40") == [WIDE, MISSING]
+    assert states(POSES, "gripper.max_opening_mm=39.999999999") == [WIDE, MISSING]
 
 
 def test_each_point_of_a_sweep_decides_for_itself():
-    scene = parse_scene(POSES.format(gripper="max_opening_mm = 45") + "[sweep]\n'object.semi_axis_a_mm' = [21, 25]\n")
+    scene = parse_scene(POSES, overrides=["gripper.max_opening_mm=45", "sweep.object.semi_axis_a_mm=[21, 25]"])
     found = make_plan(scene).units
     assert [unit.state for unit in found] == [MISSING, MISSING, WIDE, MISSING]
     assert [row for unit in found if unit.state for rows in unit.rows for row in rows] == [4, 5]
@@ -78,26 +64,29 @@ def test_each_point_of_a_sweep_decides_for_itself():
 
 def test_a_finger_that_is_larger_than_the_pad_runs_into_a_step():
     """A pad on the waist of a dumb-bell whose heads stand 20 mm above it."""
-    text = """
-[object]
-shape = "revolution"
-profile_mm = [[0, 40], [10, 40], [20, 40], [25, 30], [30, 20], [40, 20], [50, 20], [60, 20], [70, 20], [75, 30],
-              [80, 40], [90, 40], [100, 40]]
-[gripper]
-pad_length_mm = 20
-pad_thickness_mm = {gripper}
-[candidates]
-stations_mm = [50]
-[load]
-normal_force_n = [1]
-"""
-    finger = "\nfinger_size_mm = [70, 22]"
-    assert states(text, "15") == [MISSING]
-    assert states(text, f"15{finger}") == [COLLIDES]
-    assert states(text, f"25{finger}") == [MISSING]
+    corners = [
+        (0, 40),
+        (10, 40),
+        (20, 40),
+        (25, 30),
+        *((z, 20) for z in range(30, 80, 10)),
+        (75, 30),
+        (80, 40),
+        (90, 40),
+    ]
+    outline = [list(corner) for corner in (*corners, (100, 40))]
+    text = text_of(f'shape = "revolution"\nprofile_mm = {outline}', stations="[50]", forces="[1]")
+    finger = "gripper.finger_size_mm=[70, 22]"
+
+    def state(thickness, *more):
+        return states(text, "gripper.pad_length_mm=20", f"gripper.pad_thickness_mm={thickness}", *more)
+
+    assert state(15) == [MISSING]
+    assert state(15, finger) == [COLLIDES]
+    assert state(25, finger) == [MISSING]
 
 
 def test_a_finger_is_at_least_as_large_as_its_pad():
     with pytest.raises(SceneError) as refused:
-        parse_scene(GRID.format(gripper="finger_size_mm = [40, 22]"))
+        parse_scene(GRID, overrides=["gripper.finger_size_mm=[40, 22]"])
     assert refused.value.problems[0].key == "gripper.finger_size_mm"

@@ -1,4 +1,4 @@
-"""Meshes through whole cases: poses are those of the mesh's own file, mirrored meshes mirror, facets are the body."""
+"""Whole cases of meshes: poses in the frame of the file, mirror images, facets, triangles as users have them."""
 
 from __future__ import annotations
 
@@ -6,31 +6,22 @@ import numpy as np
 import pytest
 import trimesh
 
+import softjaw as sj
 from softjaw.study import pipeline
-from softjaw.study.case.candidates import units
+from softjaw.study.case.build import build_object
+from softjaw.study.case.candidates import candidates
+from softjaw.study.case.model import approach, image_signs
+from softjaw.study.case.pressing import OnRigid
 from softjaw.study.result.read import open as open_dataset
 from softjaw.study.result.skeleton import create
 from softjaw.study.run.plan import make_plan
-from softjaw.study.scene import parse_scene
+from tests.fem.test_triangles import KINDS
+from tests.objects.bodies import outline_body, slabs
+from tests.study.scenes import BALL, NO_COUPLING, mesh_of, pose_of, results_of, scene_of, units_of
 
 TURN = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])  # the object's z is the file's x
 SHIFT = np.array([120.0, -45.0, 30.0])  # mm
-SCENE = """
-[object]
-shape = "mesh"
-mesh = "{mesh}"
-unit = "mm"
-axis = "{axis}"
-[gripper]
-elements = [4, 4, 2]
-{candidates}
-[load]
-normal_force_n = [2]
-[effects]
-friction_pressure_coupling = "none"
-"""
-GRID = "[candidates]\nstations_mm = [40]\nangles_deg = [0]"
-POSE = "[[candidates.poses]]\npoint_mm = {point}\napproach = {approach}\nlong_side = {long_side}"
+GRID = "stations_mm = [40]\nangles_deg = [0]\n"
 
 
 @pytest.fixture(scope="module")
@@ -46,19 +37,19 @@ def files(tmp_path_factory):
     return folder
 
 
-def scene(files, name, candidates=GRID):
-    return parse_scene(SCENE.format(mesh=files / f"{name}.stl", axis="xz"[name == "upright"], candidates=candidates))
+def scene(files, name, where=GRID):
+    shape = mesh_of(files / f"{name}.stl") + f'\naxis = "{"xz"[name == "upright"]}"'
+    return scene_of(shape, NO_COUPLING, where=where, elements="[4, 4, 2]")
 
 
-def solved(found):
-    [unit] = units(found, lambda point: 1)
+def solved(made):
+    [unit] = units_of(made)
     [(_, result)] = pipeline.solve_unit(unit)
     return pipeline.image(result, unit, 0).values
 
 
 def explicit(turn, shift):
-    point, approach, long_side = turn @ [0.0, 0, 40] + shift, turn @ [-1.0, 0, 0], turn @ [0.0, 0, 1]
-    return POSE.format(point=point.tolist(), approach=approach.tolist(), long_side=long_side.tolist())
+    return pose_of(turn @ [0.0, 0, 40] + shift, turn @ [-1.0, 0, 0], turn @ [0.0, 0, 1])
 
 
 def test_a_mesh_that_was_moved_in_its_file_has_its_grasps_moved(files):
@@ -89,34 +80,17 @@ def test_the_file_states_the_frame_in_which_stations_count(files, tmp_path):
 # --- facets -----------------------------------------------------------------------------------------------------------
 
 
-FACETS = """
-[object]
-{}
-[gripper]
-pad_length_mm = 30
-pad_width_mm = 20
-pad_thickness_mm = 12
-shear_modulus_kpa = 40
-elements = {}
-[friction]
-mu = 0.8
-[candidates]
-stations_mm = [{}]
-angles_deg = [{}]
-[load]
-normal_force_n = [2]
-"""
+PAD = ("gripper.pad_length_mm=30", "gripper.pad_width_mm=20", "gripper.pad_thickness_mm=12")
 
 
 def mesh(body, folder, name):
     body.export(folder / f"{name}.stl")
-    return f'shape = "mesh"\nmesh = "{folder / name}.stl"\nunit = "mm"'
+    return mesh_of(folder / f"{name}.stl")
 
 
 def solved_shape(shape, elements=(10, 6, 4), station=0.0, angle=0.0):
-    scene = parse_scene(FACETS.format(shape, list(elements), station, angle))
-    (unit,) = units(scene, lambda point: point.axis_symmetry)
-    ((_, result),) = pipeline.solve_unit(unit)
+    place = {"stations": f"[{station}]", "angles": f"[{angle}]", "elements": list(elements)}
+    [result] = results_of(scene_of(shape, *PAD, **place))
     return result
 
 
@@ -141,6 +115,55 @@ def test_a_mirrored_mesh_gives_mirrored_results(tmp_path):
 @pytest.mark.long
 def test_a_ball_of_facets_is_the_ball(tmp_path):
     facets = trimesh.creation.uv_sphere(30, count=[25, 48])
-    ball = solved_shape('shape = "sphere"\nradius_mm = 30', (20, 14, 6))
+    ball = solved_shape(BALL, (20, 14, 6))
     found = solved_shape(mesh(facets, tmp_path, "ball"), (20, 14, 6), station=30)
     assert found.values["maps/quality"] == pytest.approx(ball.values["maps/quality"], rel=5e-3)
+
+
+@pytest.fixture(scope="module")
+def lopsided(tmp_path_factory):
+    """A lopsided ball: before one finger it is the mirror image of what is before the other, in single precision."""
+    path = tmp_path_factory.mktemp("mesh") / "ball.stl"
+    mesh = trimesh.creation.icosphere(4, 0.03)
+    x, y, z = mesh.vertices.T
+    mesh.vertices = np.column_stack([x, y * (1 + 4 * y), z * (1 + 3 * z)])
+    mesh.export(path)
+    return scene_of(mesh_of(path, "m"), NO_COUPLING, where=pose_of((0, 0, 4)), forces="[4]", elements="[6, 4, 2]")
+
+
+def test_the_other_finger_is_the_mirror_image(lopsided):
+    """Beyond the mesh's own asymmetry of facets it is x of the object that changes its sign: y of the pad."""
+    poses = candidates(lopsided)[0].poses
+    _, other = fingers = [approach(build_object(lopsided.object), pose, lopsided.gripper) for pose in poses]
+    assert image_signs(*fingers, lopsided.gripper.pad_size) == (1, -1)
+    both = OnRigid(lopsided, fingers, poses, coarser=False)
+    assert len(both.parts) == 1
+    _, other = both.contacts([next(part.load_path([4.0])) for part in both.parts])
+    alone = OnRigid(lopsided, fingers[::-1], poses[::-1], coarser=False)
+    solved, _ = alone.contacts([next(part.load_path([4.0])) for part in alone.parts])
+    for name in ("f_x", "f_y", "tau_z", "e_n"):
+        assert getattr(other.limits["ccm"], name) == pytest.approx(getattr(solved.limits["ccm"], name), rel=1e-4)
+    np.testing.assert_allclose(other.origin, solved.origin, atol=1e-6)
+    np.testing.assert_allclose(other.normal, solved.normal, atol=1e-4)
+    np.testing.assert_allclose(other.pressure_wrench, solved.pressure_wrench, atol=1e-4)
+
+
+def values(folder, name: str, mesh: trimesh.Trimesh) -> np.ndarray:
+    """e_n [m], quality and payload [kg] of one grasp."""
+    mesh.export(folder / f"{name}.stl")
+    shape, where = mesh_of(folder / f"{name}.stl", "m"), pose_of((0, 0, 55), (-1, 0, 0))
+    case = sj.press(scene_of(shape, where=where, forces="[5]", elements="[16, 8, 5]"), candidate=0, force=5.0)
+    return np.array([case.e_n, case.quality, case.payload])
+
+
+@pytest.fixture(scope="module")
+def sound(tmp_path_factory):
+    return values(tmp_path_factory.mktemp("sound"), "closed", outline_body())
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("kind", [*KINDS, "slabs"])
+def test_the_map_does_not_depend_on_how_the_triangles_are_given(kind, sound, tmp_path):
+    body = outline_body()
+    mesh = slabs(5) if kind == "slabs" else trimesh.Trimesh(*KINDS[kind](body.vertices, body.faces), process=False)
+    np.testing.assert_allclose(values(tmp_path, "other", mesh), sound, rtol=5e-3)

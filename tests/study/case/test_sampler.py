@@ -17,6 +17,7 @@ from softjaw.study.run.shares import shares
 from softjaw.study.scene import SceneError, parse_scene
 from softjaw.study.units import GRAVITY
 from tests.objects.bodies import hollow_bowl
+from tests.study.scenes import BOX, OVAL, pose_of, scene_of, text_of
 
 PAD = (0.05, 0.022, 0.015)
 JAWS = Jaws(PAD, stiffness=8e6, mu=0.8, force=5.0)
@@ -167,24 +168,12 @@ def test_grasps_are_spread_over_the_places_of_an_object():
     assert max(np.diff(heights)) < 0.05
 
 
-SCENE = """
-[object]
-shape = "box"
-size_mm = [40, 60, 120]
-edge_radius_mm = 4
-[gripper]
-max_opening_mm = {opening}
-[friction]
-[load]
-normal_force_n = [2, 5]
-[candidates]
-sampled = 3
-{more}
-"""
+SLAB = BOX.replace("50, 40", "40, 60")
 
 
 def sampled_scene(opening=50, more=""):
-    return with_sampled_grasps(parse_scene(SCENE.format(opening=opening, more=more)))
+    text = text_of(SLAB, f"sampled = 3\n{more}", forces="[2, 5]")
+    return with_sampled_grasps(parse_scene(text, overrides=[f"gripper.max_opening_mm={opening}"]))
 
 
 @pytest.mark.long
@@ -207,43 +196,28 @@ def test_a_scene_without_a_grasp_between_the_pads_is_refused():
 @pytest.mark.parametrize("more", ["angles_deg = [0]", "stations_mm = [20]"])
 def test_a_sampler_excludes_stations(more):
     with pytest.raises(SceneError) as refused:
-        parse_scene(SCENE.format(opening=50, more=more))
+        sampled_scene(more=more)
     assert any("candidates" in problem for problem in map(str, refused.value.problems))
 
 
 # --- which candidates are solved --------------------------------------------------------------------------------------
 
 
-ROUND = """
-[object]
-shape = "elliptic_cylinder"
-semi_axis_a_mm = 30
-semi_axis_b_mm = 30
-length_mm = 100
-[gripper]
-elements = [8, 4, 2]
-pad_length_mm = 20
-[friction]
-mu = {mu}
-[load]
-normal_force_n = [1, 2]
-[candidates]
-{more}
-"""
-POSE = "[[candidates.poses]]\npoint_mm = [0, {y}, 0]\napproach = [1, 0, 0]\nlong_side = [0, 0, 1]\n"
+ROUND = OVAL.replace("25", "30").replace("20", "30", 1)
 
 
-def units(more, mu=0.8):
-    return make_plan(parse_scene(ROUND.format(more=more, mu=mu)), ordered=True).units
+def solved_or_not(more, mu=0.8):
+    changes = "gripper.pad_length_mm=20", f"friction.mu={mu}", "object.length_mm=100"
+    return make_plan(scene_of(ROUND, *changes, where=f"{more}\n", forces="[1, 2]"), ordered=True).units
 
 
 def test_only_the_best_are_solved_and_each_has_its_place():
-    poses = "".join(POSE.format(y=y) for y in (0, 12, 24))
-    assert [u.state for u in units(poses)] == [MISSING] * 3
-    assert [u.state for u in units(f"solve_best = 1\n{poses}")] == [MISSING, WORSE, WORSE]
-    assert [u.state for u in units(f"solve_best = 2\n{poses}")][::2] == [MISSING, WORSE]
-    assert [u.state for u in units(f"solve_best = 7\n{poses}")] == [MISSING] * 3
-    stations = units("stations_mm = [-20, 0, 20]\nangles_deg = [0, 90]\nsolve_best = 2")
+    poses = "".join(pose_of((0, y, 0)) for y in (0, 12, 24))
+    assert [u.state for u in solved_or_not(poses)] == [MISSING] * 3
+    assert [u.state for u in solved_or_not(f"solve_best = 1\n{poses}")] == [MISSING, WORSE, WORSE]
+    assert [u.state for u in solved_or_not(f"solve_best = 2\n{poses}")][::2] == [MISSING, WORSE]
+    assert [u.state for u in solved_or_not(f"solve_best = 7\n{poses}")] == [MISSING] * 3
+    stations = solved_or_not("stations_mm = [-20, 0, 20]\nangles_deg = [0, 90]\nsolve_best = 2")
     assert [u.state for u in stations].count(WORSE) == 1  # images of a grasp count once
     assert all(len(u.rows) == 2 for u in stations)
 
@@ -251,10 +225,10 @@ def test_only_the_best_are_solved_and_each_has_its_place():
 @pytest.mark.parametrize(("mu", "held"), [(3.0, True), (0.3, False)])
 def test_a_contact_that_slips_comes_last_or_is_skipped(mu, held):
     """A pad beside the middle of a round section meets it askew: the normals lean out of the cone of friction."""
-    poses = "".join(POSE.format(y=y) for y in (22, 0))
-    last = units(poses, mu)
+    poses = "".join(pose_of((0, y, 0)) for y in (22, 0))
+    last = solved_or_not(poses, mu)
     assert [u.state for u in last] == [MISSING] * 2
     assert shares(last, np.full(100, MISSING), 1)[-1].unit.index == 0 or held
     assert last[0].hopeless or held
-    skipped = units(f"solve_best = 'holding'\n{poses}", mu)
+    skipped = solved_or_not(f"solve_best = 'holding'\n{poses}", mu)
     assert [u.state for u in skipped] == [MISSING if held else SLIPS, MISSING]

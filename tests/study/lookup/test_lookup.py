@@ -87,7 +87,8 @@ def test_one_point_is_the_same_as_an_array_of_points(straight):
 
 
 def test_units_of_people_and_missing_coordinates(straight):
-    assert straight.at(station_mm=15, angle_deg=40, force=3).e_n == straight.at(0.015, np.radians(40), 3).e_n
+    found = straight.at(station_mm=15, angle_deg=40, force=3).e_n
+    assert found == pytest.approx(straight.at(0.015, np.radians(40), 3).e_n, rel=1e-14)
     with pytest.raises(ValueError, match="station is given twice"):
         straight.at(0.01, 0.1, 3, station_mm=10)
     with pytest.raises(ValueError, match="angle is missing"):

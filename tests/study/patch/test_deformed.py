@@ -8,43 +8,25 @@ import numpy as np
 import pytest
 from scipy.interpolate import RegularGridInterpolator
 
-from softjaw.study import pipeline
-from softjaw.study.case.candidates import units
 from softjaw.study.case.contact import Contact
 from softjaw.study.cli import main
 from softjaw.study.messages import OTHER_FILE, USAGE
 from softjaw.study.scene import parse_scene
+from tests.study.scenes import OVAL, QUICK, results_of, scene_of
 
 NOISE = 0.1  # mm
-SCENE = """[object]
-{shape}
-[gripper]
-elements = {elements}
-[candidates]
-stations_mm = [{station}]
-angles_deg = [0]
-[load]
-normal_force_n = [{force}]
-[accuracy]
-meshes = 1
-[friction]
-mu = 0.6
-[effects]
-model_size = "full"
-friction_pressure_coupling = "none"
-"""
-CYLINDER = 'shape = "elliptic_cylinder"\nsemi_axis_a_mm = 25\nsemi_axis_b_mm = 25\nlength_mm = 160'
+CYLINDER = OVAL.replace("20", "25", 1)
 BOTTLE = 'shape = "revolution"\nprofile_mm = [[0, 26], [30, 33], [70, 31], [105, 24], [130, 22], [150, 20], [200, 12]]'
 
 
-def scene_of(shape, station, force, elements):
-    return SCENE.format(shape=shape, station=station, force=force, elements=list(elements))
+def scene_text(shape, station, force, elements):
+    place = {"stations": f"[{station}]", "forces": f"[{force}]", "elements": list(elements)}
+    return scene_of(shape, *QUICK, "friction.mu=0.6", "effects.model_size='full'", **place).effective_toml()
 
 
 def face_of(text):
     """S and e_n of the first finger of a solved case, and its deformed face, seen from the backing plate [mm]."""
-    [unit] = units(parse_scene(text), lambda point: point.axis_symmetry)
-    [(_, result)] = list(pipeline.solve_unit(unit))
+    [result] = results_of(parse_scene(text))
     contact = result.contacts[0]
     state = contact.state
     face = (state.contact_face - [0, 0, state.closing]).reshape(*state.pad.contact_grid, 3)
@@ -80,7 +62,7 @@ def told(capsys):
 
 def test_a_contour_gives_what_any_patch_gives(tmp_path, told):
     """On a coarse mesh, so that it is fast; without noise."""
-    text = scene_of(CYLINDER, 0, 5, (6, 6, 2))
+    text = scene_text(CYLINDER, 0, 5, (6, 6, 2))
     (tmp_path / "scene.toml").write_text(text)
     S, e_n, face = face_of(text)
     answer = told(table(tmp_path / "contour.csv", face, True, noise=0.0), tmp_path / "scene.toml", "--distance", 50)
@@ -108,7 +90,7 @@ def test_a_contour_gives_what_any_patch_gives(tmp_path, told):
 def test_points_that_are_no_face_are_refused_with_their_place(tmp_path, capsys, text, part, code):
     file, scene = tmp_path / "points.csv", tmp_path / "scene.toml"
     file.write_text(text)
-    scene.write_text(scene_of(CYLINDER, 0, 5, (4, 4, 2)))
+    scene.write_text(scene_text(CYLINDER, 0, 5, (4, 4, 2)))
     assert main(["patch", "--deformed", str(file), str(scene)]) == code
     said = capsys.readouterr().err
     assert str(file) in said
@@ -127,7 +109,7 @@ def test_points_that_are_no_face_are_refused_with_their_place(tmp_path, capsys, 
 def test_options_that_do_not_belong_together_are_refused(tmp_path, capsys, words, part, code):
     file, scene = tmp_path / "points.csv", tmp_path / "scene.toml"
     file.write_text("y_mm,z_mm\n0,0\n")
-    scene.write_text(scene_of(CYLINDER, 0, 5, (4, 4, 2)))
+    scene.write_text(scene_text(CYLINDER, 0, 5, (4, 4, 2)))
     assert main(["patch", *(word.format(file=file, scene=scene) for word in words)]) == code
     assert part in capsys.readouterr().err
 
@@ -138,8 +120,8 @@ def test_options_that_do_not_belong_together_are_refused(tmp_path, capsys, words
 ])  # fmt: skip
 def test_a_camera_sees_e_n_within_5_percent_and_S_within_10(tmp_path, told, shape, station, force, contour):
     """The face of a case on a finer mesh, with 0.1 mm of noise, back through the command on the scene's own mesh."""
-    S, e_n, face = face_of(scene_of(shape, station, force, (24, 14, 7)))
-    (tmp_path / "scene.toml").write_text(scene_of(shape, station, force, (20, 10, 6)))
+    S, e_n, face = face_of(scene_text(shape, station, force, (24, 14, 7)))
+    (tmp_path / "scene.toml").write_text(scene_text(shape, station, force, (20, 10, 6)))
     for seed in (1, 2):
         answer = told(table(tmp_path / "points.csv", face, contour, seed), tmp_path / "scene.toml")
         [found] = answer["patches"]

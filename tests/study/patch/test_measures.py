@@ -45,14 +45,6 @@ def test_they_do_not_depend_on_the_coordinates():
     assert np.diagonal(here[:, [0, 1, 5]]) == pytest.approx([one.f_x, one.f_y, one.tau_z])
 
 
-def test_the_second_patch_may_be_given():
-    turn = np.diag([1.0, -1.0, -1.0])
-    facing = replace(FLAT, centroid=FLAT.centroid @ turn + [0, 0, 0.06], normal=FLAT.normal @ turn)
-    apart, both = sj.grasp_quality(FLAT, mu=0.5, distance=0.06), sj.grasp_quality(FLAT, facing, mu=0.5)
-    assert both.quality == pytest.approx(apart.quality, rel=1e-9)
-    assert both.epsilon == pytest.approx(apart.epsilon, rel=1e-6)
-
-
 @pytest.mark.long
 def test_the_quality_is_that_of_the_command_with_every_surface():
     judged = EvaluatedPatch(read_patch(str(EXAMPLE), Reading()), 0.8)

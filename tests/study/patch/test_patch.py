@@ -16,12 +16,9 @@ from scipy.spatial.transform import Rotation
 from softjaw.friction.frame import FrameFlag, principal_direction
 from softjaw.friction.patch import ContactPatch
 from softjaw.study.cli import main
-from softjaw.study.patch.answer import SURFACES, EvaluatedPatch
-from softjaw.study.patch.answer_text import PLANES, section
-from softjaw.study.patch.contacts import check_facing, read_patch
+from softjaw.study.patch.answer import SURFACES
+from softjaw.study.patch.contacts import check_facing
 from softjaw.study.patch.faces import corner_geometry
-from softjaw.study.patch.patch_reader import Reading
-from tests.friction.closed_forms import cylinder_torque
 from tests.generators import cylinder_grid
 from tests.study.launching import ROOT
 from tests.study.patch_files import centres, corners, cylinder_mesh, vtk
@@ -59,27 +56,6 @@ def friction(answer):
     return [patch["S"], patch["F_N"], *every]
 
 
-def test_a_uniform_cylinder_has_the_friction_of_its_closed_form(tmp_path, told):
-    """S = 2 R t L p, F_N = 2 R sin(t) L p, f_x = mu S, f_y = mu F_N; the torque is an elliptic integral."""
-    R, t, L, p = 0.03, math.pi / 3, 0.04, 2e4
-    patch = cylinder_grid(R, t, L, 65, 64)
-    file = centres(tmp_path / "cylinder.csv", replace(patch, pressure=p * patch.pressure), "mm", "kpa")
-    found = told(file, "--long-side", "1,0,0")["patches"][0]
-    S, F_N = 2 * R * t * L * p, 2 * R * math.sin(t) * L * p
-    curved, flat = found["friction"]["ccm"], found["friction"]["pcm"]
-    assert found["S"] == pytest.approx(S, rel=1e-12)
-    assert found["F_N"] == pytest.approx(F_N, rel=5e-5)
-    assert curved["f_x_max"] == pytest.approx(MU * S, rel=1e-12)
-    assert curved["f_y_max"] == pytest.approx(MU * found["F_N"], rel=1e-12)
-    torque = R**3 * p * cylinder_torque(1.0, 1.0, t, L / R)
-    assert curved["tau_z_max"] == pytest.approx(MU * torque, rel=1e-4)
-    assert curved["tau_pure"] == pytest.approx(curved["tau_z_max"], rel=1e-8)
-    assert curved["e_n"] == pytest.approx(torque / S, rel=1e-4)
-    assert curved["e_n_projected"] == pytest.approx(torque / F_N, rel=2e-4)
-    assert flat["f_y_max"] == pytest.approx(MU * S, rel=1e-12)
-    assert np.allclose(found["frame"]["axes"], np.eye(3), atol=1e-9)
-
-
 @pytest.mark.parametrize("triangles", [False, True], ids=["quadrilaterals", "triangles"])
 def test_every_kind_of_file_gives_the_same_friction(tmp_path, told, triangles):
     points, cells, patch = faceted(triangles)
@@ -98,16 +74,6 @@ def test_every_kind_of_file_gives_the_same_friction(tmp_path, told, triangles):
             continue
         assert friction(answer) == pytest.approx(friction(by_corners), **SAME)
         assert np.allclose(answer["patches"][0]["frame"]["origin"], by_corners["patches"][0]["frame"]["origin"])
-
-
-def test_centres_and_corners_agree_where_the_pressure_is_symmetric(tmp_path, told):
-    points, cells, patch = faceted()
-    pressure = 2e4 * (1 - (patch.centroid[:, 1] / 0.03) ** 2)
-    one = told(corners(tmp_path / "corners.csv", points, cells, pressure))
-    two = told(centres(tmp_path / "centres.csv", replace(patch, pressure=pressure), "mm", "kpa"))
-    assert friction(two) == pytest.approx(friction(one), **SAME)
-    flags = [answer["patches"][0]["frame"]["flag"] for answer in (one, two)]
-    assert flags == [0, 4]
 
 
 def test_pressure_at_points_is_averaged_over_each_face_and_said(tmp_path, told):
@@ -208,18 +174,6 @@ def test_the_grasp_of_equal_ellipsoids_has_its_closed_form(told):
     assert grasp["misalignment"] == pytest.approx(0.0, abs=1e-9)
 
 
-def test_the_picture_shows_sections_through_the_largest_loads(tmp_path, told):
-    picture = tmp_path / "sections.svg"
-    limits = told(EXAMPLE, "-o", picture)["patches"][0]["friction"]["ccm"]
-    assert picture.read_text().count("<path") > 20
-    patch = EvaluatedPatch(read_patch(str(EXAMPLE), Reading()), MU)
-    largest = [limits[f"{name}_max"] / patch.contact.limits["ccm"].S for name in ("f_x", "f_y", "tau_z")]
-    for name in ("exact", "three_motions"):
-        for plane in PLANES:
-            reach = section(patch, name, plane).max(axis=0)
-            assert reach == pytest.approx([largest[k] for k in plane], rel=2e-2 if name == "exact" else 1e-9)
-
-
 def opposite(patch, distance):
     """The same patch half a turn about x away, facing the first."""
     turn = np.diag([1.0, -1.0, -1.0])
@@ -247,15 +201,6 @@ def test_a_grasp_that_slips_is_told(tmp_path, told):
     two = centres(tmp_path / "two.csv", replace(aside, centroid=np.add(aside.centroid, [0.05, 0, 0])))
     answer = told(one, "--other", two, "--surface", "three_motions")
     assert answer["grasp"]["slips"]
-
-
-def test_overhanging_faces_are_counted(tmp_path, told):
-    """Half angle 100 deg: the outermost of 21 strips on each side hangs over."""
-    patch = cylinder_grid(0.03, np.radians(100), 0.02, 21, 4)
-    answer = told(centres(tmp_path / "round.csv", patch), "--long-side", "1,0,0")
-    beyond = int((patch.normal[:, 2] < 0).sum())
-    assert beyond > 0
-    assert answer["patches"][0]["frame"]["overhang_count"] == beyond
 
 
 def test_given_normals_outrank_the_order_of_the_corners(tmp_path, told):

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from softjaw.study import pipeline
-from softjaw.study.case import candidates as grasps
 from softjaw.study.cli import main
 from softjaw.study.lookup import GraspMap
 from softjaw.study.messages import OTHER_FILE, StudyError
@@ -22,20 +21,9 @@ from softjaw.study.result.write import ResultWriter, record, verify
 from softjaw.study.run.plan import make_plan
 from softjaw.study.scene import parse_scene
 from softjaw.study.show.report.verdict import plain_report
-from tests.study.formula_results import OBJECT
+from tests.study.scenes import OVAL, text_of, units_of
 
-SCENE = (
-    OBJECT
-    + """mass_g = 50
-[gripper]
-elements = [4, 4, 2]
-[candidates]
-stations_mm = [-5, 0]
-angles_deg = [0]
-[load]
-normal_force_n = [1, 2]
-"""
-)
+SCENE = text_of(f"{OVAL}\nmass_g = 50", stations="[-5, 0]", forces="[1, 2]", elements="[4, 4, 2]")
 COMMANDS = {
     "status": ("status",),
     "status --json": ("status", "--json"),
@@ -55,7 +43,7 @@ def whole(tmp_path_factory):
     create(path, plan.layout, plan.header)
     writer = ResultWriter(path, plan.layout, None)
     writer.begin_session(start="2024-01-01T00:00:00+00:00", reason="running", ranks=1, host="here")
-    for unit in grasps.units(scene, lambda point: point.axis_symmetry):
+    for unit in units_of(scene):
         for k, result in pipeline.solve_unit(unit):
             for c, rows in enumerate(unit.rows):
                 writer.count_attempt(rows[k])

@@ -357,14 +357,6 @@ def test_data_from_elsewhere_are_not_read(path, tmp_path, put):
     assert caught.value.code == OTHER_FILE
 
 
-def test_a_small_file_cannot_claim_terabytes(path):
-    with h5py.File(path, "r+") as file:
-        del file["study/axes/station"]
-        file.create_dataset("study/axes/station", (10**13,), "<f8", chunks=(1000,))
-    with pytest.raises(StudyError):
-        open_result(path)
-
-
 def test_a_lock_keeps_a_second_run_away_and_goes_with_its_holder(tmp_path):
     first, second = Lock(tmp_path / "x.hdf", "first"), Lock(tmp_path / "x.hdf", "second")
     first.take_first()

@@ -265,9 +265,7 @@ def test_values_are_in_si_units_and_lists_rise():
 def test_hyperfoam_fills_in_its_terms_and_its_modulus():
     one = parse_scene(BALL, overrides=["gripper.material=hyperfoam", "gripper.shear_modulus_kpa=30"])
     assert one.gripper.hyperfoam_terms == ((-2,), (30e3,))
-    two = parse_scene(
-        BALL, overrides=["gripper.material=hyperfoam", "gripper.terms_kpa=[[8, 10], [-2, 20]]"]
-    )
+    two = parse_scene(BALL, overrides=["gripper.material=hyperfoam", "gripper.terms_kpa=[[8, 10], [-2, 20]]"])
     assert two.gripper.shear_modulus_kpa == 30
     p = problem(BALL, "gripper.material=hyperfoam", "gripper.terms_kpa=[[-2, 10]]", "gripper.shear_modulus_kpa=40")
     assert (p.key, p.found) == ("gripper.shear_modulus_kpa", "40.0")

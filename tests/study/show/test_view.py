@@ -22,7 +22,6 @@ from softjaw.study.show.object_surface import NOBODY, Cells, Wall, areas, betwee
 from softjaw.study.show.view.model import quantity_of, view_of
 from softjaw.study.show.view.object3d import object_block, payload, view_page
 from softjaw.study.show.view.pads import pads_of
-from tests.study.chromium import PROGRAM, Browser
 from tests.study.view_files import CLOSING, FAILED, PRESSURE, SIZE, make, quality
 
 
@@ -303,53 +302,3 @@ def test_a_picture_without_a_screen_shows_object_pads_and_limit_surface(file, tm
     assert (below[0].min(axis=-1) < 200).mean() > 4 * (below[1].min(axis=-1) < 200).mean()
     changed = (found["best"] != found["turn"]).any(axis=-1)
     assert 1e-4 < changed[:, :930].mean() < 0.05  # the arrows, and nothing else on the left
-
-
-@pytest.mark.long
-def test_slider_and_click_of_the_window_change_the_case(shown):
-
-    from softjaw.study.show.view import window
-
-    view, index = shown
-    plotter = window.plot(view, index, "quality", "x", off_screen=True)
-    try:
-        controls = window.add_controls(plotter, view, index, "quality", "x")
-        before = plotter.screenshot(return_img=True)
-        controls["force"](1.2)
-        assert controls["state"]["at"] == (1, 0, 0)
-        assert (before != plotter.screenshot(return_img=True)).any()
-        mesh = plotter.renderers[0].actors["object"].mapper.dataset
-
-        class Picker:
-            def GetDataSet(self):
-                return mesh
-
-            def GetCellId(self):
-                return int(np.flatnonzero(mesh.cell_data["candidate"] == 5)[0])
-
-        controls["pick"](None, Picker())
-        assert controls["state"]["at"] == (2, 1, 0)
-    finally:
-        plotter.close()
-
-
-@pytest.mark.long
-@pytest.mark.skipif(PROGRAM is None, reason="no Chromium on this machine")
-def test_the_page_works_in_a_browser(file, tmp_path):
-    """Slider, choice and click change what is shown; nothing is asked for from outside."""
-    assert main(["view", str(file), "--html", str(tmp_path / "view.html")]) == 0
-    with Browser(tmp_path / "profile") as browser:
-        browser.open(tmp_path / "view.html")
-        said = "document.querySelector('.controls p').textContent.replaceAll('\\u00a0', ' ')"
-        assert "angle 0°, 5 N" in browser.wait(said)
-        assert browser.ask("document.querySelector('.plot').data[0].i.length") > 100
-        whole = browser.ask("document.querySelector('.plot').data[3].i.length")
-        assert whole == 16  # two triangles of each loaded face
-        browser.ask("document.querySelector('input').value = 0")
-        browser.ask("document.querySelector('input').dispatchEvent(new Event('input'))")
-        assert "angle 0°, 1 N" in browser.ask(said)
-        there = "(t) => t.includes('station\\u00a020') && t.includes('angle\\u00a00')"
-        point = f"{{curveNumber: 0, pointNumber: plots[0].data[0].text.findIndex({there})}}"
-        browser.ask(f"plots[0].emit('plotly_click', {{points: [{point}]}})")
-        assert "station 20 mm, angle 0°, 1 N" in browser.ask(said)
-        assert not [kind for kind, _ in browser.told if kind in ("error", "request", "console")]
