@@ -133,7 +133,7 @@ class Crossings:
     def __init__(self, problem):
         self.problem, self.at = problem, None
 
-    def solve(self, x, tolerance, iterations=None):
+    def solve(self, x, tolerance, *limits):
         control = self.problem.control
         self.at = np.array([control.closing])
         if control.force is not None:
@@ -215,9 +215,9 @@ def test_a_state_whose_nodes_alternate_passes_where_it_is_near_enough(scatter, p
     known = last(press_of(), [5])
     proper = press.solver.solve
 
-    def stalls(x, tolerance, iterations=None):
+    def stalls(x, tolerance, *limits):
         if press.problem.control.force is None:
-            return proper(x, tolerance, iterations)
+            return proper(x, tolerance, *limits)
         error = ConvergenceError("alternates")
         error.end = known.unknowns * (1 + scatter), 1e-5
         raise error

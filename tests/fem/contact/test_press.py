@@ -151,8 +151,8 @@ def test_wrong_states_are_refused_whatever_the_solver_says(tamper, law):
     press = Press(pad_of(), reference.plane)
     solve = press.solver.solve
 
-    def wrong(x, tolerance, iterations=None):
-        x, done = solve(x, tolerance, iterations)
+    def wrong(x, tolerance, *limits):
+        x, done = solve(x, tolerance, *limits)
         if press.problem.control.force is not None:
             tamper(press, x)
         return x, done
@@ -190,7 +190,7 @@ def test_a_step_that_fails_is_cut_and_the_answer_is_the_same():
     ladder = short.load_path([1.0, 20.0])
     next(ladder)
     solve = short.solver.solve
-    short.solver.solve = lambda x, tolerance, iterations=None: solve(x, tolerance, 3)
+    short.solver.solve = lambda x, tolerance, *limits: solve(x, tolerance, 3)
     pressed = next(ladder)
     assert pressed.halvings > 0
     assert pressed.steps > last.steps

@@ -184,7 +184,7 @@ class Jumping:
     def __init__(self, problem, close=0.05):
         self.problem, self.close = problem, close
 
-    def solve(self, x, tolerance, iterations=None):
+    def solve(self, x, tolerance, *limits):
         control = self.problem.control
         if control.force is None:
             return np.array([control.closing]), 1
@@ -237,7 +237,7 @@ def test_what_watches_the_way_can_end_it():
 def test_steps_that_keep_failing_end_the_walk():
     steps = stepping()
 
-    def solve(x, tolerance, iterations=None):
+    def solve(x, tolerance, *limits):
         raise ConvergenceError("no luck")
 
     steps.solver.solve = solve
