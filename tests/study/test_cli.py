@@ -217,7 +217,9 @@ RUNNABLE = [  # all but those that take minutes and are tested elsewhere
 def solved(tmp_path_factory):
     """A finished study of seconds, which stands in for all results that the examples name."""
     path = tmp_path_factory.mktemp("solved") / "smoke.hdf"
-    code, output, errors = launch(0, "-m", "softjaw", "run", ROOT / "jobs" / "smoke.toml", "-o", path, "--set", "load.normal_force_n=[2, 4]")
+    code, output, errors = launch(
+        0, "-m", "softjaw", "run", ROOT / "jobs" / "smoke.toml", "-o", path, "--set", "load.normal_force_n=[2, 4]"
+    )
     assert code == 0, output + errors
     return path
 
