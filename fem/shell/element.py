@@ -96,41 +96,27 @@ class Elements:
     Attributes
     ----------
     nodes : (n, 4) array
-    plane : (n, 4, 2, 3) array
-        At each Gauss point, rows that make the local strains 11 and 22 from the covariant ``E11, E22, 2 E12``.
-    twist : (n, 3) array
-        The same at the centre for the local shear ``gamma_12``.
-    membrane : (n, 4) array
-        ``thickness dA E / (1 - nu^2)`` of each Gauss point [N].
-    in_plane : (n,) array
-        ``thickness G area`` for ``gamma_12`` [N m]. Bending stiffnesses are a third of the membrane's.
-    shear, thickness : (n, 4, 4) arrays
-        Stiffnesses of the transverse shears on the four sides and of the thickness strains of the four nodes.
+    weights : (n, 26, 4) array
+        Of the products of samples that make up each strain, see ``fem.shell.element_kernel``.
+    stiffness : (n, 26, 26) array
+        Of the strains: in the middle surface at each Gauss point ``thickness dA E / (1 - nu^2)`` [N], in bending a
+        third of that; of the shear at the centre, the transverse shears on the four sides and the thickness strains.
     start : (n, 26) array
         The quadratic forms of the reference state; strains are the differences from it.
     area : (n, 4) array
         Reference area of each Gauss point [m^2].
-    poisson_ratio : float
     """
 
     nodes: IntArray
-    plane: FloatArray
-    twist: FloatArray
-    membrane: FloatArray
-    in_plane: FloatArray
-    shear: FloatArray
-    thickness: FloatArray
+    weights: FloatArray
+    stiffness: FloatArray
     start: FloatArray
     area: FloatArray
-    poisson_ratio: float
 
     @property
     def loops(self) -> tuple[Any, ...]:
         """Leading arguments of the compiled loops."""
-        return (
-            self.nodes, self.plane, self.twist, self.membrane, self.in_plane, self.shear, self.thickness, self.start,
-            self.poisson_ratio,
-        )  # fmt: skip
+        return self.nodes, self.weights, self.stiffness, self.start
 
 
 def elements(X: FloatArray, D: FloatArray, nodes: IntArray, young_modulus: float, poisson_ratio: float) -> Elements:
@@ -171,20 +157,32 @@ def elements(X: FloatArray, D: FloatArray, nodes: IntArray, young_modulus: float
         [2 * c[:, 0, 0] * c[:, 1, 0], 2 * c[:, 0, 1] * c[:, 1, 1], c[:, 0, 0] * c[:, 1, 1] + c[:, 0, 1] * c[:, 1, 0]],
         axis=1,
     )
-    result = Elements(
-        nodes,
-        plane,
-        twist,
-        volume * E / (1.0 - nu**2),
-        G * volume.sum(axis=1),
-        np.einsum("nq,nqbs,nqbt->nst", SHEAR_CORRECTION * G * volume / h**2, gP, gP),
-        np.einsum("nq,qi,qj->nij", E * volume / h**4, N_G, N_G),
-        np.zeros((len(nodes), STRAINS)),
-        area,
-        float(nu),
-    )
-    kernel.forms(nodes, plane, twist, np.hstack([X, D]), result.start)
-    return result
+    weights = _weights(plane, twist)
+    stiffness = np.zeros((len(nodes), STRAINS, STRAINS))
+    for q in range(4):
+        in_plane = (volume[:, q] * E / (1.0 - nu**2))[:, None, None] * np.array([[1.0, nu], [nu, 1.0]])
+        for first, share in ((2 * q, 1.0), (8 + 2 * q, 3.0)):  # the mean of zeta^2 over the wall is 1/3
+            stiffness[:, first : first + 2, first : first + 2] = in_plane / share
+    stiffness[:, 16, 16], stiffness[:, 17, 17] = G * volume.sum(axis=1), G * volume.sum(axis=1) / 3.0
+    stiffness[:, 18:22, 18:22] = np.einsum("nq,nqbs,nqbt->nst", SHEAR_CORRECTION * G * volume / h**2, gP, gP)
+    stiffness[:, 22:, 22:] = np.einsum("nq,qi,qj->nij", E * volume / h**4, N_G, N_G)
+    start = np.zeros((len(nodes), STRAINS))
+    kernel.forms(nodes, weights, np.hstack([X, D]), start)
+    return Elements(nodes, weights, stiffness, start, area)
+
+
+def _weights(plane: FloatArray, twist: FloatArray) -> FloatArray:
+    """Weights ``(n, 26, 4)`` of the products in each strain.
+
+    ``plane (n, 4, 2, 3)`` are the rows that make the local strains 11 and 22 at each Gauss point from the covariant
+    ``E11, E22, 2 E12``, ``twist (n, 3)`` the same at the centre for the local shear ``gamma_12``.
+    """
+    weights, half = np.zeros((len(twist), STRAINS, 4)), np.array([0.5, 0.5, 1.0])
+    weights[:, :8, :3] = (plane * half).reshape(-1, 8, 3)
+    weights[:, 8:16] = plane[..., [0, 1, 2, 2]].reshape(-1, 8, 4)
+    weights[:, 16, :3], weights[:, 17] = twist * half, twist[:, [0, 1, 2, 2]]
+    weights[:, 18:22, 0], weights[:, 22:, 0] = 1.0, 0.5
+    return weights
 
 
 def _bisecting_axis(A1: FloatArray, A2: FloatArray) -> FloatArray:

@@ -204,7 +204,7 @@ def middles(shell: Shell, q: FloatArray) -> tuple[FaceState, FaceState]:
     """Outer and inner face in the middles of the ``n`` elements in the state ``q (6 k,)``."""
     parts, e = shell.elements, np.empty((len(shell.elements.nodes), kernel.STRAINS))
     x = np.hstack([shell.mesh.X, shell.mesh.D]) + q.reshape(-1, 6)
-    kernel.forms(parts.nodes, parts.plane, parts.twist, x, e)
+    kernel.forms(parts.nodes, parts.weights, x, e)
     e -= parts.start
     membrane, bending = (e[:, first : first + 8].reshape(-1, 4, 2).mean(axis=1) for first in (0, 8))
     outer, inner = (
