@@ -20,7 +20,7 @@ from softjaw.study.table import Table, with_unit
 from softjaw.study.units import shown_unit
 
 Block = dict[str, Any]
-Section = tuple[str, str, list[Block]]
+Section = tuple[str, str, Sequence[Block | None]]
 FOLDER = "softjaw.study.templates"
 
 
@@ -104,12 +104,14 @@ def label(words: str) -> str:
 
 
 def page(title: str, subtitle: str, sections: Sequence[Section]) -> str:
-    """The page of sections ``(anchor, heading, blocks)``, the first without a heading; empty ones are left out."""
+    """The page of sections ``(anchor, heading, blocks)``, the first without a heading; without blocks that are None."""
     made = jinja2.Environment(loader=jinja2.PackageLoader(*FOLDER.rsplit(".", 1)), autoescape=True)
     made.policies["json.dumps_function"] = lambda figure, **_: figure.to_json(validate=False)
-    shown = [dict(zip(("anchor", "heading", "blocks"), s, strict=True)) for s in sections if s[2]]
+    parts = ((anchor, head, [block for block in blocks if block]) for anchor, head, blocks in sections)
+    names = ("anchor", "heading", "blocks")
+    shown: list[dict[str, Any]] = [dict(zip(names, part, strict=True)) for part in parts if part[2]]
     own = [files(FOLDER).joinpath(name).read_text(encoding="utf-8") for name in ("page.css", "page.js")]
-    drawn = any(block["kind"] == "plot" for _, _, blocks in sections for block in blocks)
+    drawn = any(block["kind"] == "plot" for section in shown for block in section["blocks"])
     scripts = [get_plotlyjs().replace("</script", "<\\/script"), own[1]] if drawn else []
     return made.get_template("page.html").render(
         title=title, subtitle=subtitle, sections=shown, style=own[0], scripts=scripts, policy=policy(scripts)

@@ -12,10 +12,8 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
-from matplotlib.patheffects import withStroke
 
 from softjaw.study.quantities import MODEL_NAMES
 
@@ -85,12 +83,6 @@ def _saved(drawn: Any, **options: Any) -> bytes:
     return store.getvalue()
 
 
-def model_look(model: str, **more: Any) -> dict[str, Any]:
-    """How the line of a friction model looks, with its name as label."""
-    name, colour, line, marker = MODEL_LOOKS[model]
-    return {"label": name, "color": colour, "linestyle": line, "marker": marker, **more}
-
-
 def span(values: Any) -> tuple[float, float]:
     """Smallest and largest finite value, widened where they are one; 0 to 1 where there is none."""
     finite = np.asarray(values)[np.isfinite(values)]
@@ -114,15 +106,6 @@ def heat(axes: Any, x: np.ndarray, y: np.ndarray, values: np.ndarray, failed: np
     return axes.pcolormesh(x, y, np.ma.masked_invalid(np.where(failed, np.nan, values)), **look)
 
 
-def polygons(axes: Any, corners: np.ndarray, values: np.ndarray, limits: tuple[float, float], **look: Any) -> Any:
-    """Polygons in the colours of ``values``."""
-    look = {"edgecolor": "face", "linewidth": 0.5, **look}
-    drawn = PolyCollection(list(corners), array=np.ma.masked_invalid(values), **look)
-    drawn.set_clim(*limits)
-    axes.add_collection(drawn, autolim=False)
-    return drawn
-
-
 def colour_bar(drawn: Any, mappable: Any, axes: Any, label: str, beside: bool = False) -> None:
     """A colour bar with its quantity and unit; ``beside`` keeps it as high as axes that have an aspect of their own."""
     if beside:
@@ -130,25 +113,4 @@ def colour_bar(drawn: Any, mappable: Any, axes: Any, label: str, beside: bool = 
     else:
         place = {"ax": axes, "aspect": 10 * drawn.get_figheight(), "pad": 0.015}
     bar = drawn.colorbar(mappable, label=label, **place)
-    bar.outline.set_visible(False)
-
-
-def arrow(axes: Any, tail: np.ndarray, tip: np.ndarray) -> None:
-    """An arrow that shows on light and dark ground."""
-    style = {"arrowstyle": "-|>", "color": INK, "lw": 1.4, "shrinkA": 0, "shrinkB": 0}
-    axes.annotate("", tip, tail, arrowprops={**style, "path_effects": [withStroke(linewidth=4, foreground="white")]})
-
-
-def placed(axes: Any, image: np.ndarray, title: str) -> None:
-    """Set an image into axes of its own, without frame and ticks."""
-    axes.imshow(image, interpolation="antialiased", interpolation_stage="rgba")
-    axes.set_title(title)
-    axes.set_axis_off()
-
-
-def scale(drawn: Any, axes: Any, label: str, colours: str, limits: tuple[float, float]) -> None:
-    """A colour bar of images, below the axes that hold them."""
-    some = np.ravel(axes)
-    mapped = some[0].scatter([], [], c=[], cmap=colours, vmin=limits[0], vmax=limits[1])
-    bar = drawn.colorbar(mapped, ax=list(some), location="bottom", label=label, shrink=0.6, aspect=30, pad=0.02)
     bar.outline.set_visible(False)

@@ -29,7 +29,6 @@ ALLOWED = {
 ALLOWED["study"] |= {f"softjaw.{name}" for name in OWN}
 PICTURES = {
     "fem/objects/triangles.py",
-    "study/show/view/solids.py",
     "study/show/view/window.py",
     "study/show/vtk.py",
 }

@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from jobs.figures import drawing
 from softjaw.study import pictures
 from softjaw.study.case.build import outer_surface
 from softjaw.study.scene import load_scene
 from softjaw.study.show.grasps import at, forces, number
-from softjaw.study.show.view import solids
+from softjaw.study.show.view import window as solids
 from softjaw.study.show.view.model import FORCE, NEUTRAL, View
 from softjaw.study.show.view.pads import Pad
 
@@ -53,8 +54,8 @@ def contact(ds: xr.Dataset) -> tuple[Any, str]:
         ("(b) its elements' friction against a turn about the normal", close, 0.9 * out + 0.5 * beside + 0.15 * along),
     )
     for panel, (title, draw, towards) in zip(axes[0], parts, strict=True):
-        pictures.placed(panel, solids.rendered(draw, towards, out, (1500, 900)), title)
-    pictures.scale(drawn, axes, "contact pressure [kPa]", pictures.COLOURS["pressure"], (0, top))
+        drawing.placed(panel, drawing.rendered(draw, towards, out, (1500, 900)), title)
+    drawing.scale(drawn, axes, "contact pressure [kPa]", pictures.COLOURS["pressure"], (0, top))
     tilt = np.degrees(np.arccos(np.clip(pad.normal[pad.loaded] @ pad.approach, -1, 1))).max()
     return drawn, (
         f"loaded elements tilt by up to {number(tilt, 2)} degrees; of the friction across the cylinder that the PCM "
@@ -88,8 +89,8 @@ def candidates(ds: xr.Dataset) -> tuple[Any, str]:
 
     drawn, axes = pictures.figure(WIDTH, 3.5, 1, 2, width_ratios=[1, 1.7])
     seen = -0.5 * pad.approach + 0.85 * np.cross(up, pad.approach) + 0.2 * up
-    image = solids.rendered(whole, seen, up, (1100, 1300))
-    pictures.placed(axes[0, 0], image, f"(a) {len(marks) // 2} candidates, one grasp")
+    image = drawing.rendered(whole, seen, up, (1100, 1300))
+    drawing.placed(axes[0, 0], image, f"(a) {len(marks) // 2} candidates, one grasp")
     mapped = _front(axes[0, 1], pad, top)
     place = f"station {number(1e3 * ds.station.values[0])} mm, {number(forces(ds)[-1])} N"
     axes[0, 1].set_title(f"pressure on its pad: {place}")
@@ -123,12 +124,12 @@ def _front(axes: Any, pad: Pad, top: float) -> Any:
     """The pad's contact face in its own frame, with the contact frame and the pad's middle."""
     corners, loaded = 1e3 * pad.own(pad.quads().reshape(-1, 3)).reshape(-1, 4, 3)[..., :2], pad.loaded.ravel()
     pale = {"cmap": "Greys", "edgecolor": "#d5dade"}
-    pictures.polygons(axes, corners[~loaded], np.zeros((~loaded).sum()), (0, 12), **pale).set_zorder(0)
+    drawing.polygons(axes, corners[~loaded], np.zeros((~loaded).sum()), (0, 12), **pale).set_zorder(0)
     pressure, colours = 1e-3 * pad.pressure.ravel()[loaded], pictures.COLOURS["pressure"]
-    mapped = pictures.polygons(axes, corners[loaded], pressure, (0.0, top), cmap=colours)
+    mapped = drawing.polygons(axes, corners[loaded], pressure, (0.0, top), cmap=colours)
     origin, frame = 1e3 * pad.own(pad.origin)[:2], pad.frame @ pad.rotation
     for name, direction in zip("xy", frame[:2], strict=True):
-        pictures.arrow(axes, origin, origin + 8 * direction[:2])
+        drawing.arrow(axes, origin, origin + 8 * direction[:2])
         axes.text(*(origin + 10 * direction[:2]), name, ha="center", va="center")
     axes.plot(*origin, "o", ms=5, mfc="white", mec=pictures.INK)
     axes.plot(0, 0, "+", ms=9, mew=1.4, color=pictures.INK)

@@ -7,13 +7,14 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from jobs.figures import drawing
 from jobs.figures.contacts import WIDTH, outline
 from softjaw.study import pictures
 from softjaw.study.quantities import MODELS
 from softjaw.study.ranking import largest
 from softjaw.study.show.grasps import WIDE, field, forces, number, place
 from softjaw.study.show.object_surface import NOBODY
-from softjaw.study.show.view import solids
+from softjaw.study.show.view import window as solids
 from softjaw.study.show.view.model import View, read_scene
 
 COMPONENTS = {"f_y": ("across, f_y", "-", "o"), "tau_z": ("torque, tau_z", "--", "s"), "f_x": ("along, f_x", ":", "^")}
@@ -64,9 +65,9 @@ def force_study(ds: xr.Dataset) -> tuple[Any, str]:
         top, below = axes[:, k]
         gap = {model: 100 * (1 - values["ccm"] / values[model]) for model in LOOKS}
         for model, look in LOOKS.items():
-            top.plot(forces(ds), values[model], **pictures.model_look(model, **look))
+            top.plot(forces(ds), values[model], **drawing.model_look(model, **look))
             if model != "ccm":
-                below.plot(forces(ds), gap[model], **pictures.model_look(model, **look))
+                below.plot(forces(ds), gap[model], **drawing.model_look(model, **look))
         top.set_title(f"({'abcd'[k]}) {title}")
         top.margins(y=0.12)
         below.axhline(0, color=pictures.SOFT, lw=0.7)
@@ -104,8 +105,8 @@ def maps(*objects: xr.Dataset) -> tuple[Any, str]:
     for ds, pair in zip(objects, axes.reshape(len(objects), -1), strict=True):
         for panel, (name, (label, _)) in zip(pair, QUANTITIES.items(), strict=True):
             image, limits = _map(ds, name)
-            pictures.placed(panel, image, f"{ds.attrs['title']}, {number(forces(ds)[ds.attrs['level']])} N")
-            pictures.scale(drawn, panel, label, pictures.COLOURS[name], limits)
+            drawing.placed(panel, image, f"{ds.attrs['title']}, {number(forces(ds)[ds.attrs['level']])} N")
+            drawing.scale(drawn, panel, label, pictures.COLOURS[name], limits)
     return drawn, "; ".join(best_and_widest(ds) for ds in objects)
 
 
@@ -119,7 +120,7 @@ def _map(ds: xr.Dataset, name: str) -> tuple[np.ndarray, tuple[float, float]]:
     def draw(plotter: Any) -> None:
         solids.surface(plotter, 1e3 * view.moved(index), corners, shown, cmap=pictures.COLOURS[name], clim=limits)
 
-    return solids.rendered(draw, (0.8, 0.6, 0.25), (0, 0, 1), (900, 1300)), limits
+    return drawing.rendered(draw, (0.8, 0.6, 0.25), (0, 0, 1), (900, 1300)), limits
 
 
 def best_and_widest(ds: xr.Dataset) -> str:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from jobs.figures import drawing
 from jobs.figures.contacts import WIDTH
 from softjaw.friction.motion import cor_grid, fibonacci_twists
 from softjaw.lsfit.samples import fit_error
@@ -25,7 +26,7 @@ from softjaw.study.show.stored_surface import (
     sphere,
     stored_surface,
 )
-from softjaw.study.show.view import solids
+from softjaw.study.show.view import window as solids
 from softjaw.study.show.view.model import View
 
 MODELS = ("pcm", "ccm")
@@ -73,7 +74,7 @@ def wrench_spaces(ds: xr.Dataset, sharp: xr.Dataset) -> tuple[Any, str]:
 def _shadows(panel: Any, known: dict[str, StoredSurface], i: int, j: int) -> None:
     for model, found in known.items():
         outline = found.outline(i, j, TURN) * found.unit[[i, j]]
-        panel.plot(*np.vstack([outline, outline[:1]]).T, **pictures.model_look(model, marker=""))
+        panel.plot(*np.vstack([outline, outline[:1]]).T, **drawing.model_look(model, marker=""))
     panel.set(xlabel=NAMES[i], ylabel=NAMES[j])
     if (i, j) == (0, 1):
         panel.set_aspect("equal", adjustable="datalim")
@@ -108,12 +109,12 @@ def fitted_surfaces(ds: xr.Dataset) -> tuple[Any, str]:
     results = []
     for panel, (name, error), letter in zip(axes[0], errors.items(), "ab", strict=True):
         draw = partial(_body, found=found, shape=shapes[name], error=error, top=top)
-        image = solids.rendered(draw, (0.9, 0.75, 0.45), (0, 0, 1), (1300, 1100))
+        image = drawing.rendered(draw, (0.9, 0.75, 0.45), (0, 0, 1), (1300, 1100))
         fit, mean, most = FITS[name][0], number(100 * at(ds, name, index), 2), number(error.max(), 2)
-        pictures.placed(panel, image, f"({letter}) {fit}: {mean} % off on average")
+        drawing.placed(panel, image, f"({letter}) {fit}: {mean} % off on average")
         grid = number(100 * errors_on_grid(found)[name], 2)
         results.append(f"{fit}: mean {mean} % over even motions, {grid} % on the paper's grid, largest {most} %")
-    pictures.scale(drawn, axes, "distance from the exact limit surface, of its radius [%]", ERRORS, (0, top))
+    drawing.scale(drawn, axes, "distance from the exact limit surface, of its radius [%]", ERRORS, (0, top))
     return drawn, "; ".join(results)
 
 

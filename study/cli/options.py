@@ -60,8 +60,8 @@ OPTIONS = {
     "level": _option("--force", type=number(), metavar="N", help="force level nearest to N [N]"),
     "by": _option("--by", choices=RANKED_BY, help="what ranks grasps; force: the least that holds (default payload)"),
     "top": _option("--top", type=whole(0), default=10, metavar="K", help="how many rows, 0: all (default 10)"),
-    "most": _option("--top", type=whole(0), metavar="K", help="how many grasps, the best first, 0: all (default: 1 for"
-                    " a simulator, which gets a file for each, else all)"),
+    "most": _option("--top", type=whole(0), metavar="K",
+                    help="how many grasps, 0: all (default: 1 for a simulator, which gets a file for each, else all)"),
     "compared": _option("--quantity", default="e_n", metavar="NAME", help="map that is listed by case (default e_n)"),
     "model": _option("--model", choices=MODELS, default="ccm", help="friction model (default ccm)"),
     "candidate": _option("--candidate", type=int, metavar="N", help="candidate, counted over stations and angles"),
@@ -77,10 +77,9 @@ OPTIONS = {
                    help="leave out grasps with less, in the unit of 'softjaw show', as payload=200; repeatable"),
     "written": _option("-o", metavar="FILE", dest="output", help="file to write (default: standard output)"),
     "approach": _option("--approach", choices=("x", "minus-x", "y", "minus-y"), action="append", dest="approaches",
-                        help="palm to fingertips: along or against the long (x) or short (y) side of finger 1's pad;"
-                        " repeatable (default minus-x)"),
-    "closing": _option("--closing", choices=("x", "y"), help="axis of the gripper's frame from finger 1 to finger 2; z"
-                       " approaches (default x for graspgen, else y)"),
+                        help="palm to fingertips, by the long (x) or short (y) side of pad 1 (default minus-x)"),
+    "closing": _option("--closing", choices=("x", "y"),
+                       help="gripper's axis from finger 1 to 2; z approaches (default x for graspgen, else y)"),
     "depth": _option("--depth", type=number("a number, 0 or above", 0.0), default=0.0, metavar="MM",
                      help="from the origin of the gripper's frame to the middle of the pads (default 0)"),
     "wider": _option("--wider", type=number("a number, 0 or above", 0.0), default=20.0, metavar="MM",
@@ -100,11 +99,11 @@ OPTIONS = {
     "field": _option("file", metavar="FILE",
                      help="CSV with one face per line, or VTU / VTP; columns: docs/pressure-fields.md"),
     "pad": _option("scene", metavar="SCENE", nargs="?", help="with --deformed: scene file (TOML), whose pad is solved"),
-    "deformed": _option("--deformed", action="store_true", help="FILE holds points of the pad's deformed contact face"
-                        " (CSV with x, y, z), or of a contour along its width (y, z), seen from the backing plate"),
+    "deformed": _option("--deformed", action="store_true",
+                        help="FILE holds points of the pad's deformed face (CSV with x, y, z), or of a contour (y, z)"),
     "mu": _option("--mu", type=POSITIVE, help="friction coefficient (default 0.8; with --deformed that of the scene)"),
-    "side": _option("--long-side", type=direction, metavar="X,Y,Z", help="direction of the contact frame's x axis, as"
-                    " --long-side=-1,0,0 (default: the longer direction of the patch)"),
+    "side": _option("--long-side", type=direction, metavar="X,Y,Z",
+                    help="the contact frame's x axis, as --long-side=-1,0,0 (default: the patch's longer direction)"),
     "unit": _option("--unit", choices=("m", "cm", "mm"), help="unit of lengths and areas, where the file gives none"),
     "pressure unit": _option("--pressure-unit", choices=("pa", "kpa", "mpa"), help="unit of the pressure, likewise"),
     "pressure": _option("--pressure-name", metavar="NAME", help="column or array of the pressure (default: pressure)"),
@@ -233,8 +232,7 @@ def program() -> Program:
     """The parser of the whole command line."""
     parser = Program(
         prog="softjaw",
-        description="How well a two-finger gripper with soft jaws holds an object, place by place. "
-        "'softjaw COMMAND --help' explains a command and shows an example.",
+        description="How well a gripper with soft jaws holds an object, place by place; see 'softjaw COMMAND --help'.",
         epilog="example:\n  mpirun -n 8 softjaw run jobs/bottle-rigid.toml",
     )
     listed = parser.add_subparsers(metavar="COMMAND", required=True, parser_class=Parser)

@@ -8,10 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 MILLION = 10**6
-NO_DRAKE = (
-    "Drake has no parameter for it: its point contact has no torsional friction, and its hydroelastic contact finds a"
-    " pressure field, and with it e_n, of its own; expected another format"
-)
+NO_DRAKE = "Drake has no parameter for it: no torsional friction, or a pressure field of its own; expected"
 
 
 def number(expected: str = "a number", least: float = -math.inf) -> Callable[[str], float]:
@@ -84,5 +81,5 @@ def direction(text: str) -> tuple[float, ...]:
 def format_of(text: str) -> str:
     """A format of `export`; another one than those is refused by argparse, Drake with the reason."""
     if text == "drake":
-        raise ArgumentTypeError(NO_DRAKE)
+        raise ArgumentTypeError(f"{NO_DRAKE} another format")
     return text

@@ -173,9 +173,7 @@ class GraspPoint:
         from softjaw.study.result.surfaces import finger_surface
 
         if self.shape or self.reason:
-            raise ValueError(
-                self.reason if not self.shape else "limit surfaces are made one at a time: ask for one point"
-            )
+            raise ValueError("limit surfaces are made one at a time: ask for one point" if self.shape else self.reason)
         return finger_surface(self.fingers, finger, model, fitted)
 
     def __str__(self) -> str:
@@ -214,10 +212,7 @@ class GraspPoint:
             return f"no value: the case beside it at {source.case(bad)} {what}"
         if state == SNAP:
             before, after = (next(c for c, n in cases if self.map.snapped.ravel()[n] == side) for side in (False, True))
-            return (
-                f"no value: the wall snaps in between {source.case(before)} and {source.case(after)};"
-                " ask at one of the solved cases"
-            )
+            return f"no value: the wall snaps in between {source.case(before)} and {source.case(after)}; ask at a case"
         if state == JUMP:
             first, other = (f"{source.case(c)} ({self._contact(n)})" for c, n in self._unlike(cases))
             return f"no smooth value: the contact changes between {first} and {other}; take `nearest`, a solved case"

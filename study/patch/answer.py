@@ -40,8 +40,8 @@ DEFINITIONS = {
     "S": "sum of pressure times area over the patch",
     "F_N": "its part along the contact normal: the force of the gripper",
     "rho": "longer side of the rectangle round the loaded faces in the contact frame",
-    "ccm, pcm, pcm_projected": "curved contact model, where every face resists in its own plane; planar contact model,"
-    " where all lie in one, scaled by S (as in the paper); the same scaled by F_N",
+    "ccm": "curved contact model: every face resists in its own plane",
+    "pcm, pcm_projected": "planar contact model: all faces in one plane, scaled by S (as in the paper), or by F_N",
     "f_x_max, f_y_max, tau_z_max": "largest friction along x and y, and about the contact normal through the origin",
     "tau_pure": "largest friction torque while no net force is transmitted",
     "e_n": "tau_z_max / (mu S)",
@@ -226,6 +226,5 @@ def _patch_notes(evaluated: EvaluatedPatch) -> list[str]:
             notes.append(f"{model}: fit failed for {', '.join(failed)}; three-motion ellipsoid used")
     if evaluated.rank < SPACE:
         space = {1: "one line", 2: "a plane"}.get(evaluated.rank, "a point")
-        notes.append(f"the loads that friction can carry fill {space} only (rank {evaluated.rank}): the limit surface "
-                     "has no volume and no fit is judged")  # fmt: skip
+        notes.append(f"the loads that friction can carry fill {space} only (rank {evaluated.rank}): no fit is judged")
     return notes

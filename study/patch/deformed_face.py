@@ -20,16 +20,7 @@ from softjaw.friction.patch import NEGLIGIBLE, ContactPatch, FloatArray
 from softjaw.study.case.model import contact_rules, pad_of, settings
 from softjaw.study.messages import SOME_FAILED, USAGE, Problem, StudyError
 from softjaw.study.patch.faces import ReadPatch, refuse
-from softjaw.study.patch.patch_reader import (
-    FACTORS,
-    Reading,
-    checked_file,
-    refused,
-    split_header,
-    table_numbers,
-    table_rows,
-    without_unit,
-)
+from softjaw.study.patch.patch_reader import Reading, checked_file, refused, si_columns, split_header, table_rows
 from softjaw.study.scene import Scene
 
 MOST_POINTS = 20_000
@@ -93,18 +84,14 @@ def _points(path: Path, unit: str | None, scene: Scene) -> tuple[FloatArray, tup
     """Points ``(n, 2)`` or ``(n, 3)`` [m] of a table, and notes on it; all that is wrong with it at once."""
     numbers, (headers, *cells) = table_rows(path)
     headers = [header.strip() for header in headers]
-    given = {pair[0]: (i, pair[1]) for i, header in enumerate(headers) if (pair := split_header(header))}
+    given = {pair[0]: i for i, header in enumerate(headers) if (pair := split_header(header))}
     needed = [name for name in "xyz" if name in given]
     if len(cells) > MOST_POINTS:
         raise refused(path, None, "", f"{len(cells)} points", f"at most {MOST_POINTS}", "thin them")
     if not {"y", "z"} <= given.keys():
         found = f"the columns {', '.join(headers)}"
         raise refused(path, 1, "", found, COLUMNS, "name the columns in the first line, with their unit")
-    units = {name: given[name][1] or Reading(unit).unit_of("length") or "" for name in needed}
-    bare = [headers[given[name][0]] for name in needed if not units[name]]
-    refuse([without_unit(path, "length", bare)] if bare else [])
-    values = table_numbers(path, numbers[1:], cells, headers, {name: given[name][0] for name in needed})
-    metres = {name: FACTORS["length"][units[name]] * values[name] for name in needed}
+    metres = si_columns(path, numbers[1:], cells, headers, {name: given[name] for name in needed}, Reading(unit))
     sides = dict(zip("xyz", scene.gripper.pad_size, strict=True))
     problems = []
     for name in needed:
@@ -114,11 +101,10 @@ def _points(path: Path, unit: str | None, scene: Scene) -> tuple[FloatArray, tup
         for i in np.flatnonzero(np.abs(metres[name]) > most).tolist():
             found, expected = f"{1e3 * metres[name][i]:.4g} mm", f"at most {1e3 * most:.4g} mm from the face's centre"
             remedy = "check the unit, and that the origin is the centre of the undeformed contact face"
-            problems.append(Problem(str(path), numbers[1 + i], headers[given[name][0]], found, expected, remedy))
+            problems.append(Problem(str(path), numbers[1 + i], headers[given[name]], found, expected, remedy))
     refuse(problems)
     notes = [
-        f"the points cover {100 * np.ptp(metres[name]) / sides[name]:.0f} % of the pad along {name}: the face is "
-        "continued straight beyond them"
+        f"the points cover {100 * np.ptp(metres[name]) / sides[name]:.0f} % of the pad along {name}; straight beyond"
         for name in needed
         # share of the pad's side: what fewer points cover is continued by much
         if name != "z" and np.ptp(metres[name]) < 0.8 * sides[name]

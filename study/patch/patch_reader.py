@@ -141,16 +141,8 @@ def read_table(path: Path, reading: Reading) -> Faces:
     refuse([Problem(str(path), 1, name, f"{one} and {other}", "one column for it", "remove one of the two")
             for name, one, other in twice] + _missing(path, headers, position, reading))  # fmt: skip
     needed = _needed(position)
-    given = {pair[0]: pair[1] for pair in pairs if pair}
-    units = {name: given[name] or reading.unit_of(KINDS[name]) or "" for name in needed}
-    bare = [name for name in needed if not units[name]]
-    refuse([without_unit(path, kind, [headers[position[name]] for name in bare if KINDS[name] == kind])
-            for kind in dict.fromkeys(KINDS[name] for name in bare)])  # fmt: skip
-    values = table_numbers(path, numbers[1:], cells, headers, {name: position[name] for name in needed})
-    with np.errstate(over="ignore"):  # what is not finite is reported with its place
-        values = {name: FACTORS[KINDS[name]][units[name]] * row for name, row in values.items()}
-    unused = [h for pair, h in zip(pairs, headers, strict=True) if pair and pair[0] not in needed]
-    unused += [h for pair, h in zip(pairs, headers, strict=True) if pair is None]
+    values = si_columns(path, numbers[1:], cells, headers, {name: position[name] for name in needed}, reading)
+    unused = [h for pair, h in zip(pairs, headers, strict=True) if not pair or pair[0] not in needed]
     notes = (f"not used of {path}: {', '.join(unused)}",) if unused else ()
     stacked = {names: np.stack([values[name] for name in names], axis=-1) for names in (CENTRE, NORMAL)
                if names[0] in values}  # fmt: skip
@@ -213,17 +205,29 @@ def _missing(path: Path, headers: Sequence[str], names: Any, reading: Reading) -
     return [Problem(str(path), 1, "", found, f"also {', '.join(absent)}", f"{remedy} (known units: {units})")]
 
 
-def without_unit(path: Path, kind: str, headers: Sequence[str]) -> Problem:
-    """The problem of columns of a kind that name no unit, where no option gives one."""
-    option, suffix, unit = OPTIONS[kind]
-    remedy = f"write {headers[0]}_{suffix}, or add {option} {unit}: units are not guessed"
-    return Problem(str(path), 1, ", ".join(headers), "no unit", f"a unit of {kind}", remedy)
+def si_columns(
+    path: Path, numbers: Sequence[int], rows: Sequence[Sequence[str]], headers: Sequence[str], position: dict[str, int],
+    reading: Reading,
+) -> dict[str, FloatArray]:  # fmt: skip
+    """Values of the columns at some positions in SI units; a fourth corner may be empty (NaN)."""
+    pairs = {name: split_header(headers[k], reading.pressure_name) for name, k in position.items()}
+    units = {name: (pair and pair[1]) or reading.unit_of(KINDS[name]) or "" for name, pair in pairs.items()}
+    problems = []
+    for kind in dict.fromkeys(KINDS[name] for name in position if not units[name]):
+        bare = [headers[k] for name, k in position.items() if KINDS[name] == kind and not units[name]]
+        option, suffix, unit = OPTIONS[kind]
+        remedy = f"write {bare[0]}_{suffix}, or add {option} {unit}: units are not guessed"
+        problems.append(Problem(str(path), 1, ", ".join(bare), "no unit", f"a unit of {kind}", remedy))
+    refuse(problems)
+    values = _numbers(path, numbers, rows, headers, position)
+    with np.errstate(over="ignore"):  # what is not finite is reported with its place
+        return {name: FACTORS[KINDS[name]][units[name]] * column for name, column in values.items()}
 
 
-def table_numbers(
+def _numbers(
     path: Path, numbers: Sequence[int], rows: Sequence[Sequence[str]], headers: Sequence[str], position: dict[str, int]
 ) -> dict[str, FloatArray]:
-    """Values of the columns at some positions, as they stand there; a fourth corner may be empty (NaN)."""
+    """Values of the columns at some positions, as they stand there."""
     problems = []
     values = {name: np.full(len(rows), np.nan) for name in position}
     for i, (line, cells) in enumerate(zip(numbers, rows, strict=True)):

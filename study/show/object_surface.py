@@ -191,22 +191,13 @@ def areas(corners: np.ndarray) -> np.ndarray:
     return 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
 
 
-@dataclass(frozen=True)
-class Wall:
-    """Where the points of a surface lie on the wall: ``around (n,)`` and ``along (n,)`` in steps of the file's grid.
-
-    ``around`` counts from angle 0 about the axis; points that are not on the wall have NaN.
-    """
-
-    around: np.ndarray
-    along: np.ndarray
-
-    def moved(self, u: np.ndarray, angle: float) -> np.ndarray:
-        """Displacement ``(n, 3)`` of the points, from the grid's ``(AROUND, ALONG, 3)``, which begins at ``angle``."""
-        on = np.isfinite(self.around)
-        found = np.zeros((len(on), 3))
-        found[on] = between(u, self.around[on] - angle * AROUND / (2 * np.pi), self.along[on])
-        return found
+def moved(places: np.ndarray, u: np.ndarray, angle: float) -> np.ndarray:
+    """Displacement ``(n, 3)`` of points at `on_wall`, from the grid ``(AROUND, ALONG, 3)`` that begins at ``angle``."""
+    around, along = places.T
+    known = np.isfinite(around)
+    displacement = np.zeros((len(known), 3))
+    displacement[known] = between(u, around[known] - angle * AROUND / (2 * np.pi), along[known])
+    return displacement
 
 
 def between(grid: np.ndarray, around: np.ndarray, along: np.ndarray) -> np.ndarray:
@@ -217,8 +208,11 @@ def between(grid: np.ndarray, around: np.ndarray, along: np.ndarray) -> np.ndarr
     return (1 - s) * ((1 - t) * grid[i, j] + t * grid[i, j + 1]) + s * ((1 - t) * grid[k, j] + t * grid[k, j + 1])
 
 
-def wall_of(shape: Any, points: np.ndarray) -> Wall | None:
-    """Where points ``(n, 3)`` of the surface [m] lie on the wall of a shape; None for shapes without one."""
+def on_wall(shape: Any, points: np.ndarray) -> np.ndarray | None:
+    """Where points ``(n, 3)`` of the surface [m] lie on the wall of a shape ``(n, 2)``; None for shapes without one.
+
+    Around from angle 0 about the axis, and along it, in steps of the file's grid; NaN for points that are not on it.
+    """
     # Imported here: it is slow to load, and only views of walls need it.
     from scipy.spatial import cKDTree
 
@@ -226,10 +220,10 @@ def wall_of(shape: Any, points: np.ndarray) -> Wall | None:
     if grid is None or not len(points):
         return None
     fine = np.meshgrid(np.arange(0, AROUND, 1 / FINER), np.linspace(0, ALONG - 1, FINER * ALONG), indexing="ij")
-    around, along = (f.ravel() for f in fine)
-    distance, nearest = cKDTree(between(grid, around, along)).query(points)
-    off = distance > 3e-3  # distance from the wall within which a point of the surface moves with it [m]
-    return Wall(np.where(off, np.nan, around[nearest]), np.where(off, np.nan, along[nearest]))
+    places = np.stack([f.ravel() for f in fine], axis=1)
+    distance, nearest = cKDTree(between(grid, *places.T)).query(points)
+    # distance from the wall within which a point of the surface moves with it [m]
+    return np.where(distance[:, None] > 3e-3, np.nan, places[nearest])
 
 
 def undeformed(shape: Any, angle: float) -> np.ndarray | None:
@@ -251,9 +245,9 @@ def _lid(shape: Any, corners: np.ndarray) -> np.ndarray:
     """Triangles that close the top of an object that is open there: its surface is that of a solid."""
     wall = None
     if getattr(shape, "open_top", False) and shape.shape != "mesh":
-        wall = wall_of(shape, corners.reshape(-1, 3))
+        wall = on_wall(shape, corners.reshape(-1, 3))
     if wall is None:
         return np.zeros(len(corners), bool)
     z = corners[..., 2]
     # The upper half only: a bottom belongs to the object, a lid does not.
-    return np.isnan(wall.around).reshape(-1, 3).any(axis=1) & (z.mean(axis=1) > 0.5 * (z.min() + z.max()))
+    return np.isnan(wall[:, 0]).reshape(-1, 3).any(axis=1) & (z.mean(axis=1) > 0.5 * (z.min() + z.max()))

@@ -49,7 +49,7 @@ def watch(path: Path, every: float, stream: TextIO | None = None, sleep: Callabl
     stream = stream or sys.stdout
     # Titles and messages are the user's text: brackets in them are no markup.
     console = Console(file=stream, markup=False, emoji=False, highlight=False)
-    view = View(console, stream)
+    view = Display(console, stream)
     try:
         with ExitStack() as stack:
             if console.is_terminal:
@@ -66,7 +66,7 @@ def watch(path: Path, every: float, stream: TextIO | None = None, sleep: Callabl
     return view.code
 
 
-class View:
+class Display:
     """What is drawn, and what of it has to be remembered from look to look.
 
     ``code`` and ``last_words`` are those of a run that has ended; ``live`` draws over itself on a terminal.

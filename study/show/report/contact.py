@@ -46,11 +46,9 @@ def patch(view: View, index: Index) -> Block | None:
     made.update_scenes(plots.scene(camera=eye)).update_layout(margin={"l": 0, "r": 80, "t": 58, "b": 0})
     words = {name: value_text(view.ds, name, index, unit=True) for name in ("p_max", "contact_area")}
     summary = f"largest pressure {words['p_max']}, contact area {words['contact_area']}"
-    caption = (
-        f"{place(view.ds, index, force=True)}: {summary}. The pad's deformed face in its own frame: x along the pad,"
-        " y across it; faces without contact are pale. Blue: the friction that faces carry, each in its own plane,"
-        " while the object slips along x or turns about z of the contact frame (black axes). Drag to turn it."
-    )
+    frame = "The pad's deformed face in its own frame, x along the pad; faces without contact are pale."
+    blue = "Blue: friction of the faces against a slip along x or a turn about z of the contact frame (black axes)."
+    caption = f"{place(view.ds, index, force=True)}: {summary}. {frame} {blue} Drag to turn it."
     return plot(made, caption, f"Contact pressure and friction on the pad, {summary}", 300 * len(fingers) + 40)
 
 
@@ -104,10 +102,9 @@ def limit_surfaces(view: View, index: Index) -> Block | None:
     parts = zip(worst, mean, strict=True)
     fitted, ellipsoid = (f"{number(100 * w, 2)} % (mean error {number(100 * m, 2)} %)" for w, m in parts)
     off = f"They claim too much by up to (CCM): {fitted} the fitted surface, {ellipsoid} the ellipsoid."
-    caption = (
-        f"{place(ds, index, force=True)}: the loads that one contact carries without slipping. Above its shadows: full"
-        f" lines the fitted surface, dashed the ellipsoid from three motions. {exact}"
-    ) + off * bool(np.isfinite([*worst, *mean]).all())
+    caption = f"{place(ds, index, force=True)}: the loads that one contact carries without slipping, and their shadows."
+    caption += f" Full: the fitted surface; dashed: the ellipsoid from three motions. {exact}"
+    caption += off * bool(np.isfinite([*worst, *mean]).all())
     return plot(made, caption, f"Limit surfaces of {' and '.join(known)} over f_x, f_y and tau_z.", 820)
 
 

@@ -103,24 +103,6 @@ def abscissa(ds: xr.Dataset, position: int) -> tuple[Any, dict[str, Any]]:
     return axis_values(ds, axis), {"title_text": title}
 
 
-def fit_error(ds: xr.Dataset, position: int, index: Index) -> Block | None:
-    """What both limit surfaces claim too much at most, along one axis; None where it is not stored."""
-    found = {"fitted surface": field(ds, "overclaim"), "ellipsoid from three motions": field(ds, "overclaim_ellipsoid")}
-    lines = {name: 100 * values[along(position, index)] for name, values in found.items() if values is not None}
-    if not any(np.isfinite(line).sum() > 1 for line in lines.values()):
-        return None
-    made = plots.figure()
-    x, settings = abscissa(ds, position)
-    for (name, line), dash in zip(lines.items(), ("solid", "dash"), strict=False):
-        made.add_scatter(x=x, y=line, name=name, mode="lines+markers", line={"color": "#12436d", "dash": dash})
-    made.update_xaxes(**settings).update_yaxes(title_text="largest overclaim [%]", rangemode="tozero")
-    caption = (
-        "Largest share by which a limit surface claims more friction than the contact carries, CCM, of the finger where"
-        " it is larger, on motions that no surface was fitted to."
-    )
-    return plot(made, caption, f"Overclaim of the limit surfaces over {spoken(str(ds.status.dims[position]))}", 300)
-
-
 # --- what curvature costs --------------------------------------------------------------------------------------------
 
 
@@ -196,10 +178,9 @@ def _differences(ds: xr.Dataset, name: str, x: np.ndarray, lines: dict[Any, Any]
     fine = HALF_AS_FINE if any(e is not None for _, e in lines.values()) else ""
     missing = int(np.sum(ds.status.values[..., index[-1]] != DONE))
     gaps = f" {missing} cases at this force have no value." if missing else ""
-    caption = (
-        f"At {number(forces(ds)[index[-1]])} N: the share of the planar model's claim that the curved contact cannot"
-        f" carry.{fine}{gaps} Only the trend can be compared with the paper, whose numbers are not published."
-    )
+    share = "the share of the planar model's claim that the curved contact cannot carry."
+    trend = "Only the trend can be compared with the paper, whose numbers are not published."
+    caption = f"At {number(forces(ds)[index[-1]])} N: {share}{fine}{gaps} {trend}"
     ends = {key: [number(100 * f(v), 2) for f in (np.nanmin, np.nanmax)] for key, (v, _) in lines.items()}
     summary = "; ".join(f"{COMPONENTS[key][0]}, {model}: {a} to {b} %" for (model, key), (a, b) in ends.items())
     return plot(made, caption, f"Differences of PCM and CCM over {name}. {summary}.", 400)
@@ -230,10 +211,8 @@ def wall_curves(ds: xr.Dataset, index: Index, allowed: float | None) -> Block | 
         made.add_vline(1e3 * allowed, line={"color": "#c05a00", "dash": "dash"}, row=1, col=2)
     made.update_yaxes(title_text="normal force [N]", col=1)
     rule = f" Dashed: the allowed indentation, {1e3 * allowed:g} mm." if allowed is not None else ""
-    caption = (
-        f"Dark: {place(ds, index)}; grey: other candidates. A wall that softens bends its line to the right; open"
-        f" diamonds: the wall snapped in at a smaller force.{rule}"
-    )
+    diamonds = "Open diamonds: the wall snapped in at a smaller force."
+    caption = f"Dark: {place(ds, index)}; grey: other candidates. {diamonds}{rule}"
     here = f"{number(1e3 * indentation[index])} mm at {place(ds, index, force=True)}"
     return plot(made, caption, f"Force over closing and indentation; {here}.", 340)
 

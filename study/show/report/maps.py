@@ -31,8 +31,8 @@ from softjaw.study.show.grasps import (
 
 MOST_PANELS, MOST_LABELS, MOST_NOTES = 6, 16, 8000
 MORE = ("quality_fitted", "epsilon", "f_x_max", "f_y_max", "tau_z_max", "safety_factor", "contact_area", "p_max",
-        "closing", "curvature_loss", "fit_error", "indentation", "wall_stress", "support_force",
-        *(q.of_error.name for q in TABLE if q.error and q.rank))  # fmt: skip
+        "closing", "curvature_loss", "fit_error", "overclaim", "overclaim_ellipsoid",
+        "indentation", "wall_stress", "support_force", *(q.of_error.name for q in TABLE if q.error and q.rank))
 LEVEL_COLOURS = ("#e9eef2", "#8fb4cf", "#12436d")  # light to dark with the cost of a level
 PART_COLOURS = ("#12436d", "#6f9cc0", "#c05a00", "#c9ced2")  # as PARTS
 MARKS = (((FAILED,), "x-thin-open", 8), (NO_GRASP, "line-ew-open", 8), ((MISSING,), "circle", 3))  # of states; size
@@ -118,10 +118,9 @@ def _maps(ds: xr.Dataset, index: Index, x: int, y: int, over: int, panels: list[
                        "yanchor": "bottom", "pad": {"b": 28}}], margin={"t": 90}, plot_bgcolor=plots.EMPTY,
                        showlegend=False)  # fmt: skip
     where = elsewhere(ds, index, x, y, over)
-    caption = (
-        f"{f'At {where}. ' if where else ''}Choose the quantity at the upper left; point at a cell for its values and"
-        " notes. Crosses: failed. Lines: no grasp, its note says why. Dots: not computed yet."
-    )
+    marks = "Crosses: failed. Lines: no grasp. Dots: not computed yet."
+    choose = "Choose the quantity at the upper left; point at a cell for its values and notes."
+    caption = f"{f'At {where}. ' if where else ''}{choose} {marks}"
     names = " and ".join(plots.MODELS[m][0] for m in models)
     alt = f"Maps over {spoken(axes[x])} and {spoken(axes[y])}, {names}. {extremes(ds, index)}"
     return plot(made, caption, alt, total)
@@ -224,12 +223,8 @@ def safe_forces(ds: xr.Dataset, index: Index) -> Block | None:
                              row=1, col=column)  # fmt: skip
     made.update_layout(showlegend=False).update_xaxes(**settings)
     made.update_yaxes(range=[0, 1.12 * forces(ds)[-1]]).update_yaxes(title_text="normal force [N]", col=1)
-    caption = (
-        "Bars: from the minimum holding force (safety factor 1, CCM; zero without a mass) to the maximum force before"
-        " the indentation exceeds what is allowed or the stress the yield strength, by straight lines between solved"
-        " forces. No bar: no force is safe; triangles mark the force that holds (up) and the one that the wall bears"
-        " (down)."
-    )
+    bars = "Bars: from the force that holds (CCM; 0 without a mass) to the one that the wall bears."
+    caption = f"{bars} No bar: no force is safe; triangles mark the force that holds (up) and that is borne (down)."
     return plot(made, caption, f"Safe force ranges: {int(np.sum(low <= high))} of {high.size} grasps have one.", 300)
 
 

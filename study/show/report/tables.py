@@ -37,14 +37,8 @@ SHOWN = ("payload", "quality", "quality_fitted", "e_n", "f_x_max", "f_y_max", "t
 MORE = ("epsilon", "contact_area", "p_max", "closing", "indentation", "wall_stress", "safety_factor")
 WALL = ("indentation", "wall_stress", "wall_strain", "support_force", "safety_factor")
 FORCED = REASONS.index("forced by the scene")
-SAFE = (
-    "Safe forces: normal forces per finger that hold the object's weight, where its mass is given, and that its wall"
-    " bears; a plus: the wall bears the largest solved force."
-)
-STRESS = (
-    "Wall stress is the largest von Mises stress on both faces; support force is what the table or the clamp has to"
-    " bear along the axis because the pads push an object with sloping walls."
-)
+SAFE = "Safe forces per finger hold the object's weight and are borne by its wall; +: also the largest solved force is."
+STRESS = "Wall stress: largest von Mises stress on both faces. Support force: what table or clamp bears along the axis."
 
 
 def best_grasps(ds: xr.Dataset) -> list[Block]:

@@ -67,7 +67,7 @@ def build(ds: xr.Dataset, candidate: int | None = None, place: Place = (None, No
     best = ds.attrs["best"] or (*(0 for _ in ds.status.shape[:-1]), ds.attrs["level"])
     view = View(ds, best[:-3])
     sections: list[Section] = [
-        ("answer", "", [*the_object(view, best), *the_answer(ds)]),
+        ("answer", "", [the_object(view, best), the_answer(ds)]),
         ("best", "Best grasps", best_grasps(ds)),
         ("maps", "Maps", (maps.maps(ds, best) if ds.status.size > 1 else []) +
          tables.reasons(ds, FAILED, *NO_GRASP)),
@@ -75,9 +75,9 @@ def build(ds: xr.Dataset, candidate: int | None = None, place: Place = (None, No
         ("curvature", "What curvature costs", curves.differences(ds, scene, best)),
         *(cases(view, scene) if ds.attrs["best"] is not None else []),
         ("effects", "What was simulated",
-         [*tables.effects(ds), *_there(maps.levels(ds, best)), text(verdict.CAVEAT, "note")]),
+         [*tables.effects(ds), maps.levels(ds, best), text(verdict.CAVEAT, "note")]),
         ("cost", "Convergence and cost",
-         [*tables.states(ds), tables.checks(ds), *_there(maps.effort(ds, best)), *tables.time_split(ds)]),
+         [*tables.states(ds), tables.checks(ds), maps.effort(ds, best), *tables.time_split(ds)]),
         ("cases", "All cases", tables.every_case(ds)),
         ("definitions", "Definitions", tables.definitions(ds)),
         ("provenance", "Provenance", tables.provenance(ds)),
@@ -87,45 +87,37 @@ def build(ds: xr.Dataset, candidate: int | None = None, place: Place = (None, No
     return page(title, verdict.subtitle(ds), sections), picture(ds, scene, best)
 
 
-def _there(*blocks: Block | None) -> list[Block]:
-    return [block for block in blocks if block is not None]
-
-
-def the_answer(ds: xr.Dataset) -> list[Block]:
+def the_answer(ds: xr.Dataset) -> Block | None:
     """The best grasp at a glance: where, how wide, how hard, what it holds, why no more."""
     if ds.attrs["best"] is None:
-        return []
+        return None
     lines = answer_lines(ds, ds.attrs["best"], f", {ds.attrs['why']}")
-    return [answer((name, *value) for name, value in lines.items())]
+    return answer((name, *value) for name, value in lines.items())
 
 
 def best_grasps(ds: xr.Dataset) -> list[Block]:
     """How sure the best grasp is, what speaks against it, and the tables of the best grasps."""
-    found = [box(verdict.verdict(ds), "verdict")]
-    if warnings := verdict.warnings(ds):
-        found.append(box(warnings, "warn"))
-    if chosen := verdict.chosen(ds):
-        found.append(box([chosen], "verdict"))
-    return found + tables.best_grasps(ds)
+    chosen = [verdict.chosen(ds)] if ds.attrs["chosen"] else []
+    boxes = [(verdict.verdict(ds), "verdict"), (verdict.warnings(ds), "warn"), (chosen, "verdict")]
+    return [box(texts, look) for texts, look in boxes if texts] + tables.best_grasps(ds)
 
 
-def the_object(view: View, best: Index) -> list[Block]:
+def the_object(view: View, best: Index) -> Block | None:
     """The object in three dimensions with the pads of the best and of the chosen grasp at every force."""
     shown = [i for i in (best, view.ds.attrs["chosen"]) if i and i[:-3] == view.point]
     cases = dict.fromkeys((*i[:-1], k) for i in shown for k in range(len(forces(view.ds))))
-    if block := object_block(view, best, view.ds.attrs["score"], "x", list(cases)):
-        return [block]
-    return [text(f"{view.note[:1].upper()}{view.note[1:]}.", "note")] * bool(view.note)
+    block = object_block(view, best, view.ds.attrs["score"], "x", list(cases))
+    return block or (text(f"{view.note[:1].upper()}{view.note[1:]}.", "note") if view.note else None)
 
 
-def wall(view: View, best: Index) -> list[Block]:
+def wall(view: View, best: Index) -> list[Block | None]:
     """Limits, safe forces, shape and force curves of a thin wall; empty without one."""
     ds, shape = view.ds, getattr(view.scene, "object", None)
     if field(ds, "indentation") is None:
         return []
     allowed = getattr(shape, "allowed_dent", None)
-    figures = maps.safe_forces(ds, best), curves.wall_section(view, best), curves.wall_curves(ds, best, allowed)
-    return [*tables.wall(ds, shape), *_there(*figures)]
+    sections = curves.wall_section(view, best)
+    return [*tables.wall(ds, shape), maps.safe_forces(ds, best), sections, curves.wall_curves(ds, best, allowed)]
 
 
 def cases(view: View, scene: Any) -> list[Section]:
@@ -139,16 +131,13 @@ def cases(view: View, scene: Any) -> list[Section]:
     which = "of the best case" if len(roles) == 1 else "of both cases"
 
     def headed(draw: Callable[[View, Index], Block | None]) -> list[Block]:
-        drawn = {role: block for role, index in roles.items() if (block := draw(views[index], index)) is not None}
+        drawn = {role: block for role, index in roles.items() if (block := draw(views[index], index))}
         return [part for role, block in drawn.items() for part in ([heading(role)] * (len(roles) > 1) + [block])]
 
-    axes = [*reversed(curves.worth_a_curve(ds)), len(best) - 1]
-    over = next((p for p in axes if ds.status.shape[p] > 1), None)
-    fit = [] if over is None else _there(curves.fit_error(ds, over, best))
     return [
         ("models", "Friction models compared", curves.models(ds, best, scene.friction.mu if scene else None)),
         ("patch", f"Contact patch {which}", headed(contact.patch)),
-        ("surface", f"Limit surface {which}", [*headed(contact.limit_surfaces), *fit]),
+        ("surface", f"Limit surface {which}", headed(contact.limit_surfaces)),
     ]
 
 

@@ -21,7 +21,7 @@ from softjaw.study.ranking import nearest
 from softjaw.study.result.read import axes_of, read_field, read_patch
 from softjaw.study.scene import SceneError, parse_scene
 from softjaw.study.show.grasps import Index, at, candidate_of, field, forces, number, order, place, quantity, unravelled
-from softjaw.study.show.object_surface import NOBODY, Surface, Wall, scene_at, surface_of, undeformed, wall_of
+from softjaw.study.show.object_surface import NOBODY, Surface, moved, on_wall, scene_at, surface_of, undeformed
 from softjaw.study.show.stored_surface import body, stored_surface, weaker
 from softjaw.study.show.view.pads import Faces, Pad, pads_of
 
@@ -133,9 +133,9 @@ class View:
         return self.placed.to_pad(first), np.repeat(of, origin.shape[-2])
 
     @cached_property
-    def wall(self) -> Wall | None:
+    def wall(self) -> np.ndarray | None:
         """Where the surface's points lie on the wall."""
-        return wall_of(self.scene.object, self.surface.points) if self.walled else None
+        return on_wall(self.scene.object, self.surface.points) if self.walled else None
 
     @cached_property
     def _places(self) -> np.ndarray:
@@ -156,7 +156,7 @@ class View:
         """The surface's points ``(n, 3)``, moved with the wall of a case where the file has it."""
         found = self.displacement(index) if self.wall is not None else None
         x = self.surface.points
-        return x if found is None or self.wall is None else x + self.wall.moved(*found)
+        return x if found is None or self.wall is None else x + moved(self.wall, *found)
 
     # --- a case ---
 

@@ -89,8 +89,8 @@ def payload(
         "owner": _packed(view.owner, "<i4"),
         "marks": {"points": (1e3 * where).round(4).tolist(), "owner": of.tolist()},
         "grid": [AROUND, ALONG],
-        "around": "" if wall is None else _packed(np.nan_to_num(wall.around, nan=-1e9), "<f4"),
-        "along": "" if wall is None else _packed(np.nan_to_num(wall.along), "<f4"),
+        "around": "" if wall is None else _packed(np.nan_to_num(wall[:, 0], nan=-1e9), "<f4"),
+        "along": "" if wall is None else _packed(np.nan_to_num(wall[:, 1]), "<f4"),
         "colours": [NEUTRAL, OPEN, CROSSED],
         "cases": kept,
     }

@@ -1,4 +1,7 @@
-"""A case as a picture without a screen, or as a window with a slider over the forces; through pyvista."""
+"""A case as a picture without a screen, or as a window with a slider over the forces; through pyvista.
+
+Lengths are drawn in mm and pressures in kPa.
+"""
 
 from __future__ import annotations
 
@@ -9,16 +12,17 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 
-from softjaw.study.pictures import COLOURS, INK
+from softjaw.study.pictures import COLOURS, INK, SOFT
 from softjaw.study.quantities import DONE, FAILED, MISSING, NO_GRASP
 from softjaw.study.ranking import nearest
 from softjaw.study.show.grasps import Index, forces, label_of
 from softjaw.study.show.object_surface import NOBODY
 from softjaw.study.show.stored_surface import COMPONENTS, weaker
-from softjaw.study.show.view import solids
-from softjaw.study.show.view.model import ARROW_MM, CROSSED, NEUTRAL, OPEN, View
+from softjaw.study.show.view.model import ARROW_MM, CROSSED, FORCE, NEUTRAL, OPEN, PAD, View
+from softjaw.study.show.view.pads import Pad
 
 SIZE = (1400, 900)
+LIGHT = {"ambient": 0.62, "diffuse": 0.42, "specular": 0.0}  # colours have to be those of the bar
 BAR = {"vertical": True, "height": 0.36, "width": 0.045, "title_font_size": 15, "label_font_size": 13, "n_labels": 5,
        "color": INK, "fmt": "%.4g", "position_x": 0.07}  # fmt: skip
 
@@ -40,9 +44,9 @@ def plot(view: View, index: Index, quantity: str, motion: str, *, off_screen: bo
     plotter.set_background("white", all_renderers=True)
     draw(plotter, view, index, quantity, motion)
     plotter.subplot(1, 2)
-    solids.look(plotter, (0.8, -1.0, 0.55), (0, 0, 1), 0.95)
+    look(plotter, (0.8, -1.0, 0.55), (0, 0, 1), 0.95)
     plotter.subplot(0, 0)
-    solids.look(plotter, *view.eye(index), 0.9)
+    look(plotter, *view.eye(index), 0.9)
     # the object is drawn with its axis upright; its file's own axes are named
     named = ["xyz"[abs(column).argmax()] for column in view.placed.rotation.T]
     labels = dict(zip(("xlabel", "ylabel", "zlabel"), named, strict=True))
@@ -78,13 +82,13 @@ def _object(plotter: Any, view: View, index: Index, quantity: str) -> None:
     x = 1e3 * view.moved(index)
     for name, (colour, chosen) in plain.items():
         if chosen.any():
-            solids.surface(plotter, x, corners[chosen], None, cell[chosen], name=name, color=colour)
+            surface(plotter, x, corners[chosen], None, cell[chosen], name=name, color=colour)
     if shown.any():
-        solids.surface(plotter, x, corners[shown], values[cell[shown]], cell[shown], name="object", **colours)
+        surface(plotter, x, corners[shown], values[cell[shown]], cell[shown], name="object", **colours)
     places, owner = view.marks
     if len(places):
         # radius of the balls where fingers of explicit poses touch [mm]
-        solids.dots(plotter, 1e3 * places, 4.0, values[owner], name="marks", **colours)
+        dots(plotter, 1e3 * places, 4.0, values[owner], name="marks", **colours)
 
 
 def _pads(plotter: Any, view: View, index: Index, motion: str) -> None:
@@ -95,10 +99,10 @@ def _pads(plotter: Any, view: View, index: Index, motion: str) -> None:
     top = max((1e-3 * pad.pressure.max(initial=0.0) for pad in found), default=0.0)
     bar = {**BAR, "position_y": 0.1, "title": "contact pressure [kPa]"}
     for number, pad in enumerate(found):
-        solids.block(plotter, pad, f"pad {number}")
+        block(plotter, pad, f"pad {number}")
         if pad.loaded.any():
-            solids.pressures(plotter, pad, top, name=f"pad {number} pressure", scalar_bar_args=bar, pickable=False)
-            solids.arrows(plotter, pad.arrows(motion, ARROW_MM), name=f"pad {number} arrows", pickable=False)
+            pressures(plotter, pad, top, name=f"pad {number} pressure", scalar_bar_args=bar, pickable=False)
+            arrows(plotter, pad.arrows(motion, ARROW_MM), name=f"pad {number} arrows", pickable=False)
 
 
 def _say(plotter: Any, text: str, name: str) -> None:
@@ -118,11 +122,11 @@ def _limit(plotter: Any, view: View, index: Index) -> None:
     reach = np.abs(points).max(axis=(0, 1))
     x, y, z = np.moveaxis(points / reach, -1, 0)
     plotter.add_mesh(pv.StructuredGrid(x, y, z), color="#9cc0e0", show_edges=True, edge_color="#54728c", line_width=0.5,
-                     name="limits", **solids.LIGHT)  # fmt: skip
+                     name="limits", **LIGHT)  # fmt: skip
     axes = 1.45 * np.array([[-np.eye(3)[k], np.eye(3)[k]] for k in range(3)])
-    solids.lines(plotter, axes, INK, name="limit lines")
+    lines(plotter, axes, INK, name="limit lines")
     texts = [f"{name} {r:.3g} {unit}" for (name, unit), r in zip(COMPONENTS, reach, strict=True)]
-    solids.labels(plotter, axes[:, 1] * 1.05, texts, 15, name="limit labels", shape=None)
+    labels(plotter, axes[:, 1] * 1.05, texts, 15, name="limit labels", shape=None)
     title = f"limit surface of finger {weaker(view.ds, index) + 1} (CCM):\nloads that it carries without slipping"
     return _say(plotter, title, "limit title")
 
@@ -162,3 +166,86 @@ def add_controls(plotter: Any, view: View, index: Index, quantity: str, motion: 
     click = {"left_clicking": True, "show_message": False, "show_point": False}
     plotter.enable_point_picking(pick, picker="cell", use_picker=True, **click)
     return {"state": state, "force": force, "pick": pick}
+
+
+# --- parts -----------------------------------------------------------------------------------------------------------
+
+
+def look(plotter: Any, towards: Any, up: Any, zoom: float = 1.0) -> None:
+    """See everything from a direction, without perspective."""
+    plotter.view_vector(towards, viewup=up)
+    plotter.enable_parallel_projection()
+    plotter.reset_camera()
+    plotter.camera.zoom(zoom)
+
+
+def surface(
+    plotter: Any, points: np.ndarray, triangles: np.ndarray, values: Any = None, candidate: Any = None, **look: Any
+) -> None:
+    """Triangles ``(m, 3)`` among points ``(n, 3)``: of one colour, or in those of ``values (m,)``; grey without one.
+
+    ``candidate (m,)`` are numbers that a click finds again.
+    """
+    mesh = pv.PolyData.from_regular_faces(points, triangles)
+    if values is not None:
+        mesh.cell_data["value"] = values
+        look = {"scalars": "value", "nan_color": NEUTRAL, **look}
+    if candidate is not None:
+        mesh.cell_data["candidate"] = candidate
+    # points of two candidates' cells lie on each other: joined, or the light would show the cells' borders
+    # degrees; normals are not averaged over sharper bends
+    mesh = mesh.clean().compute_normals(split_vertices=True, feature_angle=40, cell_normals=False)
+    plotter.add_mesh(mesh, **{**LIGHT, **look})
+
+
+def faces(plotter: Any, corners: np.ndarray, values: Any = None, **look: Any) -> None:
+    """Quadrilaterals ``(k, 4, 3)``, of one colour or in those of ``values (k,)``."""
+    mesh = pv.PolyData.from_regular_faces(corners.reshape(-1, 3), np.arange(4 * len(corners)).reshape(-1, 4))
+    if values is not None:
+        mesh.cell_data["value"] = values
+        look = {"scalars": "value", **look}
+    plotter.add_mesh(mesh, **{"lighting": False, **look})
+
+
+def block(plotter: Any, pad: Pad, name: str = "pad") -> None:
+    """A pad's sides, which one sees through, and its edges."""
+    faces(plotter, 1e3 * pad.sides(), color=PAD, opacity=0.22, name=f"{name} sides")
+    lines(plotter, 1e3 * pad.lines(), PAD, name=f"{name} lines")
+
+
+def pressures(plotter: Any, pad: Pad, top: float, **look: Any) -> None:
+    """The loaded faces of a pad in the colours of their pressure, up to ``top`` [kPa]."""
+    look = {"cmap": COLOURS["pressure"], "clim": (0, top), "edge_color": SOFT, "line_width": 1, **look}
+    faces(plotter, *pad.pressed(), **look)
+
+
+def lines(plotter: Any, ends: np.ndarray, colour: str, width: float = 2.0, **look: Any) -> None:
+    """Segments ``(k, 2, 3)``."""
+    plotter.add_mesh(pv.line_segments_from_points(ends.reshape(-1, 3)), color=colour, line_width=width, **look)
+
+
+def arrows(plotter: Any, ends: np.ndarray, **look: Any) -> None:
+    """Arrows along segments ``(k, 2, 3)``, such as those of `study.show.view.pads.Pad.arrows`."""
+    cloud = pv.PolyData(ends[:, 0])
+    cloud["vector"] = ends[:, 1] - ends[:, 0]
+    if cloud["vector"].any():
+        shape = pv.Arrow(tip_length=0.35, tip_radius=0.14, shaft_radius=0.06, tip_resolution=10, shaft_resolution=8)
+        glyphs = cloud.glyph(orient="vector", scale="vector", geom=shape)
+        plotter.add_mesh(glyphs, color=FORCE, lighting=False, **look)
+
+
+def dots(plotter: Any, places: np.ndarray, radius: float, values: Any = None, **look: Any) -> None:
+    """Balls at ``places (n, 3)``, of one colour or in those of values."""
+    cloud = pv.PolyData(places)
+    if values is not None:
+        cloud["value"] = values
+        look = {"scalars": "value", "nan_color": NEUTRAL, **look}
+    ball = pv.Sphere(radius=radius, theta_resolution=12, phi_resolution=12)
+    plotter.add_mesh(cloud.glyph(geom=ball, scale=False, orient=False), **{**LIGHT, **look})
+
+
+def labels(plotter: Any, places: np.ndarray, texts: list[str], size: int = 34, **look: Any) -> None:
+    """Names at places, on white ground."""
+    ground = {"shape": "rounded_rect", "shape_color": "white", "shape_opacity": 0.75, "margin": 4}
+    plotter.add_point_labels(places, texts, font_size=size, text_color=INK, show_points=False, always_visible=True,
+                             **{**ground, **look})  # fmt: skip

@@ -18,7 +18,7 @@ from softjaw.study.quantities import ALONG, AROUND
 from softjaw.study.result.read import dataset
 from softjaw.study.result.store import open_result
 from softjaw.study.show.grasps import judge, order
-from softjaw.study.show.object_surface import NOBODY, Cells, Wall, areas, between, coloured, cut
+from softjaw.study.show.object_surface import NOBODY, Cells, areas, between, coloured, cut, moved
 from softjaw.study.show.view.model import quantity_of, view_of
 from softjaw.study.show.view.object3d import object_block, payload, view_page
 from softjaw.study.show.view.pads import pads_of
@@ -104,10 +104,9 @@ def test_values_between_the_places_of_a_wall_are_bilinear_and_close_round_the_ax
 def test_a_wall_moves_with_the_grid_that_begins_at_finger_one():
     u = np.zeros((AROUND, ALONG, 3))
     u[0] = (-1e-3, 0, 0)  # under finger 1
-    wall = Wall(np.array([12.0, 0.0, np.nan]), np.array([5.0, 5.0, 5.0]))
-    moved = wall.moved(u, angle=math.pi / 2)
-    assert moved[0] == pytest.approx([-1e-3, 0, 0])  # a quarter of the way round
-    assert not moved[1:].any()
+    shifts = moved(np.array([[12.0, 5.0], [0.0, 5.0], [np.nan, 5.0]]), u, angle=math.pi / 2)
+    assert shifts[0] == pytest.approx([-1e-3, 0, 0])  # a quarter of the way round
+    assert not shifts[1:].any()
 
 
 # --- pads ------------------------------------------------------------------------------------------------------------
