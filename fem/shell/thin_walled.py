@@ -14,12 +14,12 @@ from functools import lru_cache
 
 import numpy as np
 
-from softjaw.fem.materials import WallMaterial
 from softjaw.fem.objects.gap import Pose
 from softjaw.fem.objects.outer_surface import OuterSurface, Turned
 from softjaw.fem.objects.stacked import wall_surface
 from softjaw.fem.shell.element import FloatArray, Shell
 from softjaw.fem.shell.facing import Wall
+from softjaw.fem.shell.wall_material import WallMaterial
 from softjaw.fem.shell.wall_mesh import BodyMesh, MeshSize, body_mesh
 from softjaw.fem.shell.wall_model import LinearShell, LinearWall, NonlinearWall
 from softjaw.friction.patch import NEGLIGIBLE

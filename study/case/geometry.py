@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.fem.errors import MeshError
-from softjaw.fem.materials import WallMaterial, wall_material
 from softjaw.fem.objects.centre_line import CentreLine, centre_line
 from softjaw.fem.objects.gap import GapObject
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.fem.objects.outer_surface import OuterSurface
 from softjaw.fem.objects.stacked import Stacked
 from softjaw.fem.objects.traced_surface import TracedSurface, TraceReport, traced
+from softjaw.fem.shell.wall_material import WallMaterial, wall_material
 from softjaw.fem.shell.wall_mesh import MeshSize, along, around, body_mesh
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.scene.objects import Mesh, Walled

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from softjaw.fem.materials import wall_material
+from softjaw.fem.shell.wall_material import wall_material
 from softjaw.study.case.build import axis_span, has_wall, told
 from softjaw.study.units import UNITS, shown, shown_text
 

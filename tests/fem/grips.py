@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 
 from softjaw.fem.contact.extract import extract
-from softjaw.fem.materials import WallMaterial, material, wall_material
+from softjaw.fem.materials import material
 from softjaw.fem.objects.gap import Pose
 from softjaw.fem.objects.outer_surface import of_revolution
 from softjaw.fem.objects.revolution import Revolution
@@ -13,6 +13,7 @@ from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.pad.shape import PadShape
 from softjaw.fem.shell.grip import Grip
 from softjaw.fem.shell.thin_walled import ThinWalled, WallMesh, grasp, wall_between
+from softjaw.fem.shell.wall_material import WallMaterial, wall_material
 from softjaw.fem.shell.wall_problem import WallProblem
 from softjaw.friction.frame import contact_frame, in_frame
 from softjaw.friction.wrench import friction_limits

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from softjaw.fem.errors import MeshError
-from softjaw.fem.materials import wall_material
 from softjaw.fem.objects.gap import grid_triangles
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.fem.objects.outer_surface import Section, Turned, of_sections
@@ -16,6 +15,7 @@ from softjaw.fem.objects.stacked import Stacked
 from softjaw.fem.objects.traced_outline import cast, centroids, smooth_rings, smooth_spline
 from softjaw.fem.objects.traced_surface import traced
 from softjaw.fem.shell.thin_walled import ThinWalled
+from softjaw.fem.shell.wall_material import wall_material
 from softjaw.fem.shell.wall_mesh import MeshSize, body_mesh
 from tests.fem.grips import can, e_n, grip, thin
 

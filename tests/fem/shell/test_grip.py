@@ -10,8 +10,8 @@ from softjaw.fem.contact.load_stepping import Work
 from softjaw.fem.contact.path import OnPath
 from softjaw.fem.contact.press import Press
 from softjaw.fem.contact.problem import Control
-from softjaw.fem.materials import WallMaterial, wall_material
 from softjaw.fem.shell.thin_walled import WallMesh
+from softjaw.fem.shell.wall_material import WallMaterial, wall_material
 from tests.fem.grips import check_tangent, e_n, gap_at, grip, pose, stirred, thin
 
 FORCES = (0.5, 2.0)

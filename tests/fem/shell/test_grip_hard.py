@@ -8,11 +8,11 @@ import pytest
 from softjaw.fem.contact.extract import extract, turned
 from softjaw.fem.contact.load_stepping import Settings, Stepping, Work
 from softjaw.fem.errors import CheckError, ConvergenceError
-from softjaw.fem.materials import WallMaterial
 from softjaw.fem.objects.gap import Pose
 from softjaw.fem.shell.facing import FAR, face
 from softjaw.fem.shell.opening import Opening
 from softjaw.fem.shell.thin_walled import WallMesh, grasp
+from softjaw.fem.shell.wall_material import WallMaterial
 from softjaw.fem.shell.wall_mesh import MeshSize, body_mesh
 from tests.fem.falling_force import MM, Curve, crossings
 from tests.fem.grips import e_n, grip, pose, thin

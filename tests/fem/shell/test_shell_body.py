@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from softjaw.fem.errors import ConvergenceError
-from softjaw.fem.materials import WallMaterial, wall_material
 from softjaw.fem.objects.outer_surface import Section, of_revolution, of_sections
 from softjaw.fem.objects.revolution import Revolution
 from softjaw.fem.shell.thin_walled import supported
+from softjaw.fem.shell.wall_material import WallMaterial, wall_material
 from softjaw.fem.shell.wall_mesh import MeshSize, body_mesh, divided, limited
 from softjaw.fem.shell.wall_model import LinearShell, faces
 from tests.fem.shell.shell_path import Loaded, load_steps

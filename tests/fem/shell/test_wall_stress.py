@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from softjaw.fem.materials import WallMaterial
 from softjaw.fem.objects.outer_surface import of_revolution
 from softjaw.fem.objects.revolution import Revolution
 from softjaw.fem.shell.thin_walled import supported
+from softjaw.fem.shell.wall_material import WallMaterial
 from softjaw.fem.shell.wall_mesh import MeshSize, body_mesh
 from softjaw.fem.shell.wall_model import LinearShell, faces
 
