@@ -71,9 +71,8 @@ class SoftContact:
                 raise ValueError(f"{name} is {length}: it must be a positive length in metres")
         arm = (self.position - _vector("centre_of_mass", centre_of_mass)) / lengths
         x, y, N = self.axes
-        C = np.zeros((6, 4))
-        for column, force in enumerate((N, x, y)):
-            C[:3, column], C[3:, column] = force, np.cross(arm, force)
+        C, forces = np.zeros((6, 4)), np.array([N, x, y])
+        C[:3, :3], C[3:, :3] = forces.T, np.cross(arm, forces).T
         C[3:, 3] = N / contact_length
         return C
 
