@@ -30,17 +30,7 @@ from softjaw.scoring.contact import SoftContact, contact_axes
 from softjaw.scoring.epsilon import epsilon
 from softjaw.scoring.pose import pose_volume
 from softjaw.scoring.quality import score
-from tests.generators import (
-    build,
-    bump,
-    cyl_mesh,
-    grid_mesh,
-    lcg_noise,
-    lcg_patch,
-    lcg_sphere,
-    mesh_patch,
-    screw_twist,
-)
+from tests.generators import build, bump, cyl_mesh, grid_mesh, lcg_noise, lcg_patch, lcg_sphere, mesh_patch, screw_twist
 from tests.oracles import body_volume, least_squares_quartic
 
 TABLE = json.loads((Path(__file__).parent / "data" / "friction_table.json").read_text())["cases"]

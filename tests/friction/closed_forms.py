@@ -16,15 +16,7 @@ from scipy.integrate import quad
 from scipy.special import ellipe
 
 from softjaw.friction.patch import ContactPatch
-from tests.generators import (
-    PRESSURES,
-    cap_polar,
-    cylinder_grid,
-    disc_polar,
-    points_patch,
-    rect_grid,
-    wedge,
-)
+from tests.generators import PRESSURES, cap_polar, cylinder_grid, disc_polar, points_patch, rect_grid, wedge
 
 ALPHA = pi / 3
 

@@ -7,16 +7,7 @@ import pytest
 
 from softjaw.friction.frame import FrameFlag, contact_frame, contact_length, in_frame
 from softjaw.friction.patch import NoContactError
-from tests.generators import (
-    cyl_mesh,
-    cylinder_grid,
-    disc_polar,
-    grid_mesh,
-    lcg,
-    mesh_patch,
-    points_patch,
-    rect_grid,
-)
+from tests.generators import cyl_mesh, cylinder_grid, disc_polar, grid_mesh, lcg, mesh_patch, points_patch, rect_grid
 
 X = [1.0, 0.0, 0.0]
 

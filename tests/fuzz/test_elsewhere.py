@@ -190,17 +190,6 @@ def test_a_result_file_that_lies_is_read_or_refused(tmp_path, told, lie):
         assert "<script>alert" not in page.read_text()
 
 
-@pytest.mark.long
-def test_words_of_a_file_are_no_part_of_the_report(tmp_path, told):
-    path = make(tmp_path / "a.hdf")
-    with h5py.File(path, "r+") as file:
-        LIES["words with orders"](file)
-    assert told("report", sealed(path), "-o", tmp_path / "page.html")[0] == 0
-    text = (tmp_path / "page.html").read_text()
-    assert "<script>alert" not in text
-    assert "&lt;script&gt;alert" in text
-
-
 def test_a_file_that_hdf5_breaks_on_is_refused(tmp_path):
     path = make(tmp_path / "a.hdf")
     content = bytearray(path.read_bytes())

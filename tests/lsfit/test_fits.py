@@ -25,16 +25,7 @@ from softjaw.lsfit.sos import (
     smallest,
 )
 from softjaw.lsfit.surface import FitError, FitFlag
-from tests.generators import (
-    build,
-    cylinder_grid,
-    disc_polar,
-    heightfield,
-    lcg,
-    lcg_patch,
-    points_patch,
-    rect_grid,
-)
+from tests.generators import build, cylinder_grid, disc_polar, heightfield, lcg, lcg_patch, points_patch, rect_grid
 from tests.oracles import body_volume, least_squares_quartic, samples, smallest_curvature
 
 HERTZ = {"gen": "disc_polar", "args": {"R": 1.0, "nr": 40, "nt": 96}, "pressure": {"kind": "hertz", "a": 1.0}}

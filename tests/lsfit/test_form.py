@@ -4,13 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from softjaw.lsfit.form import (
-    exponents,
-    hessian_tensor,
-    monomial_gradients,
-    monomials,
-    substitute,
-)
+from softjaw.lsfit.form import exponents, hessian_tensor, monomial_gradients, monomials, substitute
 from softjaw.lsfit.lowest import lies_above, smallest_value
 from softjaw.lsfit.sos import ball_coefficients
 

@@ -13,16 +13,7 @@ import trimesh
 from trimesh.creation import box, capsule, cylinder, icosphere
 from trimesh.transformations import rotation_matrix
 
-from tests.objects.bodies import (
-    hollow_bowl,
-    mug,
-    outline_body,
-    punctured,
-    revolved,
-    scan,
-    slabs,
-    spoiled,
-)
+from tests.objects.bodies import hollow_bowl, mug, outline_body, punctured, revolved, scan, slabs, spoiled
 
 Mesh = trimesh.Trimesh
 Maker = Callable[[], Mesh]

@@ -10,14 +10,7 @@ from pathlib import Path
 import pytest
 
 from softjaw.study import doctor
-from softjaw.study.doctor import (
-    COMPILED,
-    NOT_IN_TIME,
-    ask,
-    launch_environment,
-    outside_mpi,
-    trouble,
-)
+from softjaw.study.doctor import COMPILED, NOT_IN_TIME, ask, launch_environment, outside_mpi, trouble
 from softjaw.study.messages import CANNOT_WRITE, USAGE
 
 

@@ -146,24 +146,6 @@ def test_a_run_that_is_stopped_or_killed_goes_on_with_other_ranks_to_the_same_bi
     assert differing(path, contents(alone)) == []
 
 
-def test_a_solver_from_the_command_line_finds_the_same_contact(tmp_path, scene, alone):
-    """Bounds on the pressures instead of the active set: another algorithm, the same answer at one of the places."""
-    path = tmp_path / "bounds.hdf"
-    changes = ("candidates.stations_mm=[30]", "candidates.angles_deg=[5]", "limit_surface.wrench_samples='none'")
-    place = [word for change in changes for word in ("--set", change)]
-    code, _, errors = run(0, scene, path, *place, "--", "-contact_snes_type", "vinewtonrsls")
-    assert code == 0, errors
-    with open_result(path) as found, open_result(alone) as expected:
-        assert 'contact_snes_type = "vinewtonrsls"' in found.scene
-        for name in ("e_n", "quality", "f_x_max", "f_y_max", "tau_z_max"):
-            for model in ("ccm", "pcm", "pcm_projected"):
-                here, there = (of.read(f"{name}/{model}") for of in (found, expected))
-                assert here[0, 0, 0] == pytest.approx(there[1, 1, 0], rel=1e-8), name
-        pressure = expected.patch(expected.row(1, 1, 0))["pressure"]
-        bounded = found.patch(found.row(0, 0, 0))["pressure"]
-        assert bounded == pytest.approx(pressure, abs=1e-7 * np.abs(pressure).max())
-
-
 # --- two nodes --------------------------------------------------------------------------------------------------------
 
 

@@ -70,9 +70,8 @@ def test_a_signal_stops_the_run_and_puts_the_job_back_into_the_queue(script, tmp
 
 def test_a_job_that_never_ends_is_not_put_back_for_ever(tmp_path, slurm):
     words = (SCRIPTS[-1], tmp_path, slurm, "a.toml")
-    code, output = finished(*words, SLURM_RESTART_COUNT="5", MOST_RESTARTS="5", FAKE_CODE="75")
+    code, _ = finished(*words, SLURM_RESTART_COUNT="5", MOST_RESTARTS="5", FAKE_CODE="75")
     assert code == 75
-    assert "stopped for good after 5 restarts" in output
     assert not any("scontrol" in line for line in calls(tmp_path))
 
 

@@ -9,10 +9,9 @@ import pytest
 
 from softjaw.study import pipeline
 from softjaw.study.case import wall
-from softjaw.study.case.effects import SMALL_INDENTATION
+from softjaw.study.case.effects import ABOVE, BELOW, SMALL_INDENTATION
 from softjaw.study.case.result import CaseFailure
 from softjaw.study.flags import Flag
-from softjaw.study.quantities import REASONS
 from tests.study.scenes import QUICK, scene_of, units_of
 from tests.study.test_pipeline import differing
 
@@ -21,25 +20,10 @@ profile_mm = [[0, 24], [4, 28], [30, 30], [60, 32], [80, 34]]
 wall_mm = 0.6
 wall_material = "PP"
 """
-OVAL = """shape = "sections"
-wall_mm = 0.5
-[[object.sections]]
-z_mm = 0
-a_mm = 22
-b_mm = 18
-[[object.sections]]
-z_mm = 20
-a_mm = 24
-b_mm = 20
-[[object.sections]]
-z_mm = 40
-a_mm = 24
-b_mm = 20
-[[object.sections]]
-z_mm = 70
-a_mm = 24
-b_mm = 20
-"""
+OVAL = 'shape = "sections"\nwall_mm = 0.5\n' + "".join(
+    f"[[object.sections]]\nz_mm = {z}\na_mm = {a}\nb_mm = {b}\n"
+    for z, a, b in ((0, 22, 18), (20, 24, 20), (40, 24, 20), (70, 24, 20))
+)
 COARSE = ("accuracy.wall_element_mm=4", *QUICK)
 WHERE = "stations_mm = [40]\nangles_deg = [0]"
 
@@ -66,9 +50,7 @@ def test_the_level_follows_the_indentation_and_says_so():
     assert names == ("rigid", "linear shell", "nonlinear shell")
     assert indicators == tuple(sorted(indicators))
     assert indicators[1] <= SMALL_INDENTATION < indicators[2]
-    assert "below" in REASONS[reasons[0]]
-    assert "below" in REASONS[reasons[1]]
-    assert "above" in REASONS[reasons[2]]
+    assert reasons == (BELOW, BELOW, ABOVE)
 
 
 LONG = pytest.mark.long
@@ -121,7 +103,7 @@ def test_a_tilted_approach_keeps_one_plane_and_one_along_the_axis_is_refused():
     tilted = solved(CUP, where=pose([-1, 0, 0.2], [0, 0, 1]))[-1]
     assert tilted.effects["model_size"][0] == "half"
     assert np.isfinite(tilted.values["maps/e_n"]).all()
-    with pytest.raises(Exception, match="a finger approaches a thin-walled object at 90 degrees"):
+    with pytest.raises(Exception, match="90 degrees"):
         solved(CUP, where=pose([0, 0, 1], [1, 0, 0]))
 
 
@@ -178,9 +160,8 @@ def test_a_collapse_fails_the_case_and_those_above_with_the_reason(monkeypatch):
     monkeypatch.setattr(Opening, "__call__", lambda self, q: 1.0 - 1e3 * float(np.abs(q).max()))
     path = [r for _, r in pipeline.solve_unit(walled(CUP, forces="[0.2, 3, 4]")[0])]
     assert not isinstance(path[0], CaseFailure)
-    assert "the wall collapsed: its opposite sides meet at" in path[1].message
-    assert "the last good force is 0.2 N" in path[1].message
-    assert path[2].message.startswith("not tried")
+    assert all(isinstance(result, CaseFailure) for result in path[1:])
+    assert "0.2 N" in path[1].message
 
 
 def test_a_grasp_whose_support_bears_more_than_friction_slides_out():
@@ -190,4 +171,4 @@ def test_a_grasp_whose_support_bears_more_than_friction_slides_out():
         # the funnel's slope of 0.4 pushes it along its axis with about that share of both normal forces
         assert 0.2 < result.values["maps/support_force"] / 2.0 < 0.5
         assert bool(result.values["maps/flags"] & Flag.SLIDES_OUT) == slides
-        assert ("slides out" in result.message) == slides
+        assert (Flag.SLIDES_OUT.sentence in result.message) == slides

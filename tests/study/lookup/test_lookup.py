@@ -55,7 +55,7 @@ def test_a_point_has_the_errors_of_the_mesh_in_the_unit_of_the_value(tmp_path, s
     assert point.mesh_error("e_n") == pytest.approx(0.02 * point.e_n, rel=1e-12)
     assert point.mesh_error("opening_loaded") == pytest.approx(1e-4, rel=1e-12)
     assert np.isnan(point.mesh_error("opening"))
-    assert "by the mesh +- 0.1 mm" in str(point)
+    assert "0.1 mm" in str(point)
     assert np.isnan(straight.at(0.02, 0.0, 3.0).mesh_error("e_n"))
 
 
@@ -89,17 +89,17 @@ def test_one_point_is_the_same_as_an_array_of_points(straight):
 def test_units_of_people_and_missing_coordinates(straight):
     found = straight.at(station_mm=15, angle_deg=40, force=3).e_n
     assert found == pytest.approx(straight.at(0.015, np.radians(40), 3).e_n, rel=1e-14)
-    with pytest.raises(ValueError, match="station is given twice"):
-        straight.at(0.01, 0.1, 3, station_mm=10)
-    with pytest.raises(ValueError, match="angle is missing"):
-        straight.at(0.01, force=3)
-    with pytest.raises(ValueError, match="force is missing"):
-        straight.at(0.01, 0.1)
-    with pytest.raises(ValueError, match="stations and angles"):
-        straight.at(candidate=0, force=3)
+    for named, given in (
+        ("station", {"station": 0.01, "angle": 0.1, "force": 3, "station_mm": 10}),
+        ("angle", {"station": 0.01, "force": 3}),
+        ("force", {"station": 0.01, "angle": 0.1}),
+        ("station", {"candidate": 0, "force": 3}),
+    ):
+        with pytest.raises(ValueError, match=named):
+            straight.at(**given)
     with pytest.raises(ValueError, match="model is 'round'"):
         straight.value("e_n", 0.01, 0.1, 3.0, "round")
-    with pytest.raises(KeyError, match="safety_factor is not in"):
+    with pytest.raises(KeyError, match="safety_factor"):
         _ = straight.at(0.01, 0.1, 3).safety_factor
 
 
@@ -133,7 +133,7 @@ def test_beside_a_case_without_result_there_is_no_value(tmp_path, code, word):
     assert "station 20 mm, angle 30 deg, normal_force 2 N" in beside.reason
     assert there.at(0.01, ANGLES[1], 2).e_n == pytest.approx(linear(0.01, 0, 2))  # a solved case next to it
     assert there.value("e_n", 0.02, float(ANGLES[0]), 1.5) == pytest.approx(linear(0.02, 0, 1.5))
-    with pytest.raises(ValueError, match="no value: the case beside it"):
+    with pytest.raises(ValueError, match="station 20 mm"):
         beside.limit_surface(1)
     assert list(there.at([0.019, 0.035], 0.5, 1.9).reason) == [beside.reason, ""]
 

@@ -16,7 +16,7 @@ from softjaw.study.result.layout import DONE, FAILED
 from softjaw.study.show.best_grasps import best, force_to_use, safe_range
 from softjaw.study.show.places import distinct
 from softjaw.study.show.status import grouped
-from softjaw.study.table import as_csv, as_json, as_text
+from softjaw.study.table import as_csv, as_json
 
 FORCES = np.array([1.0, 5.0])
 
@@ -178,16 +178,6 @@ def test_the_payload_is_shown_in_grams_and_stored_in_kilograms():
 
 
 WIDE = ("mass", "wall", "two meshes")
-
-
-@pytest.mark.parametrize("width", [60, 80, 100, 200])
-def test_where_to_grasp_and_the_first_maps_stay_in_a_narrow_terminal(width):
-    walls = study([[4, 4], [3, 3]], flags=[0.0, float(Flag.SLIPS + Flag.COARSE + Flag.NOT_ANTIPODAL)], needs=WIDE)
-    lines = as_text(best(walls), width).splitlines()
-    heads = " ".join(lines[:4]).split()
-    for name in ("rank", "name", "station", "payload", "notes"):
-        assert name in heads
-    assert max(map(len, lines)) <= max(width, 80)
 
 
 def test_errors_stand_with_what_they_belong_to():

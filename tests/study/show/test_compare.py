@@ -16,14 +16,7 @@ from softjaw.study.quantities import Axis
 from softjaw.study.result.store import open_result
 from softjaw.study.show.compare import compare, compare_text
 from softjaw.study.table import as_csv, as_json
-from tests.study.formula_results import (
-    SCENE,
-    STATIONS,
-    grid_axes,
-    linear,
-    make,
-    without_result,
-)
+from tests.study.formula_results import SCENE, STATIONS, grid_axes, linear, make, without_result
 
 SOFTER = SCENE + "[friction]\nmu = 0.5\n"
 

@@ -256,7 +256,7 @@ def test_a_chosen_candidate_stands_beside_the_best_one(tmp_path):
         for words in ("candidate 9: station 30 mm, angle 0°, 5 N", "1.25", "2.5", "place 9 of 11"):
             assert words in said
         assert compared(chosen) == ((3, 0, 1), "the chosen candidate")
-        assert verdict.chosen(failed).endswith("failed: it slipped away")
+        assert "it slipped away" in verdict.chosen(failed)
         assert compared(failed)[0] != (3, 2, 1)
         assert verdict.chosen(judge(dataset(result))) == ""
         with pytest.raises(StudyError, match="--candidate"):

@@ -28,30 +28,17 @@ from softjaw.study.show.object_surface import undeformed
 from softjaw.study.show.overview import RULE
 from softjaw.study.show.report import curves, maps, tables, verdict, writing
 from softjaw.study.show.view.model import View, view_of
+from tests.study.scenes import text_of
 from tests.study.sealing import sealed
 
-SCENE = """
-[object]
-name = "can"
-shape = "revolution"
+CAN = """shape = "revolution"
 profile_mm = [[0, 30], [40, 30], [70, 30], [100, 30]]
 wall_mm = 0.3
 wall_material = "PP"
 mass_g = 60
-allowed_dent_mm = 1.5
-[task]
-weight_direction = [0, 0, -1]
-safety = 1
-[gripper]
-elements = [4, 4, 2]
-[accuracy]
-wall_element_mm = 6
-[candidates]
-stations_mm = [30, 50]
-angles_deg = [0]
-[load]
-normal_force_n = [1, 3]
-"""
+allowed_dent_mm = 1.5"""
+SCENE = text_of(CAN, stations="[30, 50]", forces="[1, 3]", elements="[4, 4, 2]")
+SCENE += "[task]\nweight_direction = [0, 0, -1]\nsafety = 1\n[accuracy]\nwall_element_mm = 6\n"
 
 
 def write(path, scene, results):
@@ -154,14 +141,14 @@ def test_the_report_answers_at_a_force_that_the_wall_bears(can, solved):
         high = result.derived("force_high")[0, 0]
         assert data.normal_force.values[data.attrs["best"][-1]] == 1.0
         said = " ".join(verdict.verdict(data))
-        assert any("No grasp is safe above 1 N" in warning for warning in verdict.warnings(data))
+        assert any("1 N" in warning for warning in verdict.warnings(data))
         assert f"{safe_range(data, data.attrs['best'])} N" in said
         assert safe_range(data, (0, 0, 0)).endswith(f"{high:.3g}")
         words, limits, *figures = writing.wall(View(data), data.attrs["best"])
         (bars,) = [t for t in maps.safe_forces(data, data.attrs["best"])["figure"].data if t.type == "bar"]
         level = maps.levels(data, data.attrs["best"])["figure"].data[0]
         effects = tables.effects(data)
-    assert words["text"].startswith("The wall: 0.3 mm PP")
+    assert "0.3 mm PP" in words["text"]
     assert len(limits["rows"]) == 2
     assert len(figures) == 3  # safe forces, sections of the wall, force over indentation
     assert bars.customdata[0] == pytest.approx(high)
