@@ -83,6 +83,21 @@ def block_of(found: Table, first: bool = False) -> Block:
     return table(found.title, heads, rows, texts[:-1], texts[-1:], first)
 
 
+def objects(caption: str, columns: Sequence[tuple[str, str]], rows: Sequence[Block]) -> Block:
+    """A table with pictures that a reader sorts by its ``columns``, each a name and ``n`` (numbers) or ``text``.
+
+    A row has ``cells``, each a text and what it is sorted by; ``anchor`` of the section that it leads to, ``image``
+    (PNG) with ``alt``, or empty texts.
+    """
+    made = [row | {"image": base64.b64encode(row["image"]).decode()} for row in rows]
+    return {"kind": "objects", "caption": caption, "head": columns, "rows": made}
+
+
+def link(words: str, target: str) -> Block:
+    """A line that leads to a file beside the page."""
+    return {"kind": "link", "text": words, "target": target}
+
+
 def plot(figure: Any, caption: str, alt: str, height: int = 360) -> Block:
     """A plotly figure: what it shows (``alt``, for those who cannot see it) and how to read it (``caption``)."""
     return {"kind": "plot", "figure": figure, "caption": caption, "alt": alt, "height": height}
@@ -110,9 +125,10 @@ def page(title: str, subtitle: str, sections: Sequence[Section]) -> str:
     parts = ((anchor, head, [block for block in blocks if block]) for anchor, head, blocks in sections)
     names = ("anchor", "heading", "blocks")
     shown: list[dict[str, Any]] = [dict(zip(names, part, strict=True)) for part in parts if part[2]]
-    own = [files(FOLDER).joinpath(name).read_text(encoding="utf-8") for name in ("page.css", "page.js")]
-    drawn = any(block["kind"] == "plot" for section in shown for block in section["blocks"])
-    scripts = [get_plotlyjs().replace("</script", "<\\/script"), own[1]] if drawn else []
+    own = [files(FOLDER).joinpath(name).read_text(encoding="utf-8") for name in ("page.css", "page.js", "objects.js")]
+    kinds = {block["kind"] for section in shown for block in section["blocks"]}
+    scripts = [get_plotlyjs().replace("</script", "<\\/script"), own[1]] if "plot" in kinds else []
+    scripts += [own[2]] if "objects" in kinds else []
     return made.get_template("page.html").render(
         title=title, subtitle=subtitle, sections=shown, style=own[0], scripts=scripts, policy=policy(scripts)
     )

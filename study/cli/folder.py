@@ -143,3 +143,11 @@ def show(options: Namespace) -> str:
     """Print the objects with their best grasps."""
     table = objects.index_table(_index(options), options.top)
     return FORMS[options.form](table) if options.form else as_text(table, terminal_width())
+
+
+def report(options: Namespace) -> str:
+    """Write one page on all objects."""
+    from softjaw.study.show.report.objects_page import write_objects_page  # matplotlib and plotly
+
+    path = _index(options)
+    return f"written: {write_objects_page(path, Path(options.output or path.with_suffix('.html')))}"

@@ -126,6 +126,14 @@ def test_index_answers_commands(solved):
     assert command(0, "watch", solved / "index.hdf")[0] == SOME_FAILED
 
 
+def test_the_page_has_a_row_for_every_object_and_a_section_for_solved_ones(solved, tmp_path):
+    assert command(0, "report", solved, "-o", tmp_path / "page.html")[0] == DONE
+    html = (tmp_path / "page.html").read_text()
+    assert [name for name in (*NAMES, "empty") if f'"#object-{name}"' in html] == ["a", "grows", "longest"]
+    assert html.count("<tr><td>") == len(NAMES) + 1
+    assert html.count("<button") > 5
+
+
 @pytest.mark.ranks
 def test_two_ranks_give_the_same_bits(scene, solved):
     out = scene.parent / "two"

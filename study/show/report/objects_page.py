@@ -1,0 +1,93 @@
+"""The page of a folder of objects: a picture of each with its best grasp, sorted as a reader likes, and its answer."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from softjaw.study import page, pictures
+from softjaw.study.messages import StudyError, write_file
+from softjaw.study.result.index import SOLVED, read_index
+from softjaw.study.result.read import open
+from softjaw.study.show.grasps import judge
+from softjaw.study.show.objects import counts_text, index_table
+from softjaw.study.show.report.tables import best_grasps
+from softjaw.study.show.report.writing import the_answer
+from softjaw.study.show.view.model import View
+from softjaw.study.table import Row, with_unit
+from softjaw.study.units import shown_unit
+
+NOT_SHOWN = ("payload_error", "best", "cases", "done", "failed", "mass", "preparing", "file", "mesh", "quality")
+BODY, PAD = np.array([0.72, 0.78, 0.83]), np.array([0.93, 0.55, 0.25])
+AMBIENT = 0.45  # share of the light that comes from everywhere
+
+
+def write_objects_page(index: Path, out: Path) -> Path:
+    """Write one page on all objects of a folder; the path that was written.
+
+    Raises
+    ------
+    StudyError
+        The index cannot be read, or the page cannot be written.
+    """
+    rows, about = read_index(index)
+    table = index_table(index)
+    columns = [c for c in table.columns if c.name not in NOT_SHOWN]
+    heads = [(with_unit(c.label or c.name, shown_unit(c.unit)), "text" if c.wrap else "n") for c in columns]
+    listed, sections = [], []
+    for row in table.rows:
+        image, blocks = _object(index.parent, row) if row["state"] in SOLVED else (b"", [])
+        anchor = f"object-{row['object']}" if blocks else ""
+        cells = [(table.cell(row, c), _sorted_by(row[c.name])) for c in columns]
+        listed.append({"cells": cells, "anchor": anchor, "image": image, "alt": f"best grasp of {row['object']}"})
+        sections.append((anchor, row["object"], blocks))
+    note = "Click on the head of a column to sort by it, on an object for its best grasps."
+    gallery = [page.text(note, "note"), page.objects("best grasp of every object", heads, listed)]
+    title = f"{index.parent.name}: where to grasp {len(rows)} objects"
+    subtitle = f"{counts_text(rows)}; {about.get('scene_file', '')}"
+    return write_file(out, page.page(title, subtitle, [("objects", "", gallery), *sections]))
+
+
+def _sorted_by(value: Any) -> Any:
+    return "" if isinstance(value, float) and math.isnan(value) else value
+
+
+def _object(folder: Path, row: Row) -> tuple[bytes, list[page.Block]]:
+    """Picture of an object with its best grasp, and what its section says; nothing where its file cannot be read."""
+    try:
+        ds = judge(open(folder / row["file"]))
+    except StudyError as error:
+        return b"", [page.box([error.message], "warn")]
+    blocks = [*filter(None, [the_answer(ds)]), *best_grasps(ds)]
+    report = Path(row["file"]).with_suffix(".html")
+    if (folder / report).exists():
+        blocks.append(page.link(f"report on {row['object']}", report.as_posix()))
+    else:
+        blocks.append(page.text(f"softjaw report {folder / row['file']}: all maps, contacts and definitions", "note"))
+    return picture(View(ds, ds.attrs["best"][:-3]), ds.attrs["best"]) if ds.attrs["best"] else b"", blocks
+
+
+def picture(view: View, best: tuple[int, ...]) -> bytes:
+    """Small picture of an object between the pads of a case; empty where the object cannot be drawn."""
+    surface, pads = view.surface, view.pads(best)
+    if not len(surface.triangles) or not pads:
+        return b""
+    towards, up = view.eye(best)
+    towards = towards / np.linalg.norm(towards)
+    up = up - (up @ towards) * towards
+    up /= np.linalg.norm(up)
+    screen = np.column_stack([np.cross(up, towards), up])
+    body = surface.points[surface.triangles]
+    parts = [(body, BODY), *((np.concatenate([pad.quads(), pad.sides()]), PAD) for pad in pads)]
+    flat, colours, depth = [], [], []
+    for corners, colour in parts:
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        light = np.abs(normal @ towards) / np.maximum(np.linalg.norm(normal, axis=1), 1e-30)
+        colours.append((AMBIENT + (1 - AMBIENT) * light)[:, None] * colour)
+        depth.append((corners @ towards).mean(axis=1))
+        flat += list(corners @ screen)
+    order = np.argsort(np.concatenate(depth), kind="stable")
+    return pictures.thumbnail([flat[i] for i in order], np.concatenate(colours)[order])
