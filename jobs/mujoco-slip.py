@@ -16,9 +16,9 @@ from collections.abc import Iterator
 import mujoco
 import numpy as np
 
-from softjaw.study.export.body import Body, body_of
 from softjaw.study.export.mjcf import as_mjcf
 from softjaw.study.export.point_contact import cell
+from softjaw.study.export.rigid_body import RigidBody, body_of
 from softjaw.study.export.selection import GripperFrame, RankedGrasp, Selection, grasps
 from softjaw.study.result.read import open as open_result
 
@@ -35,7 +35,7 @@ MOVES = (1e-4, 1e-4, 1e-2)  # speeds [m/s, m/s, rad/s] from which a finger slips
 FREE = (("x", "mjJNT_SLIDE", (1, 0, 0)), ("y", "mjJNT_SLIDE", (0, 1, 0)), ("turn", "mjJNT_HINGE", (0, 0, 1)))
 
 
-def fixture(grasp: RankedGrasp, body: Body, finger: int) -> mujoco.MjModel:
+def fixture(grasp: RankedGrasp, body: RigidBody, finger: int) -> mujoco.MjModel:
     """The exported model with a fast object, and a finger that can slide along x and y and turn about its normal."""
     spec = mujoco.MjSpec.from_string(as_mjcf(grasp, body))
     spec.delete(spec.joint("object"))
@@ -69,7 +69,7 @@ def predicted(grasp: RankedGrasp, finger: int, shares: tuple[int, ...]) -> np.nd
     return w * contact.F_N * np.array([contact.mu_x, contact.mu_y, contact.r])
 
 
-def ratios(grasp: RankedGrasp, body: Body, finger: int = 1, steps: int = STEPS) -> list[float]:
+def ratios(grasp: RankedGrasp, body: RigidBody, finger: int = 1, steps: int = STEPS) -> list[float]:
     """Simulated over predicted load of every one of `LOADS`."""
     model = fixture(grasp, body, finger)
     return [slip(model, predicted(grasp, finger, shares), steps) for shares in LOADS.values()]

@@ -4,22 +4,24 @@ from __future__ import annotations
 
 import sys
 from argparse import Namespace
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from softjaw.study.export.body import body_of
 from softjaw.study.export.cases import as_csv, as_json
 from softjaw.study.export.mjcf import as_mjcf
 from softjaw.study.export.physx import as_usd
 from softjaw.study.export.planners import CLOSING, as_graspgen, as_isaac_grasp, as_moveit
+from softjaw.study.export.rigid_body import body_of
 from softjaw.study.export.sdf import as_sdf
 from softjaw.study.export.selection import GripperFrame, Selection, chosen, grasps, usable
 from softjaw.study.messages import USAGE, StudyError, write_file
 from softjaw.study.result.read import open
+from softjaw.study.scene.grippers import Hand, gripper_file
 from softjaw.study.units import in_si
 
 TABLES = {"csv": as_csv, "json": as_json}
-PLANNERS = {"isaac_grasp": as_isaac_grasp, "graspgen": as_graspgen, "moveit": as_moveit}
+PLANNERS: dict[str, Callable[..., str]] = {"isaac_grasp": as_isaac_grasp, "graspgen": as_graspgen, "moveit": as_moveit}
 SIMULATORS = {"mjcf": as_mjcf, "sdf": as_sdf, "physx": as_usd}
 
 
@@ -33,11 +35,10 @@ def export(options: Namespace) -> str:
     if options.form in TABLES:
         asked = options.force or options.by or options.least or options.top is not None
         return _written(options, [TABLES[options.form](ds, options.model, chosen(ds, choice)[0] if asked else None)])
-    closing = options.closing or CLOSING.get(options.form, "x")
-    gripper = GripperFrame(
-        tuple(options.approaches or ("minus-x",)), closing, in_si("depth_mm", options.depth),
-        in_si("wider_mm", options.wider), options.joints, *options.frames,
-    )  # fmt: skip
+    hand = gripper_file(options.gripper)[1] if options.gripper else Hand()
+    approaches = tuple(options.approaches or (("x",) if options.form in SIMULATORS else ()))
+    closing = CLOSING.get(options.form, "")
+    gripper = GripperFrame(hand, approaches, closing, in_si("wider_mm", options.wider), options.frame)
     ranked = grasps(ds, choice, gripper)
     if options.form != "graspgen":  # which has a field for those that do not hold
         ranked, left = usable(ranked)
@@ -46,7 +47,8 @@ def export(options: Namespace) -> str:
     if not ranked:
         raise StudyError(USAGE, f"{options.file}: no grasp is left to write; 'softjaw show' lists all")
     if options.form in PLANNERS:
-        return _written(options, [PLANNERS[options.form](ranked, gripper, ds)])
+        folder = (str(Path(options.output or ".").parent),) if options.form == "graspgen" else ()
+        return _written(options, [PLANNERS[options.form](ranked, gripper, ds, *folder)])
     return _written(options, [SIMULATORS[options.form](grasp, body_of(ds, grasp.case)) for grasp in ranked])
 
 

@@ -77,18 +77,14 @@ OPTIONS = {
                    help="leave out grasps with less, in the unit of 'softjaw show', as payload=200; repeatable"),
     "written": _option("-o", metavar="FILE", dest="output", help="file to write (default: standard output)"),
     "approach": _option("--approach", choices=("x", "minus-x", "y", "minus-y"), action="append", dest="approaches",
-                        help="palm to fingertips, by the long (x) or short (y) side of pad 1 (default minus-x)"),
-    "closing": _option("--closing", choices=("x", "y"),
-                       help="gripper's axis from finger 1 to 2; z approaches (default x for graspgen, else y)"),
-    "depth": _option("--depth", type=number("a number, 0 or above", 0.0), default=0.0, metavar="MM",
-                     help="from the origin of the gripper's frame to the middle of the pads (default 0)"),
+                        help="palm to fingertips, by the long (x) or short (y) side of pad 1 (default: from above where"
+                        " the hand is clear of the object, else the clearest)"),
+    "gripper": _option("--gripper", metavar="NAME", help="franka_hand, robotiq_2f85, schunk_egp50, wsg50, or a file of"
+                       " the same form: frame, joints, stroke, forces, palm and fingers"),
     "wider": _option("--wider", type=number("a number, 0 or above", 0.0), default=20.0, metavar="MM",
                      help="how far the gripper opens beyond first touch (default 20)"),
-    "joints": _option("--joints", type=several(named, "names, such as a,b"), default=("finger_joint1", "finger_joint2"),
-                      metavar="A,B",
-                      help="joints of the fingers, each at half the opening (default finger_joint1,finger_joint2)"),
-    "frames": _option("--frames", type=several(named, "two names, such as a,b", 2, 2), default=("gripper", "object"),
-                      metavar="A,B", help="names of the gripper's and the object's frame (default gripper,object)"),
+    "frame": _option("--frame", type=named, default="object", metavar="NAME",
+                     help="name of the object's frame (default object)"),
     "kind": _option("kind", choices=tuple(KINDS), help="what to start from"),
     "name": _option("-o", metavar="NAME", dest="name",
                     help="name of both files, also with a folder (default: the kind, or the name of the mesh)"),
@@ -118,11 +114,11 @@ OPTIONS = {
                        help="limit surface that is scored (default: quartic)"),
     "sections": _option("-o", metavar="PICTURE", dest="picture", help="picture of the limit surface (.png or .svg)"),
 }  # fmt: skip
-GRIPPER = ("approach", "closing", "depth", "wider", "joints", "frames")
+GRIPPER = ("gripper", "approach", "wider", "frame")
 COMMANDS = {  # by what they are for, in the order of use: name, what it does, an example, its module, its options
     "prepare": (
         ("init", "write a commented scene and a batch script to start from", "init bottle", "cli.quick",
-         ("kind", "name", "mesh", "mesh unit", "axis", "replace")),
+         ("kind", "name", "mesh", "mesh unit", "axis", "gripper", "replace")),
         ("check", "find every error of a scene, or say what would be run", "check jobs/bottle-rigid.toml", "cli.quick",
          ("scene", "set")),
         ("plan", "cases, units, disk, memory and time, before anything is spent", "plan jobs/bottle-rigid.toml -n 16",

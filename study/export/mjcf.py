@@ -21,18 +21,17 @@ Four things belong to it.
   the frame of the closed pads, x across and y along their long side. Where the tangents are not the contact's axes, and
   for a gripper that turns, the smaller slide in both places is on the safe side.
 
-The file is a scene that runs. The object has its surface, mass, centre of mass and inertia (`study.export.body`), and
-gravity pulls as the scene says. Both fingers slide along the closing axis. An equality keeps their strokes equal, as
-the drive of a parallel gripper does: a load along the closing axis shifts force from one finger to the other, and their
-sum stays. The balls press on plates in the contact planes; the surface itself is there to be seen, and for a table or
-walls that are added to the model, which meet its convex hull.
+The file is a scene that runs. The object has its surface, mass, centre of mass and inertia
+(`study.export.rigid_body`), and gravity pulls as the scene says. Both fingers slide along the closing axis. An equality
+keeps their strokes equal, as the drive of a parallel gripper does: a load along the closing axis shifts force from one
+finger to the other, and their sum stays. The balls press on plates in the contact planes; the surface itself is there
+to be seen, and for a table or walls that are added to the model, which meet its convex hull.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from softjaw.study.export.body import Body, places, weight
 from softjaw.study.export.point_contact import (
     PAD_MASS,
     RADIUS,
@@ -43,6 +42,7 @@ from softjaw.study.export.point_contact import (
     heading,
     numbers,
 )
+from softjaw.study.export.rigid_body import RigidBody, places, weight
 from softjaw.study.export.selection import FloatArray, RankedGrasp, quaternion
 
 ALONG = 1e-6  # sine between a tangent and an axis of the contact below which they are one
@@ -73,7 +73,7 @@ def friction(contact: PointContact) -> tuple[float, float, float]:
     return (contact.mu_y, contact.mu_x, contact.r) if along_x < ALONG else (contact.mu, contact.mu, contact.r)
 
 
-def as_mjcf(grasp: RankedGrasp, body: Body) -> str:
+def as_mjcf(grasp: RankedGrasp, body: RigidBody) -> str:
     """A MuJoCo model of one grasp of an object, with gravity."""
     contacts = cell(grasp, body.down)
     return "\n".join(
@@ -113,7 +113,7 @@ def as_mjcf(grasp: RankedGrasp, body: Body) -> str:
     )
 
 
-def _object(contacts: Cell, body: Body) -> list[str]:
+def _object(contacts: Cell, body: RigidBody) -> list[str]:
     """The object with its surface, in the frame of its own file."""
     inertia = numbers(*body.inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]])
     return [

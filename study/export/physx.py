@@ -21,8 +21,8 @@ other material: give the object no more friction than the pads.
 
 from __future__ import annotations
 
-from softjaw.study.export.body import Body
 from softjaw.study.export.point_contact import RADIUS, PointContact, cell, heading, numbers
+from softjaw.study.export.rigid_body import RigidBody
 from softjaw.study.export.selection import FloatArray, RankedGrasp, quaternion
 
 
@@ -31,7 +31,7 @@ def torsional_radius(contact: PointContact) -> float:
     return contact.r / contact.mu
 
 
-def as_usd(grasp: RankedGrasp, body: Body) -> str:
+def as_usd(grasp: RankedGrasp, body: RigidBody) -> str:
     """A stage of both fingers at one grasp, with the frame of the object's own file, as USD in text form (.usda)."""
     contacts = cell(grasp)
     return "\n".join(

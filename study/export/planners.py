@@ -21,58 +21,64 @@ MoveIt takes from its first shape; approach and retreat are along the gripper's 
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Sequence
 from typing import Any
 
 import xarray as xr
 
 from softjaw.study.export.cases import MEANING
+from softjaw.study.export.reach import WAY
 from softjaw.study.export.selection import GripperFrame, RankedGrasp
 from softjaw.study.export.yaml import yaml_text
 from softjaw.study.ranking import task_keys
 from softjaw.study.table import plain
 from softjaw.study.units import UNITS
 
-CLOSING = {"isaac_grasp": "y", "graspgen": "x", "moveit": "y"}  # as Franka's hand, and as GraspGen wants it
-WAY, LEAST_WAY = 0.1, 0.05  # of approach and retreat [m]: wanted, and enough
+CLOSING = {"graspgen": "x"}  # of every gripper of the format; others have the hand's own
+LEAST_WAY = WAY / 2  # of approach and retreat [m] that is enough
 
 
 def as_isaac_grasp(found: Sequence[RankedGrasp], gripper: GripperFrame, ds: xr.Dataset) -> str:
     """An isaac_grasp file; what it has no field for stands in comments."""
     made: dict[str, Any] = {"#": _about(ds, gripper), "format": "isaac_grasp", "format_version": 1.0}
-    for key, name in (("object_frame", gripper.object_frame), ("gripper_frame", gripper.gripper_frame)):
+    for key, name in (("object_frame", gripper.object_frame), ("gripper_frame", gripper.hand.frame)):
         made |= {key: name, f"{key}_link": name}
-    made["grasps"] = {grasp.name: _isaac_grasp(grasp, gripper) for grasp in found}
+    made["grasps"] = {grasp.name: _isaac_grasp(grasp) for grasp in found}
     return yaml_text(made)
 
 
-def _isaac_grasp(grasp: RankedGrasp, gripper: GripperFrame) -> dict[str, Any]:
+def _isaac_grasp(grasp: RankedGrasp) -> dict[str, Any]:
     x, y, z, w = grasp.quaternion.tolist()
     return {
         "#": grasp.remark,
         "confidence": grasp.merit,
         "position": grasp.origin.tolist(),
         "orientation": {"w": w, "xyz": [x, y, z]},
-        "cspace_position": dict.fromkeys(gripper.joints, grasp.half("opening_loaded")),
-        "pregrasp_cspace_position": dict.fromkeys(gripper.joints, grasp.half("opening") + gripper.wider / 2),
+        "cspace_position": grasp.closed_joints,
+        "pregrasp_cspace_position": grasp.open_joints,
     }
 
 
-def as_graspgen(grasps: Sequence[RankedGrasp], gripper: GripperFrame, ds: xr.Dataset) -> str:
-    """A GraspGen file of all grasps, also of those that do not hold, with everything else that is known beside them."""
+def as_graspgen(grasps: Sequence[RankedGrasp], gripper: GripperFrame, ds: xr.Dataset, folder: str = ".") -> str:
+    """A GraspGen file of all grasps, also of those that do not hold, with everything else that is known beside them.
+
+    The mesh is named from the ``folder`` of the file.
+    """
     keys = task_keys(ds, "object")
+    file = os.path.relpath(keys["mesh"], folder) if "mesh" in keys else ""
     made = {
-        "object": {"file": keys.get("mesh", ""), "scale": UNITS[keys.get("unit", "m")].size},
-        "gripper": {"name": gripper.gripper_frame, "approach_axis": "z", "closing_axis": gripper.closing,
-                    "depth": gripper.depth, "about": _about(ds, gripper)},
+        "object": {"file": file, "scale": UNITS[keys.get("unit", "m")].size},
+        "gripper": {"name": gripper.hand.frame, "approach_axis": "z", "closing_axis": gripper.along,
+                    "about": _about(ds, gripper)},
         "grasps": {
             "transforms": [grasp.matrix.tolist() for grasp in grasps],
-            "object_in_gripper": [not grasp.lost for grasp in grasps],
+            "object_in_gripper": [not grasp.reasons for grasp in grasps],
             "qualities": [grasp.merit for grasp in grasps],
             "forces": [grasp.force for grasp in grasps],
             "widths": [plain(grasp.maps["opening"]) for grasp in grasps],
             "names": [grasp.name for grasp in grasps],
-            "warnings": [grasp.warnings for grasp in grasps],
+            "warnings": [[*grasp.warnings, *grasp.unfit] for grasp in grasps],
         },
         "softjaw": {
             "file": str(ds.attrs["file"]), "units": grasps[0].units if grasps else {}, "meaning": MEANING,
@@ -92,12 +98,11 @@ def _moveit(grasp: RankedGrasp, gripper: GripperFrame) -> dict[str, Any]:
         "position": dict(zip("xyz", grasp.origin.tolist(), strict=True)),
         "orientation": dict(zip("xyzw", grasp.quaternion.tolist(), strict=True)),
     }
-    open_wide, closed = grasp.half("opening") + gripper.wider / 2, grasp.half("opening_loaded")
     return {
         "#": grasp.remark,
         "id": grasp.name,
-        "pre_grasp_posture": _posture(gripper, open_wide, []),
-        "grasp_posture": _posture(gripper, closed, [grasp.force]),
+        "pre_grasp_posture": _posture(grasp.open_joints, []),
+        "grasp_posture": _posture(grasp.closed_joints, [grasp.force]),
         "grasp_pose": {"header": _header(gripper.object_frame), "pose": pose},
         "grasp_quality": grasp.merit,
         "pre_grasp_approach": _way(gripper, 1.0),
@@ -112,22 +117,21 @@ def _header(frame: str) -> dict[str, Any]:
     return {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": frame}
 
 
-def _posture(gripper: GripperFrame, position: float, effort: list[float]) -> dict[str, Any]:
+def _posture(joints: dict[str, float], effort: list[float]) -> dict[str, Any]:
     """A trajectory_msgs/JointTrajectory of one point."""
-    count = len(gripper.joints)
     point = {
-        "positions": [position] * count,
+        "positions": list(joints.values()),
         "velocities": [],
         "accelerations": [],
-        "effort": effort * count,
+        "effort": effort * len(joints),
         "time_from_start": {"sec": 1, "nanosec": 0},
     }
-    return {"header": _header(""), "joint_names": list(gripper.joints), "points": [point]}
+    return {"header": _header(""), "joint_names": list(joints), "points": [point]}
 
 
 def _way(gripper: GripperFrame, z: float) -> dict[str, Any]:
     """A moveit_msgs/GripperTranslation along the gripper's own z axis."""
-    direction = {"header": _header(gripper.gripper_frame), "vector": {"x": 0.0, "y": 0.0, "z": z}}
+    direction = {"header": _header(gripper.hand.frame), "vector": {"x": 0.0, "y": 0.0, "z": z}}
     return {"direction": direction, "desired_distance": WAY, "min_distance": LEAST_WAY}
 
 
@@ -136,8 +140,8 @@ def _about(ds: xr.Dataset, gripper: GripperFrame) -> str:
     return "\n".join(
         [
             f"Made by softjaw from {ds.attrs['file']}: poses of the gripper in the frame of the object's own file [m].",
-            f"Gripper: approaches along z, closes along {gripper.closing} from finger 1 to finger 2; its origin is"
-            f" {gripper.depth:g} m behind the middle of the pads.",
+            f"Gripper: {gripper.hand.frame}; it approaches along z and closes along {gripper.along} from finger 1 to"
+            " finger 2.",
             "Quality and confidence are relative to the best grasp of this file.",
         ]
     )

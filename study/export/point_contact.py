@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from softjaw.study.export.body import DENSITY, Body
+from softjaw.study.export.rigid_body import DENSITY, RigidBody
 from softjaw.study.export.selection import FloatArray, RankedGrasp
 from softjaw.study.messages import USAGE, StudyError
 
@@ -102,7 +102,7 @@ def _contact(finger: dict[str, Any], W: FloatArray, middle: FloatArray) -> Point
     return PointContact(U @ V, W.T @ (finger["frame_origin"] - middle), f_x, f_y, tau_z, F_N, *pad)
 
 
-def carried(grasp: RankedGrasp, body: Body) -> Body:
+def carried(grasp: RankedGrasp, body: RigidBody) -> RigidBody:
     """The object with the mass that it has in a simulator: the scene's, else no more than a share of the payload."""
     most, held = SHARE * grasp.maps["payload"], body.mass
     if body.weighed or not most < held:  # also where the payload is unknown
@@ -119,7 +119,7 @@ def numbers(*values: float) -> str:
     return " ".join(repr(float(value) + 0.0) for value in values)
 
 
-def heading(grasp: RankedGrasp, body: Body) -> list[str]:
+def heading(grasp: RankedGrasp, body: RigidBody) -> list[str]:
     """What the comment at the top of a file says of its grasp and of the mass of its object."""
     mass = carried(grasp, body).mass
     if body.weighed:

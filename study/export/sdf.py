@@ -27,8 +27,8 @@ import warnings
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from softjaw.study.export.body import Body
 from softjaw.study.export.point_contact import PAD_MASS, RADIUS, PointContact, cell, heading, numbers
+from softjaw.study.export.rigid_body import RigidBody
 from softjaw.study.export.selection import FloatArray, RankedGrasp
 
 VERSION = "1.7"  # the newest that Gazebo Classic reads
@@ -40,7 +40,7 @@ def patch_radius(contact: PointContact) -> float:
     return contact.r / (BALL * contact.mu)
 
 
-def as_sdf(grasp: RankedGrasp, body: Body) -> str:
+def as_sdf(grasp: RankedGrasp, body: RigidBody) -> str:
     """A model of both fingers at one grasp, with the frame of the object's own file."""
     contacts = cell(grasp)
     return "\n".join(

@@ -3,16 +3,17 @@
 Everything is in the frame of the object's own file, in SI units. A grasp is a case of `study.export.cases` with the
 frame of a two-finger gripper laid into its pads.
 
-The gripper's frame has its origin ``depth`` behind the middle between the centres of both undeformed contact faces at
-first touch. Its z axis is the direction of approach, from the palm to the fingertips; its closing axis, x or y, runs
-from finger 1 to finger 2; the third axis makes it right-handed. A parallel gripper may come from any side across its
-closing axis, so ``approach`` says which: along the long side of the pads (x) or their short side (y) of finger 1's pad,
-or against one of them.
+The gripper's frame has its origin its hand's depth behind the middle between the centres of both undeformed contact
+faces at first touch. Its z axis is the direction of approach, from the palm to the fingertips; its closing axis, x or
+y, runs from finger 1 to finger 2; the third axis makes it right-handed. A parallel gripper may come from any side
+across its closing axis, so ``approach`` says which: along the long side (x) or the short side (y) of finger 1's pad, or
+against one of them (`study.export.reach` finds the clearest).
 """
 
 from __future__ import annotations
 
 import textwrap
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -22,17 +23,20 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from softjaw.study.case.result import TIE
 from softjaw.study.export.cases import cases
+from softjaw.study.export.reach import FREE, boxes, chosen_approach, clearance, surface_points
+from softjaw.study.export.rigid_body import scene_of
 from softjaw.study.flags import LOST, flag_words, flags_in
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.quantities import FORCE_RANGE, LEAST_FORCE, MAIN
 from softjaw.study.ranking import at_level, judged, ranked, score_of
 from softjaw.study.result.read import axes_of, maps_in
 from softjaw.study.result.store import place_text
+from softjaw.study.scene.grippers import APPROACHES, Hand
 from softjaw.study.units import shown, shown_text
 
 FloatArray = NDArray[np.float64]
-APPROACHES = {"x": (0, 1.0), "minus-x": (0, -1.0), "y": (1, 1.0), "minus-y": (1, -1.0)}  # axis of finger 1's pad, sign
 COMMENT = 100  # characters in a line of a comment
 
 
@@ -53,19 +57,23 @@ class Selection:
 
 @dataclass(frozen=True)
 class GripperFrame:
-    """Where the gripper's frame lies in the pads (see the module), with names and distances that formats want.
+    """The gripper that comes to the grasps: its hand, and how it comes.
 
-    ``joints`` are those of both fingers, each at half the opening; ``wider`` [m] is how much the fingers open beyond
-    first touch before the grasp; ``depth`` [m] lies between the origin of the frame and the middle of the pads.
+    ``approach`` are the directions that each grasp is written for; without any it is the one that suits it best.
+    ``closing`` is the axis of a format whose grippers all close along it; ``wider`` [m] is how much the fingers open
+    beyond first touch before the grasp, as far as the stroke allows.
     """
 
+    hand: Hand = field(default_factory=Hand)
     approach: tuple[str, ...] = ("minus-x",)
     closing: str = ""
-    depth: float = 0.0
     wider: float = 0.02
-    joints: tuple[str, ...] = ("finger_joint1", "finger_joint2")
-    gripper_frame: str = "gripper"
     object_frame: str = "object"
+
+    @property
+    def along(self) -> str:
+        """The closing axis of the gripper's frame."""
+        return self.closing or self.hand.closing
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +82,8 @@ class RankedGrasp:
 
     ``place`` is the case in words. ``rotation`` ``(3, 3)`` has the gripper's axes as columns, ``origin`` ``(3,)`` [m]
     is where it stands. ``merit`` is what the grasp is ranked by over the largest of all that are written: 1 for the
-    best, 0 where there is nothing.
+    best, 0 where there is nothing. ``open_joints`` and ``closed_joints`` are the gripper's joint values [m or rad]
+    before the grasp and in it, and ``unfit`` says why this gripper cannot take it.
     """
 
     name: str
@@ -85,6 +94,9 @@ class RankedGrasp:
     merit: float
     force: float
     units: dict[str, str]
+    open_joints: dict[str, float]
+    closed_joints: dict[str, float]
+    unfit: tuple[str, ...] = ()
 
     @property
     def maps(self) -> dict[str, float]:
@@ -92,9 +104,10 @@ class RankedGrasp:
         return {name: float(value) for name, value in self.case["maps"].items()}
 
     @property
-    def lost(self) -> bool:
-        """Whether it slips, does harm or does not hold the object."""
-        return bool(self.case["flags"] & LOST)
+    def reasons(self) -> tuple[str, ...]:
+        """Why it is no grasp to write: it slips, does harm, holds nothing, or is none for this gripper."""
+        lost = tuple(flag.word for flag in flags_in(self.case["flags"] & LOST))
+        return (*lost, *(("payload 0",) if self.maps.get("payload", np.nan) <= 0 else ()), *self.unfit)
 
     @property
     def warnings(self) -> list[str]:
@@ -112,10 +125,6 @@ class RankedGrasp:
         matrix = np.eye(4)
         matrix[:3, :3], matrix[:3, 3] = self.rotation, self.origin
         return matrix
-
-    def half(self, opening: str) -> float:
-        """Half of the opening at first touch or under load [m], which is where each finger stands."""
-        return self.maps[opening] / 2
 
     @property
     def remark(self) -> str:
@@ -187,17 +196,66 @@ def grasps(ds: xr.Dataset, choice: Selection, gripper: GripperFrame) -> list[Ran
     made = []
     for i, (case, place) in enumerate(zip(cases, places, strict=True)):
         merit = float(score[i] / best) if best > 0 else 0.0
-        for approach in gripper.approach:
-            R, o = gripper_frame(case, approach, gripper.closing, gripper.depth)
+        for approach, hold in _holds(ds, case, gripper).items():
             name = f"grasp_{i}" + (f"_{approach.replace('-', '_')}" if len(gripper.approach) > 1 else "")
-            made.append(RankedGrasp(name, place, case, R, o, merit, case["place"]["normal_force"], units))
+            R, o = gripper_frame(case, approach, gripper.along, hold.depth)
+            of_gripper = units, hold.open_joints, hold.closed_joints, hold.unfit
+            made.append(RankedGrasp(name, place, case, R, o, merit, case["place"]["normal_force"], *of_gripper))
     return made
 
 
-def usable(found: Sequence[RankedGrasp]) -> tuple[list[RankedGrasp], str]:
-    """Grasps that hold the object and do no harm, and a sentence on those left out."""
-    kept = [grasp for grasp in found if not grasp.lost]
-    left = [grasp for grasp in found if grasp.lost]
-    words = sorted({word for grasp in left for word in grasp.warnings})
-    return kept, f"{len(left)} grasps left out ({', '.join(words)})" if left else ""
+@dataclass(frozen=True)
+class Hold:
+    """How the gripper takes a grasp: joint values before it and in it, depth [m], and why it cannot."""
+
+    open_joints: dict[str, float]
+    closed_joints: dict[str, float]
+    depth: float
+    unfit: tuple[str, ...]
+
+
+def _holds(ds: xr.Dataset, case: dict[str, Any], gripper: GripperFrame) -> dict[str, Hold]:
+    """By approach how the gripper takes a case."""
+    hand, maps, force = gripper.hand, case["maps"], case["place"]["normal_force"]
+    scene = scene_of(ds, case)
+    foam, opening = 2 * scene.gripper.pad_thickness, float(maps["opening"])
+    most = min(hand.stroke_mm / 1e3 - foam, scene.gripper.max_opening or np.inf)
+    wide, closed = min(opening + gripper.wider, max(most, opening)), float(maps["opening_loaded"]) + foam
+    depth, low, high = hand.depth(opening + foam), *hand.force_n
+    beyond = [f"wider than the {shown_text(most, 'm')} that it opens"] * (opening > most * (1 + TIE))
+    beyond += [f"a force beyond its {low:g} to {high:g} N"] * (not low <= force <= high)
+    joints = hand.values(wide + foam), hand.values(closed), depth
+    if gripper.approach:
+        return dict.fromkeys(gripper.approach, Hold(*joints, tuple(beyond)))
+    approach, room = _clearest(scene, case, gripper, wide, depth)
+    beyond += ["the hand meets the object from every side"] * (room < FREE and not beyond)
+    return {approach: Hold(*joints, tuple(beyond))}
+
+
+def _clearest(scene: Any, case: dict[str, Any], gripper: GripperFrame, wide: float, depth: float) -> tuple[str, float]:
+    """The approach from above, if hand and object are apart there, else the clearest one, and its clearance [m]."""
+    try:
+        points = surface_points(scene.object)
+    except (ValueError, OSError) as error:
+        text = f"the object cannot be built, so that no approach can be chosen: {error}; name one with --approach"
+        raise StudyError(USAGE, text) from error
+    length, width = scene.gripper.pad_size[:2]
+    weight = np.array(scene.task.direction or (0.0, 0.0, -1.0))
+    room, down = {}, {}
+    for approach in gripper.hand.approaches:
+        R, o = gripper_frame(case, approach, gripper.along, depth)
+        sides = (length, width) if approach.endswith("x") else (width, length)
+        parts = boxes(gripper.hand, gripper.along, np.array([*sides, scene.gripper.pad_thickness]), wide, depth)
+        room[approach] = clearance((points - o) @ R, parts)
+        down[approach] = float(R[:, 2] @ weight / np.linalg.norm(weight))
+    approach = chosen_approach(room, down)
+    return approach, room[approach]
+
+
+def usable(grasps: Sequence[RankedGrasp]) -> tuple[list[RankedGrasp], str]:
+    """Grasps that hold the object, do no harm and fit the gripper, and a sentence on those left out."""
+    kept = [grasp for grasp in grasps if not grasp.reasons]
+    reasons = Counter(reason for grasp in grasps for reason in grasp.reasons)
+    listed = ", ".join(f"{reason} ({count})" if len(reasons) > 1 else reason for reason, count in reasons.items())
+    return kept, f"{len(grasps) - len(kept)} of {len(grasps)} grasps left out: {listed}" if reasons else ""
 

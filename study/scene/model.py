@@ -18,6 +18,7 @@ from pydantic import ConfigDict, Field, ValidationError, ValidationInfo, field_v
 from softjaw.study.messages import Problem, closest, shortened, shown
 from softjaw.study.scene.errors import Errors, KeyPath, Place, SceneError, lines_of, problems_of, refuse, wrong
 from softjaw.study.scene.grasps import OF_EVERY_KIND, Candidates, GraspPose
+from softjaw.study.scene.grippers import filled_in
 from softjaw.study.scene.objects import SHAPES, Mesh, Object, SectionTable
 from softjaw.study.scene.section import SceneSection
 from softjaw.study.scene.sections import (
@@ -388,6 +389,11 @@ def _scene(
         data["sweep"] = flat(data["sweep"])  # dotted keys mean the same with and without quotes
     given: dict[KeyPath, Place] = {}
     problems = put_overrides(data, overrides, given)
+    if trouble := filled_in(data, path.parent):
+        key, found, expected = trouble
+        line = lines_of(text).get(tuple(key.split(".")))
+        where = given.get(tuple(key.split(".")), (str(path), line))
+        problems.append(Problem(*where, key, shown(found), expected, ""))
     # Before the checks, which want to see what depends on the file's name and on the sweep.
     _fill_in(data, path)
     try:

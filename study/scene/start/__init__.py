@@ -8,11 +8,14 @@ import os
 import re
 import shlex
 import sys
+import tomllib
 from argparse import Namespace
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from softjaw.study.messages import CANNOT_WRITE, USAGE, StudyError, write_file
+from softjaw.study.scene.grippers import gripper_file
+from softjaw.study.scene.section import numbers_text
 
 HERE = Path(__file__).parent
 PAD_LENGTH, PAD_WIDTH, OPENING = 50.0, 22.0, 85.0  # mm, as in the template of a mesh
@@ -66,7 +69,9 @@ def init(options: Namespace, measure: Callable[[Namespace], Measured]) -> str:
     words = {"NAME": base.name, "SOFTJAW": _program()}
     mesh, notes = _about_mesh(options, scene, measure) if options.kind == "mesh" else ({}, ())
     for path, template in ((scene, f"{options.kind}.toml"), (batch, "run.sbatch")):
-        write_file(path, _filled(template, words | mesh), folders=True)
+        text = _filled(template, words | mesh)
+        text = with_gripper(text, options.gripper) if path == scene and options.gripper else text
+        write_file(path, text, folders=True)
     measured = []
     if mesh:
         measured = ["object:  {SIZE} mm, the last along its axis, with --unit {UNIT} --axis {AXIS}".format(**mesh)]
@@ -102,6 +107,18 @@ def _filled(template: str, words: dict[str, str]) -> str:
     for name, word in words.items():
         text = text.replace(f"@{name}@", word)
     return re.sub(r"[ ]+$", "", text, flags=re.MULTILINE)
+
+
+def with_gripper(text: str, name: str) -> str:
+    """A scene with a gripper's preset instead of its own pad, and with normal forces that the gripper has."""
+    keys, hand = gripper_file(name)
+    low, high = hand.force_n
+    size = "x".join(f"{keys.get(key, 0):g}" for key in ("pad_length_mm", "pad_width_mm", "pad_thickness_mm"))
+    line = f'preset = "{name}"  # pads of {size} mm, {hand.stroke_mm:g} mm of stroke, {low:g} to {high:g} N'
+    text = re.sub(r"(?m)^(pad_\w+|max_opening_mm) = .*\n", "", text).replace("[gripper]\n", f"[gripper]\n{line}\n")
+    forces = [force for force in tomllib.loads(text)["load"]["normal_force_n"] if low <= force <= high]
+    forces = forces if len(forces) > 1 else [force for force in (low, 2 * low, 3 * low) if force <= high]
+    return re.sub(r"(?m)^normal_force_n = \[.*\]", f"normal_force_n = {numbers_text(forces)}", text)
 
 
 def _about_mesh(options: Namespace, scene: Path, measure: Callable) -> tuple[dict[str, str], tuple[str, ...]]:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from softjaw.study.case.poses import axis_poses
-from softjaw.study.export.body import body_of
+from softjaw.study.export.rigid_body import body_of
 from softjaw.study.export.selection import GripperFrame, Selection, grasps
 from softjaw.study.result.read import open as open_result
 from tests.study.formula_results import grid_axes, make

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import softjaw as sj
-from softjaw.study.export.body import body_of, solid
 from softjaw.study.export.mjcf import as_mjcf
 from softjaw.study.export.point_contact import SHARE, carried
+from softjaw.study.export.rigid_body import body_of, solid
 from softjaw.study.export.selection import GripperFrame, Selection, grasps
 from softjaw.study.result.read import open as open_result
 from softjaw.study.units import GRAVITY

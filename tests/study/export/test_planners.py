@@ -18,8 +18,10 @@ from softjaw.study.export.selection import APPROACHES, GripperFrame, Selection, 
 from softjaw.study.export.yaml import yaml_text
 from softjaw.study.flags import Flag
 from softjaw.study.messages import CANNOT_WRITE, USAGE
+from softjaw.study.scene.grippers import Hand
 from tests.study.export.grasp_results import RADIUS, STATIONS, geometry, opened, write
 
+FOAM = 0.015  # thickness of a pad [m]
 LOST = 1  # the station whose grasps slip
 
 # isaac_grasp, format version 1.0: the fields of a grasp, and those of the file that Isaac Sim and Isaac ROS name.
@@ -79,6 +81,14 @@ def said(path, capsys):
     return say
 
 
+@pytest.fixture
+def gripper(tmp_path):
+    """A file of a gripper of our own."""
+    path = tmp_path / "mine.toml"
+    path.write_text('[hand]\nframe = "hand"\ndepth_mm = 103.4\njoints = { left = 0.5, right = -0.5 }\nstroke_mm = 90\n')
+    return path
+
+
 def read_yaml(text):
     yaml = pytest.importorskip("yaml", reason="PyYAML is not installed: pip install pyyaml")
     return yaml.safe_load(text)
@@ -110,14 +120,14 @@ def station_of(position):
 
 def test_every_format_of_the_command_has_a_writer_and_the_other_way_round():
     assert set(FORMATS) == {*TABLES, *PLANNERS, *SIMULATORS, "vtk"}
-    assert set(CLOSING) == set(PLANNERS)
+    assert set(CLOSING) < set(PLANNERS)
 
 
 @pytest.mark.parametrize("closing", ["x", "y"])
 def test_the_gripper_stands_over_its_pads(path, closing):
     """Where the file's pads are, seen from the gripper: finger 1 behind, finger 2 ahead along its closing axis."""
-    depth = 0.1
-    found = grasps(opened(path), Selection(force=4.0), GripperFrame(tuple(APPROACHES), closing, depth))
+    depth, hand = 0.1, Hand(closing=closing, depth_mm=100.0)
+    found = grasps(opened(path), Selection(force=4.0), GripperFrame(hand, tuple(APPROACHES)))
     for grasp, approach in zip(found, 5 * tuple(APPROACHES), strict=True):
         R, o, _ = geometry(station_of(grasp.case["fingers"][0]["pose_origin"]))
         one, two = (grasp.rotation.T @ (origin - grasp.origin) for origin in o)
@@ -131,8 +141,8 @@ def test_the_gripper_stands_over_its_pads(path, closing):
         assert grasp.name.endswith(approach.replace("-", "_"))
 
 
-def test_isaac_grasp_has_the_fields_of_its_documentation(said):
-    text = said("--format", "isaac_grasp", "--force", 4, "--joints", "left,right", "--frames", "hand,object")
+def test_isaac_grasp_has_the_fields_of_its_documentation(said, gripper):
+    text = said("--format", "isaac_grasp", "--force", 4, "--approach", "minus-x", "--gripper", gripper)
     found = read_yaml(text)
     assert set(found) == ISAAC_FILE
     assert (found["format"], found["format_version"], found["gripper_frame"]) == ("isaac_grasp", 1.0, "hand")
@@ -142,20 +152,23 @@ def test_isaac_grasp_has_the_fields_of_its_documentation(said):
         assert 0 <= grasp["confidence"] <= 1
         assert fits(grasp["position"], [float])
         assert fits(grasp["orientation"], {"w": float, "xyz": [float]})
-        R, o, _ = geometry(station_of(grasp["position"]))
         rotation = turned(*grasp["orientation"]["xyz"], grasp["orientation"]["w"])
+        ahead = np.array(grasp["position"]) + 0.1034 * rotation[:, 2]
+        R, o, _ = geometry(station_of(ahead))
         assert rotation[:, 1] == pytest.approx(R[0][:, 2], abs=1e-12)  # closes along y
         assert rotation[:, 2] == pytest.approx(-R[0][:, 0], abs=1e-12)
-        assert grasp["position"] == pytest.approx(o.mean(axis=0).tolist())
-        assert grasp["cspace_position"] == pytest.approx(dict.fromkeys(("left", "right"), RADIUS - 0.001))
-        assert grasp["pregrasp_cspace_position"] == pytest.approx(dict.fromkeys(("left", "right"), RADIUS + 0.01))
+        assert ahead == pytest.approx(o.mean(axis=0))
+        # the foam is on fingers whose bare faces meet at zero, and 90 mm of stroke are less than 20 mm wider
+        inner = RADIUS - 0.001 + FOAM
+        assert grasp["cspace_position"] == pytest.approx({"left": inner, "right": -inner})
+        assert grasp["pregrasp_cspace_position"] == pytest.approx({"left": 0.045, "right": -0.045})
     assert [g["confidence"] for g in found["grasps"].values()] == pytest.approx(sorted(
         (1.0 + np.delete(STATIONS, LOST)) / 1.04, reverse=True))  # fmt: skip
     assert "warnings: coarse" in text
 
 
-def test_moveit_grasps_have_the_fields_of_their_messages(said):
-    found = read_yaml(said("--format", "moveit", "--force", 16, "--depth", 103.4, "--frames", "gripper,mug"))
+def test_moveit_grasps_have_the_fields_of_their_messages(said, gripper):
+    found = read_yaml(said("--format", "moveit", "--force", 16, "--gripper", gripper, "--frame", "mug"))
     assert set(found) == {"grasps"}
     assert len(found["grasps"]) == 4
     for grasp in found["grasps"]:
@@ -230,8 +243,8 @@ def test_simulators_get_a_file_for_each_grasp(path, said, tmp_path):
         (("--csv", "--min", "beauty=3"), USAGE),
         (("--csv", "--min", "payload"), USAGE),
         (("--format", "moveit", "--min", "payload=1e9"), USAGE),
-        (("--format", "moveit", "--joints", "a,,b"), USAGE),
-        (("--format", "moveit", "--depth=-1"), USAGE),
+        (("--format", "moveit", "--gripper", "three_fingers"), USAGE),
+        (("--format", "moveit", "--gripper", "robotiq_2f85"), USAGE),  # presses with 20 N at least
         (("--format", "mjcf", "-o", "/no/such/folder/x.xml"), CANNOT_WRITE),
     ],
 )

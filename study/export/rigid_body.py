@@ -7,6 +7,7 @@ with the object's mass; of a surface that is not closed its convex hull is taken
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 from softjaw.study.case.build import build_object, centre_of_mass, own_frame, surface_triangles
 from softjaw.study.messages import OTHER_FILE, StudyError
 from softjaw.study.result.read import axes_of
-from softjaw.study.scene import SceneError
+from softjaw.study.scene import Scene, SceneError
 from softjaw.study.scene.model import parse_scene
 from softjaw.study.units import GRAVITY
 
@@ -25,7 +26,7 @@ DENSITY = 1000.0  # of an object without `object.mass_g` [kg/m^3], as simulators
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
+class RigidBody:
     """An object: ``points (k, 3)`` [m], ``triangles (m, 3)``, ``mass`` [kg], ``centre (3,)`` of mass [m].
 
     ``inertia (3, 3)`` is about the centre of mass [kg m^2]. ``weighed`` says whether the scene gives the mass, and
@@ -43,7 +44,28 @@ class Body:
     pad: FloatArray
 
 
-def body_of(ds: xr.Dataset, case: dict[str, Any]) -> Body:
+def scene_of(ds: xr.Dataset, case: dict[str, Any]) -> Scene:
+    """The scene of a case (`study.export.cases`), with its values of what is swept.
+
+    Raises
+    ------
+    StudyError
+        The file's scene is none of this version.
+    """
+    index = [int(np.flatnonzero(axis.values == case["place"][axis.name])[0]) for axis in axes_of(ds)[:-3]]
+    try:
+        return _scene_at(ds.attrs["scene"], tuple(index))
+    except SceneError as error:
+        raise StudyError(OTHER_FILE, f"{ds.attrs['file']}: {error}") from error
+
+
+@lru_cache(maxsize=64)
+def _scene_at(text: str, index: tuple[int, ...]) -> Scene:
+    scene = parse_scene(text, check_files=False)
+    return scene.with_values({key: v[i] for (key, v), i in zip(scene.sweep.items(), index, strict=False)})
+
+
+def body_of(ds: xr.Dataset, case: dict[str, Any]) -> RigidBody:
     """The object of a case (`study.export.cases`).
 
     Raises
@@ -51,24 +73,22 @@ def body_of(ds: xr.Dataset, case: dict[str, Any]) -> Body:
     StudyError
         The object cannot be built, as when its mesh is not there any more.
     """
-    index = [int(np.flatnonzero(axis.values == case["place"][axis.name])[0]) for axis in axes_of(ds)[:-3]]
+    scene = scene_of(ds, case)
+    shape = scene.object
     try:
-        scene = parse_scene(ds.attrs["scene"], check_files=False)
-        scene = scene.with_values({key: v[i] for (key, v), i in zip(scene.sweep.items(), index, strict=False)})
-        shape = scene.object
         built, frame = build_object(shape), own_frame(shape)
         points, triangles = surface_triangles(shape)
-    except (SceneError, ValueError, OSError) as error:
+    except (ValueError, OSError) as error:
         raise StudyError(OTHER_FILE, f"{ds.attrs['file']}: its object cannot be built: {error}") from error
     centre = frame.to_object(centre_of_mass(scene, built)[None])[0]
     points = frame.to_object(np.asarray(points, float))
     volume, inertia = solid(points[triangles] if getattr(built, "closed", True) else _hull(points))
     mass = DENSITY * volume if shape.mass is None else shape.mass
     down, pad = np.array(scene.task.direction or (0.0, 0.0, -1.0)), np.array(scene.gripper.pad_size)
-    return Body(points, triangles, mass, shape.mass is not None, centre, inertia * mass / volume, down, pad)
+    return RigidBody(points, triangles, mass, shape.mass is not None, centre, inertia * mass / volume, down, pad)
 
 
-def weight(mass: float, body: Body) -> FloatArray:
+def weight(mass: float, body: RigidBody) -> FloatArray:
     """Weight ``(3,)`` [N] of a mass [kg] in the direction in which the body's own pulls."""
     return mass * GRAVITY * body.down / np.linalg.norm(body.down)
 

@@ -1,0 +1,104 @@
+"""From which side a hand comes to a grasp: where its palm and fingers, as boxes, leave the object free.
+
+The object is points of its surface. Boxes are two corners in the gripper's frame (`study.export.selection`): the palm,
+both fingers and the foam on them, as wide open as before the grasp, and prolonged against the approach by the way that
+the hand comes. The distance of a point from a box is exact: the clearance is known to the spacing of the points.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softjaw.study.case.build import own_frame, surface_triangles
+from softjaw.study.scene.grippers import Hand
+
+FloatArray = NDArray[np.float64]
+WAY = 0.1  # of approach and retreat [m]
+FREE = 1e-3  # clearance [m] from which a hand and an object are apart, of points that are 2 mm apart
+SPACING = 2e-3  # of points on a surface [m]
+MOST_SPACINGS = 200.0  # along the object's diagonal; larger objects get points that are further apart
+FINGER_THICKNESS = 0.01  # of a hand that does not say it [m]
+FROM_ABOVE = np.cos(np.radians(45.0))  # between the approach and the weight
+
+
+@lru_cache(maxsize=8)
+def surface_points(shape: Any) -> FloatArray:
+    """Points ``(n, 3)`` [m] on an object's surface, no further apart than `SPACING`, in the frame of its own file."""
+    points, triangles = surface_triangles(shape)
+    points = own_frame(shape).to_object(np.asarray(points, float))
+    size = max(SPACING, float(np.linalg.norm(np.ptp(points, axis=0))) / MOST_SPACINGS)
+    corners = points[np.asarray(triangles)]
+    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    parts = np.maximum(np.ceil(longest / size), 1).astype(int)
+    finer = [_grid(n) @ corners[parts == n] for n in np.unique(parts)]
+    return np.unique(np.round(np.concatenate([x.reshape(-1, 3) for x in finer]), 7), axis=0)
+
+
+def _grid(n: int) -> FloatArray:
+    """Barycentric coordinates ``(k, 3)`` of points that divide the sides of a triangle into ``n`` parts."""
+    i, j = np.meshgrid(np.arange(n + 1), np.arange(n + 1), indexing="ij")
+    i, j = i[i + j <= n], j[i + j <= n]
+    return np.column_stack([i, j, n - i - j]) / n
+
+
+def boxes(hand: Hand, along: str, pad: FloatArray, opening: float, depth: float) -> FloatArray:
+    """Corners ``(k, 2, 3)`` [m] of palm, fingers and foam in the hand's frame, prolonged by `WAY` against z.
+
+    ``along`` is the closing axis, ``pad (3,)`` the pad's extents along the approach and across both axes, and its
+    thickness [m], ``opening`` the distance of the faces of the foam, and ``depth`` the pads' distance from the frame.
+    """
+    closing = "xy".index(along)
+    across = 1 - closing
+    width, thickness = (pad[1], FINGER_THICKNESS) if hand.finger_mm is None else np.array(hand.finger_mm) / 1e3
+    tip, root = depth + pad[0] / 2, depth - pad[0] / 2
+    bare = opening / 2 + pad[2]
+    made = []
+    for low, high, wide, start in (
+        (opening / 2, bare, pad[1], root),
+        (bare, bare + thickness, max(width, pad[1]), min(0.0, root)),
+    ):
+        for sign in (-1.0, 1.0):
+            box = np.zeros((2, 3))
+            box[:, closing] = sorted((sign * low, sign * high))
+            box[:, across] = -wide / 2, wide / 2
+            box[:, 2] = start - WAY, tip
+            made.append(box)
+    if hand.palm_mm is not None:
+        palm = np.array(hand.palm_mm) / 1e3
+        palm[:, :2] = palm[:, :2] if along == hand.closing else palm[:, 1::-1]
+        made.append(palm - [[0.0, 0.0, WAY], [0.0, 0.0, 0.0]])
+    return np.stack(made)
+
+
+def clearance(points: FloatArray, corners: FloatArray) -> float:
+    """Least distance [m] of points ``(n, 3)`` from boxes ``(k, 2, 3)``; negative as deep as a point is inside.
+
+    >>> clearance(np.array([[3.0, 0, 0], [0, 5, 4]]), np.array([[[-1.0, -1, -1], [1, 1, 1]]]))
+    2.0
+    """
+    least = np.inf
+    for low, high in corners:
+        outside = np.maximum(low - points, points - high)
+        distance = np.linalg.norm(np.maximum(outside, 0.0), axis=1) + np.minimum(outside.max(axis=1), 0.0)
+        least = min(least, float(distance.min()))
+    return least
+
+
+def chosen_approach(clearances: dict[str, float], down: dict[str, float]) -> str:
+    """Of the approaches that are `FREE` the one from above, if there is one, else the clearest.
+
+    ``down`` is the cosine between each approach and the weight.
+
+    >>> chosen_approach({"x": 0.02, "y": 0.01, "minus-y": 0.03}, {"x": 0.0, "y": 1.0, "minus-y": -1.0})
+    'y'
+    >>> chosen_approach({"x": 0.02, "y": -0.01}, {"x": 0.0, "y": 1.0})
+    'x'
+    """
+    above = [name for name, value in clearances.items() if value >= FREE and down[name] > FROM_ABOVE]
+    ranked = down if above else clearances
+    # Rounded, so that of equal ones the first is taken on every machine.
+    return max(above or clearances, key=lambda name: round(ranked[name], 6))

@@ -1,0 +1,100 @@
+"""From where the hand comes: on an elliptic cylinder of 50 x 40 x 100 mm, whose clearances are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from softjaw.study.case.poses import axis_poses
+from softjaw.study.export.reach import WAY, boxes, clearance, surface_points
+from softjaw.study.export.rigid_body import scene_of
+from softjaw.study.export.selection import GripperFrame, Selection, grasps, usable
+from softjaw.study.scene.grippers import Hand, gripper_file
+from tests.study.export.grasp_results import RADIUS, STATIONS, opened, write
+
+FRANKA = gripper_file("franka_hand")[1]
+TOP = 0.05  # of the cylinder, whose middle is the origin
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    poses = [axis_poses(station, np.pi / 2, 0.0) for station in STATIONS]  # across its 40 mm, upright
+    R = np.array([[pose.rotation for pose in pair] for pair in poses])
+    o = np.array([[[0, 0, z]] * 2 for z in STATIONS]) - RADIUS * R[..., 2]
+    shape = (len(STATIONS), 1, 3, 2, 3)
+    upright = {"fingers/pose_rotation": np.broadcast_to(R[:, None, None], (*shape, 3)),
+               "fingers/pose_origin": np.broadcast_to(o[:, None, None], shape)}  # fmt: skip
+    return write(tmp_path_factory.mktemp("reach") / "grasps.hdf", **upright)
+
+
+def taken(path, hand, force=4.0):
+    found = grasps(opened(path), Selection(force=force), GripperFrame(hand, ()))
+    return sorted(found, key=lambda grasp: grasp.case["place"]["station"])
+
+
+def test_a_hand_comes_from_above_only_where_its_palm_stays_over_the_object(path):
+    """The palm of Franka's hand is 37.65 mm behind the pads' middle; the cylinder's top is 50 mm above its own."""
+    found = taken(path, FRANKA)
+    room = (FRANKA.depth_mm - FRANKA.palm_mm[1][2]) / 1e3
+    assert room < TOP - STATIONS[0]
+    assert room > TOP - STATIONS[4] + 0.005
+    assert abs(found[0].rotation[2, 2]) < 0.1
+    assert found[4].rotation[2, 2] == pytest.approx(-1.0)
+    assert not any(grasp.unfit for grasp in found)
+
+
+def test_without_a_palm_every_grasp_is_taken_from_above(path):
+    assert all(grasp.rotation[2, 2] < -0.99 for grasp in taken(path, Hand()))
+
+
+@pytest.mark.parametrize(
+    ("hand", "why"),
+    [
+        (Hand(depth_mm=10, palm_mm=[[-100, -100, -20], [100, 100, 5]]), "every side"),
+        (Hand(stroke_mm=60), "30 mm"),  # pads of 15 mm leave half of it, and the object is 40 mm wide
+        (Hand(force_n=[5, 50]), "5 to 50 N"),
+    ],
+)
+def test_what_the_gripper_cannot_take_is_left_out_with_the_reason(path, hand, why):
+    kept, said = usable(taken(path, hand))
+    assert not kept
+    assert why in said
+    assert said.startswith("5 of 5 ")
+
+
+def test_fingers_open_no_wider_than_the_stroke(path):
+    hand = Hand(stroke_mm=80)
+    for grasp in taken(path, hand):
+        assert grasp.open_joints == pytest.approx({"finger_joint1": 0.040, "finger_joint2": 0.040})
+        assert grasp.closed_joints == pytest.approx({"finger_joint1": 0.034, "finger_joint2": 0.034})
+
+
+def test_clearance_of_a_sphere_from_boxes():
+    ball = np.random.default_rng(1).normal(size=(20_000, 3))
+    ball *= 0.03 / np.linalg.norm(ball, axis=1)[:, None]
+    beside, corner = np.array([[0.05, -1, -1], [1, 1, 1]]), np.array([[0.03, 0.03, 0.03], [1, 1, 1]])
+    assert clearance(ball, beside[None]) == pytest.approx(0.02, abs=1e-4)
+    assert clearance(ball, corner[None]) == pytest.approx(0.03 * (np.sqrt(3) - 1), abs=1e-4)
+    assert clearance(ball, np.stack([beside, corner])) == pytest.approx(0.02, abs=1e-4)
+    assert clearance(ball, beside[None] - [0.03, 0, 0]) == pytest.approx(-0.01, abs=1e-4)
+
+
+def test_points_lie_on_the_surface_and_close_together(path):
+    grasp = taken(path, Hand())[0]
+    points = surface_points(scene_of(opened(path), grasp.case).object)
+    inside = np.abs(points[:, 2]) < TOP - 1e-6
+    assert np.hypot(points[inside, 0] / 0.025, points[inside, 1] / 0.020).max() == pytest.approx(1.0, abs=1e-5)
+    assert np.abs(points[:, 2]).max() == pytest.approx(TOP)
+    grid = np.array([[0.025, 0.0, z] for z in np.linspace(-TOP, TOP, 50)])
+    nearest = np.linalg.norm(points[None] - grid[:, None], axis=-1).min(axis=1)
+    assert nearest.max() < 2e-3
+
+
+def test_boxes_stand_beside_the_pads_and_behind_them():
+    parts = boxes(FRANKA, "y", np.array([0.02, 0.018, 0.005]), 0.06, 0.10365)
+    foam, fingers, palm = parts[:2], parts[2:4], parts[4]
+    assert foam[1] == pytest.approx(np.array([[-0.009, 0.030, 0.09365 - WAY], [0.009, 0.035, 0.11365]]))
+    assert fingers[0] == pytest.approx(np.array([[-0.011, -0.061, -WAY], [0.011, -0.035, 0.11365]]))
+    assert palm[:, 2] == pytest.approx([-0.0259 - WAY, 0.066])
+    turned = boxes(FRANKA, "x", np.array([0.02, 0.018, 0.005]), 0.06, 0.10365)
+    assert turned == pytest.approx(parts[:, :, [1, 0, 2]])

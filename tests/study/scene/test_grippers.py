@@ -1,0 +1,114 @@
+"""Presets of grippers: what a scene gets from them, joint values, and files of one's own."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from softjaw.study.cli import main
+from softjaw.study.cli.options import KINDS
+from softjaw.study.messages import USAGE, StudyError
+from softjaw.study.scene import Scene, SceneError, load_scene
+from softjaw.study.scene.grippers import PRESETS, gripper_file
+from tests.study.launching import ROOT
+
+SCENE = """
+[object]
+shape = "sphere"
+radius_mm = 10
+[gripper]
+preset = "{name}"
+{more}
+[candidates]
+stations_mm = [0]
+[load]
+normal_force_n = [{force}]
+"""
+
+
+def loaded(tmp_path, name, force=60, more=""):
+    (tmp_path / "scene.toml").write_text(SCENE.format(name=name, force=force, more=more))
+    return load_scene(tmp_path / "scene.toml").gripper
+
+
+def test_there_are_four_presets():
+    assert set(PRESETS) == {"franka_hand", "robotiq_2f85", "schunk_egp50", "wsg50"}
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_a_preset_sets_pad_and_opening_and_is_gone(tmp_path, name):
+    keys, hand = gripper_file(name)
+    found = loaded(tmp_path, name)
+    assert {key: getattr(found, key) for key in keys} == keys
+    assert found.max_opening_mm == pytest.approx(hand.stroke_mm - 2 * found.pad_thickness_mm)
+    scene = load_scene(tmp_path / "scene.toml")
+    assert Scene.of_tables(scene.effective()) == scene
+
+
+def test_keys_of_the_scene_come_first(tmp_path):
+    found = loaded(tmp_path, "franka_hand", more="pad_thickness_mm = 10\npad_width_mm = 30")
+    assert (found.pad_width_mm, found.pad_thickness_mm, found.max_opening_mm) == (30, 10, 60)
+    assert loaded(tmp_path, "franka_hand", more="max_opening_mm = 33").max_opening_mm == 33
+
+
+@pytest.mark.parametrize(
+    ("name", "force", "key"),
+    [("four_fingers", 5, "gripper.preset"), ("robotiq_2f85", 5, "load.normal_force_n"),
+     ("wsg50", 81, "load.normal_force_n")],
+)  # fmt: skip
+def test_what_a_gripper_cannot_do_is_refused_with_its_key_and_line(tmp_path, name, force, key):
+    with pytest.raises(SceneError) as error:
+        loaded(tmp_path, name, force)
+    (problem,) = error.value.problems
+    assert problem.key == key
+    assert problem.line is not None
+
+
+def test_a_preset_on_the_command_line():
+    scene = Scene.from_file(ROOT / "jobs" / "smoke.toml", ["gripper.preset=wsg50", "load.normal_force_n=[5, 10]"])
+    assert scene.gripper.max_opening_mm == 100
+
+
+def test_joints_of_a_parallel_hand_are_half_the_gap_within_the_stroke():
+    _, hand = gripper_file("franka_hand")
+    assert hand.values(0.05) == pytest.approx({"fr3_finger_joint1": 0.025, "fr3_finger_joint2": 0.025})
+    assert max(hand.values(1.0).values()) == 0.04
+    _, hand = gripper_file("wsg50")
+    assert sorted(hand.values(0.05).values()) == pytest.approx([-0.025, 0.025])
+
+
+def test_the_joint_of_robotiq_is_the_angle_of_its_linkage():
+    """The crank turned by the angle brings the pad to half the gap, and as far ahead as the depth says."""
+    _, hand = gripper_file("robotiq_2f85")
+    link = hand.linkage_mm
+    for gap in (0.005, 0.03, 0.06, 0.085):
+        (angle,) = hand.values(gap).values()
+        c, s = math.cos(angle), math.sin(angle)
+        y, z = np.array(link.pivot) + np.array([[c, -s], [s, c]]) @ link.crank + link.pad
+        assert (2 * y, z) == pytest.approx((1e3 * gap, 1e3 * hand.depth(gap)))
+    assert hand.values(0.0) == {"finger_joint": 0.8}
+    assert 0 < hand.values(0.085)["finger_joint"] < 0.02
+
+
+@pytest.mark.parametrize("text", ["[hand]\nfingers = 3", "[hand]\nstroke_mm = -1", "[hand]\nclosing = 'z'", "hand ="])
+def test_a_file_with_wrong_keys_is_refused(tmp_path, text):
+    (tmp_path / "mine.toml").write_text(text)
+    with pytest.raises(StudyError) as error:
+        gripper_file(str(tmp_path / "mine.toml"))
+    assert error.value.code == USAGE
+
+
+@pytest.mark.parametrize("name", PRESETS)
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "mesh"])
+def test_init_writes_it_and_check_passes(kind, name, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["init", kind, "--gripper", name, "-o", "mine"]) == 0
+    text = (tmp_path / "mine.toml").read_text()
+    assert f'preset = "{name}"' in text
+    assert max(map(len, text.splitlines())) <= 120
+    scene = load_scene("mine.toml")
+    low, high = gripper_file(name)[1].force_n
+    assert low <= min(scene.load.normal_force_n) <= max(scene.load.normal_force_n) <= high
+    assert main(["init", kind, "--gripper", "none", "-o", "other"]) == USAGE
