@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from softjaw.fem.materials import MATERIALS
+from softjaw.fem.shell.wall_material import MATERIALS
 from softjaw.study.scene import Scene, parse_scene
 from softjaw.study.scene.text import toml_text
 from softjaw.study.units import split_unit
