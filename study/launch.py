@@ -15,6 +15,7 @@ from softjaw.study.case.candidates import with_sampled_grasps
 from softjaw.study.case.model import check_petsc, check_poses
 from softjaw.study.result import derived
 from softjaw.study.result.read import dataset
+from softjaw.study.run.finer import next_cases
 from softjaw.study.run.objects import run_objects
 from softjaw.study.run.plan import make_plan
 from softjaw.study.run.refine import Rounds, added_cases, next_round, refined
@@ -90,14 +91,14 @@ def solve_objects(folder: ObjectFolder, out: Path, comm: Any, *, retry_failed: b
 
 
 def _growth(scene: Scene, plan: Any, comm: Any) -> Growth:
-    """How the grasps of a scene are refined; also a file that has been refined already needs it."""
+    """How the grasps of a scene are refined, and their meshes; also a file that has been refined already needs it."""
     each, about = added_cases(plan.units, plan.layout), (plan.header.scene_file, plan.header.overrides)
 
     def study(rounds: Rounds) -> tuple[Any, Work]:
         made = on_rank0(comm, make_plan, scene, *about, True, rounds)
         return made, work(refined(scene, rounds))
 
-    return Growth(study, lambda result: next_round(result, scene, each))
+    return Growth(study, lambda result: next_round(result, scene, each) or next_cases(result, scene))
 
 
 def prepare(scene: Scene, scene_file: str, overrides: Sequence[str]) -> Any:

@@ -14,9 +14,10 @@ from typing import Any
 import numpy as np
 
 from softjaw.fem.errors import CheckError, ConvergenceError
+from softjaw.fem.pad.halving import halved
 from softjaw.study.case.build import build_object, forces_apart, own_frame, pad_shape
-from softjaw.study.case.effects import EffectChoice, Simulated, settled
-from softjaw.study.case.errors import mesh_errors
+from softjaw.study.case.effects import COUPLING, SCREENED, EffectChoice, Simulated, settled
+from softjaw.study.case.errors import coarse_errors, mesh_errors
 from softjaw.study.case.evaluate import EvaluationSettings, evaluate, settings_of
 from softjaw.study.case.pressing import state_flags
 from softjaw.study.case.result import CaseFailure, CaseResult
@@ -25,6 +26,8 @@ from softjaw.study.case.topology import of_fingers, on_faces
 from softjaw.study.case.wall import wall_flags
 from softjaw.study.flags import Flag, flag_sentences
 from softjaw.study.quantities import misses
+from softjaw.study.scene import Scene
+from softjaw.study.scene.sections import COARSE, FINEST
 
 
 def solve_unit(
@@ -35,8 +38,30 @@ def solve_unit(
     Each force starts from the state at the one before, so that all up to the last one are solved; or it is independent
     of the others, and only those are. Not a bit of a case depends on what is wanted.
     """
-    settings = settings_of(unit.scene, build_object(unit.scene.object))
-    solver = CandidateSolver(unit.scene, unit.candidate.poses)
+    forces = range(len(unit.scene.load.normal_force)) if wanted is None else sorted(wanted)
+    coarse = [k for k in forces if unit.finest and unit.finest[k] == COARSE]
+    for some, scene in ((coarse, screened(unit.scene)), ([k for k in forces if k not in coarse], unit.scene)):
+        if some:
+            yield from _cases(unit, scene, some)
+
+
+def screened(scene: Scene) -> Scene:
+    """The scene on its coarse mesh alone: no friction that acts back unless it is asked for, and no fits."""
+    gripper = scene.gripper.model_copy(update={"elements": halved(scene.gripper.elements)})
+    surface = scene.limit_surface.model_copy(update={"model": "three_motions", "objective": "least_squares"})
+    parts: dict[str, Any] = {"gripper": gripper, "limit_surface": surface}
+    parts["accuracy"] = scene.accuracy.model_copy(update={"meshes": 1})
+    if scene.effects.friction_pressure_coupling == "auto":
+        parts["effects"] = scene.effects.model_copy(update={"friction_pressure_coupling": "none"})
+    return scene.model_copy(update=parts)
+
+
+def _cases(
+    unit: Any, scene: Scene, wanted: Collection[int]
+) -> Generator[tuple[int, CaseResult | CaseFailure], None, None]:
+    """Cases of a unit as a scene solves them, its own or the screened one."""
+    settings = settings_of(scene, build_object(scene.object))
+    solver = CandidateSolver(scene, unit.candidate.poses, finest=unit.finest)
     try:
         start = time.perf_counter()
         choice = EffectChoice(solver)
@@ -44,18 +69,19 @@ def solve_unit(
         for k, outcome in _outcomes(choice, wanted):
             if isinstance(outcome, CaseFailure):
                 yield k, outcome
-            else:
-                yield k, _result(settings, choice, k, outcome, unit.candidate.note, choosing)
+            elif k in wanted:
+                yield k, _result(settings, choice, k, outcome, unit, choosing)
                 choosing = 0.0  # counted once for all forces
     finally:
         solver.destroy()
 
 
 def _result(
-    settings: EvaluationSettings, choice: EffectChoice, k: int, solved: Solved, note: str, choosing: float
+    settings: EvaluationSettings, choice: EffectChoice, k: int, solved: Solved, unit: Any, choosing: float
 ) -> CaseResult:
     """Values, checks, work, effects and patches of one case; its effects took ``choosing`` seconds to choose."""
-    scene, fine, coarse = choice.solver.scene, solved.fine, solved.coarse
+    scene, fine, coarse = unit.scene, solved.fine, solved.coarse
+    finest = unit.finest[k] if unit.finest else FINEST
     start, contacts = time.perf_counter(), fine.contacts
     shape = contacts[0].state.pad.shape
     values, fits = evaluate(contacts, settings)
@@ -66,19 +92,26 @@ def _result(
     if coarse:
         other = _state_values(coarse)
         values |= mesh_errors(contacts, coarse.contacts, values, other, settings, coarse.views, solved.weight)
-        # only where the scene asks for a target: without one the sums at the end say how many cases miss the usual one
-        if (target := scene.accuracy.target) is not None:
+        # only where every case has a target: without one the sums at the end say how many cases miss the usual one
+        if (target := scene.accuracy.target) is not None and not unit.finest:
             error = values[f"maps/{scene.accuracy.target_of}_error"]
             values["maps/flags"] |= Flag.COARSE * bool(misses(error, target))
+    case = Simulated(choice.solver.scene, contacts, fits, fine.fingers.planes, fine.fingers.fingers_solved)
+    effects = choice.effects_at(k, contacts) | settled(case)
+    if finest == COARSE:
+        left_out = 0.0
+        if scene.effects.friction_pressure_coupling == "auto":
+            effects[COUPLING] = effects[COUPLING]._replace(reason=SCREENED)
+            left_out = effects[COUPLING].indicator
+        values |= coarse_errors(contacts, values, fine.views, settings, left_out)
+        values["maps/flags"] &= ~Flag.COARSE  # its errors say so
     values |= _work(solved, time.perf_counter() - start, choosing)
     if scene.accuracy.target is not None:
-        values["maps/pad_elements"] = math.prod(shape.elements)
+        values |= {"maps/pad_elements": math.prod(shape.elements), "work/mesh": finest}
     patches = [on_faces(c, pad_shape(scene.gripper)) for c in contacts]
     patch = {name: np.stack([faces[name] for faces in patches]) for name in patches[0]}
     notes = dict.fromkeys(note for c in contacts for note in c.state.notes)
-    message = join_notes(flag_sentences(values["maps/flags"]), *notes, solved.note, note)
-    case = Simulated(scene, contacts, fits, fine.fingers.planes, fine.fingers.fingers_solved)
-    effects = choice.effects_at(k, contacts) | settled(case)
+    message = join_notes(flag_sentences(values["maps/flags"]), *notes, solved.note, unit.candidate.note)
     return CaseResult(values, patch, message, effects, tuple(contacts))
 
 

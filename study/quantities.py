@@ -23,6 +23,8 @@ NO_GRASP = (WIDE, COLLIDES, SLIPS, WORSE)
 RIMS = (1, 2, 4, 8)  # bits of the rims of a pad that carry load: its ends at -x and +x, its sides at -y and +y
 REALISATION = "realisation"  # dimension of the samples of uncertain inputs; the first has the scene's own
 E_N_TARGET = 0.01  # relative error of e_n that is good enough where a scene names none
+LISTED_TARGET = 0.03  # the same of the payload, of the best of sampled grasps
+LISTED = 10  # places that a list of the best grasps has where nobody asks for another number
 BOTH_ENDS = RIMS[0] | RIMS[1]
 PARTS = ("assembly", "factorisation", "rest", "friction")  # of a case's time
 # What a quantity may need that not every scene asks for; the layout of a file knows of `HELD` by their sizes.
@@ -102,6 +104,7 @@ REASONS = (
     "measured change of e_n above the target",
     "measured change of e_n not surely below the target",
     "left out, though e_n may change by more than the target: it was not solved",
+    "left out on the coarse mesh alone, and part of the errors there",
 )
 MEASURED = {  # parts of an effect that the coarse mesh decides
     "change": "Relative change of e_n (CCM) by the dearer of the two levels that were compared last, on the coarse"
@@ -350,6 +353,9 @@ ROWS = (
     Quantity("newton_iterations", F, "", "Newton iterations", "Since the force below.", "work"),
     Quantity("load_steps", F, "", "load steps", "Newton solves since the force below.", "work"),
     Quantity("step_halvings", F, "", "step halvings", "Solves that failed and were repeated in half steps.", "work"),
+    Quantity("mesh", (), "", "finest mesh that the case was tried on",
+             "0: half as many elements per direction as the scene's; 1: the scene's; 3: up to two finer ones, until"
+             " accuracy.target is met.", "work", needs=("finer meshes",)),
     *(
         Quantity(f"seconds_{part}", (), "s", f"seconds in {part}", f"Time of the case spent in {part}.", "work")
         for part in (*PARTS, "total")

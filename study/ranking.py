@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import tomllib
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -19,6 +21,7 @@ from softjaw.study.result.read import mesh_error, values_of
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 LARGEST = "the largest that was solved"
+MIN_ROLL_COSINE = math.cos(math.radians(30.0))  # pads rolled by more are another place
 
 
 def judged(ds: Any) -> IntArray:
@@ -205,6 +208,53 @@ def ranked(ds: xr.Dataset, k: int, by: str | None = None) -> IntArray:
     width = values_of(ds, "opening")[..., k].ravel() if "opening" in ds else np.zeros(len(score))
     marks, wide = flags[order], _places(-width)[order]
     return order[np.lexsort((wide, marks != 0, marks & Flag.NOT_ANTIPODAL, group))]
+
+
+# --- distinct places, and the force that is shown ---------------------------------------------------------------------
+
+
+class Place(NamedTuple):
+    """The best grasp of a place, and the others there: neighbours within a distance [m], and images by symmetry."""
+
+    best: int
+    near: list[int]
+    within: float
+    images: list[int]
+
+
+def distinct(ds: xr.Dataset, order: Sequence[int], score: np.ndarray, k: int, top: int = 0) -> list[Place]:
+    """The first ``top`` distinct places (0: all) of a ranking at a force level.
+
+    Grasps are neighbours where both pads touch less than half a pad apart, rolled by at most 30 degrees. Stations and
+    angles have images too: grasps at one station with the same ``score``.
+    """
+    shape, rest, places = ds.status.shape[:-1], np.asarray(order, int), list[Place]()
+    count = int(np.prod(shape))
+    index = np.array(np.unravel_index(np.arange(count), shape)).T
+    origin, turn = (ds[name].values if name in ds else None for name in ("finger_pose_origin", "finger_pose_rotation"))
+    pad = task_keys(ds, "gripper")
+    half = 0.5e-3 * np.array([pad.get(f"pad_{side}_mm", 0.0) for side in ("length", "width", "width")])
+    while len(rest) and not 0 < top <= len(places):
+        head = rest[0]
+        here = (index[rest, :-2] == index[head, :-2]).all(axis=1)
+        near, far = np.zeros(len(rest), bool), np.zeros(len(rest))
+        if origin is not None and turn is not None:
+            x, R = origin[..., k, :, :].reshape(count, 2, 3), turn[..., k, :, :, :].reshape(count, 2, 3, 3)
+            rolled = np.abs(R[rest, 0, :, 0] @ R[head, 0, :, 0]) < MIN_ROLL_COSINE
+            # The fingers of two grasps may have changed sides.
+            for pads in (x[rest], x[rest][:, ::-1]):
+                apart = np.einsum("nfi,fij->nfj", pads - x[head], R[head])
+                close = (np.abs(apart) < half).all(axis=(1, 2)) & here & ~rolled
+                near, far = near | close, np.where(close, np.linalg.norm(apart, axis=2).max(axis=1), far)
+        alike = np.abs(score[rest] - score[head]) <= TIE * abs(score[head])
+        images = here & (index[rest, -2] == index[head, -2]) & alike & (not ds.attrs["poses"]) & ~near
+        near[0], images[0] = False, False
+        gone = near | images
+        gone[0] = True
+        found = (rest[mask].tolist() for mask in (near, images))
+        places.append(Place(int(head), next(found), float(far[near].max(initial=0.0)), next(found)))
+        rest = rest[~gone]
+    return places
 
 
 def at_level(ds: Any, force: float | None = None) -> tuple[Any, int, str]:

@@ -148,6 +148,8 @@ class Unit:
         One of `study.quantities.NO_GRASP` and why, for a candidate that is not solved; else `MISSING`, not computed.
     hopeless : bool
         Whether a bed of springs says that it cannot hold, or bears on a pad's rim: it comes last in the order of work.
+    finest : tuple of int
+        Finest mesh of each force, as `study.case.solver` numbers them; empty where the scene alone says it.
     """
 
     index: int
@@ -160,11 +162,12 @@ class Unit:
     state: int = MISSING
     reason: str = ""
     hopeless: bool = False
+    finest: tuple[int, ...] = ()
 
     @property
     def apart(self) -> bool:
         """Whether its forces are independent of each other, so that ranks may divide them."""
-        return forces_apart(self.scene)
+        return forces_apart(self.scene) and (not self.finest or any(self.finest))
 
 
 def axes(scene: Scene) -> list[Axis]:

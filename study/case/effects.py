@@ -26,17 +26,18 @@ from softjaw.study.case.evaluate import settings_of
 from softjaw.study.case.model import contact_rules, pad_of, plate_compliance
 from softjaw.study.case.pressing import PressedContact, grasp_of
 from softjaw.study.case.result import surely_below
-from softjaw.study.case.solver import COARSE, CandidateSolver, Levels, Solved, join_notes
+from softjaw.study.case.solver import CandidateSolver, Levels, Solved, join_notes
 from softjaw.study.case.task import payload_alone
 from softjaw.study.case.wall import estimated_indentation, thin_body
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import E_N_TARGET, EFFECTS, REASONS
 from softjaw.study.scene import Scene
+from softjaw.study.scene.sections import COARSE
 
 COUPLING = "friction_pressure_coupling"
 
 (
-    ONLY, FORCED, BELOW, ABOVE, SYMMETRY, NO_WALL, CHEAP, APART, LITTLE, MUCH, UNDECIDED, FAILED,
+    ONLY, FORCED, BELOW, ABOVE, SYMMETRY, NO_WALL, CHEAP, APART, LITTLE, MUCH, UNDECIDED, FAILED, SCREENED,
 ) = range(len(REASONS))  # fmt: skip
 # In 440 cases (pads, objects, supports, forces up to 13 N) a rigid plate put e_n off by at most 3.5 times the relative
 # compliance of the plate that it stood for (where a pad just reaches the middle of a waist).

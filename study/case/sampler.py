@@ -19,13 +19,13 @@ from softjaw.fem.objects.gap import Pose
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.friction.patch import NoContactError
 from softjaw.study.case.bed import JawsOnSurface, Side, held
-from softjaw.study.case.build import build_object, own_frame, surface_triangles
+from softjaw.study.case.build import build_object, forces_apart, own_frame, surface_triangles
 from softjaw.study.case.contact import slips
 from softjaw.study.case.fit import Jaws, fit_of, jaws_of
 from softjaw.study.case.poses import across, pad_axes
 from softjaw.study.case.task import Task, task_of
 from softjaw.study.messages import USAGE, NoGraspError
-from softjaw.study.quantities import MISSING, SLIPS, STATES
+from softjaw.study.quantities import LISTED_TARGET, MISSING, SLIPS, STATES
 from softjaw.study.scene import Scene
 from softjaw.study.scene.grasps import OF_EVERY_KIND, Candidates, GraspPose
 from softjaw.study.units import converted
@@ -284,7 +284,12 @@ def with_sampled_grasps(scene: Scene) -> Scene:
             " poses, another pad, or a larger gripper.max_opening_mm",
         )
     kept = {key: getattr(given, key) for key in OF_EVERY_KIND}
-    return scene.model_copy(update={"candidates": Candidates(poses=poses, **kept)})
+    # how many were asked for stays, which tells that they are screened
+    where = Candidates(poses=poses, **kept).model_copy(update={"sampled": given.sampled})
+    parts: dict[str, Any] = {"candidates": where}
+    if forces_apart(scene) and scene.accuracy.target is None:
+        parts["accuracy"] = scene.accuracy.model_copy(update={"target": LISTED_TARGET})
+    return scene.model_copy(update=parts)
 
 
 def lids_of(obj: Any) -> FloatArray | None:

@@ -26,9 +26,8 @@ from softjaw.study.case.model import approach
 from softjaw.study.case.pressing import OnRigid, OnWall, PressedContact, pressing, refuse_along_axis
 from softjaw.study.case.result import surely_below
 from softjaw.study.scene import Scene
-from softjaw.study.scene.sections import MOST_ELEMENTS, MOST_MESHES
+from softjaw.study.scene.sections import COARSE, FINE, FINEST, MOST_ELEMENTS
 
-COARSE, FINE = 0, 1  # meshes: half as many elements in every direction, the scene's; each further one is finer still
 NEGLIGIBLE_FORCE = 1e-3  # of the largest one; below it a failed load step says nothing of the forces above
 MOST_STARTS = 3  # coarse states that a force on the scene's mesh is started from, before it starts from nothing
 NO_ERROR = "the error of the mesh is not known, for on the coarser one {reason}"
@@ -134,14 +133,19 @@ class CandidateSolver:
         Of the pads before they touch; ``fingers`` are they at first touch.
     forces : sequence of float, optional
         The load path: those of the scene, or others [N]; rising. Forces are asked for by their number in it.
+    finest : sequence of int
+        Finest mesh of each force that ``accuracy.target`` may ask for; `FINEST` where it is empty.
     """
 
-    def __init__(self, scene: Scene, poses: Sequence[Pose], forces: Sequence[float] | None = None) -> None:
+    def __init__(
+        self, scene: Scene, poses: Sequence[Pose], forces: Sequence[float] | None = None, finest: Sequence[int] = ()
+    ) -> None:
         self.scene, self.poses, self.walled = scene, poses, has_wall(scene.object)
         self.fingers = [approach(build_object(scene.object), pose, scene.gripper) for pose in poses]
         if self.walled:
             refuse_along_axis(self.fingers)
         self.forces = tuple(scene.load.normal_force if forces is None else forces)
+        self.finest = tuple(finest) or (FINEST,) * len(self.forces)
         self._pressing: dict[tuple[int, Levels], OnRigid | OnWall] = {}
         self._paths: dict[tuple[int, Levels, int], Iterator[Any]] = {}
         self._states: dict[tuple[int, int, Levels, int], Any] = {}  # or failures, of every part
@@ -218,7 +222,7 @@ class CandidateSolver:
         """
         if (target := self.scene.accuracy.target) is None:
             return solved
-        for mesh in range(FINE + 1, MOST_MESHES):
+        for mesh in range(FINE + 1, self.finest[k] + 1):
             # undecided, and unknown, is refined, which is right in both cases
             too_large = math.prod(pad_elements(self.scene, mesh)) > MOST_ELEMENTS
             if surely_below(self.error(solved), target) or too_large:

@@ -7,6 +7,7 @@ origin. A *row* is one case: its flat index over all axes, the last axis (normal
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
@@ -92,9 +93,10 @@ class Layout:
     """The file of one study: its axes (``name, values, units, long_name``), the faces of a patch and the options.
 
     ``has`` names what of `NEEDS` the scene asks for besides two meshes; the wrenches of ``samples`` motions are stored
-    for the candidates ``sampled``, counted over stations and angles. ``added`` is what each round of a refinement added
-    to the scene: stations [mm], or poses as `study.run.pattern.Place`. ``stored`` are the paths of the columns in an
-    existing file, which may be others than those of this version; empty for a new one.
+    for the candidates ``sampled``, counted over stations and angles. ``rounds`` is what each round of a run added:
+    stations [mm], poses as `study.run.pattern.Place`, or cases that are solved on a finer mesh, by the numbers of their
+    point of a sweep, candidate and force. ``stored`` are the paths of the columns in an existing file, which
+    may be others than those of this version; empty for a new one.
     """
 
     axes: tuple[Any, ...]
@@ -105,8 +107,18 @@ class Layout:
     has: tuple[str, ...] = ()
     samples: int = 0
     sampled: tuple[int, ...] = ()
-    added: tuple[tuple[Any, ...], ...] = ()
+    rounds: tuple[tuple[Any, ...], ...] = ()
     stored: tuple[str, ...] = ()
+
+    @property
+    def added(self) -> tuple[tuple[Any, ...], ...]:
+        """What the rounds of a refinement added: stations or poses."""
+        return tuple(some for some in self.rounds if not is_case(some[0]))
+
+    @property
+    def finer(self) -> Counter[tuple[int, int, int]]:
+        """How often rounds named each case for a finer mesh."""
+        return Counter(case for some in self.rounds if is_case(some[0]) for case in some)
 
     @cached_property
     def summed(self) -> tuple[str, ...]:
@@ -222,10 +234,15 @@ class Layout:
     def options(self) -> str:
         """The part of the layout that the axes do not tell, as JSON."""
         derived = [asdict(d) for d in self.derived]
-        names = ("faces", "meshes", "patches", "has", "samples", "sampled", *["added"] * bool(self.added))
+        names = ("faces", "meshes", "patches", "has", "samples", "sampled", *["rounds"] * bool(self.rounds))
         return json.dumps(
             {**{name: getattr(self, name) for name in names}, "derived": derived, "columns": self.summed[:-1]}
         )
+
+
+def is_case(added: Any) -> bool:
+    """Whether what a round added is a case for a finer mesh, and no station or pose."""
+    return isinstance(added, tuple) and len(added) == 3
 
 
 def layout_from_options(axes: Sequence[Any], text: str) -> Layout:
@@ -242,17 +259,19 @@ def layout_from_options(axes: Sequence[Any], text: str) -> Layout:
         if not set(has) <= set(NEEDS) or not 0 <= samples < 10**6 or len(set(sampled)) < len(sampled):
             raise ValueError(f"has {has}, {samples} samples of candidates {sampled[:5]}")
         patches = bool(options["patches"])
-        added = tuple(tuple(map(_place, some)) for some in options.get("added", ()))
+        rounds = tuple(tuple(map(_place, some)) for some in options.get("rounds", ()) if some)
         stored = tuple(map(str, options["columns"]))
-        return Layout(tuple(axes), faces, meshes, patches, derived, has, samples, sampled, added, stored)
+        return Layout(tuple(axes), faces, meshes, patches, derived, has, samples, sampled, rounds, stored)
     except (KeyError, TypeError, AttributeError) as error:
         raise ValueError(f"its layout attribute is damaged ({error})") from error
 
 
 def _place(given: Any) -> Any:
-    """A station, or a pose with its step."""
+    """A station, a pose with its step, or a case."""
     if not isinstance(given, list):
         return float(given)
+    if len(given) == 3:
+        return tuple(map(int, given))
     if len(given) != 10:
         raise ValueError(f"an added pose of {len(given)} numbers")
     return tuple(map(float, given))

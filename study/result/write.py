@@ -16,20 +16,25 @@ from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, StudyError
 from softjaw.study.quantities import EFFECT_TABLE, EFFECTS, MEASURED, MODELS
 from softjaw.study.result import checksums
 from softjaw.study.result.datasets import CLOSING_SUMS, MESSAGE_BYTES, SUMS
-from softjaw.study.result.hdf5 import StoredFile
+from softjaw.study.result.hdf5 import StoredFile, text_of
 from softjaw.study.result.layout import DONE, FAILED, MISSING, ROOT, SESSION, Header, Layout
 from softjaw.study.result.skeleton import HDF5_VERSIONS, report_bytes, text_bytes
 from softjaw.study.result.store import Result, open_result
 from softjaw.study.scene.text import differences
 
+MESH = "work/mesh"
+NOT_FINER = "on a finer mesh it was not solved: "
+
 
 class ResultWriter:
     """A result file open on all ranks of ``comm``; opening and closing are collective, everything else is not.
 
-    With ``comm = None`` this process has it alone and needs no MPI; nor does a single rank.
+    With ``comm = None`` this process has it alone and needs no MPI; nor does a single rank. ``wanted (rows,)`` is the
+    finest mesh of every row: one that is stored from a coarser mesh counts as missing, and keeps its values until
+    those of the finer mesh replace them.
     """
 
-    def __init__(self, path: Path, layout: Layout, comm: Any) -> None:
+    def __init__(self, path: Path, layout: Layout, comm: Any, wanted: np.ndarray | None = None) -> None:
         if comm is not None and not h5py.get_config().mpi:
             if comm.size > 1:
                 text = "this h5py was loaded without MPI; 'softjaw doctor' says how to cure that"
@@ -43,19 +48,19 @@ class ResultWriter:
         self._code, self._attempts = (self._file[f"{ROOT}/status/{name}"] for name in ("code", "attempts"))
         self._sums, self._closing_sums = self._file[SUMS], self._file[CLOSING_SUMS]
         self._sessions = self._file[f"{ROOT}/provenance/sessions"]
-        self.session = 0
-
-    def layout_of(self, _row: int) -> Layout:
-        """Layout of the file that a row is stored in."""
-        return self.layout
+        self.session, self._wanted = 0, wanted
 
     def codes(self) -> np.ndarray:
         """State of every row, ``(rows,)``."""
-        return self._code[()].ravel()
+        codes: np.ndarray = self._code[()].ravel()
+        if self._wanted is not None:
+            codes[(codes == DONE) & (self._file[f"{ROOT}/{MESH}"][()].ravel() < self._wanted)] = MISSING
+        return codes
 
     def attempts(self) -> np.ndarray:
         """How often every row was begun without an end, ``(rows,)``."""
-        return self._attempts[()].ravel()
+        # a row with the values of a coarser mesh was begun once for these
+        return np.maximum(self._attempts[()].ravel().astype(int) - (self._code[()].ravel() == DONE), 0)
 
     def count_attempt(self, row: int, change: int = 1) -> None:
         """Note that a case is about to be solved (or, with -1, that it was given up in an orderly way)."""
@@ -72,21 +77,44 @@ class ResultWriter:
 
     def tidy(self, row: int) -> None:
         """Make a missing row that a killed process had stored, but not marked, like any other missing one."""
-        self._sums[(*self._index(row), -1)] = checksums.OF_STATE[MISSING]
+        if self._code[self._index(row)] == MISSING:  # not one that has the values of a coarser mesh
+            self._sums[(*self._index(row), -1)] = checksums.OF_STATE[MISSING]
 
     def write(self, row: int, values: Sequence[np.ndarray]) -> None:
         """Store a solved case; ``values`` as from ``record``."""
         self._store(row, values, DONE)
 
     def fail(self, row: int, message: str, state: int = FAILED, seconds: float = math.nan) -> None:
-        """Store why a case has no result: it failed after ``seconds``, or is one of `study.quantities.NO_GRASP`."""
-        self._store(row, blank(self.layout, message, seconds), state)
+        """Store why a case has no result: it failed after ``seconds``, or is one of `study.quantities.NO_GRASP`.
+
+        One that has the values of a coarser mesh keeps them, with the message.
+        """
+        if self._wanted is not None and self._code[self._index(row)] == DONE:
+            self._store(row, self._kept(row, message), DONE)
+        else:
+            self._store(row, blank(self.layout, message, seconds), state)
+
+    def _kept(self, row: int, message: str) -> list[np.ndarray]:
+        """The stored values of a row, tried on the mesh that is wanted, with one more message."""
+        assert self._wanted is not None
+        values: list[np.ndarray] = []
+        for column, dataset, place in zip(self.layout.columns, self._columns, self.layout.places(row), strict=True):
+            value = np.full(column.shape, column.fill, column.dtype) if place is None else np.asarray(dataset[place])
+            if column.key == MESH:
+                value = np.asarray(self._wanted[row], column.dtype)
+            elif column.dtype.kind == "S":
+                known = text_of(bytes(value.item()))
+                value = np.array(text_bytes("; ".join(filter(None, (known, NOT_FINER + message))), MESSAGE_BYTES))
+            values.append(value)
+        return values
 
     def _store(self, row: int, values: Sequence[np.ndarray], state: int) -> None:
         index = self._index(row)
-        # A complete case is final: readers that look on must not see it change.
+        # A complete case is final, unless a finer mesh is wanted: readers that look on must not see it change.
         if self._code[index] == DONE:
-            raise ValueError(f"row {row} is done already and must not be written again")
+            if self.codes()[row] == DONE:
+                raise ValueError(f"row {row} is done already and must not be written again")
+            self._code[index] = MISSING
         if not self._attempts[index]:  # a row that is stored is begun: only such a one may be without its mark
             self._attempts[index] = 1
         places = self.layout.places(row)

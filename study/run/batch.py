@@ -39,7 +39,7 @@ class Files:
 
     def __init__(self, folder: Path, parts: Sequence[Part], comm: Any) -> None:
         self.path, self.layout = folder, parts[0].plan.layout
-        self.files = [ResultWriter(part.path, part.plan.layout, comm) for part in parts]
+        self.files = [ResultWriter(part.path, part.plan.layout, comm, part.plan.wanted) for part in parts]
         self._first = np.cumsum([0, *(part.plan.layout.rows for part in parts)])
 
     def _at(self, row: int) -> tuple[ResultWriter, int]:

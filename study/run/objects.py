@@ -162,7 +162,7 @@ class _ObjectsRun:
         for part, number in zip(parts, files.session, strict=True):
             if part.number in self._mine:
                 _, work, _ = self._mine[part.number]
-                finish_alone(work, part.path, part.plan.layout, number, session.signal)
+                finish_alone(work, part.path, part.plan, number, session.signal)
         # Nobody reads a file that is being finished.
         self._comm.Barrier()
         return code == messages.STOPPED
@@ -174,7 +174,7 @@ class _ObjectsRun:
             added = growth.more(result)
         if not added:
             return None
-        plan, work = growth.study((*plan.layout.added, added))
+        plan, work = growth.study((*plan.layout.rounds, added))
         rewrite(part.path, plan.layout, plan.header)
         self._mine[part.number] = plan, work, growth
         return replace(part, plan=plan, torn=())

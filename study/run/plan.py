@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import shutil
+from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,22 +14,33 @@ import numpy as np
 
 from softjaw.fem.objects.outer_surface import Turned
 from softjaw.study.case import candidates as grasps
-from softjaw.study.case.build import check_object, geometry, has_wall, outer_surface, own_frame, pad_elements, pad_shape
+from softjaw.study.case.build import (
+    check_object,
+    forces_apart,
+    geometry,
+    has_wall,
+    outer_surface,
+    own_frame,
+    pad_elements,
+    pad_shape,
+)
 from softjaw.study.case.candidates import decided
 from softjaw.study.quantities import ALONG, AROUND, NO_GRASP, STATES
 from softjaw.study.result.derived import derived
-from softjaw.study.result.layout import Header, Layout
+from softjaw.study.result.layout import Header, Layout, is_case
 from softjaw.study.result.store import open_result
 from softjaw.study.run.estimate import START_S, estimated
 from softjaw.study.run.progress import duration
 from softjaw.study.run.refine import Rounds, added_cases, refined
 from softjaw.study.run.shares import by_cost
+from softjaw.study.scene.sections import COARSE, FINE, FINEST
 
 LIBRARY_BYTES = 3e8  # bytes of a rank that has loaded PETSc, numba and scipy and nothing else
 FILL_FACTOR = 20.0  # factor entries over dofs^(4/3), the growth of nested dissection in 3-D
 # Measured on a cup of 0.4 mm, 5 000 to 21 000 unknowns: a force takes 7 Newton steps of 15 us per unknown each; the
 # factors, what they are made from and what is not given back take 16 kB per unknown of the wall.
 SECONDS_PER_UNKNOWN, BYTES_PER_UNKNOWN = 1e-4, 1.6e4
+SCREENED_COST = 0.25  # of a force on the coarse mesh alone, over that on the scene's
 DENSE_COPIES = 8  # copies of a linear wall's dense stiffness: compliance, inverse, assembled entries and their factors
 SECONDS_PER_CUBE = 2.1e-10  # seconds per force and cube of the unknowns of that stiffness
 
@@ -58,6 +70,17 @@ class Plan:
         return [cost / n for cost, n in zip(costs, each, strict=True) for _ in range(n)]
 
     @property
+    def wanted(self) -> np.ndarray | None:
+        """Finest mesh of every row ``(rows,)``; None where no case waits for a finer one."""
+        if not any(unit.finest for unit in self.units):
+            return None
+        wanted = np.zeros(self.layout.rows, int)
+        for unit in self.units:
+            for rows in unit.rows:
+                wanted[list(rows)] = unit.finest or 0
+        return wanted
+
+    @property
     def served(self) -> int:
         """Number of candidates, those that share a unit by symmetry counted one by one."""
         return sum(len(unit.rows) for unit in self.units)
@@ -84,6 +107,8 @@ def make_plan(
         from softjaw.study.case.promise import chosen  # compiled loops, which most scenes are planned without
 
         units = chosen(scene, units)
+    if scene.candidates.sampled and forces_apart(scene):
+        units = [_with_meshes(unit, scene, rounds) for unit in units]
     header = Header(
         digest=digest,
         scene=text,
@@ -106,6 +131,18 @@ def make_plan(
         rounds,
     )
     return Plan(layout, header, tuple(units))
+
+
+def _with_meshes(unit: Any, scene: Any, rounds: Rounds) -> Any:
+    """A unit whose forces are solved on the coarse mesh, and on finer ones as often as rounds named a case of it."""
+    named = Counter(case for some in rounds if is_case(some[0]) for case in some)
+    forces, count = len(scene.load.normal_force), scene.candidates.total
+    times = [
+        max(named[*divmod(rows[0] // forces, count), k] for rows in unit.rows) for k in range(forces)
+    ]
+    finest = tuple((COARSE, FINE, FINEST)[min(n, 2)] for n in times)
+    share = sum(1.0 if mesh else SCREENED_COST for mesh in finest) / forces
+    return replace(unit, finest=finest, cost=unit.cost * share)
 
 
 def has(scene: Any) -> tuple[str, ...]:

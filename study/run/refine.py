@@ -18,17 +18,19 @@ from numpy.typing import NDArray
 from softjaw.study.case.result import UNDECIDED
 from softjaw.study.flags import LOST
 from softjaw.study.quantities import DONE, MISSING
+from softjaw.study.result.layout import is_case
 from softjaw.study.run.pattern import gained, next_poses, with_places
 from softjaw.study.scene import Scene
 
 FloatArray = NDArray[np.float64]
-Rounds = tuple[tuple[Any, ...], ...]  # what each round added: stations [mm], or poses as `pattern.Place`
+Rounds = tuple[tuple[Any, ...], ...]  # as `study.result.layout.Layout.rounds`
 STEEPER_SLOPE = 1.5  # how much steeper a score may be than its slopes between stations show
 FINEST_SPACING_SHARE = 1 / 64  # of the scene's mean distance of stations; nearer ones would only follow a jump
 
 
 def refined(scene: Scene, rounds: Rounds) -> Scene:
-    """The scene with what all rounds added as its own."""
+    """The scene with the stations or poses that rounds added as its own."""
+    rounds = tuple(added for added in rounds if not is_case(added[0]))
     if not rounds:
         return scene
     where, given = scene.candidates, scene.candidates.station_values_mm
@@ -193,6 +195,8 @@ def about(result: Any) -> str:
 
 def round_text(added: Sequence[Any]) -> str:
     """What a round adds, in words."""
+    if is_case(added[0]):
+        return f"{_counted(len(added), 'case')} on a finer mesh, those that may be among the best"
     if isinstance(added[0], tuple):
         return f"{len(added)} more pose{'s' * (len(added) > 1)} around the best, by {added[0][0]:g} of the first step"
     return f"{_counted(len(added), 'more station')}, at {', '.join(f'{s:g}' for s in added)} mm"

@@ -22,7 +22,7 @@ from mpi4py import MPI
 from softjaw.study.messages import CANNOT_WRITE, DONE, SOME_FAILED, STOPPED, StudyError, make_folders
 from softjaw.study.quantities import DONE as CASE_DONE
 from softjaw.study.result import provenance
-from softjaw.study.result.layout import FAILED, MISSING, Layout
+from softjaw.study.result.layout import FAILED, MISSING
 from softjaw.study.result.lock import Lock, OpenedFile
 from softjaw.study.result.skeleton import create, rewrite
 from softjaw.study.result.store import Result, open_result, torn_rows
@@ -86,14 +86,15 @@ def on_rank0(comm: Any, function: Callable[..., T], *arguments: Any) -> T:
 
 @dataclass(frozen=True)
 class Growth:
-    """How a study gets more grasps while it runs.
+    """How a study gets more grasps, and finer meshes, while it runs.
 
     Parameters
     ----------
     study : callable
         ``study(rounds)`` gives plan and work with what these rounds added; collective.
     more : callable
-        ``more(result)`` gives the stations or poses of the next round, from what is stored alone; none at the end.
+        ``more(result)`` gives the stations, poses or cases of the next round, from what is stored alone; none at the
+        end.
     """
 
     study: Callable[[Rounds], tuple[Plan, Work]]
@@ -105,7 +106,7 @@ def run_study(
 ) -> int:
     """Solve all missing cases of ``plan`` into ``path`` and return the exit code; collective over ``comm``.
 
-    With ``growth`` rounds of further grasps follow, each in a file that takes the place of the one before.
+    With ``growth`` rounds of further grasps and finer meshes follow, each in a file that takes the place of the last.
 
     Raises
     ------
@@ -118,7 +119,7 @@ def run_study(
             plan, work = growth.study(rounds)
         code = _solve(plan, work, path, comm, retry_failed)
         while growth and code != STOPPED and (added := on_rank0(comm, _next_round, path, growth)):
-            plan, work = growth.study((*plan.layout.added, added))
+            plan, work = growth.study((*plan.layout.rounds, added))
             on_rank0(comm, rewrite, path, plan.layout, plan.header)
             code = _solve(plan, work, path, comm, retry_failed=False)
         if code != STOPPED:
@@ -161,7 +162,7 @@ def locked(path: Path, comm: Any) -> Iterator[None]:
 def _solve(plan: Plan, work: Work, path: Path, comm: Any, retry_failed: bool) -> int:
     """Solve what is missing of a plan in its file, which is made if need be; the exit code."""
     created, torn = on_rank0(comm, file_of, path, plan)
-    writer = ResultWriter(path, plan.layout, comm)
+    writer = ResultWriter(path, plan.layout, comm, plan.wanted)
     # Decided by one rank: all must agree on what is missing, whatever is written meanwhile.
     codes = on_rank0(comm, settle, writer, plan.units, torn, retry_failed)
     session = Session(plan, work, writer, comm, codes)
@@ -174,13 +175,13 @@ def rounds_in(path: Path, plan: Plan) -> Rounds:
     """The rounds of a file that was made from this scene; none where `verify` will refuse it."""
     with contextlib.suppress(StudyError), open_result(path) as result:
         if result.digest == plan.header.digest:
-            return result.layout.added
+            return result.layout.rounds
     return ()
 
 
 def _next_round(path: Path, growth: Growth) -> tuple[Any, ...]:
     with open_result(path) as result:
-        added, number = growth.more(result), len(result.layout.added) + 1
+        added, number = growth.more(result), len(result.layout.rounds) + 1
     if added:
         print(f"round {number}: {round_text(added)}", flush=True)
     return added
@@ -222,7 +223,7 @@ class Session:
     signal = ""
 
     def __init__(self, plan: Plan, work: Work, writer: Any, comm: Any, codes: np.ndarray) -> None:
-        self._work, self._writer, self._comm, self._codes = work, writer, comm, codes
+        self._plan, self._work, self._writer, self._comm, self._codes = plan, work, writer, comm, codes
         self._state = OpenedFile(writer.path)
         self._todo = self._divided(plan, codes)
         hosts = len(set(comm.allgather(MPI.Get_processor_name())))
@@ -306,16 +307,16 @@ class Session:
 
     def _finish_alone(self, name: str) -> None:
         """Finish by a process that has the file for itself, so that nothing it does there has to be done by all."""
-        finish_alone(self._work, self._writer.path, self._writer.layout, self._writer.session, name)
+        finish_alone(self._work, self._writer.path, self._plan, self._writer.session, name)
 
     def _finish(self, writer: ResultWriter, name: str) -> None:
         """Finish by one rank that has the file together with others."""
         finish(self._work, writer, name)
 
 
-def finish_alone(work: Work, path: Path, layout: Layout, session: int, name: str) -> int:
+def finish_alone(work: Work, path: Path, plan: Plan, session: int, name: str) -> int:
     """`finish` by a process that has the file for itself; the exit code."""
-    writer = ResultWriter(path, layout, MPI.COMM_SELF)
+    writer = ResultWriter(path, plan.layout, MPI.COMM_SELF, plan.wanted)
     writer.session = session
     try:
         finish(work, writer, name)

@@ -141,10 +141,8 @@ class Candidates(SceneSection):
 
     @property
     def total(self) -> int:
-        """Number of candidates; of a sampler as many as it may give."""
-        if self.sampled:
-            return self.sampled
-        return len(self.poses) or len(self.station_values_mm) * len(self.angles_deg)
+        """Number of candidates; of a sampler that has not run as many as it may give."""
+        return len(self.poses) or self.sampled or len(self.station_values_mm) * len(self.angles_deg)
 
     @property
     def refined_until(self) -> str:

@@ -31,7 +31,9 @@ WallSize = Annotated[float, Field(ge=0.2, le=50)]
 Names = Annotated[tuple[int | str, ...], Field(strict=False, min_length=1)]
 MOST_ELEMENTS, LARGEST_ASPECT = 1_000_000, 20.0
 UNCERTAIN = ("object", "gripper", "friction", "candidates", "task")  # sections whose numbers may be
-MOST_MESHES = 4  # of a case, each 1.4 times as fine in every direction as the one before; each costs 3 times as much
+COARSE, FINE = 0, 1  # meshes of a case: half as many elements in every direction as the scene says, and its own
+MOST_MESHES = 4  # of a case, each further one 1.4 times as fine in every direction, which costs 3 times as much
+FINEST = MOST_MESHES - 1
 CONVEX_FITS = ("full", "quartic")  # models that a convex program can fit, too
 OPTION_CHARACTERS = {*string.ascii_lowercase, *string.digits, "_"}
 VALUE_CHARACTERS = {*string.ascii_letters, *string.digits, *"_,.+-"}

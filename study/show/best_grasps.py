@@ -12,11 +12,22 @@ from softjaw.friction.patch import NEGLIGIBLE
 from softjaw.study.case.result import TIE
 from softjaw.study.flags import LOST, OF_FILE, Flag, flags_in
 from softjaw.study.quantities import BY_KEY, FORCE_RANGE, MAIN, MODELS, STATES, map_row
-from softjaw.study.ranking import Sure, at_level, judged, passed_over, rank_values, ranked, score_of, sure, task_keys
+from softjaw.study.ranking import (
+    Sure,
+    at_level,
+    distinct,
+    judged,
+    passed_over,
+    rank_values,
+    ranked,
+    score_of,
+    sure,
+    task_keys,
+)
 from softjaw.study.result.layout import DONE, MISSING
 from softjaw.study.result.read import axes_of, dataset, values_of
 from softjaw.study.show.grasps import Index, at, candidate_of, forces, note, place, unravelled
-from softjaw.study.show.places import distinct, folded_text, named, short_name, spot
+from softjaw.study.show.places import folded_text, named, short_name, spot
 from softjaw.study.show.status import RESUME, aim, counts, largest_error, no_grasps, reasons, time_split
 from softjaw.study.table import Column, Row, Table, as_text, number, terminal_width, with_error, wrapped
 from softjaw.study.units import GRAVITY, in_si, shown, shown_text, shown_unit

@@ -3,67 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 
 from softjaw.study.case.build import build_object, centre_of_mass, own_frame, surface_triangles
-from softjaw.study.case.result import TIE
-from softjaw.study.ranking import task_keys
+from softjaw.study.ranking import Place
 from softjaw.study.scene import SceneError, parse_scene
 from softjaw.study.show.grasps import Index, axis_text, field, unravelled
 from softjaw.study.units import shown_text
 
-MIN_ROLL_COSINE = math.cos(math.radians(30.0))  # pads rolled by more are another place
 SAME_EXTENT = 0.05  # relative difference of extents that makes no side the longer one
 NEARBY = 1e-3  # from the centre of mass, within which a grasp is at it [m]
 SIDES = ("broad sides", "narrow sides", "ends")  # of an object, by its extent between them
-
-
-class Place(NamedTuple):
-    """The best grasp of a place, and the others there: neighbours within a distance [m], and images by symmetry."""
-
-    best: int
-    near: list[int]
-    within: float
-    images: list[int]
-
-
-def distinct(ds: xr.Dataset, order: Sequence[int], score: np.ndarray, k: int, top: int = 0) -> list[Place]:
-    """The first ``top`` distinct places (0: all) of a ranking at a force level.
-
-    Grasps are neighbours where both pads touch less than half a pad apart, rolled by at most 30 degrees. Stations and
-    angles have images too: grasps at one station with the same ``score``.
-    """
-    shape, rest, places = ds.status.shape[:-1], np.asarray(order, int), list[Place]()
-    count = int(np.prod(shape))
-    index = np.array(np.unravel_index(np.arange(count), shape)).T
-    origin, turn = (field(ds, f"finger_pose_{name}") for name in ("origin", "rotation"))
-    pad = task_keys(ds, "gripper")
-    half = 0.5e-3 * np.array([pad.get(f"pad_{side}_mm", 0.0) for side in ("length", "width", "width")])
-    while len(rest) and not 0 < top <= len(places):
-        head = rest[0]
-        here = (index[rest, :-2] == index[head, :-2]).all(axis=1)
-        near, far = np.zeros(len(rest), bool), np.zeros(len(rest))
-        if origin is not None and turn is not None:
-            x, R = origin[..., k, :, :].reshape(count, 2, 3), turn[..., k, :, :, :].reshape(count, 2, 3, 3)
-            rolled = np.abs(R[rest, 0, :, 0] @ R[head, 0, :, 0]) < MIN_ROLL_COSINE
-            # The fingers of two grasps may have changed sides.
-            for pads in (x[rest], x[rest][:, ::-1]):
-                apart = np.einsum("nfi,fij->nfj", pads - x[head], R[head])
-                close = (np.abs(apart) < half).all(axis=(1, 2)) & here & ~rolled
-                near, far = near | close, np.where(close, np.linalg.norm(apart, axis=2).max(axis=1), far)
-        alike = np.abs(score[rest] - score[head]) <= TIE * abs(score[head])
-        images = here & (index[rest, -2] == index[head, -2]) & alike & (not ds.attrs["poses"]) & ~near
-        near[0], images[0] = False, False
-        gone = near | images
-        gone[0] = True
-        found = (rest[mask].tolist() for mask in (near, images))
-        places.append(Place(int(head), next(found), float(far[near].max(initial=0.0)), next(found)))
-        rest = rest[~gone]
-    return places
 
 
 def folded_text(ds: xr.Dataset, place: Place) -> str:

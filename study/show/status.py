@@ -189,7 +189,7 @@ def place(result: Any, index: Index) -> str:
 
 def _added(result: Any) -> dict[str, Any]:
     """What each round of a refinement added: stations, or poses in the frame of the object's own file."""
-    rounds = result.layout.added
+    rounds = result.layout.added  # not those that chose cases for a finer mesh
     if result.axes[-3].units:
         return {"added_stations_mm": [list(some) for some in rounds]}
     poses = [[{"step": x[0], "point_mm": x[1:4], "approach": x[4:7], "long_side": x[7:]} for x in r] for r in rounds]
