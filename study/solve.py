@@ -32,8 +32,8 @@ def press(
 ) -> Case:
     """Solve one case in memory: press both fingers at one place with one force, and judge the grasp.
 
-    The numbers are those that `run` stores for this case, bit for bit. A grasp or a force that the scene does not have
-    is added to its own.
+    The numbers are those that `run` stores for this case, bit for bit; a sampled grasp that `run` leaves on the coarse
+    mesh is solved on the scene's. A grasp or a force that the scene does not have is added to its own.
 
     Parameters
     ----------

@@ -63,7 +63,7 @@ def rivals(places: Iterable[Place], value: FloatArray, error: FloatArray, count:
     known: list[int] = []
     for n, place in enumerate(places):
         head = place.best
-        known += [head] * (n >= count and value[head] + error[head] > least)
+        known += [head] if n >= count and value[head] + error[head] > least else []
         best = value[head] - error[head]
         known += [i for i in place.near if value[i] + error[i] > max(best, least)]
     return sorted(known, key=lambda i: (-value[i], i))

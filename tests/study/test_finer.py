@@ -1,0 +1,129 @@
+"""Coarse first, fine where it matters: which cases the finer meshes get, and that no value is lost on the way."""
+
+from __future__ import annotations
+
+import subprocess
+
+import numpy as np
+import pytest
+import trimesh
+
+from softjaw.study.case.candidates import with_sampled_grasps
+from softjaw.study.case.result import CaseResult
+from softjaw.study.doctor import launch_environment
+from softjaw.study.quantities import DONE, LISTED, MISSING
+from softjaw.study.ranking import Place
+from softjaw.study.result.skeleton import create
+from softjaw.study.result.store import open_result, torn_rows
+from softjaw.study.result.write import ResultWriter, record
+from softjaw.study.run.finer import rivals
+from softjaw.study.run.plan import make_plan
+from softjaw.study.scene import load_scene
+from tests.study.launching import ROOT, command, contents, differing, launch, wait_for
+
+SCENE = """
+[object]
+shape = "mesh"
+mesh = "block.stl"
+unit = "mm"
+[gripper]
+max_opening_mm = 85
+elements = [8, 4, 3]
+[candidates]
+sampled = 14
+[load]
+normal_force_n = [2, 5]
+[limit_surface]
+samples = 80
+"""
+
+
+@pytest.fixture
+def scene(tmp_path):
+    """A long block with blunt ends, whose best grasps are at its middle."""
+    trimesh.creation.box(extents=(40, 60, 260)).subdivide_to_size(40).export(tmp_path / "block.stl")
+    path = tmp_path / "block.toml"
+    path.write_text(SCENE)
+    return path
+
+
+def test_rivals_are_those_that_may_be_better_than_the_last_of_the_list_or_than_the_head_of_their_place():
+    places = [Place(i, [], 0.0, []) for i in range(LISTED)] + [Place(10, [], 0.0, []), Place(11, [12], 0.0, [])]
+    value = np.array([*np.linspace(2.0, 1.1, LISTED), 1.0, 0.9, 0.89])
+    assert rivals(places, value, np.full(13, 0.04)) == []
+    assert rivals(places, value, np.where(np.arange(13) == 11, 0.3, 0.04)) == [11]
+    assert rivals([Place(0, [1], 0.0, [])], np.array([1.0, 0.99]), np.array([0.05, 0.02])) == [1]
+
+
+def test_a_case_keeps_its_coarse_values_until_finer_ones_replace_them(scene, tmp_path):
+    made = with_sampled_grasps(load_scene(scene))
+    first, path = make_plan(made), tmp_path / "a.hdf"
+    create(path, first.layout, first.header)
+    row = (0, 3, 1)
+    later = make_plan(made, rounds=((row,),))
+    number = 3 * 2 + 1
+    assert later.header.digest == first.header.digest
+    assert np.flatnonzero(later.wanted).tolist() == [number]
+
+    def filled(layout, payload, mesh):
+        return record(layout, CaseResult({"maps/payload": [payload] * 3, "maps/flags": 0.0, "work/mesh": mesh}))
+
+    writer = ResultWriter(path, first.layout, None, first.wanted)
+    for case in range(first.layout.rows):
+        writer.write(case, filled(first.layout, 1.0, 0))
+    assert (writer.codes() == DONE).all()
+    writer.close()
+    writer = ResultWriter(path, first.layout, None, later.wanted)
+    assert np.flatnonzero(writer.codes() == MISSING).tolist() == [number]
+    assert writer.attempts()[number] == 0
+    writer.count_attempt(number)
+    writer.tidy(number)  # as after a kill: the coarse values stand
+    assert writer.attempts()[number] == 1
+    assert torn_rows(path, first.layout) == []
+    writer.fail(number, "it did not converge")
+    assert (writer.codes() == DONE).all()
+    assert writer.read("payload/ccm").ravel()[number] == 1.0
+    assert b"it did not converge" in writer.read("status/message").ravel()[number]
+    with pytest.raises(ValueError, match="done already"):
+        writer.write(number, filled(first.layout, 2.0, 1))
+    writer.close()
+    assert torn_rows(path, first.layout) == []
+
+
+@pytest.mark.long
+@pytest.mark.ranks
+def test_the_best_of_a_sampled_study_are_solved_well_with_the_same_bits_on_any_ranks_and_after_a_kill(scene):
+    runs = {ranks: scene.with_name(f"{ranks}.hdf") for ranks in (0, 2)}
+    for ranks, path in runs.items():
+        assert launch(ranks, "-m", "softjaw", "run", scene, "-o", path)[0] == 0
+    expected = contents(runs[0])
+    assert differing(runs[2], expected) == []
+    with open_result(runs[0]) as result:
+        mesh, payload = (result.read(name).reshape(-1, 2) for name in ("work/mesh", "payload/ccm"))
+        error = result.read("payload_error/payload_error").reshape(-1, 2)
+        times, finer = len(result.layout.rounds), result.layout.finer
+    assert (mesh[:, 0] == 0).all()  # the force that is shown is the largest
+    assert (mesh[:, 1] > 0).sum() == len(finer) >= LISTED
+    assert np.isfinite(error).all()
+    unsolved = mesh[:, 1] == 0
+    best = np.sort((payload - payload * error)[~unsolved, 1])[-LISTED]
+    assert ((payload * (1 + error))[unsolved, 1] <= best + 1e-9).all()
+
+    killed = scene.with_name("killed.hdf")
+    words = [word for word in command(0, "-m", "softjaw", "run", scene, "-o", killed)]
+    process = subprocess.Popen(words, env=launch_environment(), cwd=ROOT, stdout=subprocess.DEVNULL)
+
+    def begun():
+        with open_result(killed, unchecked=True) as result:
+            return bool(result.layout.rounds) and (result.read("work/mesh") > 0).any()
+
+    wait_for(killed.exists)
+    wait_for(begun)
+    process.kill()
+    process.wait()
+    with open_result(killed) as result:
+        assert (result.status == DONE).all()  # coarse values stand in for finer ones
+    assert launch(0, "-m", "softjaw", "run", scene, "-o", killed)[0] == 0
+    assert differing(killed, expected) == []
+    with open_result(killed) as result:
+        assert len(result.layout.rounds) == times
