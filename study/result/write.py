@@ -50,6 +50,10 @@ class ResultWriter:
         self._sessions = self._file[f"{ROOT}/provenance/sessions"]
         self.session, self._wanted = 0, wanted
 
+    def layout_of(self, _row: int) -> Layout:
+        """Layout of the file that a row is stored in."""
+        return self.layout
+
     def codes(self) -> np.ndarray:
         """State of every row, ``(rows,)``."""
         codes: np.ndarray = self._code[()].ravel()

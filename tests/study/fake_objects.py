@@ -35,6 +35,7 @@ class FakeUnit:
     reason: str
     hopeless: bool
     apart: bool
+    finest: tuple
 
 
 def plan_of(name, rounds=()):

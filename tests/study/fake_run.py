@@ -49,13 +49,13 @@ def fake_plan(digest="scene", stations=6, derived=True, wide=-1, rounds=(), apar
             served = tuple(rows[i] for i in a)
             unit = SimpleNamespace(index=len(units), rows=served, cost=float(1 + name % 3))
             unit.first, unit.state, unit.reason, unit.hopeless = (2 * name + a[0]) * FORCES, 0, "", False
-            unit.apart = apart
+            unit.apart, unit.finest = apart, ()
             units.append(unit)
     if wide >= 0:
         units[wide].state, units[wide].reason = WIDE, "needs more"
     labels = tuple(f"candidate {i}" for i in range(2 * len(places)))
     header = Header(digest, "a = 1\n", "fake", "fake.toml", labels=labels)
-    return Plan(Layout(axes, FACES, derived=slope, added=rounds), header, tuple(units))
+    return Plan(Layout(axes, FACES, derived=slope, rounds=rounds), header, tuple(units))
 
 
 def fake_growth(digest, stations, work):

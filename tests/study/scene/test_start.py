@@ -77,7 +77,7 @@ def test_a_mesh_gets_a_sampler_and_keeps_the_pads(tmp_path):
     """The flask is 120 mm high and 49.7 mm wide along y; stations that fit it stand in comments."""
     assert started("mesh", "-o", "sub/flask") == 0
     scene = load_scene(tmp_path / "sub" / "flask.toml")
-    assert scene.candidates.sampled == 12
+    assert scene.candidates.sampled == 20
     proposed = "# stations_mm = [25.0, 35.0, 45.0, 55.0, 65.0, 75.0, 85.0, 95.0]"
     assert proposed in (tmp_path / "sub" / "flask.toml").read_text()
     assert (scene.gripper.pad_length_mm, scene.gripper.pad_width_mm) == (50, 22)
