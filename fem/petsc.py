@@ -226,10 +226,11 @@ class NonlinearSolver:
             # direct: contact makes the matrix indefinite or not symmetric, and thin walls make it ill-conditioned
             "ksp_type": "preonly", "pc_type": "lu", "pc_factor_mat_solver_type": "mumps",
         }  # fmt: skip
-        if self._condensed:
-            # entries of pads are of one size: to scale them takes time and gains no digit
-            defaults |= {"pc_type": "cholesky", "mat_mumps_icntl_8": 0}
-            if self.problem.size > 2500:  # unknowns from which on the analysis of a better ordering pays
+        if hasattr(self.problem, "symmetric"):
+            # entries of pads are of one size: to scale them, or to look for large ones, takes time and gains no digit
+            defaults |= {"pc_type": "cholesky"} if self._condensed else {"mat_mumps_icntl_6": 0}
+            defaults["mat_mumps_icntl_8"] = 0
+            if self.problem.size > 2500 or not self._condensed:  # where the analysis of a better ordering pays
                 defaults["mat_mumps_icntl_7"] = 4  # PORD; METIS and SCOTCH are rarely built in
         mine = {self.prefix + key: value for key, value in defaults.items()}
         mine = {key: value for key, value in mine.items() if key not in given} | dict(self.options)

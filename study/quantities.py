@@ -350,8 +350,9 @@ ROWS = (
              "Over the shear modulus, in 24 directions at one point per element; not positive: the foam lost "
              "ellipticity and strains may localise.", "checks"),
     # work
-    Quantity("newton_iterations", F, "", "Newton iterations", "Since the force below.", "work"),
-    Quantity("load_steps", F, "", "load steps", "Newton solves since the force below.", "work"),
+    Quantity("newton_iterations", F, "", "Newton iterations",
+             "Since the force below; from first contact with friction that acts back.", "work"),
+    Quantity("load_steps", F, "", "load steps", "Newton solves, counted as the iterations.", "work"),
     Quantity("step_halvings", F, "", "step halvings", "Solves that failed and were repeated in half steps.", "work"),
     Quantity("mesh", (), "", "finest mesh that the case was tried on",
              "0: half as many elements per direction as the scene's; 1: the scene's; 3: up to two finer ones, until"

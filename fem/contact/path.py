@@ -1,8 +1,10 @@
 """Follow the load path of pads on an object: states at growing normal forces, each started from the one before.
 
-Or each from the states of a coarser mesh. What is done where one step does not reach a force depends on the object:
-`fem.contact.press` is for rigid ones, `fem.shell.grip` for walls that give way. Every state that is passed on has
-converged and has been checked.
+Or each from the states of a coarser mesh. With friction that acts back a state depends on its path: that leads through
+fixed forces (see `fem.contact.friction`), and every force that is asked for is a branch from the last of them below it,
+which leads nowhere else. So it is the same whatever else is asked for, and every mesh has its own path. What is done
+where one step does not reach a force depends on the object: `fem.contact.press` is for rigid ones, `fem.shell.grip` for
+walls that give way. Every state that is passed on has converged and has been checked.
 """
 
 from __future__ import annotations
@@ -11,13 +13,13 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Generic, TypeVar
 
 import numpy as np
 
 from softjaw.fem.contact.checks import ALTERNATING, Checks, check
-from softjaw.fem.contact.friction import load_steps
+from softjaw.fem.contact.friction import PATH_RESIDUAL, Anchor, load_steps
 from softjaw.fem.contact.load_stepping import ASTRAY, STRAY, FloatArray, Settings, Stepping, Work
 from softjaw.fem.contact.problem import ContactPoints, ContactProblem
 from softjaw.fem.errors import CheckError, ConvergenceError
@@ -57,8 +59,6 @@ class Pressed:
         Whether a fallback was taken.
     notes : tuple of str
         Which means beside Newton's method on steps of the force it took.
-    history : tuple of (n,) arrays
-        Its states before this one that this one depends on; none without friction.
     wall : WallState, optional
         The wall that gives way.
     other : Pressed, optional
@@ -81,7 +81,6 @@ class Pressed:
     path_dependent: bool = False
     instead: bool = False
     notes: tuple[str, ...] = ()
-    history: tuple[FloatArray, ...] = ()
     wall: Any = None
     other: Pressed | None = None
 
@@ -106,6 +105,17 @@ class OnPath:
     snapped: bool = False
 
 
+@dataclass(frozen=True)
+class _PathState(Generic[ProblemT]):
+    """State on the path of friction, the effort up to it, and what the next one depends on."""
+
+    at: OnPath
+    work: Work
+    problem: ProblemT
+    others: tuple[Callable[[], ProblemT], ...]
+    anchors: tuple[Anchor, ...]
+
+
 class LoadPath(ABC, Generic[ProblemT]):
     """Pads on one object along a load path.
 
@@ -117,16 +127,21 @@ class LoadPath(ABC, Generic[ProblemT]):
     options : dict
         PETSc options with the prefix ``contact_``.
     settings : Settings
+    stride : int
+        With friction the path leads through every ``stride``-th of its forces; 2 tells what its steps leave.
     """
 
     MOST_ITERATIONS: int  # of Newton's method for one force
 
     def __init__(
-        self, problems: Sequence[Callable[[], ProblemT]], options: dict[str, Any] | None, settings: Settings | None
-    ) -> None:
+        self, problems: Sequence[Callable[[], ProblemT]], options: dict[str, Any] | None, settings: Settings | None,
+        stride: int = 1,
+    ) -> None:  # fmt: skip
         self.options, self.settings = options or {}, settings or Settings()
         self._fallbacks = self._others = tuple(problems[1:])  # the latter: those that have not been taken yet
         self._wanted = self.problem = problems[0]()
+        self._stride, self._path = stride, list[_PathState[ProblemT]]()
+        self._end: ConvergenceError | CheckError | None = None  # what ended the path
         self._begin()
         self._set_up()
 
@@ -150,17 +165,25 @@ class LoadPath(ABC, Generic[ProblemT]):
     def _begin(self) -> None:
         """Nothing has been solved on the load path yet."""
 
-    def _begin_afresh(self) -> None:
-        """Forget what was solved before, so that not a bit of what follows depends on it."""
+    @abstractmethod
+    def _watch(self, x: FloatArray, force: float) -> None:
+        """Note a state that the next one starts from."""
+
+    def _begin_afresh(self, state: _PathState[ProblemT] | None = None) -> None:
+        """Forget what was solved before but for a ``state``, so that not a bit of what follows depends on the rest."""
         self._begin()
-        self._others = self._fallbacks
-        self._wanted.forget()
-        if self.problem is self._wanted:
+        self._others, problem = (state.others, state.problem) if state else (self._fallbacks, self._wanted)
+        problem.forget()
+        if self.problem is problem:
             self.solver.forget()
             self._stepping = self._steps()
         else:
-            self._switch(self._wanted)
+            self._switch(problem)
         self.solver.left = self.MOST_ITERATIONS
+        if state:
+            assert problem.friction is not None
+            problem.friction.anchors, self._stepping.jumped = state.anchors, state.at.jumped
+            self._watch(state.at.x, state.at.force)
 
     def load_path(self, forces: Sequence[float]) -> Iterator[Pressed]:
         """Equilibrium states at ascending normal forces on each whole pad [N].
@@ -170,6 +193,9 @@ class LoadPath(ABC, Generic[ProblemT]):
         ConvergenceError, CheckError
             At the first force without an acceptable state.
         """
+        if self.problem.friction is not None:
+            yield from map(self.at, forces)
+            return
         here = None
         self._begin()
         for force in forces:
@@ -178,12 +204,13 @@ class LoadPath(ABC, Generic[ProblemT]):
             here = self._next(here, force, work)
             yield self._pressed(here, work, elapsed())
 
-    def at(self, force: float, coarse: Sequence[Pressed]) -> Pressed:
+    def at(self, force: float, coarse: Sequence[Pressed] = ()) -> Pressed:
         """State at one normal force on each whole pad [N], whatever else has been solved.
 
         ``coarse`` are states of a coarser mesh, the nearest first, none above this force. From each one Newton solve is
         tried; from the first that leads to a state on the load path the force is approached, if it is lower. Where none
-        does, or the coarser mesh has jumped before, the force is approached from first contact.
+        does, or the coarser mesh has jumped before, the force is approached from first contact. With friction it is
+        approached from the last state of the path below it.
 
         Raises
         ------
@@ -191,11 +218,36 @@ class LoadPath(ABC, Generic[ProblemT]):
             If there is no acceptable state.
         """
         work, elapsed = Work(), self._stopwatch()
+        if self.problem.friction is not None:
+            below = self._state_below(force)
+            self._begin_afresh(below)
+            work = replace(below.work) if below else work
+            return self._pressed(self._next(below.at if below else None, force, work), work, elapsed())
         self._begin_afresh()
         here = self._near(coarse, work)
         if here is None or here.force < force:
             here = self._next(here, force, work)
         return self._pressed(here, work, elapsed())
+
+    def _state_below(self, force: float) -> _PathState[ProblemT] | None:
+        """The last state of the path below a force [N]; None where it begins above."""
+        path = self._load_steps(0.0, force)[:-1]
+        for goal in path[len(self._path) :]:
+            if self._end is not None:
+                raise self._end
+            before = self._path[-1] if self._path else None
+            self._begin_afresh(before)
+            # all that has led to the state, so that the effort of a case does not depend on others
+            work = replace(before.work) if before else Work()
+            self._stepping.settings = replace(self.settings, residual=PATH_RESIDUAL)
+            try:
+                here = self._next(before.at if before else None, goal, work)
+            except (ConvergenceError, CheckError) as error:
+                self._end = error
+                raise
+            assert self.problem.friction is not None
+            self._path.append(_PathState(here, work, self.problem, self._others, self.problem.friction.anchors))
+        return self._path[len(path) - 1] if path else None
 
     @abstractmethod
     def _next(self, here: OnPath | None, force: float, work: Work) -> OnPath:
@@ -216,9 +268,6 @@ class LoadPath(ABC, Generic[ProblemT]):
 
     def _from(self, start: Pressed, work: Work) -> OnPath:
         """State at the force of a coarser mesh's, by one Newton solve after the load path that led there."""
-        self.problem.begin()
-        for k in range(len(start.history)):
-            self.problem.accept(self._interpolated(start, k))
         near = self._interpolated(start)
         x = self._stepping.from_near(near, start.force, work)
         # displacements and closing only: the bound is a distance in space, which pressures are not
@@ -228,20 +277,23 @@ class LoadPath(ABC, Generic[ProblemT]):
             raise ConvergenceError(ASTRAY.format(force=start.force))
         return OnPath(x, start.force, self._stepping.jumped)
 
-    def _interpolated(self, start: Pressed, k: int | None = None) -> FloatArray:
-        """Unknowns of a coarser mesh's state, or of the ``k``-th one in its history."""
+    def _interpolated(self, start: Pressed) -> FloatArray:
+        """Unknowns of a coarser mesh's state."""
         x, pads = np.zeros(self.problem.size), start.fingers
         for number, f in enumerate(self.problem.fingers):
             # where the coarser mesh has one finger, the other one is its image in x = 0
             image = np.array([-1.0 if number >= len(pads) else 1.0, 1.0, 1.0])
             pad = pads[min(number, len(pads) - 1)]
             turn = np.einsum("ji,j,ji->i", pad.pose.rotation, image, f.pose.rotation).round()
-            x[f.unknowns] = interpolated(pad.pad, pad.unknowns if k is None else pad.history[k], f.pad, turn)
+            x[f.unknowns] = interpolated(pad.pad, pad.unknowns, f.pad, turn)
         return x
 
     def _load_steps(self, reached: float, force: float) -> Sequence[float]:
         """Forces to go through from one (0: no contact yet) to the next [N]; without friction it does not matter."""
-        return (force,) if self.problem.friction is None else load_steps(reached, force)
+        if self.problem.friction is None:
+            return (force,)
+        pad = self.problem.fingers[0].pad
+        return load_steps(reached, force, pad.modulus_per_thickness * float(np.prod(pad.shape.size)), self._stride)
 
     def _given_up(self, reached: float, force: float) -> ConvergenceError:
         """The error where no iterations are left, at ``reached`` [N]."""
@@ -252,7 +304,7 @@ class LoadPath(ABC, Generic[ProblemT]):
         """The state, checked."""
         problem, x, steps = self.problem, here.x, self._stepping
         residual = np.abs(problem.residual(x))
-        instead, slack, path = problem.rule != self._wanted.rule, ALTERNATING if steps.off else 0.0, problem.history(x)
+        instead, slack = problem.rule != self._wanted.rule, ALTERNATING if steps.off else 0.0
         pads = []
         for k, f in enumerate(problem.fingers):
             state, unknowns = problem.contact_state(x, k), x[f.unknowns].copy()
@@ -264,7 +316,6 @@ class LoadPath(ABC, Generic[ProblemT]):
                 here.force, float(x[f.closing_dof]), unknowns, f.pad, f.pose, pressure,
                 (f.pad.nodes + f.pad.displacement(unknowns))[f.pad.contact_nodes], points, checks, effort.iterations,
                 effort.steps, effort.halvings, seconds if k == 0 else Seconds(), here.jumped, instead, self._notes(),
-                tuple(before[f.unknowns] for before in path),
             ))  # fmt: skip
         return self._together(here, pads, residual)
 

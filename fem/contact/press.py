@@ -45,6 +45,8 @@ class Press(LoadPath[RigidProblem]):
     stepping : type, optional
         How to get from one force to the next: along the path of equilibria, or in one step where Newton's method can,
         as with friction.
+    stride : int
+        As in `fem.contact.path.LoadPath`.
     """
 
     # half of them where other gaps can take over, all for the next; usual: 4 to 15
@@ -53,9 +55,10 @@ class Press(LoadPath[RigidProblem]):
     def __init__(
         self, pad: Pad, gap: Gap, options: dict[str, Any] | None = None, fallbacks: Sequence[Pad] = (),
         settings: Settings | None = None, mu: float | None = None, stepping: type[Stepping] | None = None,
+        stride: int = 1,
     ) -> None:  # fmt: skip
         self.stepping = stepping or (Following if mu is None else Stepping)
-        super().__init__([partial(RigidProblem, p, gap, mu) for p in (pad, *fallbacks)], options, settings)
+        super().__init__([partial(RigidProblem, p, gap, mu) for p in (pad, *fallbacks)], options, settings, stride)
 
     @property
     def pad(self) -> Pad:
@@ -73,7 +76,7 @@ class Press(LoadPath[RigidProblem]):
 
     def _steps(self) -> Stepping:
         return self.stepping(
-            self.problem, self.solver, self.settings, watch=self._remember, near=self._keeps_laws,
+            self.problem, self.solver, self.settings, watch=self._watch, near=self._keeps_laws,
             deepest=self.problem.thickness,
         )  # fmt: skip
 
@@ -95,7 +98,7 @@ class Press(LoadPath[RigidProblem]):
             return False
         return True
 
-    def _remember(self, x: FloatArray, force: float) -> None:
+    def _watch(self, x: FloatArray, force: float) -> None:
         if force >= self._last[1]:
             self._last = x, force
         self.problem.accept(x)
@@ -214,7 +217,7 @@ class Press(LoadPath[RigidProblem]):
         else:
             (x, reached), steps = (here.x, here.force), self._load_steps(here.force, force)
         # friction is measured from this state, and a failure on the way is explained by it
-        self._remember(x, reached)
+        self._watch(x, reached)
         try:
             # the first contact may bear more than the first steps ask for
             for goal in (f for f in steps if f > reached or f == force):

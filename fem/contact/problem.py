@@ -291,7 +291,7 @@ class ContactProblem(ABC):
     def begin(self) -> None:
         """Begin another load path; without friction it does not matter."""
         if self.friction is not None:
-            self.friction.begin([self._untouched(f) for f in self.fingers])
+            self.friction.accept([self._untouched(f) for f in self.fingers])
 
     def forget(self) -> None:
         """Be as a new problem, so that not a bit of what follows depends on what was evaluated before."""
@@ -302,11 +302,7 @@ class ContactProblem(ABC):
         # stick is measured from accepted states, not from iterates: a step that is repeated starts from the same place
         if self.friction is not None:
             contacts = zip(self.fingers, self.evaluate(x), strict=True)
-            self.friction.accept(x, [self._anchor(f, x, c) for f, c in contacts])
-
-    def history(self, x: FloatArray) -> tuple[FloatArray, ...]:
-        """States that ``x`` depends on, the first one first; none without friction."""
-        return () if self.friction is None else self.friction.leading_to(x)
+            self.friction.accept([self._anchor(f, x, c) for f, c in contacts])
 
     def _untouched(self, f: Finger) -> Anchor:
         """What friction is measured from where nothing has touched yet."""

@@ -69,8 +69,6 @@ class WallState:
         (the stiffness of the grasp is negative), the force hardly grew, or the wall closed far more than in proportion.
     opening : float
         Of the wall's inner faces towards each other, see ``fem.shell.opening``: 1 undeformed, 0 where they would meet.
-    history : tuple of (6 k,) arrays
-        States before this one that it depends on; none without friction.
     """
 
     mesh: BodyMesh
@@ -79,7 +77,6 @@ class WallState:
     reaction: FloatArray
     snapped: bool
     opening: float
-    history: tuple[FloatArray, ...] = ()
 
 
 class Grip(LoadPath[WallProblem]):
@@ -92,24 +89,26 @@ class Grip(LoadPath[WallProblem]):
     options : dict
         PETSc options with the prefix ``contact_``.
     settings : Settings
+    stride : int
+        As in `fem.contact.path.LoadPath`.
     """
 
     MOST_ITERATIONS = 200  # with weighted and with nodal gaps each; usual ones take 6
 
     def __init__(
         self, problems: Sequence[Callable[[], WallProblem]], options: dict[str, Any] | None = None,
-        settings: Settings | None = None,
+        settings: Settings | None = None, stride: int = 1,
     ) -> None:  # fmt: skip
-        super().__init__(problems, options, settings)
+        super().__init__(problems, options, settings, stride)
 
     def _begin(self) -> None:
         self._last: FloatArray | None = None  # state on the path that was solved last
         self._crept, self._in_vain = False, 0.0  # whether the wall has crept on, and the last force it crept for [N]
         self._peak = 0.0
 
-    def _begin_afresh(self) -> None:
-        super()._begin_afresh()
+    def _begin_afresh(self, state: Any = None) -> None:
         self.opening.last = 1.0, 0.0
+        super()._begin_afresh(state)
 
     def _set_up(self) -> None:
         self.opening = Opening(self.problem.model.shell.mesh)
@@ -132,10 +131,9 @@ class Grip(LoadPath[WallProblem]):
         self._watch(x, force)
         return OnPath(x, force, False, compliance, start.wall.snapped or self._gives_way(x, force, compliance))
 
-    def _interpolated(self, start: Pressed, k: int | None = None) -> FloatArray:
-        x, model, wall = super()._interpolated(start, k), self.problem.model, start.wall
-        q = wall.q if k is None else wall.history[k]
-        x[: model.size] = interpolated(wall.mesh, q, model.shell.mesh)[model.free]
+    def _interpolated(self, start: Pressed) -> FloatArray:
+        x, model, wall = super()._interpolated(start), self.problem.model, start.wall
+        x[: model.size] = interpolated(wall.mesh, wall.q, model.shell.mesh)[model.free]
         return x
 
     def _next(self, here: OnPath | None, force: float, work: Work) -> OnPath:
@@ -274,7 +272,7 @@ class Grip(LoadPath[WallProblem]):
         if self._crept:
             return self._stepping.solve(x, Control(force=force), work, self._stepping.most), False
         friction = self.problem.friction
-        before = None if friction is None else friction.memory
+        before = None if friction is None else friction.anchors
         try:
             ahead = self._stepping.step_to(x, reached, force, work, by_displacement=False)
             if self.problem.closing(ahead) - self.problem.closing(x) <= expected:
@@ -284,7 +282,7 @@ class Grip(LoadPath[WallProblem]):
         # a jump over a limit converges too, so the length of the step decides, not Newton's method alone
         forces: list[float] = []
         if friction is not None and before is not None:
-            friction.memory = before
+            friction.anchors = before
         ahead = self._stepping.displacement_control(x, force, work, LONGEST_STEP, forces, SHORTEST_STEP)
         return ahead, falls([reached, *forces])
 
@@ -324,9 +322,8 @@ class Grip(LoadPath[WallProblem]):
                 f"by {worst:.3g} N"
             )
         self._check_balance(pads, load, force)
-        before = tuple(problem.wall_state(y) for y in problem.history(here.x))
         mesh = problem.model.shell.mesh
-        wall = WallState(mesh, q, load, self._reaction(load), here.snapped, self.opening(q), before)
+        wall = WallState(mesh, q, load, self._reaction(load), here.snapped, self.opening(q))
         first, *others = (replace(pad, wall=wall) for pad in pads)
         return replace(first, other=others[0]) if others else first
 

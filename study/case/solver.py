@@ -235,7 +235,9 @@ class CandidateSolver:
 
     def _state(self, k: int, mesh: int, levels: Levels, part: int) -> Any:
         """State of one part at the ``k``-th force, or why there is none."""
-        on_path = mesh == COARSE or not forces_apart(self.scene)
+        # with friction that acts back every force is a branch of a path that is the mesh's own
+        coupled = levels.friction_pressure_coupling != "none"
+        on_path = not coupled and (mesh == COARSE or not forces_apart(self.scene))
         for i in range(0 if on_path else k, k + 1):
             if (i, mesh, levels, part) not in self._states:
                 solve = self._next if on_path else self._alone
@@ -258,7 +260,9 @@ class CandidateSolver:
             return failure
 
     def _starts(self, k: int, mesh: int, levels: Levels, part: int) -> list[Any]:
-        """States on the mesh before that a state is started from, the nearest first."""
+        """States on the mesh before that a state is started from, the nearest first; none with friction acting back."""
+        if levels.friction_pressure_coupling != "none":
+            return []
         forces = range(k, -1, -1) if mesh == FINE else (k,)
         states = (self._state(i, mesh - 1, levels, part) for i in forces)
         return [state for state in states if not isinstance(state, Failure)][:MOST_STARTS]

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from softjaw.fem.contact.checks import refuse_fall
-from softjaw.fem.contact.friction import GROWTH, load_steps
+from softjaw.fem.contact.friction import FIRST_FORCE, POWER, load_steps
 from softjaw.fem.contact.load_stepping import falls
 from softjaw.fem.contact.problem import bearing, borne
 from softjaw.fem.errors import CheckError, MeshError
@@ -307,10 +307,11 @@ def test_a_force_falls_by_more_than_rounding(seed):
 
 @tries
 @given(seeds, st.integers(1, 6))
-def test_a_way_of_whole_steps_has_as_many_forces(seed, steps):
-    low = np.random.default_rng(seed).uniform(0.01, 10.0)
-    reached, force = moved([low, low * GROWTH**steps], seed)
-    assert len(load_steps(float(reached), float(force))) == steps
+def test_a_force_of_the_path_is_its_last_step(seed, steps):
+    """Within rounding: neither a step more to itself nor one less."""
+    stiffness = np.random.default_rng(seed).uniform(1.0, 1e3)
+    force = float(moved([FIRST_FORCE * stiffness * steps**POWER], seed)[0])
+    assert len(load_steps(0.0, force, stiffness)) == steps
 
 
 @tries

@@ -248,3 +248,11 @@ def test_a_fourth_mesh_follows_where_the_third_leaves_the_error_above_the_target
     difference = abs(values["maps/e_n"][0] - third["maps/e_n"][0]) / values["maps/e_n"][0]
     # the smaller target also lets the backing plate bend, which moves e_n by 3e-4 of the difference
     assert difference <= values["maps/e_n_error"] * 1.01
+
+
+def test_with_friction_acting_back_one_mesh_and_two_give_the_same_case():
+    """Each mesh walks its own load path, and no force of the list leaves a trace in another."""
+    one, two = (dict(pipeline.solve_unit(unit_of(*ROUGH, *keys))) for keys in
+                (("accuracy.meshes=1", "load.normal_force_n=[2]"), ()))  # fmt: skip
+    for key in ("maps/payload", "maps/quality", "maps/e_n", "maps/S", "maps/closing"):
+        assert np.asarray(one[0].values[key]).tobytes() == np.asarray(two[1].values[key]).tobytes()

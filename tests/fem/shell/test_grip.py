@@ -165,31 +165,10 @@ def test_a_wall_that_hardly_gives_way_is_a_rigid_object():
         assert e_n(one.fingers[0]) == pytest.approx(e_n(other), rel=5e-4)
 
 
-@pytest.mark.long
-def test_a_level_from_the_coarse_load_path_is_that_of_the_fine_one():
-    coarse = tuple(grip(thin(), elements=(6, 4, 2), mu=MU).load_path(FORCES))
-    fine = {"elements": (12, 8, 4), "mesh": WallMesh(0.0015, 0.0025, 0.010)}
-    path, smooth = (tuple(grip(thin(), mu=mu, **fine).load_path(FORCES)) for mu in (MU, None))
-    held = grip(thin(), mu=MU, **fine)
-    for k in (1, 0):
-        changed = abs(e_n(path[k].fingers[0]) / e_n(smooth[k].fingers[0]) - 1.0)
-        level = held.at(path[k].force, coarse[k::-1])
-        assert level.fingers[0].checks.force_balance < 1e-8
-        assert level.fingers[0].iterations < 0.5 * path[0].fingers[0].iterations
-        assert e_n(level.fingers[0]) == pytest.approx(e_n(path[k].fingers[0]), rel=0.1 * changed)
-
-
-def test_what_a_step_in_vain_went_through_is_forgotten():
-    problem = grip(thin(), elements=(4, 2, 2), mu=MU).problem
-    first, in_vain, second = (stirred(problem, np.random.default_rng(seed)) for seed in range(3))
-    problem.accept(first)
-    memory = problem.friction.memory
-    problem.accept(in_vain)
-    problem.friction.memory = memory
-    problem.accept(second)
-    problem.accept(second)
-    (before,) = problem.history(second)
-    np.testing.assert_array_equal(before, first)
+def test_a_force_has_one_state_whatever_other_forces_are_asked_for():
+    alone, both = (tuple(grip(thin(), elements=(4, 2, 2), mu=MU).load_path(forces)) for forces in ([2.0], [1.0, 2.0]))
+    assert alone[-1].unknowns.tobytes() == both[-1].unknowns.tobytes()
+    assert alone[-1].wall.q.tobytes() == both[-1].wall.q.tobytes()
 
 
 # An independent prototype with another element library: force [N] and e_n [mm] by thickness and closing [mm].
