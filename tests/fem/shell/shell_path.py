@@ -30,12 +30,11 @@ class Equilibrium(NamedTuple):
 
 
 class Loaded(NamedTuple):
-    """A shell, which of its numbers are fixed and the load ``(6 k,)``; ``tie(q)``: further forces and their tangent."""
+    """A shell, which of its numbers are fixed and the load ``(6 k,)``."""
 
     shell: Shell
     fixed: np.ndarray
     load: np.ndarray
-    tie: object = None
     mixed: bool = True
 
     @property
@@ -52,13 +51,12 @@ class Loaded(NamedTuple):
         tolerance = max(TOLERANCE * np.linalg.norm(self.load[free]), noise)
         moved, first, before = free % 6 < 3, q, None  # directors have no part in a length
         for done in range(MOST_ITERATIONS + 1):
-            force, stiffness = self.tie(q) if self.tie else (0.0, 0.0)
-            residual = (shell.residual(q) + force - factor * self.load)[free]
+            residual = (shell.residual(q) - factor * self.load)[free]
             if not np.isfinite(residual).all():
                 break
             if np.linalg.norm(residual) <= tolerance and (done or not length):
                 return Equilibrium(factor, q), done
-            K = csr_matrix((shell.tangent(q, before), shell.column, shell.start), shape=(shell.size,) * 2) + stiffness
+            K = csr_matrix((shell.tangent(q, before), shell.column, shell.start), shape=(shell.size,) * 2)
             before = q if self.mixed else None
             symmetric = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 1e-3, "options": {"SymmetricMode": True}}
             solver = splu(K[free][:, free].tocsc(), **symmetric)

@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.sparse import csr_matrix
 
 from softjaw.fem.shell.element import Shell, patch
 from tests.fem.shell.shell_path import Loaded
@@ -19,17 +18,16 @@ UX, UY, UZ = np.eye(6)[:3]  # a force on a node
 
 @dataclass
 class Case:
-    """``probes`` are (node, component, sign); ``tie`` holds some numbers to each other."""
+    """``probes`` are (node, component, sign)."""
 
     shell: Shell
     fixed: np.ndarray
     load: np.ndarray
     probes: list = field(default_factory=list)
-    tie: object = None
 
     @property
     def loaded(self):
-        return Loaded(self.shell, self.fixed.ravel(), self.load.ravel(), self.tie)
+        return Loaded(self.shell, self.fixed.ravel(), self.load.ravel())
 
     def read(self, q):
         return [sign * q.reshape(-1, 6)[node, component] for node, component, sign in self.probes]
@@ -147,54 +145,6 @@ def pinched_half_cylinder(n=40):
     c.load[k[0, -1]] = -2000 / 2 * UZ
     c.probes = [(k[0, -1], 2, -1)]
     return c
-
-
-def crushed_cylinder(n=40, rotation=0.5):
-    """Eighth of a cylinder on rigid diaphragms, far into its collapse.
-
-    A diaphragm holds what lies in its plane and lets the rim warp along the axis. ``rotation`` says what it does to the
-    directors there: None holds their components in its plane, which lets them tilt by small angles only; 1 leaves them
-    free, at right angles to the rim; 0.5 holds the component along the axis of the rotation vector of the whole motion,
-    as programs with rotations do. The rim's own tangent turns by its warp, so a director that is turned without any
-    rotation about the axis follows half of that, to the second order of both.
-    """
-    c, k = cylinder(100.0, 100.0, 1.0, np.pi / 2, 30e3, 0.3, n, n)
-    symmetric(c.fixed, k[-1], 2)
-    rim = k[:, -1]
-    c.fixed[np.ix_(rim, [0, 2])] = True
-    if rotation is None:
-        c.fixed[np.ix_(rim, [3, 5])] = True
-    elif rotation < 1:
-        t = np.linspace(0, np.pi / 2, n + 1)[1:-1]
-        tangent = np.stack([np.cos(t), 0 * t, -np.sin(t)], -1)
-        c.tie = rim_tie(c.shell, rim, tangent, rotation, 100.0 * np.pi / n)
-    c.load[k[0, 0]] = -12000 / 4 * UZ
-    c.probes = [(k[0, 0], 2, -1), (k[-1, 0], 0, 1)]
-    return c
-
-
-def rim_tie(shell, rim, tangent, share, apart):
-    """Stiff ties ``d . (t + share * u_y' e_y) = 0`` between a rim's directors ``d`` and its undeformed tangents ``t``.
-
-    ``share`` is the part of the tangent's turn by the axial warp ``u_y`` that the director follows, ``apart`` the
-    distance of a node's two neighbours along the rim; its ends are held by symmetry.
-    """
-    inner, stiffness = rim[1:-1], 1e3 * shell.young_modulus
-    index = np.stack([6 * inner + 3, 6 * inner + 4, 6 * inner + 5, 6 * rim[2:] + 1, 6 * rim[:-2] + 1], -1)
-    bend = np.zeros((5, 5))
-    bend[1, 3:] = bend[3:, 1] = share / apart * np.array([1.0, -1.0])
-
-    def force_and_tangent(q):
-        d = shell.mesh.D[inner] + q.reshape(-1, 6)[inner, 3:]
-        warp, lean = share * (q[index[:, 3]] - q[index[:, 4]]) / apart, share * d[:, 1] / apart
-        value = (d * tangent).sum(-1) + warp * d[:, 1]
-        gradient = np.stack([tangent[:, 0], warp, tangent[:, 2], lean, -lean], -1)
-        force = np.bincount(index.ravel(), (stiffness * value[:, None] * gradient).ravel(), shell.size)
-        K = stiffness * (gradient[:, :, None] * gradient[:, None, :] + value[:, None, None] * bend)
-        rows, columns = (np.broadcast_to(i, K.shape).ravel() for i in (index[:, :, None], index[:, None, :]))
-        return force, csr_matrix((K.ravel(), (rows, columns)), shape=(shell.size,) * 2)
-
-    return force_and_tangent
 
 
 def linear_hemisphere(n):

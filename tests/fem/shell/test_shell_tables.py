@@ -89,21 +89,3 @@ def test_other_problems_at_full_load(name, levels, expected, tolerance):
     case = getattr(shell_problems, name)()
     *_, last = load_steps(case.loaded, levels)
     assert case.read(last.q) == pytest.approx(expected, rel=tolerance)
-
-
-COLLAPSE = [0.025, 0.05, 0.075, 0.1, 0.125, 0.15, *np.linspace(0.2, 1.0, 9)]
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(
-    ("rotation", "low", "high"),
-    [(0.5, -0.015, 0.015), (1.0, 0.01, 0.05), (None, -0.06, -0.04)],
-    ids=["no rotation about the axis", "free", "no tilt"],
-)
-def test_a_crushed_cylinder_depends_on_what_its_diaphragms_do_to_rotations(rotation, low, high):
-    """Published end: 83.10 and 34.27. What a diaphragm does to directors matters more than the mesh does."""
-    case = shell_problems.crushed_cylinder(40, rotation)
-    *_, last = load_steps(case.loaded, COLLAPSE)
-    off = np.array(case.read(last.q)) / [83.10, 34.27] - 1.0
-    assert (off >= low).all()
-    assert (off <= high).all()
