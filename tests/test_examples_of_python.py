@@ -16,7 +16,7 @@ from softjaw.study.quantities import DONE
 from tests.study.launching import ROOT
 
 FOLDER = ROOT / "jobs" / "examples"
-SOLVING = {"first_map": 6 * 2, "planner": 12 * 4 * 3, "stiffer_pad": 0}  # and the cases in their files
+SOLVING = {"first_map": 6 * 2, "planner": 12 * 4 * 3, "stiffer_pad": 0, "lift": 1}  # and the cases in their files
 
 
 def picture(folder, name):
@@ -56,6 +56,8 @@ def test_a_measured_field_is_judged(here):
 @pytest.mark.long
 @pytest.mark.parametrize("name", SOLVING)
 def test_scripts_that_solve(name, tmp_path):
+    if name == "lift":
+        pytest.importorskip("mujoco", reason="MuJoCo is not installed: pip install mujoco")
     done = subprocess.run(
         [sys.executable, FOLDER / f"{name}.py"], env={**launch_environment(), "MPLBACKEND": "Agg"}, cwd=tmp_path,
         capture_output=True, text=True, timeout=300, check=False, stdin=subprocess.DEVNULL,
@@ -66,6 +68,9 @@ def test_scripts_that_solve(name, tmp_path):
     if cases := SOLVING[name]:
         ds = sj.open(tmp_path / "results" / f"{name.replace('_', '-')}.hdf")
         assert (ds.status.size, int((ds.status == DONE).sum())) == (cases, cases)
+    if name == "lift":
+        risen = [float(line.partition("rose by ")[2].split()[0]) for line in output.splitlines() if "rose by" in line]
+        assert risen == [pytest.approx(60.0, abs=1.0), pytest.approx(0.0, abs=1.0)]  # mm
     if name == "planner":
         assert int(output.partition(" better grasps are out of reach")[0].rpartition("\n")[2]) > 0
 

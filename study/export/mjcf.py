@@ -143,12 +143,14 @@ def _finger(f: int, contacts: Cell, pad: FloatArray) -> list[str]:
     """A hidden ball on a rail along the closing axis, and the undeformed pad that it stands for."""
     contact = contacts.contacts[f - 1]
     rail = contact.rotation.T @ contacts.closing * (1.0 if f == 1 else -1.0)
+    # Fingers that have lost the object meet in the middle, and open as far.
+    reach = 0.5 * float(np.linalg.norm(contacts.contacts[1].origin - contacts.contacts[0].origin))
     middle = contact.pad_origin - pad[2] / 2 * contact.pad_rotation[:, 2] - contact.origin
     placed = _pose(contact.rotation.T @ contact.pad_rotation, contact.rotation.T @ middle)
     return [
         f"      <!-- finger {f}, in its contact frame: z is the normal, into the object -->",
         f'      <body name="finger{f}" {_pose(contact.rotation, contact.origin)}>',
-        f'        <joint name="close{f}" type="slide" axis="{numbers(*rail)}"/>',
+        f'        <joint name="close{f}" type="slide" axis="{numbers(*rail)}" range="{-reach} {reach}"/>',
         f'        <geom name="pad{f}" type="sphere" size="{RADIUS}" pos="0 0 {-RADIUS}" mass="{PAD_MASS}" {HIDDEN}/>',
         f'        <geom name="foam{f}" type="box" size="{numbers(*pad / 2)}" {placed} mass="0" {SEEN}/>',
         "      </body>",
