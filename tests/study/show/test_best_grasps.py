@@ -12,9 +12,9 @@ from scipy.spatial.transform import Rotation
 from softjaw.study.cli import main
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import MODELS, quantities
+from softjaw.study.ranking import distinct
 from softjaw.study.result.layout import DONE, FAILED
 from softjaw.study.show.best_grasps import best, force_to_use, safe_range
-from softjaw.study.show.places import distinct
 from softjaw.study.show.status import grouped
 from softjaw.study.table import as_csv, as_json
 
