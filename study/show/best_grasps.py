@@ -24,11 +24,11 @@ from softjaw.study.ranking import (
     sure,
     task_keys,
 )
-from softjaw.study.result.layout import DONE, MISSING
+from softjaw.study.result.layout import DONE
 from softjaw.study.result.read import axes_of, dataset, values_of
 from softjaw.study.show.grasps import Index, at, candidate_of, forces, note, place, unravelled
 from softjaw.study.show.places import folded_text, named, short_name, spot
-from softjaw.study.show.status import RESUME, aim, counts, largest_error, no_grasps, reasons, time_split
+from softjaw.study.show.status import RESUME, aim, counts, largest_error, no_grasps, reasons, time_split, unfinished
 from softjaw.study.table import Column, Row, Table, as_text, number, terminal_width, with_error, wrapped
 from softjaw.study.units import GRAVITY, in_si, shown, shown_text, shown_unit
 
@@ -59,7 +59,8 @@ def best(
     """
     errors = values_of(ds, name) if (name := f"{aim(ds)[0]}_error") in ds else None
     known = errors is not None or "e_n_interval" not in ds
-    error = largest_error(errors, ds, axes_of(ds), ds.label.values) if known else ""
+    mesh = ds["work_mesh"].values if "work_mesh" in ds else None
+    error = largest_error(errors, ds, axes_of(ds), ds.label.values, mesh) if known else ""
     ds, k, why = at_level(ds, force)
     flags, shape = judged(ds), ds.status.shape[:-1]
     ds = ds.assign(flags=(ds.status.dims, flags, ds["flags"].attrs))
@@ -95,7 +96,7 @@ def summary(result: Any) -> str:
     """What a run says at its end: counts, reasons of failures, where the time went, best grasps, the file."""
     width = terminal_width()
     table = [best_text(dataset(result), width)] if np.any(result.status == DONE) else []
-    again = f"; {RESUME}" if np.any(result.status == MISSING) else ""
+    again = f"; {RESUME}" if unfinished(result) else ""
     lines = [counts(result), *reasons(result, width), *time_split(result), *table]
     return "\n".join([*lines, f"results are in {result.path}{again}"])
 

@@ -12,13 +12,27 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from softjaw.study.flags import flag_sentences, flags_in
+from softjaw.study.case.result import TIE
+from softjaw.study.flags import LOST, flag_sentences, flags_in
 from softjaw.study.quantities import DONE, E_N_TARGET, FAILED, MISSING, NO_GRASP, PARTS, STATES, map_row, misses
 from softjaw.study.result.lock import holder
 from softjaw.study.result.store import open_result, place_text
 from softjaw.study.run.progress import duration
 from softjaw.study.run.refine import about
-from softjaw.study.table import MOST_NOTES, PAPER, Column, Row, Table, as_csv, as_json, terminal_width, wrapped
+from softjaw.study.scene.sections import COARSE, FINE, FINEST
+from softjaw.study.table import (
+    MOST_NOTES,
+    PAPER,
+    Column,
+    Row,
+    Table,
+    as_csv,
+    as_json,
+    terminal_width,
+    with_error,
+    wrapped,
+)
+from softjaw.study.units import shown, shown_unit
 
 MOST_PLACES = 2
 NO_ERRORS = "errors of the mesh: not known; accuracy.meshes = 2 in the scene gives them"
@@ -61,6 +75,8 @@ def status_table(result: Any) -> Table:
         rows.append(where | ({"label": str(result.labels[index[-3:-1]])} if poses else {}))
     counts = {name.replace(" ", "_"): int(np.sum(result.status == code)) for code, name in enumerate(STATES)}
     facts: Row = {"file": str(result.path), "running": holder(result.path) or None, **counts}
+    if known := rivals(result):
+        facts |= {f"rivals_{name}": value for name, value in known._asdict().items()}
     facts |= {"largest_error": largest_mesh_error(result), **_added(result), "sessions": list(result.sessions)}
     notes = [reason.text(lambda index: place(result, index)) for reason in reasons_in(result)]
     return Table(result.title, columns, rows, notes, facts, "cases")
@@ -69,21 +85,91 @@ def status_table(result: Any) -> Table:
 def status_text(result: Any, width: int = PAPER) -> str:
     """Answer of ``softjaw status``; the file may be growing meanwhile."""
     runner = holder(result.path)
-    state = f"running now: {runner}" if runner else RESUME if np.any(result.status == MISSING) else ""
-    error = largest_mesh_error(result)
-    known = [wrapped(error, width, "  ", "  ")] * bool(error)
+    state = f"running now: {runner}" if runner else RESUME if unfinished(result) else ""
+    known = [wrapped(text, width, "  ", "  ") for text in (rivals_text(result), largest_mesh_error(result)) if text]
     lines = [counts(result), *known, *[wrapped(state, width)] * bool(state), *reasons(result, width)]
     return "\n".join([*lines, *sessions(result, bool(runner), width)])
 
 
-# --- errors ----------------------------------------------------------------------------------------------------------
+# --- how well the best is known --------------------------------------------------------------------------------------
+
+
+class Rivals(NamedTuple):
+    """The best payload [kg] with its error, the force [N], and of the other usable grasps there how many may be better.
+
+    ``coarse`` of all are solved on the coarse mesh alone.
+    """
+
+    best: float
+    error: float
+    force: float
+    better: int
+    others: int
+    coarse: int
+
+
+def rivals(result: Any) -> Rivals | None:
+    """How well the best payload is known at the largest force with a usable grasp; None without errors.
+
+    Images of the best grasp, which hold as much, are no rivals.
+    """
+    if "payload_error" not in {q.name for q in result.layout.quantities}:
+        return None
+    value, error = result.read("payload/ccm"), result.read("payload_error/payload_error")
+    flags = np.nan_to_num(result.read("flags/flags")).astype(int)
+    usable = (result.status == DONE) & np.isfinite(value) & (flags & LOST == 0)
+    if not usable.any():
+        return None
+    k = int(np.flatnonzero(usable.reshape(-1, usable.shape[-1]).any(axis=0))[-1])
+    value, error = (part[..., k][usable[..., k]] for part in (value, np.nan_to_num(error * value, nan=np.inf)))
+    top, mesh = int(value.argmax()), meshes(result)
+    other = value < value[top] * (1.0 - TIE)
+    better = other & (value + error > value[top] - error[top])
+    coarse = 0 if mesh is None else int(np.sum(mesh[..., k][usable[..., k]] == COARSE))
+    force = float(result.axes[-1].values[k])
+    return Rivals(float(value[top]), float(error[top]), force, int(better.sum()), int(other.sum()), coarse)
+
+
+def rivals_text(result: Any) -> str:
+    """The same in a line; empty where nothing is known."""
+    if (known := rivals(result)) is None:
+        return ""
+    value, error, unit = *shown(np.array([known.best, known.error]), "kg"), shown_unit("kg")
+    text = with_error(value, error) if np.isfinite(error) else f"{value:.4g}"
+    coarse = f"; {known.coarse} are on the coarse mesh alone" * bool(known.coarse)
+    waiting = f"; {n} wait for a finer mesh" if (n := waits(result)) else ""
+    return (
+        f"best payload at {known.force:g} N: {text} {unit}; {known.better} of {known.others} other grasps may hold more"
+        f" within the errors of the mesh{coarse}{waiting}"
+    )
+
+
+def meshes(result: Any) -> NDArray[np.float64] | None:
+    """Finest mesh that each case was tried on; None where a file has it not."""
+    listed = {q.key for q in result.layout.quantities}
+    return result.read("work/mesh") if "work/mesh" in listed else None
+
+
+def waits(result: Any) -> int:
+    """Cases that a round named for a finer mesh and that have not been tried on it."""
+    mesh = meshes(result)
+    if mesh is None or not result.layout.finer:
+        return 0
+    stored = mesh.reshape(-1, np.prod(mesh.shape[-3:-1]), mesh.shape[-1])
+    done = (result.status == DONE).reshape(stored.shape)
+    return sum(bool(done[case] and stored[case] < (FINE, FINEST)[n > 1]) for case, n in result.layout.finer.items())
+
+
+def unfinished(result: Any) -> bool:
+    """Whether a run of the same command has something to do."""
+    return bool(np.any(result.status == MISSING)) or waits(result) > 0
 
 
 def largest_mesh_error(result: Any) -> str:
     """The largest error by the mesh so far of what the scene's target is for."""
     row = map_row(aim(result)[0]).of_error
     errors = result.read(f"{row.name}/{row.name}") if row in result.layout.quantities else None
-    return largest_error(errors, result, result.axes, result.labels)
+    return largest_error(errors, result, result.axes, result.labels, meshes(result))
 
 
 def aim(cases: Any) -> tuple[str, float]:
@@ -94,7 +180,9 @@ def aim(cases: Any) -> tuple[str, float]:
     return accuracy["target_of"], accuracy["target"]
 
 
-def largest_error(errors: NDArray[np.float64] | None, cases: Any, axes: Sequence[Any], labels: Any) -> str:
+def largest_error(
+    errors: NDArray[np.float64] | None, cases: Any, axes: Sequence[Any], labels: Any, mesh: Any = None
+) -> str:
     """The largest error by the mesh, how many are above the target, and how many solved cases have none.
 
     Parameters
@@ -105,12 +193,15 @@ def largest_error(errors: NDArray[np.float64] | None, cases: Any, axes: Sequence
         Has ``status`` and ``scene``.
     axes, labels
         As `result.store.place_text` takes them.
+    mesh : array over the cases, optional
+        As `meshes` gives it; cases on the coarse mesh alone do not count.
     """
-    status = np.asarray(cases.status)
-    solved = int(np.count_nonzero(status == DONE))
+    status, done = np.asarray(cases.status), np.asarray(cases.status) == DONE
+    done = done if mesh is None else done & (np.asarray(mesh) > COARSE)
+    solved = int(np.count_nonzero(done))
     if not solved or errors is None:
         return NO_ERRORS if solved else ""
-    known = np.where(status == DONE, errors, np.nan)
+    known = np.where(done, errors, np.nan)
     count = int(np.count_nonzero(np.isfinite(known)))
     if not count:
         return f"errors of the mesh: none of {solved} solved cases has one"
