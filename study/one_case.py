@@ -19,7 +19,7 @@ from softjaw.friction.patch import ContactPatch
 from softjaw.friction.wrench import FrictionLimits
 from softjaw.lsfit.surface import LimitSurface
 from softjaw.study import pipeline
-from softjaw.study.case.build import check_object
+from softjaw.study.case.build import check_object, with_mass
 from softjaw.study.case.candidates import decided, units, with_sampled_grasps
 from softjaw.study.case.contact import Contact
 from softjaw.study.case.model import check_petsc
@@ -182,7 +182,7 @@ def solved_case(
 ) -> Case:
     """Solve one case; arguments and errors as for `softjaw.press`."""
     _refuse_open_questions(scene)
-    scene, number = _asked(scene, station, angle, candidate, pose)
+    scene, number = _asked(with_mass(scene), station, angle, candidate, pose)
     scene, k = _at_force(scene, force)
     try:
         check_object(scene)

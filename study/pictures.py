@@ -26,6 +26,7 @@ MODEL_LOOKS = {  # name, colour, line, marker
     "pcm_projected": (MODEL_NAMES["pcm_projected"], "#2a8c82", ":", "^"),
 }
 COLOURS = {
+    "payload": "viridis",
     "quality": "viridis",
     "e_n": "cividis",
     "pressure": "magma_r",

@@ -436,7 +436,7 @@ ROWS = (
 )  # fmt: skip
 TABLE = tuple(row for q in ROWS for row in ((q, q.of_error) if q.error else (q,)))
 MAIN = tuple(q.name for q in sorted((q for q in TABLE if q.rank), key=lambda q: q.rank))
-FIRST = ("quality", "e_n")  # maps that viewers of the file open at
+FIRST = ("payload", "quality", "e_n")  # maps that viewers of the file open at
 LEAST_FORCE = "force"  # that holds object.mass_g
 RANKED_BY = ("payload", "quality", "e_n", "epsilon", LEAST_FORCE)  # what grasps can be ranked by
 FORCE_RANGE = ("force_low", "force_high")  # derived bounds of the forces that hold the object and that it bears

@@ -18,7 +18,7 @@ from softjaw.fem.pad.shape import PadShape
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.scene import Scene
 from softjaw.study.scene.sections import Gripper
-from softjaw.study.units import in_si
+from softjaw.study.units import converted, in_si
 
 
 def geometry() -> Any:
@@ -71,6 +71,53 @@ def centre_of_volume(obj: Any) -> NDArray[np.float64]:
     if hasattr(obj, "centroid"):
         return np.asarray(obj.centroid[0])
     return solid_centroid(*obj.surface())
+
+
+def volume(shape: Any) -> float:
+    """Volume of the body that an object's surface encloses [m^3], to 0.3 % where there is no closed form.
+
+    Raises
+    ------
+    ValueError
+        The surface does not enclose one.
+    """
+    match shape.shape:
+        case "sphere":
+            return 4.0 / 3.0 * math.pi * float(shape.radius) ** 3
+        case "elliptic_cylinder":
+            return math.pi * float(shape.semi_axis_a * shape.semi_axis_b * shape.length)
+        case "revolution":  # frusta between the points of its profile
+            z, r = np.transpose(shape.profile)
+            return float(np.diff(z) @ (r[1:] ** 2 + r[1:] * r[:-1] + r[:-1] ** 2)) * math.pi / 3.0
+        case "plane":
+            raise ValueError("two planes enclose no volume")
+    obj = build_object(shape)
+    if not getattr(obj, "closed", True):
+        raise ValueError("the mesh is not closed")
+    points, triangles = surface_triangles(shape)
+    corners = points[triangles] - points.mean(axis=0)
+    return abs(float(np.einsum("ka,ka->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])))) / 6.0
+
+
+def with_mass(scene: Scene) -> Scene:
+    """The scene with the mass that its object's density gives, to 0.01 g, in place of the density.
+
+    Raises
+    ------
+    StudyError
+        The object has no volume, or several in a sweep.
+    """
+    density = scene.object.density
+    if density is None:
+        return scene
+    check_object(scene)
+    try:
+        if any(key.startswith("object.") for key in scene.sweep):
+            raise ValueError("the object changes along the sweep")
+        mass = max(round(converted(density * volume(scene.object), "kg", "g"), 2), 0.01)
+    except ValueError as error:
+        raise StudyError(USAGE, f"object.density: {error}; write object.mass_g instead") from error
+    return scene.model_copy(update={"object": scene.object.model_copy(update={"density": None, "mass_g": mass})})
 
 
 def centre_of_mass(scene: Scene, obj: Any) -> NDArray[np.float64]:

@@ -17,7 +17,15 @@ from numpy.typing import NDArray
 
 from softjaw.fem.objects.gap import Pose
 from softjaw.friction.patch import NEGLIGIBLE
-from softjaw.study.case.build import check_object, forces_apart, middle_of, own_frame, pad_shape, surface_triangles
+from softjaw.study.case.build import (
+    check_object,
+    forces_apart,
+    middle_of,
+    own_frame,
+    pad_shape,
+    surface_triangles,
+    with_mass,
+)
 from softjaw.study.case.fit import doubt, fit_of, jaws_of
 from softjaw.study.case.poses import axis_poses, explicit_poses, moved, turn_of_pose
 from softjaw.study.quantities import MISSING, REALISATION, Axis
@@ -108,13 +116,14 @@ def _invariants(place: Candidate) -> tuple[float, ...]:
 
 
 def with_sampled_grasps(scene: Scene) -> Scene:
-    """The scene with explicit poses where it asks for a sampler; see `study.case.sampler`.
+    """The scene `with_mass`, and with explicit poses where it asks for a sampler; see `study.case.sampler`.
 
     Raises
     ------
     StudyError
         For geometry that cannot be, or that leaves no grasp between the pads.
     """
+    scene = with_mass(scene)
     if scene.candidates.sampled is None:
         return scene
     check_object(scene)

@@ -55,6 +55,7 @@ NOT_SWEPT = {
     "accuracy.target": "it changes which maps there are",
     "effects.wrench": "it changes what is stored",
     "object.mass_g": "it changes which maps there are; the safety factor is in proportion to 1 / mass",
+    "object.density": "it changes which maps there are; the safety factor is in proportion to 1 / density",
     "limit_surface.samples": "it changes the size of the results",
     "limit_surface.wrench_samples": "it changes the size of the results",
 }

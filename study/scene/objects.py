@@ -35,6 +35,9 @@ class Shape(SceneSection):
         shape: str  # a literal of each subclass
     name: Text = Field("", max_length=100, description="name for titles and tables")
     mass_g: Annotated[float, Field(gt=0, le=1e6)] | None = Field(None, description="mass, for the force to use")
+    density: Annotated[float, Field(gt=0, le=30_000)] | None = Field(
+        None, description="instead of the mass, of a body that is solid [kg/m^3]"
+    )
     mass: ClassVar[Any] = si("mass_g")
 
     @property
@@ -58,7 +61,10 @@ class Shape(SceneSection):
         return 1, {}
 
     def rules(self) -> Errors:
-        """Extents outside 1 mm to 2 m are slips of the unit."""
+        """Extents outside 1 mm to 2 m are slips of the unit; a body has one mass."""
+        if self.density is not None and (self.mass_g is not None or getattr(self, "wall_mm", None) is not None):
+            beside = "mass_g" if self.mass_g is not None else "wall_mm"
+            yield wrong(self.density, f"mass_g alone: {beside} stands beside it", "density")
         for i, (axis, (low, high)) in enumerate(self.spans_mm.items()):
             extent = high - low
             if not SMALLEST_MM <= extent <= LARGEST_MM:

@@ -170,10 +170,10 @@ def _differences(name: str, x: np.ndarray, lines: dict[Any, Any]) -> Any:
 
 
 def _maps(ds: xr.Dataset, index: Index) -> Any:
-    """Quality and e_n over the main axis and the force, one row for each angle."""
+    """The first maps over the main axis and the force, one row for each angle."""
     x, y, angle = maps.main_axis(ds), len(index) - 1, len(index) - 2
     rows, axis = maps.some(maps.different_angles(ds), index[angle]), str(ds.status.dims[maps.main_axis(ds)])
-    drawn, axes = pictures.figure(10, 2.4 * len(rows) + 0.6, len(rows), 2, sharex=True, sharey=True)
+    drawn, axes = pictures.figure(10, 2.4 * len(rows) + 0.6, len(rows), len(FIRST), sharex=True, sharey=True)
     # Forces by number: their steps may grow by decades, and each needs a row to be seen.
     borders = edges(axis_values(ds, axis)), np.arange(len(forces(ds)) + 1) - 0.5
     for column, name in enumerate(FIRST):

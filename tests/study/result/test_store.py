@@ -95,7 +95,7 @@ def test_viewers_find_a_plot_from_the_root_down(path):
         plot = entry[entry.attrs["default"]]
         assert plot.attrs["NX_class"] == "NXdata"
         signals = [plot.attrs["signal"], *plot.attrs["auxiliary_signals"]]
-        assert signals == ["quality", "e_n"]
+        assert signals == ["payload", "quality", "e_n"]
         # silx draws nothing over an axis of two values: that one is named '.' and keeps its dimension scale.
         assert list(plot.attrs["axes"]) == ["station", "."]
         for name in signals:
