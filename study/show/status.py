@@ -134,13 +134,13 @@ def rivals_text(result: Any) -> str:
     """The same in a line; empty where nothing is known."""
     if (known := rivals(result)) is None:
         return ""
-    value, error, unit = *shown(np.array([known.best, known.error]), "kg"), shown_unit("kg")
+    value, error = (float(v) for v in shown(np.array([known.best, known.error]), "kg"))
     text = with_error(value, error) if np.isfinite(error) else f"{value:.4g}"
     coarse = f"; {known.coarse} are on the coarse mesh alone" * bool(known.coarse)
     waiting = f"; {n} wait for a finer mesh" if (n := waits(result)) else ""
     return (
-        f"best payload at {known.force:g} N: {text} {unit}; {known.better} of {known.others} other grasps may hold more"
-        f" within the errors of the mesh{coarse}{waiting}"
+        f"best payload at {known.force:g} N: {text} {shown_unit('kg')}; {known.better} of {known.others} other grasps"
+        f" may hold more within the errors of the mesh{coarse}{waiting}"
     )
 
 
