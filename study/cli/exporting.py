@@ -13,7 +13,7 @@ from softjaw.study.export.mjcf import as_mjcf
 from softjaw.study.export.physx import as_usd
 from softjaw.study.export.planners import CLOSING, as_graspgen, as_isaac_grasp, as_moveit
 from softjaw.study.export.rigid_body import body_of
-from softjaw.study.export.sdf import as_sdf
+from softjaw.study.export.sdf import as_sdf, as_stl
 from softjaw.study.export.selection import GripperFrame, Selection, chosen, grasps, usable
 from softjaw.study.messages import USAGE, StudyError, write_file
 from softjaw.study.result.read import open
@@ -49,7 +49,13 @@ def export(options: Namespace) -> str:
     if options.form in PLANNERS:
         folder = (str(Path(options.output or ".").parent),) if options.form == "graspgen" else ()
         return _written(options, [PLANNERS[options.form](ranked, gripper, ds, *folder)])
-    return _written(options, [SIMULATORS[options.form](grasp, body_of(ds, grasp.case)) for grasp in ranked])
+    bodies = [body_of(ds, grasp.case) for grasp in ranked]
+    if options.form != "sdf" or options.output is None:
+        return _written(options, [SIMULATORS[options.form](g, b) for g, b in zip(ranked, bodies, strict=True)])
+    meshes = [path.with_suffix(".stl") for path in _paths(options, len(ranked))]  # a model cannot hold one itself
+    texts = [as_sdf(g, b, mesh.name) for g, b, mesh in zip(ranked, bodies, meshes, strict=True)]
+    beside = [f"written: {write_file(mesh, as_stl(b))}" for b, mesh in zip(bodies, meshes, strict=True)]
+    return "\n".join([_written(options, texts), *beside])
 
 
 def _vtk(options: Namespace, ds: Any) -> Path:
@@ -66,6 +72,10 @@ def _written(options: Namespace, texts: list[str]) -> str:
         if len(texts) > 1:
             raise StudyError(USAGE, f"--top: {len(texts)} grasps are a file each; name them with -o, or write --top 1")
         return texts[0]
-    path = Path(options.output)
-    paths = [path if len(texts) == 1 else path.with_stem(f"{path.stem}-{i}") for i in range(1, len(texts) + 1)]
+    paths = _paths(options, len(texts))
     return "\n".join(f"written: {write_file(p, text + chr(10))}" for p, text in zip(paths, texts, strict=True))
+
+
+def _paths(options: Namespace, count: int) -> list[Path]:
+    path = Path(options.output)
+    return [path if count == 1 else path.with_stem(f"{path.stem}-{i}") for i in range(1, count + 1)]

@@ -25,9 +25,9 @@ FORMATS = {  # of export: what stands in the file
     "isaac_grasp": "grasps for Isaac Sim and Isaac ROS (YAML)",
     "graspgen": "grasps as GraspGen keeps them (JSON), with all that is known",
     "moveit": "a list of moveit_msgs/Grasp for ROS 2 (YAML)",
-    "mjcf": "a MuJoCo scene of one grasp, with the friction of each finger",
-    "sdf": "the fingers of one grasp for Gazebo Classic with ODE",
-    "physx": "the fingers of one grasp for PhysX and Isaac Sim (USD, .usda)",
+    "mjcf": "a MuJoCo scene of one grasp that runs: object, fingers, gravity",
+    "sdf": "a model of one grasp for Gazebo Classic with ODE (its object beside it, .stl)",
+    "physx": "a stage of one grasp for PhysX and Isaac Sim (USD, .usda)",
     "vtk": "maps on the object and all pads with their pressure, for ParaView (.vtm)",
 }
 

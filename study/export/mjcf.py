@@ -34,6 +34,7 @@ import numpy as np
 
 from softjaw.study.export.point_contact import (
     PAD_MASS,
+    PLATE,
     RADIUS,
     Cell,
     PointContact,
@@ -49,7 +50,6 @@ ALONG = 1e-6  # sine between a tangent and an axis of the contact below which th
 STIFF = 'solref="0.004 1" solimp="0.9999 0.9999 0.001"'
 HIDDEN = 'contype="0" conaffinity="0" group="3"'  # viewers do not draw this group unless they are asked
 SEEN = 'contype="0" conaffinity="0" rgba="0.3 0.4 0.5 0.6"'
-PLATE = 5e-3  # half the thickness of the object's plates [m], far more than a ball sinks in
 
 
 def tangents(normal: FloatArray) -> FloatArray:

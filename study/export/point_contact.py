@@ -26,6 +26,7 @@ from softjaw.study.messages import USAGE, StudyError
 
 RADIUS = 0.01  # of the ball that stands for a pad [m]: any will do, because it touches at one point
 PAD_MASS = 0.02  # [kg]: friction does not depend on it
+PLATE = 5e-3  # half the thickness of the object's plates [m], far more than a ball sinks in
 SHARE = 0.9  # of the payload, the most that an object without a mass weighs
 DOWN = np.array([0.0, 0.0, -1.0])
 

@@ -232,6 +232,9 @@ def test_simulators_get_a_file_for_each_grasp(path, said, tmp_path):
     said("--format", "mjcf", "--top", 3, "-o", out)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["grasp-1.xml", "grasp-2.xml", "grasp-3.xml"]
     assert main(["export", str(path), "--format", "mjcf", "--top", "3"]) == USAGE
+    said("--format", "sdf", "--top", 2, "-o", tmp_path / "model.sdf")
+    assert (tmp_path / "model-2.stl").stat().st_size > 84
+    assert "<uri>model-2.stl</uri>" in (tmp_path / "model-2.sdf").read_text()
 
 
 @pytest.mark.parametrize(

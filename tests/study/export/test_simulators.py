@@ -8,11 +8,12 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+import trimesh
 
 from softjaw.study.export.mjcf import as_mjcf, friction, tangents
 from softjaw.study.export.physx import as_usd
-from softjaw.study.export.point_contact import cell
-from softjaw.study.export.sdf import as_sdf
+from softjaw.study.export.point_contact import carried, cell
+from softjaw.study.export.sdf import as_sdf, as_stl
 from softjaw.study.messages import StudyError
 from tests.study.export.grasp_results import E_N, FORCES, MU_X, MU_Y, all_grasps, body, geometry, slipping, write
 
@@ -71,7 +72,13 @@ def test_gazebo_slips_at_the_torque_of_the_file_by_its_own_formula(path):
     for i, grasp in enumerate(all_grasps(path, 16.0)):
         root = ElementTree.fromstring(as_sdf(grasp, body(path)))
         assert root.get("version") == "1.7"
-        for f, link in enumerate(root.iter("link"), start=1):
+        solid, *fingers = root.iter("link")
+        assert float(solid.findtext("inertial/mass")) == pytest.approx(carried(grasp, body(path)).mass)
+        assert numbers(solid.findtext("inertial/pose"))[:3] == pytest.approx(body(path).centre, abs=1e-9)
+        inertia = {child.tag: float(child.text) for child in solid.find("inertial/inertia")}
+        assert inertia["izz"] == pytest.approx(carried(grasp, body(path)).inertia[2, 2])
+        *place, roll, pitch, yaw = numbers(root.findtext("model/pose"))
+        for f, link in enumerate(fingers, start=1):
             surface = link.find("collision/surface/friction")
             a, c = (float(surface.findtext(f"torsional/{name}")) for name in ("patch_radius", "coefficient"))
             assert surface.findtext("torsional/use_patch_radius") == "true"
@@ -84,6 +91,20 @@ def test_gazebo_slips_at_the_torque_of_the_file_by_its_own_formula(path):
             *place, roll, pitch, yaw = numbers(link.findtext("pose"))
             assert place == pytest.approx(cell(grasp).contacts[f - 1].origin.tolist())
             assert rpy(roll, pitch, yaw) == pytest.approx(cell(grasp).contacts[f - 1].rotation, abs=1e-9)
+            rail = rpy(roll, pitch, yaw) @ numbers(root.findall("model/joint")[f - 1].findtext("axis/xyz"))
+            assert rail == pytest.approx(cell(grasp).closing * (1 if f == 1 else -1), abs=1e-9)
+
+
+def turned(x, y, z, w):
+    """The rotation of a quaternion, by its own formula."""
+    return np.eye(3) + 2 * w * (K := np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])) + 2 * K @ K
+
+
+def test_the_surface_beside_a_model_of_gazebo_is_the_object(path, tmp_path):
+    (tmp_path / "object.stl").write_bytes(as_stl(body(path)))
+    mesh = trimesh.load(tmp_path / "object.stl")
+    assert mesh.volume * 1000 == pytest.approx(body(path).mass, rel=1e-4)
+    assert mesh.bounds == pytest.approx(np.stack([body(path).points.min(axis=0), body(path).points.max(axis=0)]))
 
 
 def rpy(roll, pitch, yaw):
@@ -138,7 +159,23 @@ def test_usd_reads_the_stage(path):
     stage = Usd.Stage.CreateInMemory()
     assert stage.GetRootLayer().ImportFromString(as_usd(grasp, body(path)))
     assert UsdGeom.GetStageMetersPerUnit(stage) == 1.0
+    held, mass = carried(grasp, body(path)), UsdPhysics.MassAPI(stage.GetPrimAtPath("/grasp/object"))
+    assert mass.GetMassAttr().Get() == pytest.approx(held.mass)
+    assert list(mass.GetCenterOfMassAttr().Get()) == pytest.approx(held.centre.tolist(), abs=1e-7)
+    turn = mass.GetPrincipalAxesAttr().Get()
+    axes = turned(*turn.GetImaginary(), turn.GetReal())
+    moments = np.array(list(mass.GetDiagonalInertiaAttr().Get()))
+    assert axes * moments @ axes.T == pytest.approx(held.inertia, rel=1e-5, abs=1e-9)
+    down = UsdPhysics.Scene(stage.GetPrimAtPath("/grasp/scene")).GetGravityDirectionAttr().Get()
+    assert list(down) == pytest.approx((cell(grasp).rotation @ [0, 0, -1]).tolist(), abs=1e-6)
+    surface = UsdGeom.Mesh(stage.GetPrimAtPath("/grasp/object/surface"))
+    assert np.array(surface.GetPointsAttr().Get()) == pytest.approx(held.points, abs=1e-6)
     for f, contact in enumerate(cell(grasp).contacts, start=1):
+        joint = UsdPhysics.PrismaticJoint(stage.GetPrimAtPath(f"/grasp/close{f}"))
+        for rotation, here in ((np.eye(3), joint.GetLocalRot0Attr()), (contact.rotation, joint.GetLocalRot1Attr())):
+            q = here.Get()
+            rail = rotation @ turned(*q.GetImaginary(), q.GetReal())[:, 0]
+            assert rail == pytest.approx(cell(grasp).closing * (1 if f == 1 else -1), abs=1e-6)
         pad = stage.GetPrimAtPath(f"/grasp/finger{f}/pad{f}")
         assert UsdPhysics.CollisionAPI(pad)
         (target,) = pad.GetRelationship("material:binding:physics").GetTargets()
