@@ -33,7 +33,7 @@ def here(tmp_path, monkeypatch):
 
 
 def test_all_are_tested():
-    assert {path.stem for path in FOLDER.glob("*.py")} == {*SOLVING, "friction_alone", "measured_pressure"}
+    assert {path.stem for path in FOLDER.glob("*.py")} == {*SOLVING, "friction_alone", "measured_pressure", "data_set"}
 
 
 def test_friction_alone_falls_as_the_formula_says(here):

@@ -18,7 +18,7 @@ from softjaw.study.run.limits import is_out_of_memory, no_room, require_room
 
 UNWRITABLE = {errno.EPIPE, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}  # what standard output can answer
 SOLVING = ("run", "cost")
-OF_SCENES, OF_FOLDERS = ("check", "plan", "run"), ("watch", "status", "show", "report")  # of many objects
+OF_SCENES, OF_FOLDERS = ("check", "plan", "run"), ("watch", "status", "show", "report", "export")  # of many objects
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

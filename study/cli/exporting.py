@@ -23,10 +23,13 @@ from softjaw.study.units import in_si
 TABLES = {"csv": as_csv, "json": as_json}
 PLANNERS: dict[str, Callable[..., str]] = {"isaac_grasp": as_isaac_grasp, "graspgen": as_graspgen, "moveit": as_moveit}
 SIMULATORS = {"mjcf": as_mjcf, "sdf": as_sdf, "physx": as_usd}
+DATA_SETS = ("acronym", "webdataset")  # of folders alone
 
 
 def export(options: Namespace) -> str:
     """Write grasps for planners and simulators; files that were written, or the text itself."""
+    if options.form in DATA_SETS:
+        raise StudyError(USAGE, f"--format {options.form}: found '{options.file}', expected a folder of objects")
     ds = open(options.file)
     if options.form == "vtk":
         return f"written: {_vtk(options, ds)}"
@@ -35,10 +38,7 @@ def export(options: Namespace) -> str:
     if options.form in TABLES:
         asked = options.force or options.by or options.least or options.top is not None
         return _written(options, [TABLES[options.form](ds, options.model, chosen(ds, choice)[0] if asked else None)])
-    hand = gripper_file(options.gripper)[1] if options.gripper else Hand()
-    approaches = tuple(options.approaches or (("x",) if options.form in SIMULATORS else ()))
-    closing = CLOSING.get(options.form, "")
-    gripper = GripperFrame(hand, approaches, closing, in_si("wider_mm", options.wider), options.frame)
+    gripper = gripper_of(options)
     ranked = grasps(ds, choice, gripper)
     if options.form != "graspgen":  # which has a field for those that do not hold
         ranked, left = usable(ranked)
@@ -56,6 +56,14 @@ def export(options: Namespace) -> str:
     texts = [as_sdf(g, b, mesh.name) for g, b, mesh in zip(ranked, bodies, meshes, strict=True)]
     beside = [f"written: {write_file(mesh, as_stl(b))}" for b, mesh in zip(bodies, meshes, strict=True)]
     return "\n".join([_written(options, texts), *beside])
+
+
+def gripper_of(options: Namespace) -> GripperFrame:
+    """The gripper that comes to the grasps."""
+    hand = gripper_file(options.gripper)[1] if options.gripper else Hand()
+    approaches = tuple(options.approaches or (("x",) if options.form in SIMULATORS else ()))
+    closing = CLOSING.get(options.form, "")
+    return GripperFrame(hand, approaches, closing, in_si("wider_mm", options.wider), options.frame)
 
 
 def _vtk(options: Namespace, ds: Any) -> Path:

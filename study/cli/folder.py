@@ -151,3 +151,16 @@ def report(options: Namespace) -> str:
 
     path = _index(options)
     return f"written: {write_objects_page(path, Path(options.output or path.with_suffix('.html')))}"
+
+
+def export(options: Namespace) -> str:
+    """Write the grasps of all objects as one data set."""
+    from softjaw.study.cli.exporting import gripper_of
+    from softjaw.study.export import data_set
+
+    if options.form not in data_set.FORMS:
+        known = ", ".join(data_set.FORMS)
+        raise StudyError(USAGE, f"--format: found '{options.form}', expected one of {known} for a folder of objects")
+    if options.output is None:
+        raise StudyError(USAGE, f"--format {options.form}: name the folder of the data set with -o")
+    return data_set.write_data_set(_index(options), Path(options.output), options.form, gripper_of(options))

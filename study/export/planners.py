@@ -35,7 +35,8 @@ from softjaw.study.ranking import task_keys
 from softjaw.study.table import plain
 from softjaw.study.units import UNITS
 
-CLOSING = {"graspgen": "x"}  # of every gripper of the format; others have the hand's own
+# of every gripper of the format; others have the hand's own
+CLOSING = {"graspgen": "x", "acronym": "x", "webdataset": "x"}
 LEAST_WAY = WAY / 2  # of approach and retreat [m] that is enough
 
 

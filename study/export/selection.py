@@ -196,7 +196,7 @@ def grasps(ds: xr.Dataset, choice: Selection, gripper: GripperFrame) -> list[Ran
     made = []
     for i, (case, place) in enumerate(zip(cases, places, strict=True)):
         merit = float(score[i] / best) if best > 0 else 0.0
-        for approach, hold in _holds(ds, case, gripper).items():
+        for approach, hold in holds(ds, case, gripper).items():
             name = f"grasp_{i}" + (f"_{approach.replace('-', '_')}" if len(gripper.approach) > 1 else "")
             R, o = gripper_frame(case, approach, gripper.along, hold.depth)
             of_gripper = units, hold.open_joints, hold.closed_joints, hold.unfit
@@ -214,7 +214,7 @@ class Hold:
     unfit: tuple[str, ...]
 
 
-def _holds(ds: xr.Dataset, case: dict[str, Any], gripper: GripperFrame) -> dict[str, Hold]:
+def holds(ds: xr.Dataset, case: dict[str, Any], gripper: GripperFrame) -> dict[str, Hold]:
     """By approach how the gripper takes a case."""
     hand, maps, force = gripper.hand, case["maps"], case["place"]["normal_force"]
     scene = scene_of(ds, case)

@@ -97,6 +97,19 @@ def write_index(path: Path, rows: Sequence[Row], attributes: Mapping[str, Any]) 
             made.dims[0].attach_scale(names)
 
 
+def write_arrays(path: Path, arrays: Mapping[str, Any]) -> None:
+    """Write an HDF5 file of arrays, numbers and texts by path; an existing one is replaced.
+
+    Raises
+    ------
+    StudyError
+        It cannot be written.
+    """
+    with beside(path, folders=True) as part, h5py.File(part, "w") as file:
+        for name, values in arrays.items():
+            file[name] = values
+
+
 def _texts(values: Sequence[str]) -> Any:
     return np.array(values, h5py.string_dtype())
 

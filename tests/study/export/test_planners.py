@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from softjaw.study.cli import main
-from softjaw.study.cli.exporting import PLANNERS, SIMULATORS, TABLES
+from softjaw.study.cli.exporting import DATA_SETS, PLANNERS, SIMULATORS, TABLES
 from softjaw.study.cli.options import FORMATS
 from softjaw.study.export.planners import CLOSING
 from softjaw.study.export.selection import APPROACHES, GripperFrame, Selection, grasps
@@ -119,8 +119,8 @@ def station_of(position):
 
 
 def test_every_format_of_the_command_has_a_writer_and_the_other_way_round():
-    assert set(FORMATS) == {*TABLES, *PLANNERS, *SIMULATORS, "vtk"}
-    assert set(CLOSING) < set(PLANNERS)
+    assert set(FORMATS) == {*TABLES, *PLANNERS, *SIMULATORS, *DATA_SETS, "vtk"}
+    assert set(CLOSING) < {*PLANNERS, *DATA_SETS}
 
 
 @pytest.mark.parametrize("closing", ["x", "y"])

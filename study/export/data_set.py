@@ -1,0 +1,221 @@
+"""A folder of objects as one data set to learn from: every grasp with its label, in three formats.
+
+A grasp is a candidate at one normal force. It is successful where it holds and does no harm (flags); the others, and
+those that are too wide, collide or slip before any solve, are the unsuccessful ones. What did not converge is left out.
+All formats hold the same arrays, SI units, in the frame of the object's own file, whose coordinates times ``scale`` are
+metres. An object's name decides its split, so that a data set that grows keeps its splits.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import shutil
+import tarfile
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from softjaw.fem.objects.gap import Pose
+from softjaw.study.case.poses import explicit_poses, moved
+from softjaw.study.export.cases import MEANING, cases
+from softjaw.study.export.selection import GripperFrame, gripper_frame, holds
+from softjaw.study.flags import LOST
+from softjaw.study.messages import USAGE, StudyError, beside, write_file
+from softjaw.study.quantities import COLLIDES, DONE, SLIPS, WIDE
+from softjaw.study.ranking import judged, task_keys
+from softjaw.study.result.index import read_index, write_arrays
+from softjaw.study.result.read import maps_in, open
+from softjaw.study.scene import parse_scene
+from softjaw.study.table import plain
+from softjaw.study.units import UNITS
+
+VALID_SHARE = 5  # one object in so many is for validation
+SHARD = 100  # objects of a shard
+SPLITS = ("train", "valid")
+MAPS = ("payload", "quality", "e_n", "f_x_max", "f_y_max", "tau_z_max", "opening", "opening_loaded")
+SURFACE = ("frame_origin", "frame_axes", "semi_axes", "unit", "coefficients", "matrix")  # of each finger
+Arrays = dict[str, np.ndarray]
+
+
+@dataclass(frozen=True, eq=False)
+class ObjectGrasps:
+    """All grasps of one object: ``arrays`` by name with the grasp as first axis, and where its mesh is."""
+
+    name: str
+    mesh: Path
+    scale: float
+    mass: float
+    arrays: Arrays
+
+    @property
+    def split(self) -> str:
+        """Whether it is for training or for validation."""
+        return SPLITS[int(hashlib.sha256(self.name.encode()).hexdigest(), 16) % VALID_SHARE == 0]
+
+    @property
+    def file(self) -> str:
+        """Name of the mesh in the data set."""
+        return self.name + self.mesh.suffix.lower()
+
+
+Writer = Callable[[ObjectGrasps], None]
+
+
+def write_data_set(index: Path, out: Path, form: str, gripper: GripperFrame) -> str:
+    """Write a folder's grasps as a data set into ``out``; a line that says what was written.
+
+    Raises
+    ------
+    StudyError
+        A file cannot be read or written, or no object has a grasp.
+    """
+    if out.resolve() == index.parent.resolve():
+        raise StudyError(USAGE, f"-o: found '{out}', expected another folder than that of the results")
+    listed: dict[str, list[str]] = {split: [] for split in SPLITS}
+    good = whole = 0
+    with FORMS[form](out) as write:
+        for grasps in _objects(index, gripper):
+            write(grasps)
+            listed[grasps.split].append(grasps.file)
+            good += int(grasps.arrays["object_in_gripper"].sum())
+            whole += len(grasps.arrays["object_in_gripper"])
+    if not whole:
+        raise StudyError(USAGE, f"{index}: found no grasp that is solved; 'softjaw status' says why")
+    for split, files in listed.items():
+        write_file(out / "splits" / f"{split}.txt", "".join(f"{file}\n" for file in files), folders=True)
+    about = {"format": form, "grasps": whole, "successful": good, "splits": {k: len(v) for k, v in listed.items()},
+             "gripper": {"name": gripper.hand.frame, "approach_axis": "z", "closing_axis": gripper.along},
+             "units": _units(), "meaning": MEANING,
+             "object_in_gripper": "holds, does no harm, and this gripper can take it"}
+    write_file(out / "data-set.json", json.dumps(about, indent=1))
+    counts = " and ".join(f"{len(files)} for {split}" for split, files in listed.items())
+    return f"written: {out}: {counts}; {good} of {whole} grasps are successful"
+
+
+# --- formats ----------------------------------------------------------------------------------------------------------
+
+
+def _as_json(grasps: ObjectGrasps) -> str:
+    """One object as GraspGen keeps it; what is not known is null."""
+    about = {"file": grasps.file, "scale": grasps.scale, "mass": plain(grasps.mass)}
+    return json.dumps({"object": about, "grasps": {name: plain(v) for name, v in grasps.arrays.items()}})
+
+
+def _copied(mesh: Path, target: Path) -> None:
+    with beside(target, folders=True) as part:
+        shutil.copyfile(mesh, part)
+
+
+@contextmanager
+def _graspgen(out: Path) -> Iterator[Writer]:
+    """``objects/NAME.stl``, and ``grasps/NAME.json`` for each."""
+
+    def write(grasps: ObjectGrasps) -> None:
+        _copied(grasps.mesh, out / "objects" / grasps.file)
+        write_file(out / "grasps" / f"{grasps.name}.json", _as_json(grasps), folders=True)
+
+    yield write
+
+
+@contextmanager
+def _acronym(out: Path) -> Iterator[Writer]:
+    """``meshes/NAME.stl``, and ``grasps/NAME_SCALE.h5`` for each, with more qualities beside the simulated one."""
+
+    def write(grasps: ObjectGrasps) -> None:
+        _copied(grasps.mesh, out / "meshes" / grasps.file)
+        arrays = dict(grasps.arrays)
+        made = {"object/file": f"meshes/{grasps.file}", "object/scale": grasps.scale, "object/mass": grasps.mass,
+                "grasps/transforms": arrays.pop("transforms"),
+                "grasps/qualities/flex/object_in_gripper": arrays.pop("object_in_gripper").astype(np.int64)}
+        made |= {f"grasps/qualities/softjaw/{name}": values for name, values in arrays.items()}
+        write_arrays(out / "grasps" / f"{grasps.name}_{grasps.scale!r}.h5", made)
+
+    yield write
+
+
+@contextmanager
+def _webdataset(out: Path) -> Iterator[Writer]:
+    """``train-000000.tar``, ...: for each object ``NAME.json``, as GraspGen keeps it, and ``NAME.mesh.stl``."""
+    counts, shards = dict.fromkeys(SPLITS, 0), dict[str, tarfile.TarFile]()
+
+    def write(grasps: ObjectGrasps) -> None:
+        number, position = divmod(counts[grasps.split], SHARD)
+        if not position:
+            made = stack.enter_context(beside(out / f"{grasps.split}-{number:06d}.tar", folders=True))
+            shards[grasps.split] = stack.enter_context(tarfile.open(made, "w"))
+        counts[grasps.split] += 1
+        key = grasps.name.replace(".", "_")  # what follows the first dot is the kind of a file
+        parts = {"json": _as_json(grasps).encode(), f"mesh{grasps.mesh.suffix.lower()}": grasps.mesh.read_bytes()}
+        for kind, content in parts.items():
+            entry = tarfile.TarInfo(f"{key}.{kind}")
+            entry.size = len(content)
+            shards[grasps.split].addfile(entry, io.BytesIO(content))
+
+    with ExitStack() as stack:
+        yield write
+
+
+FORMS = {"graspgen": _graspgen, "acronym": _acronym, "webdataset": _webdataset}
+
+
+def _units() -> dict[str, str]:
+    lengths = dict.fromkeys(("opening", "opening_loaded", "e_n", "transforms"), "m")
+    return {**lengths, "force": "N", "f_x_max": "N", "f_y_max": "N", "tau_z_max": "N m", "payload": "kg"}
+
+
+def _objects(index: Path, gripper: GripperFrame) -> Iterator[ObjectGrasps]:
+    for row in read_index(index)[0]:
+        path = index.parent / row["file"]
+        if row["done"] > 0 and path.exists():
+            ds = open(path)
+            unit = task_keys(ds, "object").get("unit", "m")
+            arrays = grasp_arrays(ds, gripper)
+            yield ObjectGrasps(row["object"], index.parent / row["mesh"], UNITS[unit].size, row["mass"], arrays)
+
+
+def grasp_arrays(ds: xr.Dataset, gripper: GripperFrame) -> Arrays:
+    """Arrays over the grasps of a result file: ``transforms (n, 4, 4)``, ``object_in_gripper (n,)``, maps and surfaces.
+
+    Errors of maps are relative, NaN where they are not known, as is everything of a grasp that was not solved.
+    """
+    flags = judged(ds)
+    ds = ds.assign(flags=(ds.status.dims, flags, ds["flags"].attrs))
+    status = ds.status.values
+    solved = [tuple(map(int, at)) for at in np.argwhere(status == DONE)]
+    refused = [tuple(map(int, at)) for at in np.argwhere(np.isin(status, (WIDE, COLLIDES, SLIPS)))]
+    poses = _poses(ds)
+    refused = [at for at in refused if at[-3] < len(poses)]
+    listed = list(cases(ds, "ccm", [*solved, *refused]))
+    for case, at in zip(listed[len(solved) :], refused, strict=True):
+        for finger, pose in zip(case["fingers"], poses[at[-3]], strict=True):
+            finger |= {"pose_origin": pose.origin, "pose_rotation": pose.rotation}
+    transforms, success = np.tile(np.eye(4), (len(listed), 1, 1)), np.zeros(len(listed), bool)
+    for i, case in enumerate(listed):
+        approach, depth = "minus-x", gripper.hand.depth(gripper.hand.stroke_mm / 1e3)
+        if i < len(solved):
+            approach, hold = next(iter(holds(ds, case, gripper).items()))
+            depth = hold.depth
+            success[i] = not (case["flags"] & LOST or hold.unfit) and case["maps"].get("payload", 1.0) > 0
+        transforms[i, :3, :3], transforms[i, :3, 3] = gripper_frame(case, approach, gripper.along, depth)
+    arrays = {"transforms": transforms, "object_in_gripper": success}
+    arrays["force"] = np.array([case["place"]["normal_force"] for case in listed], float)
+    arrays["flags"] = np.array([case["flags"] for case in listed], np.int64)
+    known = maps_in(ds)
+    for name in (n for q in MAPS for n in (q, f"{q}_error") if n in known):
+        arrays[name] = np.array([case["maps"][name] for case in listed], float)
+    for name in SURFACE:
+        arrays[name] = np.array([[finger[name] for finger in case["fingers"]] for case in listed], float)
+    return arrays
+
+
+def _poses(ds: xr.Dataset) -> list[tuple[Pose, Pose]]:
+    """Poses of the scene's explicit candidates in the frame of the object's file, solved or not."""
+    where = parse_scene(ds.attrs["scene"], check_files=False).candidates
+    own = Pose(np.eye(3), np.zeros(3))
+    return [moved(explicit_poses(pose, own), where.shift, where.roll) for pose in where.poses or ()]

@@ -1,0 +1,131 @@
+"""A folder's grasps as a data set: the fields of each format, labels, poses, splits, and the loader of the examples."""
+
+from __future__ import annotations
+
+import json
+import runpy
+import tarfile
+
+import h5py
+import numpy as np
+import pytest
+
+from softjaw.study.cli import main
+from softjaw.study.export.data_set import FORMS, grasp_arrays
+from softjaw.study.export.selection import GripperFrame
+from softjaw.study.flags import Flag
+from softjaw.study.result.index import blank_row, write_index
+from softjaw.study.result.store import open_result
+from softjaw.study.run.objects import row_of
+from tests.study.export.grasp_results import FORCES, ROOT, STATIONS, geometry, opened, write
+
+NAMES = ("bowl", "cup", "mug.old", "vase")
+SLIPS = 1  # the station whose grasps slip
+COUNT = len(STATIONS) * len(FORCES)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Four objects with a mesh each, and one without a file."""
+    flags = np.zeros((len(STATIONS), 1, len(FORCES)))
+    flags[SLIPS] = Flag.SLIPS
+    out = tmp_path_factory.mktemp("folder")
+    rows = [blank_row("none", state="no grasp", reason="too wide", file="none.hdf", mesh="none.stl")]
+    for name in NAMES:
+        path = write(out / f"{name}.hdf", **{"flags/flags": flags})
+        (out / f"{name}.stl").write_bytes(name.encode())
+        with open_result(path) as result:
+            rows.append(blank_row(name, file=path.name, mesh=f"{name}.stl") | row_of(result))
+    write_index(out / "index.hdf", rows, {})
+    return out
+
+
+@pytest.fixture(scope="module")
+def sets(folder, tmp_path_factory):
+    """The data set in every format."""
+    out = tmp_path_factory.mktemp("sets")
+    for form in FORMS:
+        assert main(["export", str(folder), "--format", form, "-o", str(out / form), "--approach", "minus-x"]) == 0
+    return out
+
+
+def read_shards(out):
+    """Contents by name."""
+    found = {}
+    for path in sorted(out.glob("*.tar")):
+        with tarfile.open(path) as shard:
+            found |= {entry.name: shard.extractfile(entry).read() for entry in shard}
+    return found
+
+
+def test_arrays_are_those_of_the_file(folder):
+    ds = opened(folder / "cup.hdf")
+    arrays = grasp_arrays(ds, GripperFrame(closing="x"))
+    assert {len(values) for values in arrays.values()} == {COUNT}
+    success = arrays["object_in_gripper"].reshape(len(STATIONS), -1)
+    assert (success.all(axis=1) == (np.arange(len(STATIONS)) != SLIPS)).all()
+    assert arrays["force"].reshape(len(STATIONS), -1) == pytest.approx(np.tile(FORCES, (len(STATIONS), 1)))
+    assert arrays["payload"] == pytest.approx(ds.payload.sel(model="ccm").values.ravel())
+    for i in range(len(STATIONS)):
+        R, o, _ = geometry(i)
+        matrix = arrays["transforms"][i * len(FORCES)]
+        assert matrix[:3, 2] == pytest.approx(-R[0][:, 0])  # it approaches against the long side
+        assert matrix[:3, 0] == pytest.approx(R[0][:, 2])  # and closes along x, from finger 1
+        assert matrix[:3, 3] == pytest.approx(o.mean(axis=0))
+    assert arrays["semi_axes"].shape == (COUNT, 2, 3)
+
+
+def test_graspgen_has_its_fields_and_splits_with_relative_paths(sets):
+    out = sets / "graspgen"
+    listed = {split: (out / f"splits/{split}.txt").read_text().split() for split in ("train", "valid")}
+    assert sorted([*listed["train"], *listed["valid"]]) == [f"{name}.stl" for name in NAMES]
+    for name in NAMES:
+        found = json.loads((out / f"grasps/{name}.json").read_text())
+        assert (out / "objects" / found["object"]["file"]).read_bytes() == name.encode()
+        assert found["object"]["scale"] == 1.0
+        assert np.shape(found["grasps"]["transforms"]) == (COUNT, 4, 4)
+        assert sum(found["grasps"]["object_in_gripper"]) == COUNT - len(FORCES)
+    about = json.loads((out / "data-set.json").read_text())
+    assert (about["grasps"], about["successful"]) == (4 * COUNT, 4 * (COUNT - len(FORCES)))
+
+
+def test_acronym_has_its_datasets(sets):
+    with h5py.File(sets / "acronym/grasps/cup_1.0.h5") as file:
+        mesh = file["object/file"][()].decode()
+        assert (sets / "acronym" / mesh).read_bytes() == b"cup"
+        assert file["object/scale"][()] == 1.0
+        assert file["grasps/transforms"].shape == (COUNT, 4, 4)
+        assert int(file["grasps/qualities/flex/object_in_gripper"][()].sum()) == COUNT - len(FORCES)
+        assert file["grasps/qualities/softjaw/payload"].shape == (COUNT,)
+
+
+def test_shards_hold_both_files_of_an_object_side_by_side(sets):
+    found = read_shards(sets / "webdataset")
+    keys = [name.partition(".")[0] for name in found]
+    assert sorted(set(keys)) == ["bowl", "cup", "mug_old", "vase"]
+    assert all(first == other for first, other in zip(keys[::2], keys[1::2], strict=True))
+    assert found["cup.mesh.stl"] == b"cup"
+    assert len(json.loads(found["cup.json"])["grasps"]["force"]) == COUNT
+
+
+def test_the_example_loads_every_object(sets, capsys, monkeypatch):
+    out = sets / "graspgen"
+    loader = runpy.run_path(str(ROOT / "jobs/examples/data_set.py"))["Grasps"]
+    count = {split: len(loader(str(out), split)) for split in ("train", "valid")}
+    assert sum(count.values()) == len(NAMES)
+    assert loader(str(out))[0]["transforms"].shape == (COUNT, 4, 4)
+    monkeypatch.setattr("sys.argv", ["data_set.py", str(out)])
+    runpy.run_path(str(ROOT / "jobs/examples/data_set.py"), run_name="__main__")
+    assert f"of {count['train'] * COUNT} grasps" in capsys.readouterr().out
+
+
+def test_batches_of_torch_hold_single_grasps(sets):
+    data = pytest.importorskip("torch.utils.data", reason="PyTorch is not installed")
+    loader = runpy.run_path(str(ROOT / "jobs/examples/data_set.py"))["Grasps"]
+    batch = next(iter(data.DataLoader(loader(str(sets / "graspgen")), batch_size=1)))
+    assert tuple(batch["transforms"].shape) == (1, COUNT, 4, 4)
+
+
+def test_a_single_file_is_no_data_set(folder, tmp_path):
+    assert main(["export", str(folder / "cup.hdf"), "--format", "acronym", "-o", str(tmp_path / "set")]) == 2
+    assert main(["export", str(folder), "--format", "mjcf", "-o", str(tmp_path / "set")]) == 2
