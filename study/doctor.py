@@ -152,20 +152,12 @@ def ask(code: str, *, prefix: tuple[str, ...] = (), limit: float = 60.0) -> Comp
 
 
 SADDLE = """
-import numpy as np
-from softjaw.fem.petsc import PETSc
+from types import SimpleNamespace; import numpy as np; from softjaw.fem.petsc import PETSc, Factors
 assert PETSc.ScalarType is np.float64, "PETSc was built with complex scalars"
-K = PETSc.Mat().createDense([3, 3], array=np.array([[2.0, 0, 1], [0, 2, 1], [1, 1, 0]]), comm=PETSc.COMM_SELF)
-K = K.convert("aij")
-b, x = K.createVecLeft(), K.createVecRight()
-b.setArray([5.0, 7.0, 3.0])
-ksp = PETSc.KSP().create(PETSc.COMM_SELF)
-ksp.setOperators(K)
-ksp.setType("preonly")
-ksp.getPC().setType("lu")
-ksp.getPC().setFactorSolverType("mumps")
-ksp.solve(b, x)
-assert np.allclose(x.getArray(), [1.0, 2.0, 3.0]), f"MUMPS gave {x.getArray()} for (1, 2, 3)"
+start, column = np.array([0, 3, 6, 9], "i4"), np.tile(np.arange(3, dtype="i4"), 3)
+K = SimpleNamespace(start=start, column=column, values=np.array([2.0, 0, 1, 0, 2, 1, 1, 1, 0]))
+x = Factors(K).solve(np.array([5.0, 7.0, 3.0]))
+assert np.allclose(x, [1.0, 2.0, 3.0]), f"MUMPS gave {x} for (1, 2, 3)"
 print(".".join(map(str, PETSc.Sys.getVersion())), "with real scalars; MUMPS solves a saddle-point system")
 """
 PARALLEL = """

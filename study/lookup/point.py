@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from softjaw.lsfit.surface import LimitSurface
 from softjaw.study.flags import flags_in
 from softjaw.study.lookup.interpolation import Corners, FloatArray, blend, corners, plain
 from softjaw.study.quantities import BOTH_ENDS, BY_KEY, DONE, FAILED, FORCE_RANGE, MAIN, MISSING
 from softjaw.study.quantities import STATES as OF_CASES
 from softjaw.study.units import shown_text
-
-if TYPE_CHECKING:
-    from softjaw.lsfit.surface import LimitSurface
-    from softjaw.study.lookup import GraspMap
 
 STATES = ("inside", "outside the map", "no result beside it", "across a snap-in of the wall", "across another contact")
 INSIDE, OUTSIDE, NO_RESULT, SNAP, JUMP = range(5)
@@ -28,7 +25,7 @@ class GraspPoint:
     Where a point is not inside, values are NaN and `reason` says why.
     """
 
-    map: GraspMap
+    map: Any  # the `GraspMap` that it is a point of
     shape: tuple[int, ...]
     place: FloatArray  # (m, 3) station [m], angle [rad], force [N] as asked for
     corners: Corners

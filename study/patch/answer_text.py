@@ -21,8 +21,8 @@ from softjaw.study.patch.answer import (
     EvaluatedPatch,
     as_record,
     grasp_record,
+    read_patch,
 )
-from softjaw.study.patch.contacts import read_patch
 from softjaw.study.patch.patch_reader import Reading
 from softjaw.study.quantities import MODELS
 from softjaw.study.scene import Scene, SceneError, load_scene
@@ -33,7 +33,7 @@ PICTURES = (".png", ".svg")
 LINE = 110  # characters
 FRICTION_COEFFICIENT, ALONG_PAD = 0.8, np.array([1.0, 0.0, 0.0])
 AXES = ("f_x / S", "f_y / S", "tau_z / S [mm]")
-PLANES = ((0, 1), (0, 2), (1, 2))
+SECTIONS = ((0, 1), (0, 2), (1, 2))
 LOOK: dict[str, dict[str, Any]] = {
     "exact": {"color": "#1d2429", "linewidth": 2.2},
     "three_motions": {"color": "#c05a00", "linestyle": "--"},
@@ -177,9 +177,9 @@ def write_picture(patches: Sequence[EvaluatedPatch], kind: str, path: Path) -> N
     from softjaw.study import pictures  # loads matplotlib, which the text does not need
 
     with pictures.style():
-        drawn, axes = pictures.figure(9.0, 3.1 * len(patches), len(patches), len(PLANES))
+        drawn, axes = pictures.figure(9.0, 3.1 * len(patches), len(patches), len(SECTIONS))
         for row, patch in zip(axes, patches, strict=True):
-            for place, plane in zip(row, PLANES, strict=True):
+            for place, plane in zip(row, SECTIONS, strict=True):
                 place.axhline(0, color=pictures.SOFT, linewidth=0.4)
                 place.axvline(0, color=pictures.SOFT, linewidth=0.4)
                 for name in dict.fromkeys(["exact", "three_motions", kind]):

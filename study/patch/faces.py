@@ -12,7 +12,7 @@ from softjaw.friction.patch import ContactPatch, FloatArray, slivers
 from softjaw.study.messages import USAGE, Problem, StudyError
 
 MOST_PROBLEMS = 10  # reported of one file
-LARGEST = {"centroid": (1e3, "m"), "area": (1e4, "m^2"), "pressure": (1e12, "Pa")}  # beyond is no contact on earth
+CREDIBLE = {"centroid": (1e3, "m"), "area": (1e4, "m^2"), "pressure": (1e12, "Pa")}  # beyond is no contact on earth
 LONGEST_NORMAL, LEAST_LOAD = 1e6, 1e-12  # -, N
 
 
@@ -140,7 +140,7 @@ def _check_range(faces: Faces, wrong: Callable[..., None]) -> None:
           remedy)  # fmt: skip
     wrong(area < 0, "area", lambda i: f"{area[i]:g} m^2", "an area of 0 or more",
           "the normal alone gives the direction of a face")  # fmt: skip
-    for key, (most, unit) in LARGEST.items():
+    for key, (most, unit) in CREDIBLE.items():
         size = np.abs(getattr(faces, key)).reshape(len(area), -1).max(axis=1)
         wrong(size > most, key, lambda i, size=size, unit=unit: f"{size[i]:g} {unit}", f"at most {most:g} {unit}",
               "check the unit")  # fmt: skip

@@ -22,9 +22,8 @@ from softjaw.scoring.quality import Score, grasp_score
 from softjaw.study.case.contact import Contact
 from softjaw.study.case.evaluate import soft
 from softjaw.study.case.limit_surface import STANDS_IN, SurfaceFit, fit_surfaces, six_quartic
-from softjaw.study.patch.answer import FITTED_ON
-from softjaw.study.patch.contacts import check_facing, contact_of, exact_surface, grasp_lengths, opposite
-from softjaw.study.patch.contacts import read_patch as read_file
+from softjaw.study.patch.answer import FITTED_ON, check_facing, contact_of, exact_surface, grasp_lengths, opposite
+from softjaw.study.patch.answer import read_patch as read_file
 from softjaw.study.patch.patch_reader import Reading
 from softjaw.study.quantities import checked_model
 

@@ -156,7 +156,7 @@ def _scene(path):
 
 
 def _patch(path):
-    from softjaw.study.patch.contacts import read_patch
+    from softjaw.study.patch.answer import read_patch
     from softjaw.study.patch.patch_reader import Reading
 
     return read_patch(str(path), Reading("mm", "kpa"))

@@ -9,8 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import softjaw as sj
-from softjaw.study.patch.answer import EvaluatedPatch, as_record, grasp_record
-from softjaw.study.patch.contacts import read_patch
+from softjaw.study.patch.answer import EvaluatedPatch, as_record, grasp_record, read_patch
 from softjaw.study.patch.patch_reader import Reading
 from tests.study.launching import ROOT
 

@@ -16,8 +16,7 @@ from scipy.spatial.transform import Rotation
 from softjaw.friction.frame import FrameFlag, principal_direction
 from softjaw.friction.patch import ContactPatch
 from softjaw.study.cli import main
-from softjaw.study.patch.answer import SURFACES
-from softjaw.study.patch.contacts import check_facing
+from softjaw.study.patch.answer import SURFACES, check_facing
 from softjaw.study.patch.faces import corner_geometry
 from tests.generators import cylinder_grid
 from tests.study.launching import ROOT
