@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,18 +21,7 @@ from softjaw.study.units import shown, shown_unit
 
 FloatArray = NDArray[np.float64]
 MOST_SETTINGS, MOST_VALUES = 12, 8  # that a text lists
-STATES = ("solved in both", "only in a", "only in b", "in neither")
-
-
-@dataclass(frozen=True)
-class Match:
-    """Values of one axis that both files have, at which positions, and those that only one of them has."""
-
-    name: str
-    units: str
-    common: FloatArray
-    at: tuple[NDArray[np.int64], NDArray[np.int64]]
-    only: tuple[FloatArray, FloatArray]
+Block = tuple[NDArray[np.int64], ...]  # of a file: where its common cases lie, as `numpy.ix_` gives it
 
 
 def compare(one: xr.Dataset, other: xr.Dataset, quantity: str = "e_n", model: str = "ccm") -> Table:
@@ -56,34 +45,34 @@ def compare(one: xr.Dataset, other: xr.Dataset, quantity: str = "e_n", model: st
         Different kinds of axes, nothing in common, or an unknown quantity.
     """
     pair = (one, other)
-    axes = _matched(*pair)
-    done = [ds.status.values[_block(axes, i)] == DONE for i, ds in enumerate(pair)]
+    axes, blocks = _matched(*pair)
+    in_a, in_b = (ds.status.values[block] == DONE for ds, block in zip(pair, blocks, strict=True))
+    states = {"solved in both": in_a & in_b, "only in a": in_a & ~in_b, "only in b": ~in_a & in_b,
+              "in neither": ~in_a & ~in_b}  # fmt: skip
     names = [q.name for q in TABLE if q.group == "maps" and q.name != "flags" and q.name in one and q.name in other]
     if quantity not in names:
         text = f"--quantity: found '{quantity}', expected one that both files have: {', '.join(names)}"
         raise StudyError(USAGE, text)
     units = map_row(quantity).unit
-    values = _values(pair, axes, quantity, model)
-    labels = None if one[axes[-3].name].units else one.label.values[axes[-3].at[0]][:, 0]
+    values = _values(pair, blocks, quantity, model)
+    *few, station, angle, _ = axes
+    labels = None if axes[station]["units"] else one.label.values[blocks[0][-3].ravel(), 0]
     rows: list[Row] = []
-    for index in np.ndindex(done[0].shape):
-        place: Row = {axis.name: float(axis.common[i]) for axis, i in zip(axes, index, strict=True)}
+    for index in np.ndindex(in_a.shape):
+        place: Row = {name: float(axis["common"][i]) for (name, axis), i in zip(axes.items(), index, strict=True)}
         place |= {} if labels is None else {"label": str(labels[index[-3]])}
         rows.append(place | {name: found[index] for name, found in values.items()})
-    few = [axis.name for axis in axes if len(axis.common) < 2 and axis is not axes[-1]]
-    hidden = few if labels is None else [*few, "station", "angle"]
-    columns = [Column(axis.name, axis.units, digits=5, people=axis.name not in hidden) for axis in axes]
+    hidden = [name for name in (*few, station, angle) if len(axes[name]["common"]) < 2]
+    hidden += [] if labels is None else [station, angle]
+    columns = [Column(name, axis["units"], digits=5, people=name not in hidden) for name, axis in axes.items()]
     columns += [Column("label", wrap=MOST_VALUES * 3)] * (labels is not None)
     judged = any(value is not None for value in values["beyond_error"].ravel())
     columns += [Column("a", units), Column("b", units), Column("difference", units, "b-a"), Column("relative"),
                 Column("error", units, "errors", digits=2, people=judged),
                 Column("beyond_error", "", "exceeds\nerrors", people=judged)]  # fmt: skip
-    facts = {"files": {"a": str(one.file), "b": str(other.file)}, "settings": _settings(*pair),
-             "axes": {x.name: {"units": x.units, "common": x.common, "only_a": x.only[0], "only_b": x.only[1]}
-                      for x in axes},
-             "states": dict(zip(STATES, (int(np.sum(which)) for which in _states(*done)), strict=True)),
-             "quantity": quantity,
-             "summary": [_summary(name, _values(pair, axes, name, model)) for name in names
+    facts = {"files": {"a": str(one.file), "b": str(other.file)}, "settings": _settings(*pair), "axes": axes,
+             "states": {words: int(cases.sum()) for words, cases in states.items()}, "quantity": quantity,
+             "summary": [_summary(name, _values(pair, blocks, name, model)) for name in names
                          if map_row(name).rank or name == quantity]}  # fmt: skip
     return Table("", columns, rows, _verdict(pair, quantity, model, values), facts, "cases")
 
@@ -129,35 +118,30 @@ def _setting_lines(settings: list[Row] | None, width: int) -> list[str]:
 # --- axes ------------------------------------------------------------------------------------------------------------
 
 
-def _matched(one: xr.Dataset, other: xr.Dataset) -> tuple[Match, ...]:
+def _matched(one: xr.Dataset, other: xr.Dataset) -> tuple[dict[str, Row], list[Block]]:
+    """Values of every axis that both files have, and that only one has; which cases of each file are common."""
     both = axes_of(one), axes_of(other)
     kinds = [[(axis.name, axis.units) for axis in axes] for axes in both]
     if kinds[0] != kinds[1]:
         words = [", ".join(with_unit(*axis) for axis in kind) for kind in kinds]
         text = f"the maps have different axes: {words[0]} in {one.file}, {words[1]} in {other.file}"
         raise StudyError(USAGE, f"{text}; compare files with the same kind of candidates and the same swept keys")
-    axes = tuple(_match(*pair) for pair in zip(*both, strict=True))
-    for axis in axes:
-        if not len(axis.common):
-            a, b = (", ".join(f"{v:.6g}" for v in values[:5]) for values in axis.only)
-            text = f"no common {axis.name} [{axis.units or '-'}]: {a} in {one.file}, {b} in {other.file}"
-            raise StudyError(USAGE, f"{text}; there is nothing to compare")
-    return axes
-
-
-def _match(one: Any, other: Any) -> Match:
-    scale = max(np.abs(one.values).max(), np.abs(other.values).max(), 1e-300)
-    # relative difference of coordinates that is only rounding
-    same = np.abs(one.values[:, None] - other.values) <= 1e-9 * scale
-    if one.options and other.options:  # numbers stand for texts
-        same = np.array(one.options)[:, None] == np.array(other.options)
-    at = np.nonzero(same)
-    only = one.values[~same.any(axis=1)], other.values[~same.any(axis=0)]
-    return Match(one.name, one.units, one.values[at[0]], (at[0], at[1]), only)
-
-
-def _block(axes: tuple[Match, ...], i: int) -> tuple[NDArray[np.int64], ...]:
-    return np.ix_(*(axis.at[i] for axis in axes))
+    axes: dict[str, Row] = {}
+    at = []
+    for a, b in zip(*both, strict=True):
+        scale = max(np.abs(a.values).max(), np.abs(b.values).max(), 1e-300)
+        # relative difference of coordinates that is only rounding
+        same = np.abs(a.values[:, None] - b.values) <= 1e-9 * scale
+        if a.options and b.options:  # numbers stand for texts
+            same = np.array(a.options)[:, None] == np.array(b.options)
+        only = a.values[~same.any(axis=1)], b.values[~same.any(axis=0)]
+        if not same.any():
+            lists = (", ".join(f"{v:.6g}" for v in values[:5]) for values in only)
+            text = " and ".join(f"{values} in {ds.file}" for values, ds in zip(lists, (one, other), strict=True))
+            raise StudyError(USAGE, f"no common {a.name} [{a.units or '-'}]: {text}; there is nothing to compare")
+        at.append(np.nonzero(same))
+        axes[a.name] = {"units": a.units, "common": a.values[at[-1][0]], "only_a": only[0], "only_b": only[1]}
+    return axes, [np.ix_(*(pair[i] for pair in at)) for i in (0, 1)]
 
 
 def _left_out(name: str, axis: dict[str, Any]) -> list[str]:
@@ -170,21 +154,16 @@ def _left_out(name: str, axis: dict[str, Any]) -> list[str]:
     return lines
 
 
-def _states(a: NDArray[np.bool_], b: NDArray[np.bool_]) -> tuple[Any, ...]:
-    """Where cases are in each of `STATES`."""
-    return a & b, a & ~b, ~a & b, ~a & ~b
-
-
 # --- differences -----------------------------------------------------------------------------------------------------
 
 
 def _values(
-    pair: tuple[xr.Dataset, xr.Dataset], axes: tuple[Match, ...], name: str, model: str
+    pair: tuple[xr.Dataset, xr.Dataset], blocks: list[Block], name: str, model: str
 ) -> dict[str, NDArray[Any]]:
     """Columns of a map over the common cases; NaN where a file has no result, None where an error is unknown."""
-    a, b = (values_of(ds, name, model)[_block(axes, i)] for i, ds in enumerate(pair))
-    errors = [_error(ds, name, model) for ds in pair]
-    error = sum(np.full(a.shape, np.nan) if e is None else e[_block(axes, i)] for i, e in enumerate(errors))
+    a, b = (values_of(ds, name, model)[block] for ds, block in zip(pair, blocks, strict=True))
+    errors = zip((_error(ds, name, model) for ds in pair), blocks, strict=True)
+    error = sum(np.full(a.shape, np.nan) if e is None else e[block] for e, block in errors)
     change, size = b - a, np.abs(a)
     beyond = (np.abs(change) > error + TIE * size).astype(object)
     beyond[~(np.isfinite(change) & np.isfinite(error))] = None

@@ -26,6 +26,7 @@ from softjaw.study.show.grasps import (
     spoken,
 )
 from softjaw.study.show.object_surface import scene_at, undeformed
+from softjaw.study.show.report.maps import ticks
 from softjaw.study.show.view.model import View
 
 # map, title, factor from SI; "F" divides by the normal force
@@ -74,7 +75,7 @@ def worth_a_curve(ds: xr.Dataset) -> list[int]:
 def _models(ds: xr.Dataset, position: int, index: Index, mu: float | None) -> Block:
     """Six quantities in all friction models along one axis."""
     made = plots.figure(2, 3, [title for _, title, _ in PANELS], vertical_spacing=0.16, horizontal_spacing=0.07)
-    x, settings = abscissa(ds, position)
+    x, settings = ticks(ds, position, by_name=False)
     cut, over_force = along(position, index), position == len(index) - 1
     for k, (name, _, factor) in enumerate(PANELS):
         row, column = k // 3 + 1, k % 3 + 1
@@ -92,15 +93,6 @@ def _models(ds: xr.Dataset, position: int, index: Index, mu: float | None) -> Bl
     caption = f"{where[:1].upper()}{where[1:]}; F is the normal force of one finger.{rule}{bars}"
     alt = f"Six quantities over {spoken(str(ds.status.dims[position]))} for three friction models; {where}."
     return plot(made, caption, alt, 560)
-
-
-def abscissa(ds: xr.Dataset, position: int) -> tuple[Any, dict[str, Any]]:
-    """Values of an axis, and its settings in a figure."""
-    axis = str(ds.status.dims[position])
-    title = "normal force per finger [N]" if axis == "normal_force" else axis_label(ds, axis)
-    if texts := ds[axis].attrs.get("options", ()):
-        return [label(t) for t in texts], {"title_text": title, "type": "category"}
-    return axis_values(ds, axis), {"title_text": title}
 
 
 # --- what curvature costs --------------------------------------------------------------------------------------------

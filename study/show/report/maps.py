@@ -51,13 +51,13 @@ def plane(array: np.ndarray, x: int, y: int, index: Sequence[int]) -> np.ndarray
     return cut if y < x else cut.T
 
 
-def ticks(ds: xr.Dataset, position: int) -> tuple[Any, dict[str, Any]]:
-    """Values of an axis for a figure, and its settings: names and few levels as categories, else numbers."""
+def ticks(ds: xr.Dataset, position: int, by_name: bool = True) -> tuple[Any, dict[str, Any]]:
+    """Values of an axis for a figure, and its settings: names, and (``by_name``) few levels, as categories."""
     axis = str(ds.status.dims[position])
     values, texts = axis_values(ds, axis), list(ds[axis].attrs.get("options", ()))
     if axis == "station" and ds.attrs["poses"]:
         texts = [str(name) or str(i) for i, name in enumerate(ds.label.values[:, 0])]
-    elif len(values) == 1 or (axis in ("angle", "normal_force") and len(values) <= MOST_LABELS):
+    elif by_name and (len(values) == 1 or (axis in ("angle", "normal_force") and len(values) <= MOST_LABELS)):
         texts = [number(v, 5) for v in values]
     settings = {"title_text": axis_label(ds, axis)}
     return ([label(t) for t in texts], settings | {"type": "category"}) if texts else (values, settings)
