@@ -72,15 +72,15 @@ def table(
     return {"kind": "table", "caption": caption, "head": head, "rows": rows, "looks": looks, "first": first}
 
 
-def block_of(found: Table, first: bool = False) -> Block:
+def block_of(shown: Table, first: bool = False) -> Block:
     """The columns for people of a table, as a block; what is wrapped in a text is text here."""
-    columns = [c for c in found.columns if c.people]
+    columns = [c for c in shown.columns if c.people]
     heads = [with_unit(c.label or c.name, shown_unit(c.unit)) for c in columns]
     # A number stays in one line with its error.
-    cells = ([(c, found.cell(row, c)) for c in columns] for row in found.rows)
+    cells = ([(c, shown.cell(row, c)) for c in columns] for row in shown.rows)
     rows = [[text if c.wrap else text.replace(" ", "\N{NO-BREAK SPACE}") for c, text in row] for row in cells]
     texts = [i for i, c in enumerate(columns) if c.wrap]
-    return table(found.title, heads, rows, texts[:-1], texts[-1:], first)
+    return table(shown.title, heads, rows, texts[:-1], texts[-1:], first)
 
 
 def objects(caption: str, columns: Sequence[tuple[str, str]], rows: Sequence[Block]) -> Block:

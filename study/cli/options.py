@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import difflib
 import math
 import shutil
 import textwrap
@@ -11,7 +10,7 @@ from argparse import ArgumentTypeError
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from softjaw.study.messages import MEANING, first_rank
+from softjaw.study.messages import MEANING, closest, first_rank
 from softjaw.study.quantities import RANKED_BY
 
 MILLION = 10**6
@@ -280,8 +279,8 @@ def _meant(word: str, known: Sequence[str]) -> str:
     >>> _meant("shwo", ["show", "run"]), _meant("x", ["show", "run"])
     ("; did you mean 'show'?", ';')
     """
-    near = difflib.get_close_matches(word, known, n=1, cutoff=0.5)
-    return f"; did you mean '{near[0]}'?" if near else ";"
+    near = closest(word, known)
+    return f"; did you mean '{near}'?" if near else ";"
 
 
 class Program(Parser):

@@ -14,7 +14,7 @@ from softjaw.study.quantities import BY_KEY
 from softjaw.study.result.read import axes_of, maps_in, values_of
 from softjaw.study.result.store import place_text
 from softjaw.study.scene import SceneError, parse_scene
-from softjaw.study.units import UNITS, split_unit
+from softjaw.study.units import in_si
 
 
 class Source:
@@ -57,7 +57,7 @@ def _sweep_point(axes: Any, where: Mapping[str, Any]) -> tuple[tuple[int, ...], 
     index, point, left = [], {}, dict(where)
     for axis in axes:
         key = axis.long_name
-        factor = _size(key)
+        factor = in_si(key, 1.0)
         options: list[Any] = [*axis.options] or [v / factor for v in axis.values.tolist()]
         known = f"{key} = {', '.join(map(_text, options))}"
         if key not in left and axis.name not in left:
@@ -76,11 +76,6 @@ def _sweep_point(axes: Any, where: Mapping[str, Any]) -> tuple[tuple[int, ...], 
         known = ", ".join(axis.long_name for axis in axes) or "nothing: the file has no sweep"
         raise ValueError(f"where has {', '.join(left)}: expected {known}")
     return tuple(index), point
-
-
-def _size(key: str) -> float:
-    unit = split_unit(key)[1]
-    return UNITS[unit].size if unit else 1.0
 
 
 def _same(option: Any, given: Any) -> bool:

@@ -168,8 +168,8 @@ def _values(
     beyond = (np.abs(change) > error + TIE * size).astype(object)
     beyond[~(np.isfinite(change) & np.isfinite(error))] = None
     relative = np.divide(change, size, out=np.full(size.shape, np.nan), where=size > 0)
-    found = {"a": a, "b": b, "difference": change, "relative": relative, "error": error}
-    return {name: values.astype(object) for name, values in found.items()} | {"beyond_error": beyond}
+    columns = {"a": a, "b": b, "difference": change, "relative": relative, "error": error}
+    return {name: values.astype(object) for name, values in columns.items()} | {"beyond_error": beyond}
 
 
 def _error(ds: xr.Dataset, name: str, model: str) -> FloatArray | None:

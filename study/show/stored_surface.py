@@ -47,18 +47,18 @@ class StoredSurface:
         if self.patch is None:
             return None
         S = float((self.patch.pressure * self.patch.area).sum())
-        found = friction_wrench(self.patch, twist / [1, 1, self.rho], 1.0, self.model)[:, AXES]
-        return found / (S * np.array([1.0, 1.0, self.rho]))
+        wrench = friction_wrench(self.patch, twist / [1, 1, self.rho], 1.0, self.model)[:, AXES]
+        return wrench / (S * np.array([1.0, 1.0, self.rho]))
 
     def samples(self, count: int) -> Any:
         """Exact wrenches of evenly spread motions and of their opposites ``(2 count, 3)`` [-]."""
-        found = self.wrenches(fibonacci_twists(count, 1.0))
-        return None if found is None else np.vstack([found, -found])
+        wrenches = self.wrenches(fibonacci_twists(count, 1.0))
+        return None if wrenches is None else np.vstack([wrenches, -wrenches])
 
     def outline(self, i: int, j: int, count: int = 90) -> Any:
         """Exact outline of the body's shadow on the plane of two components ``(count, 2)`` [-]."""
-        found = self.wrenches(circle(i, j, count))
-        return None if found is None else found[:, [i, j]]
+        wrenches = self.wrenches(circle(i, j, count))
+        return None if wrenches is None else wrenches[:, [i, j]]
 
 
 def circle(i: int, j: int, count: int) -> np.ndarray:
@@ -96,9 +96,9 @@ def body(surface: StoredSurface) -> np.ndarray | None:
 
 def weaker(ds: xr.Dataset, index: Index) -> int:
     """The finger that carries the smaller torque."""
-    found = field(ds, "finger_tau_z_max")
+    torques = field(ds, "finger_tau_z_max")
     # Where the torques tie, the same finger is shown on every machine.
-    return 0 if found is None else largest(-np.nan_to_num(found[index][:, 0]))
+    return 0 if torques is None else largest(-np.nan_to_num(torques[index][:, 0]))
 
 
 def stored_surface(
@@ -110,10 +110,10 @@ def stored_surface(
     """
     m = MODELS.index(model)
     names = ("limit_surface_semi_axes", "limit_surface_rho", "finger_S", "finger_f_x_max")
-    found = [field(ds, name) for name in names]
-    if ds.status.values[index] != DONE or any(f is None or not np.isfinite(f[index][finger]).all() for f in found):
+    fields = [field(ds, name) for name in names]
+    if ds.status.values[index] != DONE or any(f is None or not np.isfinite(f[index][finger]).all() for f in fields):
         return None
-    semi_axes, rho, S, f_x = (f[index][finger] for f in found)
+    semi_axes, rho, S, f_x = (f[index][finger] for f in fields)
     planar = f_x[MODELS.index("pcm")]
     # A contact without friction or load has nothing to be divided by.
     if not (S > 0 and rho > 0 and planar > 0 and semi_axes[m].min() >= 0):
@@ -132,6 +132,6 @@ def _patch(ds: xr.Dataset, index: Index, finger: int, faces: dict[str, np.ndarra
     origin, axes = field(ds, "finger_frame_origin"), field(ds, "finger_frame_axes")
     if not faces or origin is None or axes is None:
         return None
-    own, R = {name: values[finger] for name, values in faces.items()}, axes[index][finger]
-    centroid = (own["centroid"] - origin[index][finger]) @ R.T
-    return ContactPatch(centroid, own["area"], own["normal"] @ R.T, own["pressure"])
+    own_faces, R = {name: values[finger] for name, values in faces.items()}, axes[index][finger]
+    centroid = (own_faces["centroid"] - origin[index][finger]) @ R.T
+    return ContactPatch(centroid, own_faces["area"], own_faces["normal"] @ R.T, own_faces["pressure"])

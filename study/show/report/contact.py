@@ -81,8 +81,8 @@ def front(pad: Pad, motion: str, top: float, bar: bool) -> list[Any]:
 def limit_surfaces(view: View, index: Index) -> Block | None:
     """Shadows of the weaker finger's limit surfaces, CCM beside PCM, and both in space; None where none is stored."""
     ds, finger, faces = view.ds, weaker(view.ds, index), view.faces(index)
-    found = {model: stored_surface(ds, index, finger, model, faces) for model in ("ccm", "pcm")}
-    known = {model: s for model, s in found.items() if s is not None and s.ellipsoid.rank == 3}
+    stored = {model: stored_surface(ds, index, finger, model, faces) for model in ("ccm", "pcm")}
+    known = {model: s for model, s in stored.items() if s is not None and s.ellipsoid.rank == 3}
     if not known:
         return None
     made = plots.figure(2, 3, specs=[[{}, {}, {}], [{"type": "scene", "colspan": 3}, None, None]],

@@ -56,13 +56,13 @@ def along(position: int, index: Index) -> tuple[Any, ...]:
 def models(ds: xr.Dataset, best: Index, mu: float | None) -> list[Block]:
     """Curves over the force for the best case and one other, and over every axis that is worth it for the best."""
     other, why = compared(ds)
-    found = []
+    blocks = []
     for index, role in [(best, "Best case"), *([(other, f"For comparison, {why}")] if other else [])]:
-        found += [heading(f"{role}, over the force: {place(ds, index)}"), _models(ds, len(best) - 1, index, mu)]
+        blocks += [heading(f"{role}, over the force: {place(ds, index)}"), _models(ds, len(best) - 1, index, mu)]
     for position in worth_a_curve(ds):
         name = spoken(str(ds.status.dims[position]))
-        found += [heading(f"Over the {name}, all else as in the best case"), _models(ds, position, best, mu)]
-    return found
+        blocks += [heading(f"Over the {name}, all else as in the best case"), _models(ds, position, best, mu)]
+    return blocks
 
 
 def worth_a_curve(ds: xr.Dataset) -> list[int]:
@@ -80,8 +80,8 @@ def _models(ds: xr.Dataset, position: int, index: Index, mu: float | None) -> Bl
     for k, (name, _, factor) in enumerate(PANELS):
         row, column = k // 3 + 1, k % 3 + 1
         scale = factor if factor != "F" else 1 / (forces(ds) if over_force else forces(ds)[index[-1]])
-        by_model = {m: found[cut] * scale for m in (MODELS if name != "closing" else ("ccm",))
-                    if (found := field(ds, name, m)) is not None}  # fmt: skip
+        by_model = {m: values[cut] * scale for m in (MODELS if name != "closing" else ("ccm",))
+                    if (values := field(ds, name, m)) is not None}  # fmt: skip
         error = field(ds, f"{name}_error")
         plots.lines(made, x, by_model, row, column, None if error is None else by_model["ccm"] * error[cut])
         if factor == "F" and mu is not None:
@@ -104,8 +104,8 @@ def differences(ds: xr.Dataset, scene: Any, index: Index) -> list[Block]:
     lines = {} if position is None else overestimates(ds, position, index)
     if position is None or not lines:
         return []
-    found = abscissas(ds, scene, position, index)
-    return [_differences(ds, name, x, lines, index) for name, x in found.items() if np.isfinite(x).any()]
+    abscissae = abscissas(ds, scene, position, index)
+    return [_differences(ds, name, x, lines, index) for name, x in abscissae.items() if np.isfinite(x).any()]
 
 
 def shape_axis(ds: xr.Dataset, scene: Any) -> int | None:
@@ -119,13 +119,13 @@ def shape_axis(ds: xr.Dataset, scene: Any) -> int | None:
 
 def overestimates(ds: xr.Dataset, position: int, index: Index) -> dict[tuple[str, str], Any]:
     """Overestimate of each planar model and component along an axis [-], and its error or None."""
-    found, cut = {}, along(position, index)
+    shares, cut = {}, along(position, index)
     for model, suffix in (("pcm", ""), ("pcm_projected", "_pcm_projected")):
         for key in COMPONENTS:
             values, error = (field(ds, f"{key}_overestimate{suffix}{end}") for end in ("", "_error"))
             if values is not None and np.isfinite(values[cut]).any():
-                found[model, key] = (values[cut], None if error is None else error[cut])
-    return found
+                shares[model, key] = (values[cut], None if error is None else error[cut])
+    return shares
 
 
 def abscissas(ds: xr.Dataset, scene: Any, position: int, index: Index) -> dict[str, np.ndarray]:
@@ -195,8 +195,8 @@ def wall_curves(ds: xr.Dataset, index: Index, allowed: float | None) -> Block | 
         name = label(place(ds, (*index[:-3], i, *index[-2:])))
         look = {"color": "#12436d" if own else "#aeb6bc", "width": 2.5 if own else 1}
         symbols = ["circle", *np.where(snapped[i], "diamond-open", "circle")]
-        for column, found in enumerate((closing, indentation), start=1):
-            made.add_scatter(x=[0, *1e3 * found[cut][i]], y=[0, *forces(ds)], mode="lines+markers", line=look,
+        for column, displacement in enumerate((closing, indentation), start=1):
+            made.add_scatter(x=[0, *1e3 * displacement[cut][i]], y=[0, *forces(ds)], mode="lines+markers", line=look,
                              marker={"symbol": symbols, "size": 6}, name=name, showlegend=False, connectgaps=False,
                              row=1, col=column)  # fmt: skip
     if allowed is not None:
@@ -211,10 +211,10 @@ def wall_curves(ds: xr.Dataset, index: Index, allowed: float | None) -> Block | 
 
 def wall_section(view: View, index: Index) -> Block | None:
     """Sections through the outer face of a deformed wall beside the undeformed one; None where none is stored."""
-    found, origin = view.displacement(index), field(view.ds, "finger_pose_origin")
-    if found is None or origin is None:
+    displaced, origin = view.displacement(index), field(view.ds, "finger_pose_origin")
+    if displaced is None or origin is None:
         return None
-    u, angle = found
+    u, angle = displaced
     before: Any = undeformed(view.scene.object, angle)
     out = np.array([math.cos(angle), math.sin(angle), 0.0])
     beside = np.array([-out[1], out[0], 0.0])

@@ -65,17 +65,17 @@ def ticks(ds: xr.Dataset, position: int, by_name: bool = True) -> tuple[Any, dic
 
 def different_angles(ds: xr.Dataset) -> list[int]:
     """Angles whose maps are not those of an earlier angle (images by symmetry)."""
-    found: list[int] = []
+    different: list[int] = []
     arrays = [np.moveaxis(a, -2, 0) for name in FIRST if (a := field(ds, name)) is not None]
     states = np.moveaxis(ds.status.values, -2, 0)
     for j in range(len(states)):
         same = any(
             np.array_equal(states[i], states[j])
             and all(np.allclose(a[i], a[j], rtol=1e-9, atol=0, equal_nan=True) for a in arrays)
-            for i in found
+            for i in different
         )
-        found += [] if same else [j]
-    return found
+        different += [] if same else [j]
+    return different
 
 
 def some(values: Sequence[int], kept: int) -> list[int]:
@@ -156,8 +156,8 @@ def _button(ds: xr.Dataset, name: str, cuts: Any, x: int, y: int) -> dict[str, A
     title, factor = label_of(ds, name), quantity(ds, name)[2]
     if name.endswith("_error") and factor == 1:
         title, factor = f"{title} [%]", 100.0
-    found = {m: field(ds, name, m) for m, _ in cuts}
-    z = [np.full((1, 1), np.nan) if found[m] is None else factor * plane(found[m], x, y, here) for m, here in cuts]
+    arrays = ((field(ds, name, m), at) for m, at in cuts)
+    z = [np.full((1, 1), np.nan) if array is None else factor * plane(array, x, y, at) for array, at in arrays]
     axes = [str(ds.status.dims[a]) for a in (x, y)]
     (xl, xu), (yl, yu) = ((spoken(axis), unit_of(ds[axis].units)[0]) for axis in axes)
     hover = f"{xl} %{{x}} {xu}, {yl} %{{y}} {yu}<br>{label(title)}: %{{z:.4g}}<br>%{{customdata}}<extra></extra>"
@@ -173,8 +173,8 @@ def _notes(ds: xr.Dataset) -> np.ndarray | None:
     status = ds.status.values
     if status.size > MOST_NOTES:
         return None
-    found = [label(NOT_SOLVED[int(status[i])] + note(ds, i)) for i in np.ndindex(status.shape)]
-    return np.array(found, object).reshape(status.shape)
+    notes = [label(NOT_SOLVED[int(status[i])] + note(ds, i)) for i in np.ndindex(status.shape)]
+    return np.array(notes, object).reshape(status.shape)
 
 
 def elsewhere(ds: xr.Dataset, index: Index, *drawn: int) -> str:
@@ -236,7 +236,7 @@ def levels(ds: xr.Dataset, index: Index) -> Block | None:
     x, y = main_axis(ds), len(index) - 2
     indicator = np.full(level.shape, np.nan) if indicator is None else indicator
     # one value of a candidate at all its forces
-    top, depth = (plane(np.fmax.reduce(found, axis=-1), x, y, index) for found in (level, indicator))
+    top, depth = (plane(np.fmax.reduce(array, axis=-1), x, y, index) for array in (level, indicator))
     (xv, xs), (yv, ys) = ticks(ds, x), ticks(ds, y)
     steps = [[(i + s) / 3, c] for i, c in enumerate(LEVEL_COLOURS) for s in (0, 1)]
     bar = {"tickvals": [0, 1, 2], "ticktext": list(EFFECTS["object"]), "thickness": 14}
@@ -264,7 +264,7 @@ def effort(ds: xr.Dataset, index: Index) -> Block | None:
         made.add_bar(x=values, y=_sums(ds, f"work_seconds_{part}", x, index), name=part, marker_color=colour, row=1,
                      col=3)  # fmt: skip
     made.update_layout(barmode="stack", legend={"y": -0.3}).update_xaxes(**settings)
-    iterations, halvings = (number(np.nansum(found), 6) for found in sums)
+    iterations, halvings = (number(np.nansum(counts_of), 6) for counts_of in sums)
     summary = f"{iterations} Newton iterations and {halvings} halved load steps in all"
     caption = f"Sums over all forces and angles, images of a grasp included though they are solved once: {summary}."
     return plot(made, caption, f"Effort over {spoken(str(ds.status.dims[x]))}: {summary}.", 320)

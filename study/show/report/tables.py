@@ -47,13 +47,13 @@ def best_grasps(ds: xr.Dataset) -> list[Block]:
         return []
     table_ = best(ds, top=BEST, lines=True, maps=SHOWN)
     tops = [top for k in range(len(forces(ds))) for top in order(ds, k)[:1]]
-    found = [block_of(table_, first=True)]
+    blocks = [block_of(table_, first=True)]
     if len(forces(ds)) > 1:
-        found.append(block_of(replace(case_table(ds, tops, maps=SHOWN), title="Best grasp at each force")))
+        blocks.append(block_of(replace(case_table(ds, tops, maps=SHOWN), title="Best grasp at each force")))
     marks = int(np.bitwise_or.reduce([ds["flags"].values[index] for index in tops]))
     marks |= int(np.bitwise_or.reduce([row["flags"] for row in table_.rows]))
     words = [f"{flag.word}: {flag.sentence}." for flag in flags_in(marks)]
-    return found + [text(sentence, "note") for sentence in [*[SAFE] * ("force_high" in ds), *words]]
+    return blocks + [text(sentence, "note") for sentence in [*[SAFE] * ("force_high" in ds), *words]]
 
 
 def states(ds: xr.Dataset) -> list[Block]:
@@ -71,11 +71,11 @@ def reasons(ds: xr.Dataset, *wanted: int) -> list[Block]:
             for kind in kinds[:MOST_REASONS]]  # fmt: skip
     caption = "Notes on solved cases" if wanted == (DONE,) else "Why cases have no result"
     head = ["state", "cases", "message (one example)", "where"]
-    found = [table(caption, head, rows, texts=(0,), wide=(2, 3))] if rows else []
+    blocks = [table(caption, head, rows, texts=(0,), wide=(2, 3))] if rows else []
     if len(kinds) > MOST_REASONS:
         more = f"{len(kinds) - MOST_REASONS} more kinds of messages are in status/message of the file."
-        found.append(text(more, "note"))
-    return found
+        blocks.append(text(more, "note"))
+    return blocks
 
 
 def _places(ds: xr.Dataset, cases: list[tuple[int, ...]]) -> str:
@@ -101,11 +101,11 @@ def checks(ds: xr.Dataset) -> Block:
     """The worst value of each check over all solved cases, and where it was found."""
     rows = []
     for name in (*LIMITS, "max_strain"):
-        found = field(ds, f"check_{name}")
-        if found is None:
+        values = field(ds, f"check_{name}")
+        if values is None:
             continue
-        index = unravelled(largest(-found if name in ABOVE else found), found.shape)
-        worst = float(found[index])
+        index = unravelled(largest(-values if name in ABOVE else values), values.shape)
+        worst = float(values[index])
         limit = f"> {LIMITS[name]:g}" if name in ABOVE else f"≤ {number(LIMITS[name])}" if name in LIMITS else "-"
         state = "-" if name not in LIMITS else "passed" if passes(name, worst) else "not passed"
         rows.append([spoken(name), number(worst), limit, state, place(ds, index[:-1], force=True)])
@@ -218,7 +218,7 @@ def provenance(ds: xr.Dataset) -> list[Block]:
         for i, s in enumerate(sessions, start=1)
     ]  # fmt: skip
     head = ["session", "start", "stop", "how it ended", "ranks", "solved", "failed"]
-    found = [table("Sessions", head, rows, texts=(1, 2, 3))]
+    blocks = [table("Sessions", head, rows, texts=(1, 2, 3))]
     kinds: dict[tuple[str, ...], list[str]] = {}
     for i, s in enumerate(sessions, start=1):
         key = tuple(s[k] for k in ("program", "git", "versions", "host", "cpu", "command", "petsc_options"))
@@ -227,5 +227,5 @@ def provenance(ds: xr.Dataset) -> list[Block]:
     for key, which in kinds.items():
         rows = [[name, given] for name, given in zip(names, key, strict=True) if given]
         caption = f"Program and machine of session {', '.join(which)}"
-        found.append(table(caption, ["what", "value"], rows, texts=(0,), wide=(1,)))
-    return found
+        blocks.append(table(caption, ["what", "value"], rows, texts=(0,), wide=(1,)))
+    return blocks

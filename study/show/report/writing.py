@@ -177,8 +177,8 @@ def _maps(ds: xr.Dataset, index: Index) -> Any:
     # Forces by number: their steps may grow by decades, and each needs a row to be seen.
     borders = edges(axis_values(ds, axis)), np.arange(len(forces(ds)) + 1) - 0.5
     for column, name in enumerate(FIRST):
-        found = field(ds, name)
-        z = np.full(ds.status.shape, np.nan) if found is None else quantity(ds, name)[2] * found
+        values_of = field(ds, name)
+        z = np.full(ds.status.shape, np.nan) if values_of is None else quantity(ds, name)[2] * values_of
         low, high = pictures.span(z)
         for panel, j in zip(axes[:, column], rows, strict=True):
             here = (*index[:angle], j, index[-1])

@@ -116,9 +116,9 @@ class View:
     @cached_property
     def owner(self) -> np.ndarray:
         """Candidate of every point of `surface` ``(n,)``, -1 for none."""
-        found = np.full(len(self.surface.points), NOBODY)
-        found[self.surface.triangles] = self.surface.candidate[:, None]
-        return found
+        owners = np.full(len(self.surface.points), NOBODY)
+        owners[self.surface.triangles] = self.surface.candidate[:, None]
+        return owners
 
     @cached_property
     def marks(self) -> tuple[np.ndarray, np.ndarray]:
@@ -166,8 +166,8 @@ class View:
     def load(self) -> None:
         """Read the contact faces of all cases at once; else those of a station are read when they are needed."""
         if self.ds.attrs["patches"]:
-            found = read_patch(self.ds.attrs["file"], **self._here(self.point))
-            self._faces = {i: found.isel(station=i) for i in range(self.ds.sizes["station"])}
+            patches = read_patch(self.ds.attrs["file"], **self._here(self.point))
+            self._faces = {i: patches.isel(station=i) for i in range(self.ds.sizes["station"])}
 
     def faces(self, index: Index) -> Faces:
         """Stored contact faces of both fingers at a case, by name; empty where there are none."""
@@ -175,8 +175,8 @@ class View:
             return {}
         if index[-3] not in self._faces:
             self._faces[index[-3]] = read_patch(self.ds.attrs["file"], **self._here(index[:-2]))
-        found = {str(name): v.values[index[-2:]] for name, v in self._faces[index[-3]].data_vars.items()}
-        return found if all(np.isfinite(values).all() for values in found.values()) else {}
+        faces = {str(name): v.values[index[-2:]] for name, v in self._faces[index[-3]].data_vars.items()}
+        return faces if all(np.isfinite(values).all() for values in faces.values()) else {}
 
     def pads(self, index: Index) -> list[Pad]:
         """Both pads of a case; empty where it is not solved."""
@@ -189,8 +189,8 @@ class View:
 
     def eye(self, index: Index) -> tuple[np.ndarray, np.ndarray]:
         """Where one sees finger 1 obliquely from behind and the object upright: direction of the eye, and up."""
-        found = self.pads(index)
-        out = -found[0].approach if found else np.array([1.0, 0.0, 0.0])
+        pads = self.pads(index)
+        out = -pads[0].approach if pads else np.array([1.0, 0.0, 0.0])
         up = np.array([0.0, 0.0, 1.0]) if abs(out[2]) < 0.9 else np.array([0.0, 1.0, 0.0])
         beside = np.cross(up, out)
         return 0.72 * out + 0.62 * beside / np.linalg.norm(beside) + 0.35 * up, up

@@ -103,17 +103,17 @@ def case(view: View, index: Index, motion: str, whole: bool) -> dict[str, Any]:
     pressed = [pad.pressed() for pad in both]
     corners = np.concatenate([np.empty((0, 4, 3)), *(c for c, _ in pressed)])
     step = float(np.abs(corners).max(initial=1e-3)) / 32767
-    found: dict[str, Any] = {
+    parts: dict[str, Any] = {
         "pads": len(both), "step": step, "faces": _packed(np.round(corners / step), "<i2"),
         "lines": _packed(_joined([1e3 * pad.lines() for pad in both]), "<f4"),
         "pressure": _packed(np.concatenate([np.empty(0), *(p for _, p in pressed)]), "<f4"),
         "arrows": _packed(_joined([pad.arrows(motion, ARROW_MM) for pad in both]), "<f4"),
     }  # fmt: skip
     if (moved := view.displacement(index)) is not None:
-        found |= {"wall": _packed(1e3 * moved[0], "<f4"), "angle": moved[1]}
+        parts |= {"wall": _packed(1e3 * moved[0], "<f4"), "angle": moved[1]}
     if whole and (points := view.limit(index)) is not None:
-        found |= {"limit": _packed(points, "<f4"), "rows": points.shape[0]}
-    return found
+        parts |= {"limit": _packed(points, "<f4"), "rows": points.shape[0]}
+    return parts
 
 
 def _joined(segments: list[np.ndarray]) -> np.ndarray:

@@ -146,8 +146,8 @@ def pads_of(ds: xr.Dataset, gripper: Any, index: Index, faces: Faces, placed: Po
     if not all(np.isfinite(s).all() for s in stored):
         return []
     deepest = ds.variables["check_penetration_depth"].values[index] if "check_penetration_depth" in ds else np.zeros(2)
-    found = [_pad(gripper, {n: v[k] for n, v in faces.items()}, *(s[k] for s in stored)) for k in (0, 1)]
-    return [replace(pad, lift=LIFT + float(d)) for pad, d in zip(found, np.nan_to_num(deepest), strict=True)]
+    pads = [_pad(gripper, {n: v[k] for n, v in faces.items()}, *(s[k] for s in stored)) for k in (0, 1)]
+    return [replace(pad, lift=LIFT + float(d)) for pad, d in zip(pads, np.nan_to_num(deepest), strict=True)]
 
 
 def _pad(gripper: Any, faces: Faces, R: Any, o: Any, closing: Any, axes: Any, origin: Any) -> Pad:

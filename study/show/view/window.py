@@ -95,10 +95,10 @@ def _pads(plotter: Any, view: View, index: Index, motion: str) -> None:
     """Both pads: see-through sides, pressure on the loaded faces, and the friction of these."""
     for name in [name for name in plotter.actors if name.startswith("pad ")]:
         plotter.remove_actor(name, render=False)
-    found = view.pads(index)
-    top = max((1e-3 * pad.pressure.max(initial=0.0) for pad in found), default=0.0)
+    pads = view.pads(index)
+    top = max((1e-3 * pad.pressure.max(initial=0.0) for pad in pads), default=0.0)
     bar = {**BAR, "position_y": 0.1, "title": "contact pressure [kPa]"}
-    for number, pad in enumerate(found):
+    for number, pad in enumerate(pads):
         block(plotter, pad, f"pad {number}")
         if pad.loaded.any():
             pressures(plotter, pad, top, name=f"pad {number} pressure", scalar_bar_args=bar, pickable=False)
@@ -152,9 +152,9 @@ def add_controls(plotter: Any, view: View, index: Index, quantity: str, motion: 
         redraw((*state["at"][:-1], nearest(forces(view.ds), value)))
 
     def pick(_: Any, picker: Any) -> None:
-        found = pv.wrap(picker.GetDataSet())
-        if found is not None and "candidate" in found.cell_data:
-            candidate = int(found.cell_data["candidate"][picker.GetCellId()])
+        picked = pv.wrap(picker.GetDataSet())
+        if picked is not None and "candidate" in picked.cell_data:
+            candidate = int(picked.cell_data["candidate"][picker.GetCellId()])
             if candidate != NOBODY:
                 redraw(view.index(candidate, state["at"][-1]))
 
