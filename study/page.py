@@ -103,12 +103,6 @@ def plot(figure: Any, caption: str, alt: str, height: int = 360) -> Block:
     return {"kind": "plot", "figure": figure, "caption": caption, "alt": alt, "height": height}
 
 
-def image(content: bytes, caption: str, alt: str, type_: str = "svg+xml") -> Block:
-    """An embedded picture; ``type_`` is its media type below ``image``."""
-    data = base64.b64encode(content).decode()
-    return {"kind": "image", "data": data, "type": type_, "caption": caption, "alt": alt}
-
-
 def label(words: str) -> str:
     """Text of a file as plotly has to get it, so that it shows the text and reads no tags in it.
 

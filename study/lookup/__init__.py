@@ -194,7 +194,7 @@ class GraspMap:
         return error(self._bends[key], at)
 
     def states(self, at: Corners) -> np.ndarray:
-        """Position in `STATES` of many points."""
+        """State of many points, as `GraspPoint.state` has it."""
         used, done, snapped = at.weight > 0, self.done.ravel()[at.index], self.snapped.ravel()[at.index]
         across = (used & snapped).any(axis=1) & (used & ~snapped).any(axis=1)
         kind = self.kind.ravel()[at.index]

@@ -14,7 +14,6 @@ from softjaw.study.quantities import BOTH_ENDS, BY_KEY, DONE, FAILED, FORCE_RANG
 from softjaw.study.quantities import STATES as OF_CASES
 from softjaw.study.units import shown_text
 
-STATES = ("inside", "outside the map", "no result beside it", "across a snap-in of the wall", "across another contact")
 INSIDE, OUTSIDE, NO_RESULT, SNAP, JUMP = range(5)
 
 
@@ -33,7 +32,7 @@ class GraspPoint:
 
     @property
     def state(self) -> Any:
-        """Position in `STATES`: 0 inside, 1 outside the map, 2 beside a case without result, 3 and 4 across a jump."""
+        """Where the point is: 0 inside, 1 outside the map, 2 beside a case without result, 3 and 4 across a jump."""
         return self._shaped(self.states)
 
     @property
