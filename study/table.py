@@ -174,10 +174,10 @@ def hanging(text: str, width: int) -> str:
 # --- renderings ------------------------------------------------------------------------------------------------------
 
 
-def as_text(table: Table, width: int = PAPER, rest: str = "--json") -> str:
+def as_text(table: Table, width: int = PAPER) -> str:
     """For a terminal: aligned columns with their units, notes below; lengths in mm, angles in degrees.
 
-    Columns that do not fit into ``width`` characters are left out; ``rest`` says where all notes are.
+    Columns that do not fit into ``width`` characters are left out.
     """
     title = [wrapped(table.title, width)] * bool(table.title)
     columns = _fitting(table, width)
@@ -185,7 +185,7 @@ def as_text(table: Table, width: int = PAPER, rest: str = "--json") -> str:
     cells = [[_broken(table.cell(row, c), c.wrap) for c in columns] for row in table.rows]
     lines = aligned(heads, cells, [i for i, c in enumerate(columns) if c.wrap]) if table.rows else []
     notes, more = list(table.notes[:MOST_NOTES]), len(table.notes) - MOST_NOTES
-    notes += [f"and {more} more note{'s' * (more > 1)}: {rest} lists all"] * (more > 0)
+    notes += [f"and {more} more note{'s' * (more > 1)}: --json lists all"] * (more > 0)
     return "\n".join([*title, *lines, *(wrapped(note, width, more="  ") for note in notes)])
 
 

@@ -193,7 +193,7 @@ def write_picture(patches: Sequence[EvaluatedPatch], kind: str, path: Path) -> N
     write_file(path, data)
 
 
-def section(patch: EvaluatedPatch, kind: str, plane: tuple[int, int], n: int = 361) -> FloatArray:
+def section(patch: EvaluatedPatch, kind: str, plane: tuple[int, int]) -> FloatArray:
     """Curve in which a plane of two of ``(f_x, f_y, tau_z)`` meets a limit surface of the CCM, per unit of S.
 
     Parameters
@@ -202,16 +202,14 @@ def section(patch: EvaluatedPatch, kind: str, plane: tuple[int, int], n: int = 3
     kind : str
         ``exact`` or a fitted surface.
     plane : (int, int)
-    n : int
-        Points of the curve.
 
     Returns
     -------
-    (n, 2) array
+    (361, 2) array
         Loads in the plane [-, m].
     """
-    phi = np.linspace(0, 2 * np.pi, n)
-    u = np.zeros((n, 3))
+    phi = np.linspace(0, 2 * np.pi, 361)
+    u = np.zeros((len(phi), 3))
     u[:, plane[0]], u[:, plane[1]] = np.cos(phi), np.sin(phi)
     u *= [1.0, 1.0, patch.contact.rho]  # torque in proportion to force, for even steps
     with np.errstate(invalid="ignore", divide="ignore"):

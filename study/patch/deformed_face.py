@@ -72,12 +72,11 @@ def solve_deformed(file: str, unit: str | None, scene: Scene) -> ReadPatch:
 
 def _notes(face: MeasuredFace, measured: Measured) -> tuple[str, ...]:
     """What a reader should know of the solve."""
-    closing, own = measured.state.closing, measured.state.notes
-    told = f"the points scatter by {1e3 * face.noise:.2g} mm round the smoothed face, which is good to"
-    text = f"{told} {1e3 * face.doubt:.2g} mm; closed by {1e3 * closing:.3g} mm, {measured.state.force:.3g} N"
-    if not measured.judged:
-        return text, "the face is pressed in by hardly more than its error: contact cannot be told from noise", *own
-    return text, *own
+    state = measured.state
+    smooth = f"the points scatter by {1e3 * face.noise:.2g} mm round the smoothed face, whose error is"
+    text = f"{smooth} {1e3 * face.doubt:.2g} mm; closed by {1e3 * state.closing:.3g} mm, {state.force:.3g} N"
+    weak = "the face is pressed in by hardly more than its error: contact may be noise"
+    return (text, *[weak] * (not measured.judged), *state.notes)
 
 
 def _points(path: Path, unit: str | None, scene: Scene) -> tuple[FloatArray, tuple[str, ...]]:

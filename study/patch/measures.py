@@ -307,11 +307,13 @@ def grasp_quality(
     """
     if (two is None) == (distance is None):
         raise ValueError(f"found {'neither' if two is None else 'both'}, expected a second patch or a distance [m]")
+    lengths = {"distance": distance, "object_length": object_length, "contact_length": contact_length}
+    for name, length in lengths.items():
+        if length is not None and not 0 < length < np.inf:
+            raise ValueError(f"{name} is {length}: expected a positive length [m]")
     first = contact_of(one, mu)
-    contacts = first, opposite(first, _length("distance", distance)) if two is None else contact_of(two, mu)
+    contacts = first, opposite(first, float(distance or 0.0)) if two is None else contact_of(two, mu)
     check_facing(contacts, ("one", "two"))
-    for name, length in (("object_length", object_length), ("contact_length", contact_length)):
-        _length(name, 1.0 if length is None else length)
     _, arms, torques = grasp_lengths(contacts, object_length, contact_length)
     bodies = [_body(c, surface, checked_model(model)) for c in contacts[: 1 if two is None else 2]]
     middle = (contacts[0].origin + contacts[1].origin) / 2
@@ -344,9 +346,3 @@ def _checked_samples(samples: int) -> int:
     if isinstance(samples, bool) or not isinstance(samples, int | np.integer) or samples < 10:
         raise ValueError(f"samples is {samples!r}: expected a whole number of at least 10")
     return int(samples)
-
-
-def _length(name: str, value: float | None) -> float:
-    if value is None or not 0 < value < np.inf:
-        raise ValueError(f"{name} is {value}: expected a positive length [m]")
-    return float(value)

@@ -132,7 +132,7 @@ def _matched(one: xr.Dataset, other: xr.Dataset) -> tuple[dict[str, Row], list[B
         scale = max(np.abs(a.values).max(), np.abs(b.values).max(), 1e-300)
         # relative difference of coordinates that is only rounding
         same = np.abs(a.values[:, None] - b.values) <= 1e-9 * scale
-        if a.options and b.options:  # numbers stand for texts
+        if a.options and b.options:  # the numbers are those of texts
             same = np.array(a.options)[:, None] == np.array(b.options)
         only = a.values[~same.any(axis=1)], b.values[~same.any(axis=0)]
         if not same.any():

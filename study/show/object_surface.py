@@ -28,33 +28,28 @@ class Surface(NamedTuple):
     candidate: np.ndarray
 
 
-def surface_of(scene: Any, axes: Any, point: tuple[int, ...] | None = None) -> Surface:
-    """The object's surface at a point of a scene's sweep (by default the first), cut along its candidates' cells.
-
-    It is empty where the scene does not tell the object.
+def surface_of(scene: Any, axes: Any) -> Surface:
+    """The surface of a scene's object, cut along its candidates' cells.
 
     Raises
     ------
     ValueError, OSError
         The object cannot be built, as when its mesh is not there.
     """
-    here = scene_at(scene, (0,) * (len(axes) - 3) if point is None else point)
-    if here is None:
-        return Surface(np.empty((0, 3)), np.empty((0, 3), int), np.empty(0, int))
-    body = build_object(here.object)
-    points, triangles = surface_triangles(here.object)
+    body = build_object(scene.object)
+    points, triangles = surface_triangles(scene.object)
     corners = np.asarray(points, float)[triangles]
     # Triangles without area show nothing and would only be cut further.
     corners = corners[areas(corners) > 0]
     cell = np.full(len(corners), NOBODY)
     # Explicit poses have no unit on the station axis, and no cells.
     if axes[-3].units:
-        middle = middle_of(here)
+        middle = middle_of(scene)
         corners = middle.straightened(corners) if middle else corners
-        corners, cell = coloured(corners, cells_of(here, axes, body.axis_symmetry))
+        corners, cell = coloured(corners, cells_of(scene, axes, body.axis_symmetry))
         corners = middle.straightened(corners, -1.0) if middle else corners
-        if has_wall(here.object):
-            kept = ~_lid(here.object, corners)
+        if has_wall(scene.object):
+            kept = ~_lid(scene.object, corners)
             corners, cell = corners[kept], cell[kept]
     # After the cuts, corners of neighbours differ by rounding: 1 nm makes them one point again.
     points, inverse = np.unique(np.round(corners.reshape(-1, 3), 9), axis=0, return_inverse=True)

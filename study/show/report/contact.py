@@ -40,7 +40,7 @@ def patch(view: View, index: Index) -> Block | None:
                         horizontal_spacing=0.02, vertical_spacing=0.06)  # fmt: skip
     for row, pad in enumerate(fingers.values(), start=1):
         for column, motion in enumerate(SLIPS, start=1):
-            for trace in front(pad, motion, top, bar=row == column == 1):
+            for trace in pad_face(pad, motion, top, bar=row == column == 1):
                 made.add_trace(trace, row=row, col=column)
     eye = {"eye": {"x": 0, "y": 0, "z": 2.1}, "up": {"x": 0, "y": 1, "z": 0}, "projection": {"type": "orthographic"}}
     made.update_scenes(plots.scene(camera=eye)).update_layout(margin={"l": 0, "r": 80, "t": 58, "b": 0})
@@ -52,7 +52,7 @@ def patch(view: View, index: Index) -> Block | None:
     return plot(made, caption, f"Contact pressure and friction on the pad, {summary}", 300 * len(fingers) + 40)
 
 
-def front(pad: Pad, motion: str, top: float, bar: bool) -> list[Any]:
+def pad_face(pad: Pad, motion: str, top: float, bar: bool) -> list[Any]:
     """Traces of one pad in its own frame [mm, kPa]: faces with their pressure, friction, contact frame."""
     corners = 1e3 * pad.own(pad.quads().reshape(-1, 3))
     corners -= [0, 0, corners[:, 2].min()]

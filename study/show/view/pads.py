@@ -26,7 +26,7 @@ class Pad:
     order of the face's corners; ``centroid`` and ``normal (i, j, 3)``, ``pressure`` and ``area (i, j)`` belong to the
     faces; they are empty where the file holds no patches. ``frame (3, 3)`` has the contact frame's axes as rows,
     ``origin (3,)`` is its origin; ``rotation`` and ``position`` place the pad's own frame.
-    Fronts overlap the object between the points where contact holds: pictures draw them by ``lift`` farther out.
+    Contact faces overlap the object between the points where contact holds: pictures draw them by ``lift`` farther out.
     """
 
     face: np.ndarray
