@@ -48,7 +48,7 @@ DOORS = {
 # is no circle either. The first row knows nothing of a study, and pictures is how all of them are drawn; cli joins
 # everything, and imports what a command needs when it runs.
 ORDER = (
-    "messages", "units", "flags", "quantities", "table", "pictures", "templates", "page",
+    "messages", "units", "flags", "quantities", "table", "pictures", "templates", "page", "grippers",
     "scene", "case", "pipeline", "result", "one_case", "ranking", "run", "accuracy", "lookup", "export", "patch",
     "show", "doctor", "launch", "solve", "cli",
 )  # fmt: skip

@@ -15,9 +15,9 @@ from softjaw.study.export.planners import CLOSING, as_graspgen, as_isaac_grasp, 
 from softjaw.study.export.rigid_body import body_of
 from softjaw.study.export.sdf import as_sdf, as_stl
 from softjaw.study.export.selection import GripperFrame, Selection, chosen, grasps, usable
+from softjaw.study.grippers import Hand, gripper_file
 from softjaw.study.messages import USAGE, StudyError, write_file
 from softjaw.study.result.read import open
-from softjaw.study.scene.grippers import Hand, gripper_file
 from softjaw.study.units import in_si
 
 TABLES = {"csv": as_csv, "json": as_json}

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.study.case.build import own_frame, surface_triangles
-from softjaw.study.scene.grippers import Hand
+from softjaw.study.grippers import Hand
 
 FloatArray = NDArray[np.float64]
 WAY = 0.1  # of approach and retreat [m]

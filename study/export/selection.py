@@ -28,12 +28,12 @@ from softjaw.study.export.cases import cases
 from softjaw.study.export.reach import FREE, boxes, chosen_approach, clearance, surface_points
 from softjaw.study.export.rigid_body import scene_of
 from softjaw.study.flags import LOST, flag_words, flags_in
+from softjaw.study.grippers import APPROACHES, Hand
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.quantities import FORCE_RANGE, LEAST_FORCE, MAIN
 from softjaw.study.ranking import at_level, judged, ranked, score_of
 from softjaw.study.result.read import axes_of, maps_in
 from softjaw.study.result.store import place_text
-from softjaw.study.scene.grippers import APPROACHES, Hand
 from softjaw.study.units import shown, shown_text
 
 FloatArray = NDArray[np.float64]

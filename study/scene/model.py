@@ -15,10 +15,10 @@ from typing import Annotated, Any
 
 from pydantic import ConfigDict, Field, ValidationError, ValidationInfo, field_validator
 
+from softjaw.study.grippers import filled_in
 from softjaw.study.messages import Problem, closest, shortened, shown
 from softjaw.study.scene.errors import Errors, KeyPath, Place, SceneError, lines_of, problems_of, refuse, wrong
 from softjaw.study.scene.grasps import OF_EVERY_KIND, Candidates, GraspPose
-from softjaw.study.scene.grippers import filled_in
 from softjaw.study.scene.objects import SHAPES, Mesh, Object, SectionTable
 from softjaw.study.scene.section import SceneSection
 from softjaw.study.scene.sections import (

@@ -11,9 +11,9 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import AfterValidator, ConfigDict, Field, model_validator
 
 from softjaw.fem.pad.halving import halved
+from softjaw.study.grippers import PRESETS
 from softjaw.study.messages import shown
 from softjaw.study.scene.errors import Errors, wrong
-from softjaw.study.scene.grippers import PRESETS
 from softjaw.study.scene.objects import Shape, Walled
 from softjaw.study.scene.section import Direction, Point, SceneSection, Vector, once_and_rising
 from softjaw.study.scene.text import flat

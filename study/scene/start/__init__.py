@@ -13,8 +13,8 @@ from argparse import Namespace
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
+from softjaw.study.grippers import gripper_file
 from softjaw.study.messages import CANNOT_WRITE, USAGE, StudyError, write_file
-from softjaw.study.scene.grippers import gripper_file
 from softjaw.study.scene.section import numbers_text
 
 HERE = Path(__file__).parent

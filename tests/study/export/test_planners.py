@@ -13,12 +13,12 @@ import pytest
 from softjaw.study.cli import main
 from softjaw.study.cli.exporting import DATA_SETS, PLANNERS, SIMULATORS, TABLES
 from softjaw.study.cli.options import FORMATS
-from softjaw.study.export.planners import CLOSING
+from softjaw.study.export.planners import CLOSING, as_graspgen
 from softjaw.study.export.selection import APPROACHES, GripperFrame, Selection, grasps
 from softjaw.study.export.yaml import yaml_text
 from softjaw.study.flags import Flag
+from softjaw.study.grippers import Hand
 from softjaw.study.messages import CANNOT_WRITE, USAGE
-from softjaw.study.scene.grippers import Hand
 from tests.study.export.grasp_results import RADIUS, STATIONS, geometry, opened, write
 
 FOAM = 0.015  # thickness of a pad [m]
@@ -205,6 +205,18 @@ def test_graspgen_has_its_keys_and_a_mask_of_the_grasps_that_hold(said):
         assert case["maps"]["epsilon"] is None
     assert all(len(values) == 5 for values in found["grasps"].values())
     assert found["grasps"]["warnings"][found["grasps"]["object_in_gripper"].index(False)] == ["slips"]
+
+
+def test_graspgen_names_the_mesh_from_its_own_folder(path):
+    ds = opened(path).assign_attrs(scene='[object]\nmesh = "/work/meshes/mug.stl"\nunit = "mm"')
+    made = json.loads(as_graspgen([], GripperFrame(), ds, "/work/sets/first"))
+    assert made["object"] == {"file": "../../meshes/mug.stl", "scale": 1e-3}
+
+
+def test_grasps_that_hold_nothing_are_no_grasps(tmp_path):
+    path = write(tmp_path / "empty.hdf", **{"payload/ccm": np.zeros((5, 1, 3))})
+    found = grasps(opened(path), Selection(force=4.0), GripperFrame(approach=("x",)))
+    assert {grasp.reasons for grasp in found} == {("payload 0",)}
 
 
 def test_grasps_are_chosen_by_rank_force_and_least_values(path, said):

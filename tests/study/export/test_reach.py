@@ -9,7 +9,7 @@ from softjaw.study.case.poses import axis_poses
 from softjaw.study.export.reach import WAY, boxes, clearance, surface_points
 from softjaw.study.export.rigid_body import scene_of
 from softjaw.study.export.selection import GripperFrame, Selection, grasps, usable
-from softjaw.study.scene.grippers import Hand, gripper_file
+from softjaw.study.grippers import Hand, gripper_file
 from tests.study.export.grasp_results import RADIUS, STATIONS, opened, write
 
 FRANKA = gripper_file("franka_hand")[1]

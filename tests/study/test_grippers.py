@@ -9,9 +9,9 @@ import pytest
 
 from softjaw.study.cli import main
 from softjaw.study.cli.options import KINDS
+from softjaw.study.grippers import PRESETS, gripper_file
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.scene import Scene, SceneError, load_scene
-from softjaw.study.scene.grippers import PRESETS, gripper_file
 from tests.study.launching import ROOT
 
 SCENE = """
