@@ -498,13 +498,15 @@ class Factors:
         self._matrix.destroy()
 
 
-class _OneUnknown:
-    """The equation ``x = 1``: enough for PETSc to read every option of a solve."""
+class _FewUnknowns:
+    """The equation ``x = 1`` of a few unknowns: enough for PETSc to read every option of a solve."""
 
-    size, complementarity, non_negative = 1, False, slice(0)
+    # PORD ends the process at a matrix without zeros, that of one unknown too
+    size, complementarity, non_negative = 30, False, slice(0)
 
     def __init__(self) -> None:
-        self.pattern = Pattern(1, np.zeros(1, np.int32), np.zeros(1, np.int32))
+        diagonal = np.arange(self.size, dtype=np.int32)
+        self.pattern = Pattern(self.size, diagonal, diagonal)
 
     def residual(self, x: FloatArray) -> FloatArray:
         """See `Problem`."""
@@ -526,7 +528,7 @@ def unknown_options(options: dict[str, Any]) -> list[str]:
     """
     asked = ctypes.CDLL(PETSc.__file__).PetscOptionsUsed
     judged = {name: value for name, value in options.items() if not PRINTING.search(name)}
-    solver = NonlinearSolver(_OneUnknown(), judged)
+    solver = NonlinearSolver(_FewUnknowns(), judged)
     unknown = []
     with solver._options_in_effect():
         solver._snes.setFromOptions()

@@ -56,10 +56,10 @@ class ResultWriter:
 
     def codes(self) -> np.ndarray:
         """State of every row, ``(rows,)``."""
-        codes: np.ndarray = self._code[()].ravel()
-        if self._wanted is not None:
-            codes[(codes == DONE) & (self._file[f"{ROOT}/{MESH}"][()].ravel() < self._wanted)] = MISSING
-        return codes
+        codes: np.ndarray = self._code[()]
+        if self._wanted is None:
+            return codes.ravel()
+        return codes_on(self._wanted, codes, self._file[f"{ROOT}/{MESH}"][()])
 
     def attempts(self) -> np.ndarray:
         """How often every row was begun without an end, ``(rows,)``."""
@@ -237,6 +237,11 @@ def _flattened(layout: Layout, result: CaseResult) -> dict[str, Any]:
             parts |= dict(zip(MEASURED, changes, strict=False))
         given.update({f"effects/{name}_{part}": value for part, value in parts.items()})
     return given
+
+
+def codes_on(wanted: np.ndarray, codes: np.ndarray, meshes: np.ndarray) -> np.ndarray:
+    """States ``(rows,)`` of which a case that is complete on a coarser mesh than ``wanted (rows,)`` is missing."""
+    return np.where((codes.ravel() == DONE) & (meshes.ravel() < wanted), MISSING, codes.ravel())
 
 
 def verify(path: Path, layout: Layout, header: Header) -> bool:

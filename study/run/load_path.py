@@ -31,6 +31,13 @@ HUNG = "did not come back to Python within {patience:g} s, so its rank was given
 NO_MEMORY = "more memory than run.memory_gb leaves to a rank ({text}); run on fewer ranks or a coarser mesh"
 
 
+def rows_again(units: Iterable[Any], codes: np.ndarray, torn: Iterable[int], retry_failed: bool) -> list[int]:
+    """Rows that have a state and are solved all the same: torn ones, failed ones on demand, those left out before."""
+    wanted = [row for unit in units if not unit.state for rows in unit.rows for row in rows]
+    again = [*torn, *(row for row in wanted if codes[row] in NO_GRASP)]
+    return [int(row) for row in [*again, *(np.flatnonzero(codes == FAILED) if retry_failed else [])]]
+
+
 def settle(writer: Any, units: Iterable[Any], torn: Iterable[int], retry_failed: bool) -> np.ndarray:
     """Decide by one process what is missing: torn rows again, failed ones on demand, no grasps and deadly ones never.
 
@@ -42,11 +49,8 @@ def settle(writer: Any, units: Iterable[Any], torn: Iterable[int], retry_failed:
         State of every case as the run begins.
     """
     units, codes, attempts = list(units), writer.codes(), writer.attempts()
-    wanted = [row for unit in units if not unit.state for rows in unit.rows for row in rows]
-    again = [*torn, *(row for row in wanted if codes[row] in NO_GRASP)]
-    again += list(np.flatnonzero(codes == FAILED)) if retry_failed else []
-    for row in again:
-        writer.forget(int(row))
+    for row in rows_again(units, codes, torn, retry_failed):
+        writer.forget(row)
         codes[row], attempts[row] = MISSING, 0
     # Begun and not ended: a kill may have come between the checksum and the state.
     for row in np.flatnonzero((codes == MISSING) & (attempts > 0)):

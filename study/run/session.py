@@ -26,9 +26,9 @@ from softjaw.study.result.layout import FAILED, MISSING
 from softjaw.study.result.lock import Lock, OpenedFile
 from softjaw.study.result.skeleton import create, rewrite
 from softjaw.study.result.store import Result, open_result, torn_rows
-from softjaw.study.result.write import ResultWriter, verify
+from softjaw.study.result.write import MESH, ResultWriter, codes_on, verify
 from softjaw.study.run.limits import GRACE, Stopper, limited_memory
-from softjaw.study.run.load_path import PathSolver, give_up, settle
+from softjaw.study.run.load_path import PathSolver, give_up, rows_again, settle
 from softjaw.study.run.plan import Plan
 from softjaw.study.run.progress import Progress
 from softjaw.study.run.refine import Rounds, round_text
@@ -117,12 +117,14 @@ def run_study(
         rounds = on_rank0(comm, rounds_in, path, plan) if growth else ()
         if growth and rounds:
             plan, work = growth.study(rounds)
-        code = _solve(plan, work, path, comm, retry_failed)
+        finished = on_rank0(comm, _finished, path, plan, retry_failed, comm.size)
+        code = _solve(plan, work, path, comm, retry_failed) if finished is None else finished
         while growth and code != STOPPED and (added := on_rank0(comm, _next_round, path, growth)):
             plan, work = growth.study((*plan.layout.rounds, added))
+            finished = None
             on_rank0(comm, rewrite, path, plan.layout, plan.header)
             code = _solve(plan, work, path, comm, retry_failed=False)
-        if code != STOPPED:
+        if finished is None and code != STOPPED:
             on_rank0(comm, partial(rewrite, packed=True), path, plan.layout, plan.header)
         if comm.rank == 0:
             print_summary(work, path)
@@ -157,6 +159,19 @@ def locked(path: Path, comm: Any) -> Iterator[None]:
     finally:
         # Whatever happened: a process that lives on must not keep others out.
         lock.release()
+
+
+def _finished(path: Path, plan: Plan, retry_failed: bool, ranks: int) -> int | None:
+    """Exit code of a file that is packed and lacks nothing, which is left as it is; None of any other."""
+    if not path.exists() or not verify(path, plan.layout, plan.header):
+        return None
+    with open_result(path, unchecked=True) as result:
+        codes, wanted = result.codes.ravel(), plan.wanted
+        codes = codes if wanted is None else codes_on(wanted, codes, result.read(MESH))
+    if np.any(codes == MISSING) or rows_again(plan.units, codes, torn_rows(path, plan.layout), retry_failed):
+        return None
+    print(_begins(path, codes, 0, ranks, created=False), flush=True)
+    return code_of(codes)
 
 
 def _solve(plan: Plan, work: Work, path: Path, comm: Any, retry_failed: bool) -> int:

@@ -244,8 +244,9 @@ def test_a_finished_file_is_left_as_it_is(tmp_path, whole, uninterrupted):
     shutil.copy(whole, path)
     code, _, _ = study(0, path, "--fail", 3)
     assert code == 0
+    assert path.read_bytes() == whole.read_bytes()
     assert differing(path, uninterrupted) == []
     with open_result(path) as result:
-        assert [s["reason"] for s in result.sessions] == ["complete", "complete"]
-        assert [s["ranks"] for s in result.sessions] == [1, 1]
+        assert [s["reason"] for s in result.sessions] == ["complete"]
+        assert [s["ranks"] for s in result.sessions] == [1]
         assert "numpy" in result.sessions[0]["versions"]

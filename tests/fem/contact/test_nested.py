@@ -12,7 +12,7 @@ from softjaw.fem.errors import ConvergenceError
 from softjaw.fem.pad.interpolation import interpolated
 from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.pad.shape import PadShape
-from softjaw.fem.petsc import NonlinearSolver
+from softjaw.fem.petsc import NonlinearSolver, unknown_options
 from tests.fem.contact.test_press import BALL, FOAM, OVAL, SIZE, VI, pad_of, relative
 
 FORCES = [1.0, 3.0, 10.0]
@@ -134,6 +134,11 @@ def test_a_solve_that_diverges_ends_once_the_residual_has_grown(growth, iteratio
         solver.solve(np.ones(1), 1e-10)
     assert problem.asked == iterations + 25
     solver.destroy()
+
+
+def test_an_ordering_that_ends_the_process_at_full_matrices_is_judged_on_a_sparse_one():
+    options = {"contact_mat_mumps_icntl_7": 4, "contact_mat_mumps_icntl": 4}
+    assert unknown_options(options) == ["contact_mat_mumps_icntl"]
 
 
 def test_bounds_on_the_pressures_start_from_the_coarser_mesh_alike():
