@@ -42,7 +42,11 @@ def solve_unit(
     coarse = [k for k in forces if unit.finest and unit.finest[k] == COARSE]
     for some, scene in ((coarse, screened(unit.scene)), ([k for k in forces if k not in coarse], unit.scene)):
         if some:
-            yield from _cases(unit, scene, some)
+            solver = UnitSolver(unit, scene)
+            try:
+                yield from solver.cases(some)
+            finally:
+                solver.destroy()
 
 
 def screened(scene: Scene) -> Scene:
@@ -56,24 +60,29 @@ def screened(scene: Scene) -> Scene:
     return scene.model_copy(update=parts)
 
 
-def _cases(
-    unit: Any, scene: Scene, wanted: Collection[int]
-) -> Generator[tuple[int, CaseResult | CaseFailure], None, None]:
-    """Cases of a unit as a scene solves them, its own or the screened one."""
-    settings = settings_of(scene, build_object(scene.object))
-    solver = CandidateSolver(scene, unit.candidate.poses, finest=unit.finest)
-    try:
+class UnitSolver:
+    """Cases of a unit as a scene solves them, its own or the screened one; states and choices of effects are kept."""
+
+    def __init__(self, unit: Any, scene: Scene) -> None:
+        self._unit, self._settings = unit, settings_of(scene, build_object(scene.object))
+        self._solver = CandidateSolver(scene, unit.candidate.poses, finest=unit.finest)
+        self._choice: EffectChoice | None = None
+
+    def cases(self, wanted: Collection[int]) -> Generator[tuple[int, CaseResult | CaseFailure], None, None]:
+        """Cases at these forces, upward."""
         start = time.perf_counter()
-        choice = EffectChoice(solver)
+        choice = self._choice = self._choice or EffectChoice(self._solver)
         choosing = time.perf_counter() - start
         for k, outcome in _outcomes(choice, wanted):
             if isinstance(outcome, CaseFailure):
                 yield k, outcome
             elif k in wanted:
-                yield k, _result(settings, choice, k, outcome, unit, choosing)
+                yield k, _result(self._settings, choice, k, outcome, self._unit, choosing)
                 choosing = 0.0  # counted once for all forces
-    finally:
-        solver.destroy()
+
+    def destroy(self) -> None:
+        """Give the factors' memory back."""
+        self._solver.destroy()
 
 
 def _result(

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -261,6 +262,7 @@ def same_grasp(grasp: SampledGrasp, other: SampledGrasp, length: float) -> bool:
 # --- scenes -----------------------------------------------------------------------------------------------------------
 
 
+@lru_cache(maxsize=8)
 def with_sampled_grasps(scene: Scene) -> Scene:
     """The scene with the grasps that its sampler finds as explicit poses.
 

@@ -119,6 +119,10 @@ class Scene(SceneSection):
             refuse(_point_rules(sweep, info.data))
         return {k: v if isinstance(v[0], str | tuple) else tuple(sorted(map(float, v))) for k, v in sweep.items()}
 
+    def __hash__(self) -> int:
+        """Of the sections that scenes differ in most; others hold tables, which have no hash."""
+        return hash((self.object, self.gripper, self.candidates, self.load))
+
     def rules(self) -> Errors:
         """Not more cases than a file can hold."""
         if self.cases > MOST_CASES:
