@@ -23,7 +23,7 @@ from softjaw.study.patch.faces import ReadPatch, refuse
 from softjaw.study.patch.patch_reader import Reading, checked_file, refused, si_columns, split_header, table_rows
 from softjaw.study.scene import Scene
 
-MOST_POINTS = 20_000
+MOST_MEASURED = 20_000  # points of a face
 COLUMNS = "x_mm, y_mm, z_mm, or y_mm, z_mm of a contour along the pad's width"
 
 
@@ -85,8 +85,8 @@ def _points(path: Path, unit: str | None, scene: Scene) -> tuple[FloatArray, tup
     headers = [header.strip() for header in headers]
     given = {pair[0]: i for i, header in enumerate(headers) if (pair := split_header(header))}
     needed = [name for name in "xyz" if name in given]
-    if len(cells) > MOST_POINTS:
-        raise refused(path, None, "", f"{len(cells)} points", f"at most {MOST_POINTS}", "thin them")
+    if len(cells) > MOST_MEASURED:
+        raise refused(path, None, "", f"{len(cells)} points", f"at most {MOST_MEASURED}", "thin them")
     if not {"y", "z"} <= given.keys():
         found = f"the columns {', '.join(headers)}"
         raise refused(path, 1, "", found, COLUMNS, "name the columns in the first line, with their unit")
