@@ -17,7 +17,7 @@ from softjaw.lsfit.ellipsoid import MAX_REACH_RATIO, full_ellipsoid, nearest_sol
 from softjaw.lsfit.form import exponents, powers, substitute
 from softjaw.lsfit.lowest import lies_above
 from softjaw.lsfit.quartic import Quartic
-from softjaw.lsfit.samples import checked_motions, principal_frame
+from softjaw.lsfit.samples import Fit, checked_motions, principal_frame
 from softjaw.lsfit.sos import (
     MIN_EIGENVALUE,
     ball_coefficients,
@@ -31,36 +31,7 @@ from softjaw.lsfit.surface import FitError, FitFlag, Image
 FloatArray = NDArray[np.float64]
 
 
-class QuarticFit(NamedTuple):
-    """A convex quartic limit surface ``P``, and the proof that it is convex.
-
-    Parameters
-    ----------
-    surface : Quartic or Image
-        The surface; an `Image` of a quartic if the samples are flat, or thin across the axes.
-    gram_eigenvalue : float
-        Smallest eigenvalue of ``gram``. Not negative: ``P`` is convex.
-    gram : (r * r, r * r) array
-        ``Q`` with ``z' Hess p(y) z = (z x y)' Q (z x y)`` for ``p(y) = P(B y)`` and the products ``z_i y_j``.
-    frame : (d, r) array
-        ``B``.
-    certificate : str
-        ``least squares`` if the best quartic is convex by itself, else ``semidefinite programme``.
-    """
-
-    surface: Quartic | Image
-    gram_eigenvalue: float
-    gram: FloatArray
-    frame: FloatArray
-    certificate: str
-
-    @property
-    def flag(self) -> FitFlag:
-        """What the reader should know."""
-        return self.surface.flag
-
-
-def convex_quartic(W: ArrayLike, T: ArrayLike | None = None, beta: float = 1.0, gamma: float = 0.01) -> QuarticFit:
+def convex_quartic(W: ArrayLike, T: ArrayLike | None = None, beta: float = 1.0, gamma: float = 0.01) -> Fit:
     """Convex quartic with the least ``mean (beta (P - 1)^2 + gamma |(I - t t') grad P|^2)``, with its certificate.
 
     The quartic of the linear equations is taken if a positive definite Gram matrix proves it convex. Only otherwise
@@ -110,7 +81,7 @@ def convex_quartic(W: ArrayLike, T: ArrayLike | None = None, beta: float = 1.0, 
     # the programme promises half of the margin; the rest is room for rounding on the way
     if low < MIN_EIGENVALUE / 4:
         raise FitError(f"the Gram matrix of the convex quartic has the eigenvalue {low:.2e}: report these samples")
-    return QuarticFit(surface, low, gram, samples.B, by)
+    return Fit(surface, gram, samples.B, by)
 
 
 class RoundSamples(NamedTuple):

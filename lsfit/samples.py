@@ -195,6 +195,41 @@ class FitErrors(NamedTuple):
     Edir: float
 
 
+class Fit(NamedTuple):
+    """A fitted limit surface, with what proves that it is convex, or how good it is.
+
+    Parameters
+    ----------
+    surface : LimitSurface
+        In the coordinates of the wrenches; flat, and flagged, if the samples are.
+    gram : (r * r, r * r) array
+        Of a quartic of least squares: ``Q`` with ``z' Hess p(y) z = (z x y)' Q (z x y)`` for ``p(y) = P(B y)`` and the
+        products ``z_i y_j``. Without negative eigenvalues ``P`` is convex.
+    frame : (d, r) array
+        ``B``, of a quartic of least squares.
+    certificate : str
+        ``least squares`` if the best quartic is convex by itself, else ``semidefinite programme``.
+    errors : FitErrors
+        Of a fit in the span of its samples, in its scaled coordinates, where the axes have a like length; in the others
+        a soft axis decides every angle.
+    objective, rates : float, (m,) array
+        Of a fit with Zhou's objective: its value in the scaled coordinates, and the ``s_i`` of the samples.
+    """
+
+    surface: LimitSurface
+    gram: FloatArray = np.empty((0, 0))
+    frame: FloatArray = np.empty((0, 0))
+    certificate: str = ""
+    errors: FitErrors = FitErrors(math.nan, math.nan, math.nan)
+    objective: float = math.nan
+    rates: FloatArray = np.empty(0)
+
+    @property
+    def gram_eigenvalue(self) -> float:
+        """Smallest eigenvalue of ``gram``."""
+        return float(np.linalg.eigvalsh(self.gram)[0])
+
+
 def fit_error(model: LimitSurface, W: ArrayLike, T: ArrayLike) -> FitErrors:
     """Errors of ``model`` on wrenches ``W (m, d)`` with unit motions ``T (m, d)``.
 

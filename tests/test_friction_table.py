@@ -22,8 +22,8 @@ from softjaw.lsfit.form import exponents, monomials
 from softjaw.lsfit.quartic import Quartic
 from softjaw.lsfit.quartic_fit import convex_quartic
 from softjaw.lsfit.samples import fit_error, normalised_samples, sample_rank, six_samples
+from softjaw.lsfit.span import zhou_ellipsoid, zhou_quartic
 from softjaw.lsfit.surface import FitFlag, shadow_area
-from softjaw.lsfit.zhou import zhou_ellipsoid, zhou_quartic
 from softjaw.scoring.bodies import PolytopeBody, fibonacci_vertices
 from softjaw.scoring.closed_form import epsilon_l1, epsilon_linf, volume_l1, volume_linf
 from softjaw.scoring.contact import SoftContact, contact_axes

@@ -26,9 +26,8 @@ from softjaw.lsfit.ellipsoid import (
 from softjaw.lsfit.quartic import Quartic
 from softjaw.lsfit.quartic_fit import convex_quartic
 from softjaw.lsfit.samples import FitErrors, fit_error, normalised_samples, overclaim, six_samples, sphere_motions
-from softjaw.lsfit.span import span_ellipsoid, span_quartic
+from softjaw.lsfit.span import span_ellipsoid, span_quartic, zhou_ellipsoid, zhou_quartic
 from softjaw.lsfit.surface import FitError, LimitSurface
-from softjaw.lsfit.zhou import zhou_ellipsoid, zhou_quartic
 from softjaw.study.case.contact import Contact
 from softjaw.study.flags import Flag
 from softjaw.study.scene.sections import LimitSurfaceKeys as Choice
@@ -214,7 +213,7 @@ def six_ellipsoid(patch: ContactPatch, rho: float, S: float) -> tuple[FloatArray
     except FitError:
         return np.full((6, 6), np.nan), 0, FitErrors(np.nan, np.nan, np.nan)
     assert isinstance(fit.surface, TiltedEllipsoid)
-    return fit.surface.A, fit.rank, FitErrors(*fit.errors[:2], float(np.radians(fit.errors.Edir)))
+    return fit.surface.A, fit.surface.rank, fit.errors._replace(Edir=float(np.radians(fit.errors.Edir)))
 
 
 def six_quartic(contact: Contact, model: str, samples: int) -> tuple[LimitSurface, FitErrors, float]:
@@ -225,8 +224,8 @@ def six_quartic(contact: Contact, model: str, samples: int) -> tuple[LimitSurfac
     surface = span_quartic(W[fitted_to], T[fitted_to]).surface
     errors = fit_error(surface, W[others], T[others])
     size = contact.mu * S * np.repeat([1.0, contact.rho], 3)
-    radians = FitErrors(errors.E1, errors.Erad, float(np.radians(errors.Edir)))
-    return surface.scaled(size), radians, overclaim(surface, W[others])
+    errors = errors._replace(Edir=float(np.radians(errors.Edir)))
+    return surface.scaled(size), errors, overclaim(surface, W[others])
 
 
 def _six_samples(patch: ContactPatch, rho: float, S: float, model: str, count: int) -> tuple[FloatArray, FloatArray]:

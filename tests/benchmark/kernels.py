@@ -13,8 +13,7 @@ from softjaw.friction.wrench import friction_limits, friction_wrench, pure_torqu
 from softjaw.lsfit.ellipsoid import Ellipsoid, full_ellipsoid
 from softjaw.lsfit.quartic_fit import convex_quartic
 from softjaw.lsfit.samples import normalised_samples, six_samples
-from softjaw.lsfit.span import span_quartic
-from softjaw.lsfit.zhou import zhou_quartic
+from softjaw.lsfit.span import span_quartic, zhou_quartic
 from softjaw.scoring.contact import SoftContact, contact_axes
 from softjaw.scoring.epsilon import epsilon
 from softjaw.scoring.pose import pose_volume

@@ -141,7 +141,7 @@ def test_the_flags_of_a_convex_quartic(data, gamma, outcome):
 
     def decide(rng):
         fit = convex_quartic(*turned(rng, *data), gamma=gamma)
-        return fit.flag, fit.surface.rank, fit.certificate
+        return fit.surface.flag, fit.surface.rank, fit.certificate
 
     assert outcomes(decide) == {outcome: TURNS}
 
@@ -151,7 +151,7 @@ def test_an_ellipsoid_that_the_samples_leave_open_is_flagged(data):
     """The margin is that of the bound: samples of a cylinder would have the coefficient 0 along it, exactly."""
     assert outcomes(lambda rng: full_ellipsoid(turned(rng, data)[0]).flag) == {FitFlag.BOUNDED: TURNS}
     assert outcomes(lambda rng: axis_aligned_ellipsoid(shaken(rng, data)).flag) == {FitFlag.BOUNDED: TURNS}
-    assert outcomes(lambda rng: convex_quartic(turned(rng, data)[0], gamma=0).flag & FitFlag.BOUNDED, 3) == {
+    assert outcomes(lambda rng: convex_quartic(turned(rng, data)[0], gamma=0).surface.flag & FitFlag.BOUNDED, 3) == {
         FitFlag.BOUNDED: 3
     }
     for surface in (full_ellipsoid(data), axis_aligned_ellipsoid(data)):

@@ -101,7 +101,7 @@ def test_only_two_points_need_the_programme(name):
     patch, rho, *_ = PATCHES[name]
     W, T = samples(patch, 500, rho)
     fit = convex_quartic(W, T, gamma=0)
-    assert (fit.flag, fit.surface.rank) == (FitFlag.CLEAN, 3)
+    assert (fit.surface.flag, fit.surface.rank) == (FitFlag.CLEAN, 3)
     if name == "two points":
         assert fit.certificate == "semidefinite programme"
         np.testing.assert_allclose(fit_error(fit.surface, W, T), [0.0129, 0.0033, 6.62], atol=6e-3)
@@ -225,7 +225,7 @@ def test_a_rho_far_from_the_size_of_the_patch_is_flagged(R, flag):
 def test_few_samples_are_flagged_and_stay_bounded(K):
     W, T = (x[:: 300 // K][:K] for x in samples(lcg_patch(9, 30), 300))
     fit = convex_quartic(W, gamma=0)
-    assert fit.flag & (FitFlag.UNDERDETERMINED | FitFlag.RANK_DEFICIENT)
+    assert fit.surface.flag & (FitFlag.UNDERDETERMINED | FitFlag.RANK_DEFICIENT)
     for surface in (fit.surface, full_ellipsoid(W), axis_aligned_ellipsoid(W)):
         assert (surface.semi_axes < 30 * np.abs(W).max()).all()
         assert np.isfinite(fit_error(surface, W, T)).all()

@@ -9,8 +9,8 @@ from softjaw.friction.motion import SLIDE_X, SLIDE_Y
 from softjaw.friction.wrench import friction_wrench
 from softjaw.lsfit.ellipsoid import TiltedEllipsoid
 from softjaw.lsfit.samples import fit_error, normalised_samples, six_samples, sphere_motions
+from softjaw.lsfit.span import CollapsedFitError, zhou_ellipsoid, zhou_quartic
 from softjaw.lsfit.surface import FitFlag
-from softjaw.lsfit.zhou import CollapsedFitError, zhou_ellipsoid, zhou_quartic
 from tests.generators import cylinder_grid, disc_polar, lcg_patch, points_patch, rect_grid
 from tests.oracles import samples
 
