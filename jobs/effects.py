@@ -22,7 +22,7 @@ import numpy as np
 from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.friction.motion import fibonacci_twists
 from softjaw.friction.wrench import friction_wrench
-from softjaw.scoring.bodies import polytope_volume
+from softjaw.scoring.contact import polytope_volume
 from softjaw.study import pictures
 from softjaw.study.case import effects
 from softjaw.study.case.build import build_object

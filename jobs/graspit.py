@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike
 
 import softjaw as sj
 from softjaw.lsfit.ellipsoid import Ellipsoid
-from softjaw.scoring.bodies import polytope_volume
 from softjaw.scoring.closed_form import volume_linf
+from softjaw.scoring.contact import polytope_volume
 
 
 def graspit_vertices(semi_axes: ArrayLike) -> np.ndarray:

@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from softjaw.lsfit.ellipsoid import TiltedEllipsoid
@@ -92,10 +91,7 @@ class Quartic(LimitSurface):
 
     def hessian(self, w: ArrayLike) -> FloatArray:
         """Second derivatives of ``P``, ``(m, d) -> (m, d, d)``."""
-        W, d = rows(w, self.dimension), self.dimension
-        return ((W[:, :, None] * W[:, None, :]).reshape(-1, d * d) @ self.tensor.reshape(d * d, d * d)).reshape(
-            -1, d, d
-        )
+        return _second(self.tensor, rows(w, self.dimension))[0]
 
     @cached_property
     def tensor(self) -> FloatArray:
@@ -168,12 +164,8 @@ class Quartic(LimitSurface):
         moving = length > 0
         # unit normals: the tolerances of the search are those of a problem of size one
         T = T[moving] / length[moving, None]
-        start, points = self._starts(T), np.empty_like(T)
-        failed = support_points(self._round.tensor, T, start, points)
-        if failed:
-            raise FitError(f"{failed} of {len(T)} supports did not converge: scale the quartic to reaches of about one")
         out = np.zeros((len(moving), self.dimension))
-        out[moving] = points @ self.frame.T
+        out[moving] = farthest_points(self._round.tensor, T, self._starts(T)) @ self.frame.T
         return out
 
     def _starts(self, T: FloatArray) -> FloatArray:
@@ -207,110 +199,55 @@ class Quartic(LimitSurface):
         return directions(self.dimension, n) * (P**-0.25)[:, None]
 
 
-@njit(cache=True)
-def support_points(tensor, T, start, out):  # pragma: no cover - compiled
-    """Points ``out (m, d)`` of a closed quartic surface farthest along ``T (m, d)``, by Newton's method.
+def farthest_points(tensor: FloatArray, T: FloatArray, w: FloatArray) -> FloatArray:
+    """Points ``(m, d)`` of a closed convex quartic surface farthest along unit normals ``T``, by Newton's method.
 
-    ``P(w) - t . w`` is smallest on the ray through the point of the surface that is wanted. Steps
-    are halved until the function falls; where the second derivative is singular it is shifted.
+    ``P(w) - t . w`` is smallest on the ray through the point of the surface that is wanted. Steps are halved until the
+    function falls; where the second derivative is singular it is shifted.
 
     Parameters
     ----------
     tensor : (d, d, d, d) array
-        ``Q``, symmetric: the second derivative is ``H_ij = Q_ijkl w_k w_l``, the gradient ``H w / 3``.
+        ``Q``, symmetric: the second derivative is ``H_ij = Q_ijkl w_k w_l``.
     T : (m, d) array
-        Unit normals.
-    start : (m, d) array
-        Points near the ones wanted, of any length; the lowest valley near them is found.
+    w : (m, d) array
+        Points near the ones wanted, of any length.
 
-    Returns
-    -------
-    int
-        How many of the searches did not converge.
+    Raises
+    ------
+    FitError
+        If a search does not converge.
     """
-    m, d = T.shape
-    H, g, s, y, A = np.empty((d, d)), np.empty(d), np.empty(d), np.empty(d), np.empty((d, d))
-    failed = 0
-    for n in range(m):
-        t = T[n]
-        w = start[n].copy()
-        P = _second(tensor, w, H, g)
-        # along a ray P - t . w is least where 4 P s^3 = t . w; the floor keeps starts across t from collapsing to 0
-        along = max(np.dot(t, w), 1e-3 * np.sqrt(np.dot(w, w)))
-        w *= (along / (4 * P)) ** (1 / 3)
-        P = _second(tensor, w, H, g)
-        converged = False
-        for _ in range(200):
-            size, shift = 0.0, 1e-13
-            for i in range(d):
-                size += abs(H[i, i])
-            while True:
-                for i in range(d):
-                    s[i] = t[i] - g[i]
-                    for j in range(d):
-                        A[i, j] = H[i, j]
-                    A[i, i] += shift * size
-                if _solve(A, s):
-                    break
-                shift = max(10.0 * shift, 1e-3)
-            fall = 0.0
-            for i in range(d):
-                fall += s[i] * (t[i] - g[i])
-            phi = P - np.dot(t, w)
-            if converged:
+    P = _second(tensor, w)[2]
+    # along a ray P - t . w is least where 4 P s^3 = t . w; the floor keeps starts across t from collapsing to 0
+    along = np.maximum((T * w).sum(axis=1), 1e-3 * np.linalg.norm(w, axis=1))
+    w = w * np.cbrt(along / (4 * P))[:, None]
+    for _ in range(200):
+        H, g, P = _second(tensor, w)
+        values, V = np.linalg.eigh(H)
+        values = np.maximum(values, 1e-13 * np.einsum("mii->m", H)[:, None])
+        s = np.einsum("mij,mj->mi", V, np.einsum("mij,mi->mj", V, T - g) / values)
+        fall, phi = (s * (T - g)).sum(axis=1), P - (T * w).sum(axis=1)
+        done = fall <= 1e-12 * np.abs(phi)  # this step squares what is left
+        length = np.ones(len(w))
+        for _ in range(60):
+            y = w + length[:, None] * s
+            # the last step changes phi by less than its rounding: a test of descent would judge noise
+            good = (_second(tensor, y)[2] - (T * y).sum(axis=1) <= phi - 1e-4 * length * fall) | done
+            if good.all():
                 break
-            converged = fall <= 1e-12 * abs(phi)  # one more step squares what is left
-            length, new = 1.0, phi
-            for _ in range(60):
-                y[:] = w + length * s
-                P = _second(tensor, y, H, g)
-                new = P - np.dot(t, y)
-                # the last step changes phi by less than its rounding: a test of descent would judge noise
-                if new <= phi - 1e-4 * length * fall or converged:
-                    break
-                length *= 0.5
-            w[:] = y
-        if not converged:
-            failed += 1
-        # the minimum lies on the ray through the point wanted, not on the surface
-        out[n] = w / P**0.25
-    return failed
+            length[~good] *= 0.5
+        w = y
+        if done.all():
+            # the minimum lies on the ray through the point wanted, not on the surface
+            return w / (_second(tensor, w)[2] ** 0.25)[:, None]
+    raise FitError(f"{(~done).sum()} of {len(T)} supports did not converge: scale the quartic to reaches of about one")
 
 
-@njit(cache=True)
-def _second(tensor, w, H, g):  # pragma: no cover - compiled
-    """Second derivative and gradient at ``w``, written to ``H`` and ``g``; the value is returned."""
-    d = len(w)
+def _second(tensor: FloatArray, w: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Second derivative ``(m, d, d)``, gradient ``(m, d)`` and value ``(m,)`` at ``w (m, d)``."""
+    d = w.shape[1]
+    H = ((w[:, :, None] * w[:, None, :]).reshape(-1, d * d) @ tensor.reshape(d * d, d * d)).reshape(-1, d, d)
     # Euler: a form of degree 4 has the gradient H w / 3 and the value g . w / 4
-    P = 0.0
-    for i in range(d):
-        g[i] = 0.0
-        for j in range(d):
-            h = 0.0
-            for k in range(d):
-                for m in range(d):
-                    h += tensor[i, j, k, m] * w[k] * w[m]
-            H[i, j] = h
-            g[i] += h * w[j] / 3
-        P += g[i] * w[i] / 4
-    return P
-
-
-@njit(cache=True)
-def _solve(A, b):  # pragma: no cover - compiled
-    """Solve ``A x = b`` in place by Gauss elimination; False where the symmetric matrix is not positive definite."""
-    d = len(b)
-    for k in range(d):
-        # the pivots of a symmetric matrix are positive just where it is positive definite
-        if not A[k, k] > 0.0:
-            return False
-        for i in range(k + 1, d):
-            f = A[i, k] / A[k, k]
-            for j in range(k, d):
-                A[i, j] -= f * A[k, j]
-            b[i] -= f * b[k]
-    for k in range(d - 1, -1, -1):
-        for j in range(k + 1, d):
-            b[k] -= A[k, j] * b[j]
-        b[k] /= A[k, k]
-    return True
+    g = np.einsum("mij,mj->mi", H, w) / 3
+    return H, g, (g * w).sum(axis=1) / 4

@@ -1,16 +1,225 @@
-"""A soft contact somewhere on the object: where it presses, and the loads it can carry per unit normal force."""
+"""A soft contact somewhere on the object: where it presses, and its limit surface, the loads it can carry.
+
+Limit surfaces are any bodies: polytopes, ellipsoids, and the ellipsoids that other bodies hold.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-
-from softjaw.scoring.bodies import Body
+from scipy.spatial import ConvexHull, QhullError
 
 FloatArray = NDArray[np.float64]
+ROUNDING_SHARE = 1e-12  # of the largest number of its kind: an extent, a load or an arm below it is the rounding of 0
+SUPPORT_STEP = 1e-5  # of differences of a support function of size 1: rounding and bending both leave some 1e-10
+
+
+class Body(Protocol):
+    """Limit surface in ``(f_x, f_y, tau_z)`` per unit normal force, with 0 inside or on it.
+
+    A body that has ``vertices (k, 3)`` counts as their hull, one of ``degree`` 2 as an ellipsoid about 0.
+    """
+
+    @property
+    def volume(self) -> float:
+        """Volume."""
+
+    @property
+    def shadow_area(self) -> float:
+        """Area of the shadow on the first two coordinates."""
+
+    def support(self, t: ArrayLike) -> FloatArray:
+        """Largest ``w . t`` over the body, ``(m, 3) -> (m,)``."""
+
+
+@dataclass(frozen=True, eq=False)
+class PolytopeBody:
+    """Hull of wrenches, such as samples of a limit surface or the vertices of a linearised one.
+
+    Parameters
+    ----------
+    vertices : (k, 3) array
+        ``(f_x, f_y, tau_z)`` per unit normal force [-, -, m]; 0 must not lie outside.
+    """
+
+    vertices: FloatArray
+
+    def __post_init__(self) -> None:
+        """Refuse what is no set of wrenches."""
+        points = np.array(self.vertices, dtype=float)
+        if points.ndim != 2 or points.shape[1] != 3 or len(points) == 0 or not np.isfinite(points).all():
+            raise ValueError(f"vertices has shape {points.shape}: expected finite wrenches, (k, 3)")
+        points.flags.writeable = False
+        object.__setattr__(self, "vertices", points)
+
+    @cached_property
+    def _sizes(self) -> tuple[float, float]:
+        return polytope_volume(self.vertices)
+
+    @property
+    def volume(self) -> float:
+        """Volume of the hull."""
+        return self._sizes[0]
+
+    @property
+    def shadow_area(self) -> float:
+        """Area of the hull's shadow on the plane of the forces."""
+        return self._sizes[1]
+
+    def support(self, t: ArrayLike) -> FloatArray:
+        """Largest ``w . t`` over the body, ``(m, 3) -> (m,)``."""
+        return (np.atleast_2d(np.asarray(t, float)) @ self.vertices.T).max(axis=1)
+
+
+def vertices_of(body: Body) -> FloatArray | None:
+    """Vertices ``(k, 3)`` of a polytope, None of any other body."""
+    vertices = getattr(body, "vertices", None)
+    return None if vertices is None else np.asarray(vertices, float)
+
+
+def quadratic_form(body: Body) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Reach ``(3,)``, lengths ``(3,)`` that scale loads to one, and form ``Q`` of the scaled body's squared support.
+
+    Six supports determine the form of an ellipsoid; of another body it means nothing.
+    """
+    reach = body.support(np.eye(3))
+    # a short axis keeps its digits beside long ones only if all are made one size first
+    scale = np.where(reach > 0, reach, 1.0)
+    e, pairs = np.diag(1 / scale), [(0, 1), (0, 2), (1, 2)]
+    Q = np.diag((reach / scale) ** 2)
+    for (i, j), h in zip(pairs, body.support(np.array([e[i] + e[j] for i, j in pairs])), strict=True):
+        # polarisation: the squared support of a sum holds the mixed term twice
+        product = (h**2 - Q[i, i] - Q[j, j]) / 2
+        Q[i, j] = Q[j, i] = product if abs(product) > 1e-14 else 0.0  # rounding of axes along the components
+    return reach, scale, Q
+
+
+def is_ellipsoid(body: Body) -> bool:
+    """Whether the squared support is a quadratic form, as of an ellipsoid about 0."""
+    _, scale, Q = quadratic_form(body)
+    # six supports always fit some form: others have to confirm it
+    t = fibonacci_vertices(np.ones(3), 60)
+    h2 = body.support(t / scale) ** 2
+    return bool(np.abs(h2 - np.einsum("ka,ab,kb->k", t, Q, t)).max() <= 1e-9 * h2.max())
+
+
+def ellipsoid_matrix(body: Body) -> FloatArray | None:
+    """Symmetric ``A (3, 3)`` such that the body is the image of the unit ball under it; None if its degree is not 2."""
+    if getattr(body, "degree", None) != 2:
+        return None
+    reach, scale, Q = quadratic_form(body)
+    if np.array_equal(Q, np.diag(Q.diagonal())):
+        return np.diag(reach)
+    return _root(Q * np.outer(scale, scale))
+
+
+def ellipsoid_inside(body: Body) -> FloatArray:
+    """Root ``A (3, 3)`` of an ellipsoid inside the body: ``|A t| <= support(t)``, with equality if it is one.
+
+    Otherwise it has the proportions of the body's semi-axes. Its size follows from the support on a few thousand
+    directions, less what a support function can fall between them, 2 to 4 % of its largest value.
+    """
+    # a root from the scaled form keeps the digits of short axes, which a symmetric root would mix up
+    if is_ellipsoid(body):
+        _, scale, Q = quadratic_form(body)
+        size, V = np.linalg.eigh(Q)
+        return np.sqrt(np.maximum(size, 0))[:, None] * V.T * scale
+    ends = body.support(np.vstack([np.eye(3), -np.eye(3)]))
+    axes = (ends[:3] + ends[3:]) / 2
+    # a flat body holds no ellipsoid of three axes; a point keeps the bound true
+    if (axes <= 0).any():
+        return np.zeros((3, 3))
+    # between samples a support of the even body falls by no more than the distance times its largest value
+    h = body.support(fibonacci_vertices(np.ones(3), 6000) / axes)
+    spacing = 2.8 / np.sqrt(len(h))  # no direction is farther than this from the nearest of the Fibonacci points
+    return np.diag(axes * max(h.min() - spacing * h.max() / (1 - spacing), 0))
+
+
+def _root(B: FloatArray) -> FloatArray:
+    """Symmetric root of a symmetric matrix whose eigenvalues are negative by rounding at most."""
+    values, vectors = np.linalg.eigh(B)
+    return (vectors * np.sqrt(np.maximum(values, 0))) @ vectors.T
+
+
+def touching_points(body: Body, t: ArrayLike) -> FloatArray:
+    """A point of the body that is farthest in each direction, ``(m, 3) -> (m, 3)``; 0 for no direction."""
+    T = np.atleast_2d(np.asarray(t, float))
+    vertices = vertices_of(body)
+    if vertices is not None:
+        return vertices[(T @ vertices.T).argmax(axis=1)]
+    A = ellipsoid_matrix(body)
+    if A is not None:
+        felt = T @ A
+        length = np.linalg.norm(felt, axis=1, keepdims=True)
+        return felt / np.where(length > 0, length, 1.0) @ A
+    # points by Newton's method are exact to more digits than differences of the support
+    if hasattr(body, "support_points"):
+        return np.asarray(body.support_points(T))
+    reach = body.support(np.eye(3))
+    scale = 1 / np.where(reach > 0, reach, 1.0)
+    S = T / scale
+    length = np.linalg.norm(S, axis=1, keepdims=True)
+    S /= np.where(length > 0, length, 1.0)
+    steps = SUPPORT_STEP * np.vstack([np.eye(3), -np.eye(3), np.zeros((1, 3))])
+    h = body.support(((S[None] + steps[:, None]) * scale).reshape(-1, 3)).reshape(7, len(S))
+    # the gradient of a support function is the point that touches
+    p = (h[:3] - h[3:6]).T / (2 * SUPPORT_STEP)
+    # along the direction itself the support is known better than its differences are
+    along = (p * S).sum(axis=1)
+    return p * np.where(along > 0, h[6] / np.where(along > 0, along, 1.0), 1.0)[:, None] / scale
+
+
+def joint_support(C: FloatArray, bodies: Sequence[Body], u: FloatArray, kind: str) -> FloatArray:
+    """Support ``(m,)`` of the grasp wrench space of contacts ``C (n, r, 4)`` along ``u (m, r)``; kind: `joined`."""
+    felt = np.einsum("mr,irc->imc", u, C)
+    h = np.array([part[:, 0] + body.support(part[:, 1:]) for part, body in zip(felt, bodies, strict=True)])
+    return joined(h, kind)
+
+
+def joined(h: FloatArray, kind: str) -> FloatArray:
+    """Supports ``(n, m)`` of the contacts for unit normal forces as one of the grasp; "linf" or "l1"."""
+    # without a normal force a contact adds nothing, and can be let go where it would resist
+    h = np.maximum(h, 0)
+    return h.max(axis=0) if kind == "l1" else h.sum(axis=0)
+
+
+def fibonacci_vertices(semi_axes: ArrayLike, m: int) -> FloatArray:
+    """``m`` points spread evenly over the unit sphere and stretched to the ellipsoid, ``(m, 3)``."""
+    i = np.arange(m)
+    # equal steps of height cut a sphere into rings of equal area (Archimedes)
+    z = 1 - (2 * i + 1) / m
+    phi = i * np.pi * (3 - np.sqrt(5))
+    r = np.sqrt(1 - z**2)
+    return np.column_stack([r * np.cos(phi), r * np.sin(phi), z]) * np.asarray(semi_axes, float)
+
+
+def polytope_volume(vertices: ArrayLike) -> tuple[float, float]:
+    """Volume of the hull of the vertices ``(m, 3)`` and area of its shadow on the first two coordinates.
+
+    Flat vertices give the volume 0, and vertices on a line through the shadow the area 0.
+    """
+    points = np.asarray(vertices, float)
+    return hull_volume(points), hull_volume(points[:, :2])
+
+
+def hull_volume(points: FloatArray) -> float:
+    """Volume of the hull of points ``(m, d)``; 0 where they are thinner than `ROUNDING_SHARE` of their extent."""
+    centred = points - points.mean(axis=0)
+    _, extent, axes = np.linalg.svd(centred, full_matrices=False)
+    # Qhull fails on flat points, and joggled ones would have a volume of rounding
+    if len(points) <= points.shape[1] or extent[-1] <= ROUNDING_SHARE * extent[0]:
+        return 0.0
+    even = centred @ axes.T / extent  # Qhull loses facets of points that are much longer than wide
+    try:
+        return float(ConvexHull(even).volume * extent.prod())
+    except QhullError:
+        # Joggled input always gives a hull; its volume is off by 1e-6 to 1e-5.
+        return float(ConvexHull(even, qhull_options="QJ").volume * extent.prod())
 
 
 @dataclass(frozen=True, eq=False)

@@ -39,8 +39,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linprog
 from scipy.sparse import block_diag, csc_array, vstack
 
-from softjaw.scoring.bodies import (
+from softjaw.scoring.contact import (
     Body,
+    SoftContact,
     ellipsoid_inside,
     fibonacci_vertices,
     is_ellipsoid,
@@ -48,7 +49,6 @@ from softjaw.scoring.bodies import (
     joint_support,
     touching_points,
 )
-from softjaw.scoring.contact import SoftContact
 
 FloatArray = NDArray[np.float64]
 NO_WRENCH = 1e-9  # relative to the largest wrench of a contact: what counts as none

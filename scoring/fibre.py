@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
-from softjaw.scoring.bodies import Body, ellipsoid_matrix, hull_volume, touching_points, vertices_of
+from softjaw.scoring.contact import Body, ellipsoid_matrix, hull_volume, touching_points, vertices_of
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]

@@ -27,8 +27,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from softjaw.scoring.bodies import PolytopeBody
-from softjaw.scoring.contact import SoftContact
+from softjaw.scoring.contact import PolytopeBody, SoftContact
 
 FloatArray = NDArray[np.float64]
 KINDS = ("shared", "up_to", "fixed")

@@ -29,8 +29,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softjaw.scoring.bodies import Body, PolytopeBody, vertices_of
-from softjaw.scoring.contact import SoftContact
+from softjaw.scoring.contact import Body, PolytopeBody, SoftContact, vertices_of
 from softjaw.scoring.fibre import Fibre, Span, fibre_of
 
 FloatArray = NDArray[np.float64]

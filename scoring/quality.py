@@ -10,9 +10,8 @@ from enum import IntFlag
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softjaw.scoring.bodies import ROUNDING_SHARE, Body, ellipsoid_matrix
 from softjaw.scoring.closed_form import epsilon_l1, epsilon_linf, volume_l1, volume_linf
-from softjaw.scoring.contact import SoftContact
+from softjaw.scoring.contact import ROUNDING_SHARE, Body, SoftContact, ellipsoid_matrix
 from softjaw.scoring.epsilon import epsilon
 from softjaw.scoring.pose import pose_volume
 

@@ -24,9 +24,8 @@ from softjaw.lsfit.quartic_fit import convex_quartic
 from softjaw.lsfit.samples import fit_error, normalised_samples, sample_rank, six_samples
 from softjaw.lsfit.span import zhou_ellipsoid, zhou_quartic
 from softjaw.lsfit.surface import FitFlag, shadow_area
-from softjaw.scoring.bodies import PolytopeBody, fibonacci_vertices
 from softjaw.scoring.closed_form import epsilon_l1, epsilon_linf, volume_l1, volume_linf
-from softjaw.scoring.contact import SoftContact, contact_axes
+from softjaw.scoring.contact import PolytopeBody, SoftContact, contact_axes, fibonacci_vertices
 from softjaw.scoring.epsilon import epsilon
 from softjaw.scoring.pose import pose_volume
 from softjaw.scoring.quality import score

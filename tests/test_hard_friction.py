@@ -11,7 +11,7 @@ from scipy.spatial import ConvexHull, QhullError
 from softjaw.friction.frame import FrameFlag, contact_frame, in_frame
 from softjaw.friction.motion import cor_twists
 from softjaw.friction.wrench import friction_limits, friction_wrench
-from softjaw.scoring.bodies import fibonacci_vertices, polytope_volume
+from softjaw.scoring.contact import fibonacci_vertices, polytope_volume
 from tests.generators import cap_polar, lcg_patch, points_patch
 
 X = [1.0, 0.0, 0.0]
@@ -65,5 +65,5 @@ def test_failure_of_qhull():
             raise QhullError("QH6271 topology error")
         return ConvexHull(points, qhull_options=qhull_options, **options)
 
-    with mock.patch("softjaw.scoring.bodies.ConvexHull", moody):
+    with mock.patch("softjaw.scoring.contact.ConvexHull", moody):
         np.testing.assert_allclose(polytope_volume(vertices), exact, rtol=1e-4)

@@ -34,6 +34,8 @@ from softjaw.fem.petsc import NonlinearSolver
 
 FloatArray = NDArray[np.float64]
 State = tuple[FloatArray, float]  # unknowns and force [N]
+RESIDUAL = 1e-10  # of the normal force: where a solve ends
+SHORTEST_PART = 1.0 / 8.0  # of the step between two forces, before displacement control
 MOST_STEPS = 60  # under displacement control, for one force
 SHORTEST = 1.0 / 64.0  # of the longest step under displacement control, where that is bounded
 FIRMLY, BARELY = 1e-3, 1e-6  # part of the wanted force that a first state should have, and that it must have
@@ -58,18 +60,6 @@ def falls(forces: Sequence[float]) -> bool:
     return bool((np.diff(f) < -1e-6 * np.abs(f[1:])).any())
 
 
-@dataclass(frozen=True)
-class Settings:
-    """When a solve ends and when a step is given up.
-
-    ``residual`` is relative to the normal force; ``min_step`` is the shortest part of the step between two forces that
-    is tried before displacement control.
-    """
-
-    residual: float = 1e-10
-    min_step: float = 1.0 / 8.0
-
-
 @dataclass
 class Work:
     """Effort of one force level."""
@@ -87,7 +77,6 @@ class Stepping:
     ----------
     problem : ContactProblem
     solver : NonlinearSolver
-    settings : Settings
     most : int, optional
         Newton iterations of one step after which a shorter one is tried; else the solver's own limit.
     watch : callable
@@ -100,7 +89,6 @@ class Stepping:
 
     problem: ContactProblem
     solver: NonlinearSolver
-    settings: Settings
     most: int | None = None
     watch: Callable[[FloatArray, float], None] = lambda x, force: None
     near: Callable[[FloatArray], bool] = lambda x: False
@@ -124,7 +112,7 @@ class Stepping:
         self.off = 0.0
         try:
             # a tolerance below what rounding leaves would never be met
-            x, iterations = self.solver.solve(x, max(self.settings.residual * scale, floor), most, growth)
+            x, iterations = self.solver.solve(x, max(RESIDUAL * scale, floor), most, growth)
             work.iterations += iterations
         except ConvergenceError as error:
             x, self.off = error.end or (x, np.inf)
@@ -154,7 +142,7 @@ class Stepping:
             except ConvergenceError:
                 # halves only: the length that worked last is kept, because the rest of the way is not easier
                 fraction *= 0.5
-                if fraction < self.settings.min_step:
+                if fraction < SHORTEST_PART:
                     if not by_displacement:
                         raise
                     return self.displacement_control(x, force, work)
@@ -308,7 +296,7 @@ class Following(Stepping):
                 cut *= 0.5
                 # `not >` instead of `<=`: NaN, where nothing is foretold, has to end the halving
                 # foretold closing displacement of a step that is given up where Newton's method does not converge
-                if cut < self.settings.min_step and not self._foretold(here, 0.5 * (target - here.force)) > 0.01:
+                if cut < SHORTEST_PART and not self._foretold(here, 0.5 * (target - here.force)) > 0.01:
                     if not by_displacement:
                         raise
                     return self._past_limit(here, force, work)

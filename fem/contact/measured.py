@@ -19,7 +19,6 @@ import numpy as np
 from scipy.interpolate import RectBivariateSpline
 from scipy.spatial import cKDTree
 
-from softjaw.fem.contact.load_stepping import Settings
 from softjaw.fem.contact.path import Pressed
 from softjaw.fem.contact.press import Press
 from softjaw.fem.objects.gap import FloatArray, Gap, NoContactError
@@ -81,13 +80,11 @@ class MeasuredPress:
         With other gaps, as in `fem.contact.press.Press`.
     options : dict
         PETSc options with the prefix ``contact_``.
-    settings : Settings
     """
 
     pad: Pad
     fallbacks: Sequence[Pad] = ()
     options: dict[str, Any] = field(default_factory=dict)
-    settings: Settings = field(default_factory=Settings)
 
     def solve(self, face: MeasuredFace) -> Measured:
         """State of the pad with this face, which is measured from where the undeformed face would be.
@@ -110,7 +107,7 @@ class MeasuredPress:
         return Measured(self._pressed(self._released(touching, sure, depth), depth), margin, True)
 
     def _pressed(self, face: MeasuredFace | LiftedFace, closing: float) -> Pressed:
-        press = Press(self.pad, face.gap, self.options, self.fallbacks, self.settings)
+        press = Press(self.pad, face.gap, self.options, self.fallbacks)
         try:
             return press.at_closing(closing)
         finally:

@@ -20,7 +20,7 @@ import numpy as np
 
 from softjaw.fem.contact.checks import ALTERNATING, Checks, check
 from softjaw.fem.contact.friction import PATH_RESIDUAL, Anchor, load_steps
-from softjaw.fem.contact.load_stepping import ASTRAY, STRAY, FloatArray, Settings, Stepping, Work
+from softjaw.fem.contact.load_stepping import ASTRAY, RESIDUAL, STRAY, FloatArray, Stepping, Work
 from softjaw.fem.contact.problem import ContactPoints, ContactProblem
 from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.fem.objects.gap import Pose
@@ -126,7 +126,6 @@ class LoadPath(ABC, Generic[ProblemT]):
         All number their unknowns alike.
     options : dict
         PETSc options with the prefix ``contact_``.
-    settings : Settings
     stride : int
         With friction the path leads through every ``stride``-th of its forces; 2 tells what its steps leave.
     """
@@ -134,10 +133,9 @@ class LoadPath(ABC, Generic[ProblemT]):
     MOST_ITERATIONS: int  # of Newton's method for one force
 
     def __init__(
-        self, problems: Sequence[Callable[[], ProblemT]], options: dict[str, Any] | None, settings: Settings | None,
-        stride: int = 1,
-    ) -> None:  # fmt: skip
-        self.options, self.settings = options or {}, settings or Settings()
+        self, problems: Sequence[Callable[[], ProblemT]], options: dict[str, Any] | None = None, stride: int = 1
+    ) -> None:
+        self.options = options or {}
         self._fallbacks = self._others = tuple(problems[1:])  # the latter: those that have not been taken yet
         self._wanted = self.problem = problems[0]()
         self._stride, self._path = stride, list[_PathState[ProblemT]]()
@@ -310,7 +308,7 @@ class LoadPath(ABC, Generic[ProblemT]):
             state, unknowns = problem.contact_state(x, k), x[f.unknowns].copy()
             pressure, _, points = state
             imbalance = float(residual[f.offset : f.closing_dof + 1].max()) / f.pad.share
-            checks = check(f.foam, unknowns, state, imbalance, here.force, self.settings.residual, slack)
+            checks = check(f.foam, unknowns, state, imbalance, here.force, RESIDUAL, slack)
             effort = work if k == 0 else Work()
             pads.append(Pressed(
                 here.force, float(x[f.closing_dof]), unknowns, f.pad, f.pose, pressure,

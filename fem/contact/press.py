@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from softjaw.fem.contact.checks import ALTERNATING, check, explained, refuse_fall
-from softjaw.fem.contact.load_stepping import FloatArray, Following, Settings, State, Stepping, Work
+from softjaw.fem.contact.load_stepping import RESIDUAL, FloatArray, Following, State, Stepping, Work
 from softjaw.fem.contact.path import LoadPath, OnPath, Pressed
 from softjaw.fem.contact.problem import Control, Gap
 from softjaw.fem.contact.rigid import RigidProblem
@@ -39,7 +39,6 @@ class Press(LoadPath[RigidProblem]):
         PETSc options with the prefix ``contact_``.
     fallbacks : sequence of Pad
         The same pad with other gaps, the best first, for forces at which ``pad`` has no solution.
-    settings : Settings
     mu : float, optional
         Friction coefficient; without it no friction acts back on the pressures.
     stepping : type, optional
@@ -54,11 +53,10 @@ class Press(LoadPath[RigidProblem]):
 
     def __init__(
         self, pad: Pad, gap: Gap, options: dict[str, Any] | None = None, fallbacks: Sequence[Pad] = (),
-        settings: Settings | None = None, mu: float | None = None, stepping: type[Stepping] | None = None,
-        stride: int = 1,
+        mu: float | None = None, stepping: type[Stepping] | None = None, stride: int = 1,
     ) -> None:  # fmt: skip
         self.stepping = stepping or (Following if mu is None else Stepping)
-        super().__init__([partial(RigidProblem, p, gap, mu) for p in (pad, *fallbacks)], options, settings, stride)
+        super().__init__([partial(RigidProblem, p, gap, mu) for p in (pad, *fallbacks)], options, stride)
 
     @property
     def pad(self) -> Pad:
@@ -76,7 +74,7 @@ class Press(LoadPath[RigidProblem]):
 
     def _steps(self) -> Stepping:
         return self.stepping(
-            self.problem, self.solver, self.settings, watch=self._watch, near=self._keeps_laws,
+            self.problem, self.solver, watch=self._watch, near=self._keeps_laws,
             deepest=self.problem.thickness,
         )  # fmt: skip
 
@@ -93,7 +91,7 @@ class Press(LoadPath[RigidProblem]):
             return False
         try:
             imbalance = float(np.abs(residual).max()) / self.pad.share
-            check(self.problem.foam, x, state, imbalance, force, self.settings.residual, ALTERNATING)
+            check(self.problem.foam, x, state, imbalance, force, RESIDUAL, ALTERNATING)
         except CheckError:
             return False
         return True

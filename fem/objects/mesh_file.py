@@ -19,9 +19,9 @@ from typing import TYPE_CHECKING, Any
 from softjaw.fem.errors import MeshError
 
 if TYPE_CHECKING:
+    import numpy as np
     import trimesh
-
-    from softjaw.fem.objects.gap import FloatArray, IntArray
+    from numpy.typing import NDArray
 
 # Each unit is ``times / over`` metres, so that converting rounds once.
 LENGTHS = {"mm": (1, 1000), "cm": (1, 100), "m": (1, 1), "inch": (0.0254, 1)}
@@ -42,7 +42,7 @@ DECLARED = {
 }
 
 
-def read_triangles(path: Path) -> tuple[FloatArray, IntArray]:
+def read_triangles(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Corners ``(k, 3)`` in the file's own unit and triangles ``(m, 3)`` of a mesh file.
 
     The bodies of a scene come in their places. Faces of more corners are cut into triangles where they are convex.

@@ -220,7 +220,7 @@ def through(points: FloatArray, rim: float) -> tuple[Curve, Curve]:
             end = _end(points, j, j, runs) if j < len(points) - 1 else _open_end(points[-1])
             pieces.append(spline(points[i : j + 1], start, end))
     given = joined(pieces)
-    return given, joined([*_lid(given, rim, first=True), given, *_lid(given, rim, first=False)])
+    return given, joined([*lid(given, None, rim, first=True), given, *lid(given, None, rim, first=False)])
 
 
 def _end(points: FloatArray, at: int, side: int, runs: list[tuple[int, int, bool]]) -> End:
@@ -254,26 +254,35 @@ def _corner(
     return *rounding(q - cut * t, t, u, cut / half), t, u
 
 
-def _lid(given: Curve, rim: float, *, first: bool) -> list[Curve]:
-    """Rounded rim and flat cap that carry one end of the profile to the axis; nothing where it ends there."""
-    s = given.breaks[:1] if first else given.breaks[-1:]
-    p, d1, d2 = (given.derivative(s, order)[0] for order in range(3))
+def lid(curve: Curve, height: float | None, rim: float, *, first: bool) -> list[Curve]:
+    """Rounded edge and flat lid that carry one end of an outline to the axis, in the order of s; nothing there.
+
+    The lid lies at ``height``, or where an edge rounded by ``rim`` ends [m]. Where the rounding would come close to the
+    axis, a dome is drawn.
+    """
+    s = curve.breaks[:1] if first else curve.breaks[-1:]
+    p, d1, d2 = (curve.derivative(s, order)[0] for order in range(3))
     if p[1] < 1e-9:  # rounded: the line that ends on the axis was given by its length
         return []
     mirror = np.array([-1.0, 1.0]) if first else np.ones(2)  # the first end is a last one, seen backwards
     speed = np.linalg.norm(d1)
-    d1, d2 = d1 / speed, (d2 - (d2 @ d1) * d1 / speed**2) / speed**2  # by arc length, so that the rim starts evenly
-    t, axis = (-d1 if first else d1) * mirror, np.array([0.0, -1.0])
-    # a part of the cap has to stay flat, however narrow the end is
-    radius = min(rim, 0.25 * p[1])
-    pieces, start = [], p * mirror
-    if t @ axis < 1 - 1e-9:
-        arc, length = rounding(start, t, axis, radius)
-        start = arc[-1]
+    d1, d2 = d1 / speed, (d2 - (d2 @ d1) * d1 / speed**2) / speed**2  # by arc length, so that the edge starts evenly
+    t, inwards = (-d1 if first else d1) * mirror, np.array([0.0, -1.0])
+    start, fall = p * mirror, 1.0 - t @ inwards
+    if fall <= 1e-9:
+        end = np.array([start[0], 0.0])
+        return [line(end * mirror, start * mirror) if first else line(start, end)]
+    # a part of the lid has to stay flat, however narrow the end is
+    radius = min(rim, 0.25 * p[1]) if height is None else abs(height - p[0]) / fall
+    # a rounding that reaches this far to the axis is drawn as a dome
+    if radius * np.sqrt(1.0 - (t @ inwards) ** 2) > 0.9 * p[1]:
+        pole = np.array([p[0] + mirror[0] * radius * fall, 0.0])
         if first:
-            pieces.append(spline(arc[::-1] * mirror, joint(-axis), joint(d1, d2), length[-1] - length[::-1]))
-        else:
-            pieces.append(spline(arc, joint(d1, d2), joint(axis), length))
-    end = np.array([start[0], 0.0])
-    cap = line(end * mirror, start * mirror) if first else line(start, end)
-    return [cap, *pieces] if first else [*pieces, cap]
+            return [spline(np.array([pole, p]), POLE, joint(d1, d2))]
+        return [spline(np.array([p, pole]), joint(d1, d2), POLE)]
+    arc, length = rounding(start, t, inwards, radius)
+    end = np.array([arc[-1][0], 0.0])
+    if first:
+        edge = spline(arc[::-1] * mirror, joint(-inwards), joint(d1, d2), length[-1] - length[::-1])
+        return [line(end * mirror, arc[-1] * mirror), edge]
+    return [spline(arc, joint(d1, d2), joint(inwards), length), line(arc[-1], end)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,13 @@ from softjaw.friction.patch import NEGLIGIBLE
 BLOCK = 8  # segments of the polyline that share one bounding circle
 TURN = np.radians(3.0)  # largest turn of the curve within one segment of the polyline
 CLOSEST_POINTS = 1e-6  # points of a profile closer than this are refused [m]
+
+
+def closest() -> Any:
+    """The module of closest points; it loads numba, which a scene that is only checked does not need."""
+    from softjaw.fem.objects import closest
+
+    return closest
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,19 +76,13 @@ class Revolution(Analytic):
 
     def gap(self, x: FloatArray) -> Gap:
         """Signed distance ``(n,)`` [m], normal ``(n, 3)`` and Hessian ``(n, 3, 3)`` [1/m]."""
-        from softjaw.fem.objects.closest import (
-            profile_gap,  # with numba, which a scene that is only checked does not need
-        )
-
         x = np.ascontiguousarray(x, dtype=float)
         curve = self.curve
-        return profile_gap(x, curve.breaks, curve.coefficients, self._line, self._places, self._blocks, BLOCK)
+        return closest().profile_gap(x, curve.breaks, curve.coefficients, self._line, self._places, self._blocks, BLOCK)
 
     @cached_property
     def _blocks(self) -> FloatArray:
-        from softjaw.fem.objects.closest import bounding_circles
-
-        return bounding_circles(self._line, BLOCK)
+        return closest().bounding_circles(self._line, BLOCK)
 
     @property
     def bounds(self) -> FloatArray:

@@ -21,7 +21,7 @@ from softjaw.fem.objects.gap import (
     in_plane,
     radial,
 )
-from softjaw.fem.objects.revolution import Revolution
+from softjaw.fem.objects.revolution import Revolution, closest
 from softjaw.friction.patch import NEGLIGIBLE
 
 __all__ = ["Box", "EllipticCylinder", "GapFunction", "GapObject", "Plane", "Revolution", "Sphere"]
@@ -138,12 +138,8 @@ class EllipticCylinder(Analytic):
 
     def gap(self, x: FloatArray) -> Gap:
         """Signed distance ``(n,)`` [m], normal ``(n, 3)`` and Hessian ``(n, 3, 3)`` [1/m]."""
-        from softjaw.fem.objects.closest import (
-            ellipse_gap,  # with numba, which a scene that is only checked does not need
-        )
-
         x = np.asarray(x, dtype=float)
-        g, n, H = ellipse_gap(x, float(self.a), float(self.b))
+        g, n, H = closest().ellipse_gap(x, float(self.a), float(self.b))
         normal, hessian = in_plane(x, n, H)
         beyond = np.abs(x[:, 2]) - self._wall
         wall = (beyond <= 0) & (g >= beyond - self.edge_radius)  # no farther than the cap, for points inside

@@ -18,7 +18,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from softjaw.fem.objects.gap import FloatArray, IntArray, edges_of
-from softjaw.fem.objects.triangles import neighbours
+from softjaw.fem.objects.triangles import area_vectors, neighbours
 
 CREASE_ANGLE = 30.0  # [deg]: edges that turn by less are taken for facets of a smooth surface
 STEEP = 0.7  # an edge that leaves its tangent plane by more (sine) is kept straight: its normal is no use
@@ -59,8 +59,7 @@ class SmoothTriangles:
         The second array ``(k,)`` is how far that surface would lie from the facets [m]. ``width`` is what both
         triangles measure at least across their edge [m].
         """
-        x = self.points[self.triangles]
-        area = 0.5 * np.linalg.norm(np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), axis=1)
+        area = 0.5 * np.linalg.norm(area_vectors(self.points, self.triangles), axis=1)
         length = np.linalg.norm(np.diff(self.points[self.edges], axis=1)[:, 0], axis=1)
         narrower = np.full(len(self.edges), np.inf)
         np.minimum.at(narrower, self.edge_of, 2.0 * area[:, None] / np.maximum(length[self.edge_of], 1e-300))
@@ -143,8 +142,7 @@ def smooth_triangles(
     first_side = np.zeros(len(ends), np.int64)
     first_side[joined.edge_of.ravel()[::-1]] = np.arange(len(pairs))[::-1]
     halves = np.where(paired[:, None], joined.sides, first_side[:, None])
-    a, b, c = points[triangles].transpose(1, 0, 2)
-    area = np.cross(b - a, c - a)
+    area = area_vectors(points, triangles)
     normal = area / np.maximum(np.linalg.norm(area, axis=1), 1e-300)[:, None]
     cosine = np.einsum("ed,ed->e", normal[halves[:, 0] // 3], normal[halves[:, 1] // 3])
     alike = pairs[halves[:, 0], 0] != pairs[halves[:, 1], 0]

@@ -19,29 +19,12 @@ from scipy.sparse.linalg import splu
 from softjaw.fem.errors import MeshError
 from softjaw.fem.objects.gap import FloatArray, IntArray
 from softjaw.fem.objects.mesh_object import MeshObject
-from softjaw.fem.objects.profile import POLE, Curve, joint, line, rounding, spline
+from softjaw.fem.objects.profile import Curve
 
 LEVELS = 400  # heights of the first look at a mesh
 FEW = 64  # rays per height of that look
 STEEP = 1.0  # slope dr/dz from which a surface counts as bottom or top, not as wall
 STEEPEST = 4.0  # slope up to which the outline is followed by its length
-
-
-@dataclass(frozen=True)
-class Rays:
-    """Hits of ``n`` rays at each of ``k`` heights.
-
-    Attributes
-    ----------
-    outer, inner : (k, n) arrays
-        Distance from the centre to the last and to the first hit [m]; NaN where a ray hits nothing.
-    hits : (k, n) array of int
-        How often a ray crosses the surface: 1 everywhere if the section is star-shaped about its centre.
-    """
-
-    outer: FloatArray
-    inner: FloatArray
-    hits: IntArray
 
 
 def sections(points: FloatArray, triangles: IntArray, z: FloatArray) -> tuple[FloatArray, IntArray]:
@@ -92,8 +75,14 @@ def centroids(points: FloatArray, triangles: IntArray, z: FloatArray) -> FloatAr
     return np.stack([total(cross * (p + q)[:, axis]) / area for axis in (0, 1)], axis=1)
 
 
-def cast(points: FloatArray, triangles: IntArray, z: FloatArray, centre: FloatArray, count: int) -> Rays:
-    """Rays at heights ``z (k,)`` from ``centre (k, 2)`` at ``count`` even angles, the first along x."""
+def cast(
+    points: FloatArray, triangles: IntArray, z: FloatArray, centre: FloatArray, count: int
+) -> tuple[FloatArray, FloatArray]:
+    """Distance ``(k, n)`` from centres ``(k, 2)`` at heights ``z (k,)`` to the last and to the first crossing [m].
+
+    Along ``count`` rays at even angles, the first along x; NaN where a ray meets nothing. Both are the same all round
+    if the section is star-shaped about its centre.
+    """
     segments, cut = sections(points, triangles, z)
     which, ray, distance = _hits(segments - centre[cut][:, None], count)
     place, size = cut[which] * count + ray, len(z) * count
@@ -108,8 +97,7 @@ def cast(points: FloatArray, triangles: IntArray, z: FloatArray, centre: FloatAr
     np.maximum.at(outer, place, distance)
     np.minimum.at(inner, place, distance)
     outer[hits == 0] = inner[hits == 0] = np.nan
-    shape = len(z), count
-    return Rays(outer.reshape(shape), inner.reshape(shape), hits.reshape(shape))
+    return outer.reshape(-1, count), inner.reshape(-1, count)
 
 
 def _hits(segments: FloatArray, count: int) -> tuple[IntArray, IntArray, FloatArray]:
@@ -195,11 +183,11 @@ def find_wall(mesh: MeshObject, facet: float, rim: float, wanted: tuple[float, f
     low, high = (float(v) for v in mesh.bounds[:, 2])
     z = low + (np.arange(LEVELS) + 0.5) * (high - low) / LEVELS
     centre = np.nan_to_num(centroids(mesh.points, mesh.triangles, z))
-    rays = cast(mesh.points, mesh.triangles, z, centre, FEW)
-    r = np.nan_to_num(rays.outer).mean(axis=1)
+    outer, inner = cast(mesh.points, mesh.triangles, z, centre, FEW)
+    r = np.nan_to_num(outer).mean(axis=1)
     # share of the height may be folded at either end, as a hollow bottom is, and count as bottom or top
     at_end = np.abs(z - 0.5 * (low + high)) > 0.4 * (high - low)
-    bad, slope = folded(rays, facet).any(axis=1) & at_end, np.gradient(r, z)
+    bad, slope = folded(outer, inner, facet).any(axis=1) & at_end, np.gradient(r, z)
     first, last = _run(bad | (slope > STEEP)), len(z) - 1 - _run((bad | (slope < -STEEP))[::-1])
     steep_ends = max(z[min(first, len(z) - 1)], low + rim), min(z[max(last, 0)], high - rim)
     asked = wanted or (low, high)
@@ -216,9 +204,9 @@ def find_wall(mesh: MeshObject, facet: float, rim: float, wanted: tuple[float, f
     return Wall(ends, lids, _centre_line(z[inside], centre[inside], ends, 2 * radius, tolerance), radius)
 
 
-def folded(rays: Rays, facet: float) -> NDArray[np.bool_]:
-    """Rays ``(k, n)`` that miss the surface or cross it at places further apart than a facet."""
-    return ~(rays.outer - rays.inner <= facet)
+def folded(outer: FloatArray, inner: FloatArray, facet: float) -> NDArray[np.bool_]:
+    """Rays ``(k, n)`` that miss the surface or cross it at places further apart than a facet; as `cast` gives them."""
+    return ~(outer - inner <= facet)
 
 
 def _run(flags: NDArray[np.bool_]) -> int:
@@ -263,31 +251,3 @@ def curve_of(z: BSpline, r: BSpline) -> Curve:
     breaks = z.t[3:-3]
     powers = [np.stack([f(breaks[:-1], nu=k) / g for k, g in enumerate((1, 1, 2, 6))], axis=1) for f in (z, r)]
     return Curve(breaks - breaks[0], np.stack(powers, axis=1))
-
-
-def lid(curve: Curve, height: float | None, rim: float, *, first: bool) -> list[Curve]:
-    """Rounded edge and flat lid that carry one end of an outline to the axis, in the order of its s.
-
-    The lid lies at ``height``, or where an edge rounded by ``rim`` ends [m]. Where the rounding would come close to the
-    axis, a dome is drawn.
-    """
-    s = curve.breaks[:1] if first else curve.breaks[-1:]
-    p, d1, d2 = (curve.derivative(s, order)[0] for order in range(3))
-    mirror = np.array([-1.0, 1.0]) if first else np.ones(2)  # the first end is a last one, seen backwards
-    speed = np.linalg.norm(d1)
-    d1, d2 = d1 / speed, (d2 - (d2 @ d1) * d1 / speed**2) / speed**2
-    t, inwards = (-d1 if first else d1) * mirror, np.array([0.0, -1.0])
-    fall = 1.0 - t @ inwards
-    radius = min(rim, 0.25 * p[1]) if height is None else abs(height - p[0]) / fall
-    # a rounding that reaches this far to the axis is drawn as a dome
-    if radius * np.sqrt(1.0 - (t @ inwards) ** 2) > 0.9 * p[1]:
-        pole = np.array([p[0] + mirror[0] * radius * fall, 0.0])
-        if first:
-            return [spline(np.array([pole, p]), POLE, joint(d1, d2))]
-        return [spline(np.array([p, pole]), joint(d1, d2), POLE)]
-    arc, length = rounding(p * mirror, t, inwards, radius)
-    end = np.array([arc[-1][0], 0.0])
-    if first:
-        edge = spline(arc[::-1] * mirror, joint(-inwards), joint(d1, d2), length[-1] - length[::-1])
-        return [line(end * mirror, arc[-1] * mirror), edge]
-    return [spline(arc, joint(d1, d2), joint(inwards), length), line(arc[-1], end)]

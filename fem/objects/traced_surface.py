@@ -14,17 +14,17 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 from scipy.interpolate import BSpline, CubicSpline
 
 from softjaw.fem.errors import MeshError
 from softjaw.fem.objects.gap import FloatArray
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.fem.objects.outer_surface import Jet, OuterSurface
-from softjaw.fem.objects.profile import joined
+from softjaw.fem.objects.profile import joined, lid
 from softjaw.fem.objects.spline_surface import SplineSurface, evaluate, spline_surface
 from softjaw.fem.objects.traced_outline import (
     FEW,
-    Rays,
     Wall,
     by_length,
     cast,
@@ -32,10 +32,10 @@ from softjaw.fem.objects.traced_outline import (
     curve_of,
     find_wall,
     folded,
-    lid,
     smooth_rings,
     smooth_spline,
 )
+from softjaw.fem.objects.triangles import area_vectors
 
 PER_WAVE = 16  # heights at which rays are cast
 AROUND, MOST_ALONG = 256, 800
@@ -90,25 +90,24 @@ def trace_radii(mesh: MeshObject, wall: Wall, facet: float, wavelength: float, t
         For sections that are not star-shaped about their centres.
     """
     z = np.linspace(*wall.ends, MOST_ALONG)
-    rays = cast(mesh.points, mesh.triangles, z, wall.centre(z), FEW)
+    outer, inner = cast(mesh.points, mesh.triangles, z, wall.centre(z), FEW)
     # before any smoothing, which would draw a wall through the fold that is not there
-    _refuse_folds(z, rays, facet)
-    s = by_length(z, rays.outer.mean(axis=1))
+    _refuse_folds(z, folded(outer, inner, facet))
+    s = by_length(z, outer.mean(axis=1))
     # no shorter than the samples along and around the body can show
     wavelength = max(wavelength, 0.25 * PER_WAVE * s[-1] / MOST_ALONG, 8 * np.pi * wall.radius / AROUND)
     height = smooth_spline(s, z, wavelength, (0.0, s[-1]))
     s = np.linspace(0.0, s[-1], max(33, int(np.ceil(PER_WAVE * s[-1] / wavelength)) + 1))
     z = np.clip(height(s), *wall.ends)
-    rays = cast(mesh.points, mesh.triangles, z, wall.centre(z), 2048)  # rays at each height
-    _refuse_folds(z, rays, facet)
-    waves = np.maximum(8, 2 * np.pi * rays.outer.mean(axis=1) / wavelength)  # waves round any section, at least
-    R = smooth_rings(rays.outer, waves, AROUND)
+    outer, inner = cast(mesh.points, mesh.triangles, z, wall.centre(z), 2048)  # rays at each height
+    _refuse_folds(z, folded(outer, inner, facet))
+    waves = np.maximum(8, 2 * np.pi * outer.mean(axis=1) / wavelength)  # waves round any section, at least
+    R = smooth_rings(outer, waves, AROUND)
     R, symmetric, is_round = _symmetric(R, ~wall.centre(z).any(axis=0), tolerance)
     return Radii(s, z, R, height, wavelength, symmetric, is_round)
 
 
-def _refuse_folds(z: FloatArray, rays: Rays, facet: float) -> None:
-    bad = folded(rays, facet)
+def _refuse_folds(z: FloatArray, bad: NDArray[np.bool_]) -> None:
     if bad.any():
         k = np.flatnonzero(bad.any(axis=1))
         ray = int(np.argmax(bad.sum(axis=0)))
@@ -251,7 +250,7 @@ def facet_size(mesh: MeshObject) -> float:
     """Median over the area of the triangles' shortest sides [m]."""
     X = mesh.points[mesh.triangles]
     side = np.linalg.norm(X - np.roll(X, 1, axis=1), axis=2).min(axis=1)
-    area = np.linalg.norm(np.cross(X[:, 1] - X[:, 0], X[:, 2] - X[:, 0]), axis=1)
+    area = np.linalg.norm(area_vectors(mesh.points, mesh.triangles), axis=1)
     order = np.argsort(side)
     total = np.cumsum(area[order])
     return float(side[order][np.searchsorted(total, 0.5 * total[-1])])
@@ -299,8 +298,7 @@ def _shape(q: BSpline, around: int) -> SplineSurface:
 
 def _report(surface: TracedSurface, mesh: MeshObject, wall: Wall, facet: float, wavelength: float) -> TraceReport:
     """Distances between mesh and surface."""
-    X = mesh.points[mesh.triangles]
-    middle, normal = X.mean(axis=1), np.cross(X[:, 1] - X[:, 0], X[:, 2] - X[:, 0])
+    middle, normal = mesh.points[mesh.triangles].mean(axis=1), area_vectors(mesh.points, mesh.triangles)
     away = middle[:, :2] - np.stack([surface.shift_x(middle[:, 2]), surface.shift_y(middle[:, 2])], axis=1)
     outwards = np.einsum("ni,ni->n", away, normal[:, :2]) > 0  # not the inner wall of a hollow mesh
     x = np.concatenate([mesh.points[np.unique(mesh.triangles[outwards])], middle[outwards]])

@@ -198,9 +198,14 @@ def pieces_of(points: FloatArray, triangles: IntArray) -> IntArray:
     return np.unique(connected_components(links, directed=False)[1][triangles[:, 0]], return_inverse=True)[1].ravel()
 
 
-def _areas(points: FloatArray, triangles: IntArray) -> FloatArray:
+def area_vectors(points: FloatArray, triangles: IntArray) -> FloatArray:
+    """Normals ``(m, 3)`` of triangles, as long as twice their areas [m^2]."""
     a, b, c = points[triangles].transpose(1, 0, 2)
-    return np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+    return np.cross(b - a, c - a)
+
+
+def _areas(points: FloatArray, triangles: IntArray) -> FloatArray:
+    return np.linalg.norm(area_vectors(points, triangles), axis=1) / 2
 
 
 def _sizes(points: FloatArray, triangles: IntArray, piece: IntArray) -> FloatArray:
@@ -234,17 +239,12 @@ def neighbours(points: FloatArray, triangles: IntArray) -> Neighbours:
     pair = np.full((len(key), 2), -1)
     two = count == 2
     pair[two] = np.stack([order[start[two]], order[start[two] + 1]], axis=1)
-    normal = _unit_normals(points, triangles)
+    area = area_vectors(points, triangles)
+    normal = area / np.maximum(np.linalg.norm(area, axis=1), 1e-300)[:, None]
     for n in range(3, 9):  # triangles at one edge, among which neighbours are looked for
         if (many := np.flatnonzero(count == n)).size:
             pair[many] = _smoothest(order[start[many][:, None] + np.arange(n)], sides, normal)
     return Neighbours(ordered[first], edge.reshape(-1, 3), pair, count)
-
-
-def _unit_normals(points: FloatArray, triangles: IntArray) -> FloatArray:
-    a, b, c = points[triangles].transpose(1, 0, 2)
-    area = np.cross(b - a, c - a)
-    return area / np.maximum(np.linalg.norm(area, axis=1), 1e-300)[:, None]
 
 
 def _smoothest(at: IntArray, sides: IntArray, normal: FloatArray) -> IntArray:

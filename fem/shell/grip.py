@@ -7,13 +7,12 @@ gripper that closes with a growing force meets first.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
-from softjaw.fem.contact.load_stepping import Settings, Stepping, Work, falls
+from softjaw.fem.contact.load_stepping import RESIDUAL, Stepping, Work, falls
 from softjaw.fem.contact.path import LoadPath, OnPath, Pressed
 from softjaw.fem.contact.problem import Control
 from softjaw.fem.errors import CheckError, ConvergenceError, SpentError
@@ -88,18 +87,11 @@ class Grip(LoadPath[WallProblem]):
         They make the problem, and the same one with nodal gaps, for forces at which it has no solution.
     options : dict
         PETSc options with the prefix ``contact_``.
-    settings : Settings
     stride : int
         As in `fem.contact.path.LoadPath`.
     """
 
     MOST_ITERATIONS = 200  # with weighted and with nodal gaps each; usual ones take 6
-
-    def __init__(
-        self, problems: Sequence[Callable[[], WallProblem]], options: dict[str, Any] | None = None,
-        settings: Settings | None = None, stride: int = 1,
-    ) -> None:  # fmt: skip
-        super().__init__(problems, options, settings, stride)
 
     def _begin(self) -> None:
         self._last: FloatArray | None = None  # state on the path that was solved last
@@ -117,7 +109,7 @@ class Grip(LoadPath[WallProblem]):
     def _steps(self) -> Stepping:
         most = LONGEST_SOLVE if self.problem.friction is None else WITH_FRICTION
         return Stepping(
-            self.problem, self.solver, self.settings, None if "contact_snes_max_it" in self.options else most,
+            self.problem, self.solver, None if "contact_snes_max_it" in self.options else most,
             self._watch,
         )  # fmt: skip
 
@@ -316,7 +308,7 @@ class Grip(LoadPath[WallProblem]):
         force, problem = here.force, self.problem
         load, q = problem.wall_load(here.x), problem.wall_state(here.x)
         worst = residual[: problem.model.size].max(initial=0.0)
-        if not worst <= max(WALL_BALANCE, self.settings.residual) * force:
+        if not worst <= max(WALL_BALANCE, RESIDUAL) * force:
             raise CheckError(
                 f"the state at {force:.4g} N converged but is wrong: a node of the wall is out of balance "
                 f"by {worst:.3g} N"

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softjaw.fem.contact.load_stepping import Settings
 from softjaw.fem.contact.press import Press
 from softjaw.fem.materials import Material, material
 from softjaw.fem.objects.gap import GapFunction, GapObject, NoContactError, Pose, first_touch
@@ -198,11 +197,6 @@ def usable_symmetry(scene: Scene, finger: Finger, elements: tuple[int, int, int]
     return usable
 
 
-def settings(scene: Scene) -> Settings:
-    """When a solve ends and a step is given up."""
-    return Settings()
-
-
 def pad_of(scene: Scene, symmetry: tuple[bool, bool], rule: str, coarser: bool) -> Pad:
     """Pad on its backing plate, which is rigid unless the scene says that it is elastic; ``rule`` collocates gaps."""
     return pad(scene.gripper, symmetry, rule, coarser, scene.effects.sheet == "elastic")
@@ -222,7 +216,7 @@ def press_of(scene: Scene, finger: Finger, coarser: bool) -> Press:
     symmetry = usable_symmetry(scene, finger, pad_shape(scene.gripper, coarser).elements)
     wanted, *others = (pad_of(scene, symmetry, rule, coarser) for rule in contact_rules(scene, walled=False))
     mu = scene.friction.mu if scene.effects.friction_pressure_coupling == "tangential" else None
-    return Press(wanted, finger.gap, dict(scene.petsc), others, settings(scene), mu)
+    return Press(wanted, finger.gap, dict(scene.petsc), others, mu)
 
 
 def check_poses(scene: Scene, points: list[Scene]) -> None:

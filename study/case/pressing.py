@@ -19,7 +19,7 @@ from softjaw.friction.patch import ContactPatch
 from softjaw.friction.wrench import FrictionLimits
 from softjaw.study.case.build import has_wall, pad_shape
 from softjaw.study.case.contact import Contact
-from softjaw.study.case.model import Finger, contact_rules, image_signs, pad_of, press_of, settings
+from softjaw.study.case.model import Finger, contact_rules, image_signs, pad_of, press_of
 from softjaw.study.case.poses import turn_of_pose
 from softjaw.study.case.result import UNDECIDED
 from softjaw.study.case.wall import thin_body, wall_values
@@ -293,7 +293,7 @@ def _grip(scene: Scene, fingers: Sequence[Finger], grasp_frame: Grasp, coarser: 
         return WallProblem(wall, pads, scene.friction.mu if coupled else None)
 
     problems = [partial(problem, rule) for rule in contact_rules(scene, walled=True)]
-    return Grip(problems, dict(scene.petsc), settings(scene))
+    return Grip(problems, dict(scene.petsc))
 
 
 def _gap(finger: Finger, turned: bool):

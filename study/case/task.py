@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softjaw.scoring.bodies import PolytopeBody
+from softjaw.scoring.contact import PolytopeBody
 from softjaw.scoring.payload import Payload, payload
 from softjaw.study.case.build import centre_of_mass, own_frame
 from softjaw.study.case.contact import Contact

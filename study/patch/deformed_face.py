@@ -17,7 +17,7 @@ from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.fem.objects.gap import NoContactError
 from softjaw.fem.objects.measured_face import MeasuredFace, cell_of, measured_face
 from softjaw.friction.patch import NEGLIGIBLE, ContactPatch, FloatArray
-from softjaw.study.case.model import contact_rules, pad_of, settings
+from softjaw.study.case.model import contact_rules, pad_of
 from softjaw.study.messages import SOME_FAILED, USAGE, Problem, StudyError
 from softjaw.study.patch.faces import ReadPatch, refuse
 from softjaw.study.patch.patch_reader import Reading, checked_file, refused, si_columns, split_header, table_rows
@@ -52,7 +52,7 @@ def solve_deformed(file: str, unit: str | None, scene: Scene) -> ReadPatch:
     rules = contact_rules(scene, walled=False)
     wanted, *others = (pad_of(scene, (False, False), rule, False) for rule in rules)
     try:
-        measured = MeasuredPress(wanted, others, dict(scene.petsc), settings(scene)).solve(face)
+        measured = MeasuredPress(wanted, others, dict(scene.petsc)).solve(face)
     except NoContactError as error:
         remedy = "z points along the approach, so that pressed foam has z < 0: change its sign if it is the other way"
         raise StudyError(USAGE, f"{file}: {error}; {remedy}") from error

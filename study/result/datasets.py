@@ -81,9 +81,9 @@ def datasets_of(layout: Any) -> Iterator[Dataset]:
     if layout.sampled:
         yield from _sample_datasets(layout)
     lengths = dict(zip(layout.names, layout.shape, strict=True))
-    for d in layout.derived:
-        shape = tuple(lengths[name] for name in d.dims)
-        yield Dataset(f"{ROOT}/derived/{d.name}", shape, np.dtype("<f8"), np.nan, d.attributes, d.dims)
+    for q in layout.derived:
+        shape = tuple(lengths[name] for name in q.dims)
+        yield Dataset(f"{ROOT}/{q.key}", shape, np.dtype("<f8"), np.nan, described(q, q.key), q.dims)
 
 
 def _checksums(layout: Any) -> Iterator[Dataset]:

@@ -5,56 +5,49 @@ The safe force range of a candidate is enough to hold the object's weight, and n
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softjaw.study.case.build import geometry
 from softjaw.study.case.candidates import axes
 from softjaw.study.case.result import UNDECIDED
-from softjaw.study.result.layout import DONE, Derived
+from softjaw.study.quantities import DONE, FORCE_RANGE, Quantity
 from softjaw.study.scene import Scene
 
-if TYPE_CHECKING:
-    from softjaw.study.result.write import ResultWriter
-
 FloatArray = NDArray[np.float64]
-LOW, HIGH = "force_low", "force_high"
+LOW, HIGH = FORCE_RANGE
 LOW_ERROR = f"{LOW}_error"
 
 SWEPT = {"object.semi_axis_a_mm", "object.semi_axis_b_mm"}  # give the axes that curvature studies are drawn over
 
 
-def derived(scene: Scene) -> list[Derived]:
+def derived(scene: Scene) -> list[Quantity]:
     """Everything that is derived for a scene."""
     return [*_of_sweep(scene), *_of_force_range(scene)]
 
 
-def finalise(writer: ResultWriter, scene: Scene) -> None:
+def finalise(writer: Any, scene: Scene) -> None:
     """Fill it, by one rank, after all cases."""
     _fill_sweep(writer, scene)
     _fill_force_range(writer, scene)
 
 
-def _of_sweep(scene: Scene) -> list[Derived]:
+def _of_sweep(scene: Scene) -> list[Quantity]:
     """What a sweep over an elliptic cylinder's semi-axes adds: the axes that curvature studies are drawn over."""
     if scene.object.shape != "elliptic_cylinder" or not SWEPT & set(scene.sweep):
         return []
     # Curvature belongs to the object alone: station, angle and normal force are left out.
     over = tuple(axis.name for axis in axes(scene)[:-3])
     return [
-        Derived("b_over_a", "", "b / a", "Semi-axis across the contact over that along its normal.", over),
-        Derived(
-            "apex_curvature",
-            "1/m",
-            "apex curvature a / b^2",
-            "Curvature of the section where pads at angle 0 touch.",
-            over,
-        ),
-    ]
+        Quantity("b_over_a", over, "", "b / a", "Semi-axis across the contact over that along its normal.", "derived"),
+        Quantity("apex_curvature", over, "1/m", "apex curvature a / b^2",
+                 "Curvature of the section where pads at angle 0 touch.", "derived"),
+    ]  # fmt: skip
 
 
-def _fill_sweep(writer: ResultWriter, scene: Scene) -> None:
+def _fill_sweep(writer: Any, scene: Scene) -> None:
     """Fill the axes of curvature studies."""
     if not _of_sweep(scene):
         return
@@ -65,31 +58,31 @@ def _fill_sweep(writer: ResultWriter, scene: Scene) -> None:
     writer.write_derived("apex_curvature", a / b**2)
 
 
-def _of_force_range(scene: Scene) -> list[Derived]:
+def _of_force_range(scene: Scene) -> list[Quantity]:
     """Force to use and bounds of the safe force range, as far as the scene asks for them."""
     over = tuple(axis.name for axis in axes(scene)[:-1])
     bounds = []
     if scene.object.mass is not None:
-        bounds.append(Derived(
-            LOW, "N", "force to use", "Smallest normal force per finger that holds the object: at which safety_factor"
-            " (CCM) passes task.safety, between the solved forces by straight lines, and from 0 at 0 N. NaN: none of"
-            " them holds it.", over,
-        ))  # fmt: skip
-        bounds.append(Derived(
-            LOW_ERROR, "N", "error of the force to use", "What the bend of safety_factor over the solved forces may"
-            " move it; NaN where fewer than two of them are solved up to it.", over,
-        ))  # fmt: skip
+        bounds += [
+            Quantity(LOW, over, "N", "force to use",
+                     "Smallest normal force per finger that holds the object: at which safety_factor (CCM) passes "
+                     "task.safety, between the solved forces by straight lines, and from 0 at 0 N. NaN: none of them"
+                     " holds it.", "derived"),
+            Quantity(LOW_ERROR, over, "N", "error of the force to use",
+                     "What the bend of safety_factor over the solved forces may move it; NaN where fewer than two of "
+                     "them are solved up to it.", "derived"),
+        ]  # fmt: skip
     if getattr(scene.object, "wall", None) is not None:
-        bounds.append(Derived(
-            HIGH, "N", "largest force that the wall bears", "Normal force per finger at which the indentation passes"
-            " object.allowed_dent_mm or the stress the yield strength, between the solved forces by straight lines, and"
-            " from 0 at 0 N; where neither does, the largest solved force: the wall bears at least that. NaN where the"
-            " wall was taken as rigid.", over,
+        bounds.append(Quantity(
+            HIGH, over, "N", "largest force that the wall bears",
+            "Normal force per finger at which the indentation passes object.allowed_dent_mm or the stress the yield "
+            "strength, between the solved forces by straight lines, and from 0 at 0 N; where neither does, the largest"
+            " solved force: the wall bears at least that. NaN where the wall was taken as rigid.", "derived",
         ))  # fmt: skip
     return bounds
 
 
-def _fill_force_range(writer: ResultWriter, scene: Scene) -> None:
+def _fill_force_range(writer: Any, scene: Scene) -> None:
     """Fill the bounds, by one rank, after all cases."""
     wanted = [d.name for d in _of_force_range(scene)]
     if not wanted:
@@ -104,13 +97,10 @@ def _fill_force_range(writer: ResultWriter, scene: Scene) -> None:
         writer.write_derived(HIGH, _largest(writer, scene, forces, done))
 
 
-def _largest(writer: ResultWriter, scene: Scene, forces: FloatArray, done: NDArray[np.bool_]) -> FloatArray:
+def _largest(writer: Any, scene: Scene, forces: FloatArray, done: NDArray[np.bool_]) -> FloatArray:
     """Largest force that the wall bears; NaN where it was taken as rigid, so that nothing is known of it."""
-    # Imported here: it brings the shell solver along, which objects without a wall do not need.
-    from softjaw.study.case.wall import thin_body
-
     dent: float | None = getattr(scene.object, "allowed_dent", None)
-    limits = {"indentation": dent, "wall_stress": thin_body(scene.object).material.yield_strength}
+    limits = {"indentation": dent, "wall_stress": geometry().material_of(scene.object).yield_strength}
     values = {name: np.where(done, writer.read(f"{name}/{name}"), np.nan) for name in limits}
     known = np.isfinite(values["indentation"])
     solved = np.where(known.any(axis=-1), np.where(known, forces, 0.0).max(axis=-1), np.nan)

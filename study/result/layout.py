@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -63,32 +63,6 @@ class Header:
 
 
 @dataclass(frozen=True)
-class Derived:
-    """A dataset that is filled once, after all rows: over some of the axes."""
-
-    name: str
-    units: str
-    long_name: str
-    definition: str
-    axes: tuple[str, ...] = ()
-
-    @property
-    def dims(self) -> tuple[str, ...]:
-        """Names of its axes in the file."""
-        return tuple(map(name_in_file, self.axes))
-
-    @property
-    def attributes(self) -> dict[str, str]:
-        """What the file says of it."""
-        return {"units": self.units, "long_name": self.long_name, "definition": self.definition}
-
-
-def name_in_file(axis: str) -> str:
-    """Name of an axis in the file; NeXus allows no dot in a name, the keys of a sweep have one."""
-    return axis.replace(".", "_")
-
-
-@dataclass(frozen=True)
 class Layout:
     """The file of one study: its axes (``name, values, units, long_name``), the faces of a patch and the options.
 
@@ -96,14 +70,15 @@ class Layout:
     for the candidates ``sampled``, counted over stations and angles. ``rounds`` is what each round of a run added:
     stations [mm], poses as `study.run.pattern.Place`, or cases that are solved on a finer mesh, by the numbers of their
     point of a sweep, candidate and force. ``stored`` are the paths of the columns in an existing file, which
-    may be others than those of this version; empty for a new one.
+    may be others than those of this version; empty for a new one. ``derived`` are quantities over some of the axes that
+    are filled once, after all rows.
     """
 
     axes: tuple[Any, ...]
     faces: int
     meshes: int = 1
     patches: bool = True
-    derived: tuple[Derived, ...] = ()
+    derived: tuple[Quantity, ...] = ()
     has: tuple[str, ...] = ()
     samples: int = 0
     sampled: tuple[int, ...] = ()
@@ -128,7 +103,7 @@ class Layout:
     @property
     def closing(self) -> tuple[str, ...]:
         """What is filled after all rows and has a checksum, by its dataset's name below ``/study``."""
-        return (*(f"derived/{d.name}" for d in self.derived), "report")
+        return (*(q.key for q in self.derived), "report")
 
     @cached_property
     def shape(self) -> tuple[int, ...]:
@@ -154,8 +129,8 @@ class Layout:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the axes in the file."""
-        return tuple(name_in_file(axis.name) for axis in self.axes)
+        """Names of the axes."""
+        return tuple(axis.name for axis in self.axes)
 
     @cached_property
     def shown(self) -> tuple[int, ...]:
@@ -228,12 +203,14 @@ class Layout:
 
     def definitions(self) -> str:
         """The definitions of all quantities of this layout, derived ones included."""
-        derived = [f"derived/{d.name} [{d.units or '-'}]: {d.long_name}. {d.definition}\n" for d in self.derived]
-        return definitions(self.quantities) + "".join(derived)
+        return definitions((*self.quantities, *self.derived))
 
     def options(self) -> str:
         """The part of the layout that the axes do not tell, as JSON."""
-        derived = [asdict(d) for d in self.derived]
+        derived = [
+            {"name": q.name, "units": q.unit, "long_name": q.label, "definition": q.definition, "axes": q.dims}
+            for q in self.derived
+        ]
         names = ("faces", "meshes", "patches", "has", "samples", "sampled", *["rounds"] * bool(self.rounds))
         return json.dumps(
             {**{name: getattr(self, name) for name in names}, "derived": derived, "columns": self.summed[:-1]}
@@ -249,8 +226,10 @@ def layout_from_options(axes: Sequence[Any], text: str) -> Layout:
     """The layout of an existing file from its axes and its options text; ``ValueError`` if they make no sense."""
     try:
         options = json.loads(text)
-        texts = ("name", "units", "long_name", "definition")
-        derived = tuple(Derived(**{text: d[text] for text in texts}, axes=tuple(d["axes"])) for d in options["derived"])
+        derived = tuple(
+            Quantity(d["name"], tuple(d["axes"]), d["units"], d["long_name"], d["definition"], "derived")
+            for d in options["derived"]
+        )
         faces, meshes = int(options["faces"]), int(options["meshes"])
         # No real study reaches these bounds: a damaged text must not make a reader allocate without end.
         if not 0 <= faces < 10**7:

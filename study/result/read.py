@@ -131,8 +131,8 @@ def dataset(result: Result) -> xr.Dataset:
     layout = result.layout
     listed = [q for q in layout.quantities if q.group not in ("patch", "status") and q.key not in FIELDS]
     variables = {q.variable: _variable(result, q) for q in listed}
-    for d in layout.derived:
-        variables[d.name] = xr.Variable(d.dims, result.derived(d.name), d.attributes)
+    for q in layout.derived:
+        variables[q.name] = xr.Variable(q.dims, result.derived(q.name), _about(q))
     for name in ("attempts", "message"):
         values = result.messages if name == "message" else result.read(f"status/{name}")
         variables[name] = xr.Variable(layout.names, values, _about(BY_KEY[f"status/{name}"]))
@@ -230,7 +230,7 @@ def _attributes(result: Result) -> dict[str, Any]:
         "petsc_options": scene.get("petsc_options", ""), "definitions": result.definitions, "report": result.report,
         "provenance": result.sessions, "has": layout.has, "meshes": layout.meshes,
         "patches": "patch/pressure" in {c.key for c in layout.columns}, "poses": not result.axes[-3].units,
-        "derived": tuple(d.name for d in layout.derived),
+        "derived": tuple(q.name for q in layout.derived),
         "object_rotation": np.asarray(scene.get("object_rotation", np.eye(3))),
         "object_origin": np.asarray(scene.get("object_origin", np.zeros(3))),
     }  # fmt: skip

@@ -7,8 +7,15 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from softjaw.lsfit.ellipsoid import Ellipsoid
-from softjaw.scoring.bodies import PolytopeBody, ellipsoid_matrix, fibonacci_vertices, hull_volume, is_ellipsoid
-from softjaw.scoring.contact import SoftContact, contact_axes
+from softjaw.scoring.contact import (
+    PolytopeBody,
+    SoftContact,
+    contact_axes,
+    ellipsoid_matrix,
+    fibonacci_vertices,
+    hull_volume,
+    is_ellipsoid,
+)
 from softjaw.scoring.epsilon import epsilon, separating_wrench
 from softjaw.scoring.pose import pose_volume
 from softjaw.scoring.quality import ScoreFlag, contact_flag, grasp_score, score

@@ -7,10 +7,17 @@ import pytest
 from scipy.optimize import linprog
 
 from softjaw.lsfit.ellipsoid import Ellipsoid
-from softjaw.scoring import bodies
-from softjaw.scoring.bodies import PolytopeBody, ellipsoid_inside, fibonacci_vertices, is_ellipsoid, joined
 from softjaw.scoring.closed_form import epsilon_l1, epsilon_linf
-from softjaw.scoring.contact import SoftContact, contact_axes
+from softjaw.scoring.contact import (
+    PolytopeBody,
+    SoftContact,
+    contact_axes,
+    ellipsoid_inside,
+    fibonacci_vertices,
+    is_ellipsoid,
+    joined,
+)
+from softjaw.scoring.contact import joint_support as bodies_support
 from softjaw.scoring.epsilon import contact_support, epsilon, facet_of_bodies
 
 A, B = (0.8, 0.6, 0.15), (0.5, 0.9, 0.25)
@@ -134,7 +141,7 @@ def test_the_reach_of_polytopes_is_a_linear_programme():
     )
     shapes = [k.body for k in contacts]
     u = facet_of_bodies(C, shapes, w, "linf", tolerance=1e-8)
-    assert bodies.joint_support(C, shapes, u[None], "linf") / (u @ w) == pytest.approx(-exact.fun, rel=1e-7)
+    assert bodies_support(C, shapes, u[None], "linf") / (u @ w) == pytest.approx(-exact.fun, rel=1e-7)
 
 
 class Superellipsoid:

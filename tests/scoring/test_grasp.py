@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from softjaw.lsfit.ellipsoid import Ellipsoid
-from softjaw.scoring.bodies import PolytopeBody, fibonacci_vertices, joint_support
-from softjaw.scoring.contact import SoftContact, contact_axes
+from softjaw.scoring.contact import PolytopeBody, SoftContact, contact_axes, fibonacci_vertices, joint_support
 from softjaw.scoring.pose import pose_volume
 from softjaw.scoring.quality import grasp_score, score
 

@@ -7,8 +7,7 @@ import pytest
 from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 
-from softjaw.scoring.bodies import PolytopeBody, fibonacci_vertices
-from softjaw.scoring.contact import SoftContact, contact_axes
+from softjaw.scoring.contact import PolytopeBody, SoftContact, contact_axes, fibonacci_vertices
 from softjaw.scoring.payload import BOUND_GAP, payload
 
 F, MU, E, D = 5.0, 0.8, 0.006, 0.06

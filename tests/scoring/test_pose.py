@@ -8,9 +8,16 @@ from scipy.spatial import ConvexHull
 
 from jobs.graspit import graspit_vertices
 from softjaw.lsfit.ellipsoid import Ellipsoid
-from softjaw.scoring.bodies import PolytopeBody, ellipsoid_matrix, fibonacci_vertices, polytope_volume, touching_points
 from softjaw.scoring.closed_form import volume_l1, volume_linf
-from softjaw.scoring.contact import SoftContact, contact_axes
+from softjaw.scoring.contact import (
+    PolytopeBody,
+    SoftContact,
+    contact_axes,
+    ellipsoid_matrix,
+    fibonacci_vertices,
+    polytope_volume,
+    touching_points,
+)
 from softjaw.scoring.fibre import fan_area, sphere_mesh, surface_mesh
 from softjaw.scoring.pose import joint_pairs, mixed_area, pose_volume
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from softjaw.scoring.bodies import fibonacci_vertices, polytope_volume
 from softjaw.scoring.closed_form import epsilon_l1, epsilon_linf, volume_l1, volume_linf
+from softjaw.scoring.contact import fibonacci_vertices, polytope_volume
 from softjaw.scoring.quality import ScoreFlag, score
 
 A, B = (0.8, 0.6, 0.15), (0.5, 0.9, 0.25)

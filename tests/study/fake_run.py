@@ -28,8 +28,8 @@ def fake_plan(digest="scene", stations=6, derived=True, wide=-1, rounds=(), apar
 
     Stations that rounds have added [mm] stand among those of the study; values follow from the place alone.
     """
-    from softjaw.study.quantities import WIDE, Axis
-    from softjaw.study.result.layout import Derived, Header, Layout
+    from softjaw.study.quantities import WIDE, Axis, Quantity
+    from softjaw.study.result.layout import Header, Layout
     from softjaw.study.run.plan import Plan
 
     own = np.linspace(0, 0.1, stations).tolist()
@@ -39,7 +39,7 @@ def fake_plan(digest="scene", stations=6, derived=True, wide=-1, rounds=(), apar
         Axis("angle", np.array([0, np.pi / 2]), "rad", "angle about the object's axis"),
         Axis("normal_force", np.array([1.0, 2.0, 5.0]), "N", "normal force per finger"),
     )
-    slope = (Derived("slope", "m/N", "slope", "e_n over force", ("station",)),) if derived else ()
+    slope = (Quantity("slope", ("station",), "m/N", "slope", "e_n over force", "derived"),) if derived else ()
     units = []
     for s, place in enumerate(places):
         # Named by what a study without rounds would call it, or by a number far from these.

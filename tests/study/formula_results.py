@@ -7,8 +7,8 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from softjaw.study.quantities import Axis
-from softjaw.study.result.layout import Derived, Header, Layout
+from softjaw.study.quantities import Axis, Quantity
+from softjaw.study.result.layout import Header, Layout
 from softjaw.study.result.skeleton import create
 from softjaw.study.result.write import ResultWriter, record
 from tests.study.sealing import sealed
@@ -125,4 +125,5 @@ def without_result(code, message=""):
 
 
 def window(axes):
-    return (Derived("force_high", "N", "largest force", "as the test says", tuple(a.name for a in axes[:-1])),)
+    over = tuple(a.name for a in axes[:-1])
+    return (Quantity("force_high", over, "N", "largest force", "as the test says", "derived"),)

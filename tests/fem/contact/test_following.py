@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from softjaw.fem.contact.load_stepping import Following, Settings, Stepping, Work
+from softjaw.fem.contact.load_stepping import Following, Stepping, Work
 from softjaw.fem.contact.press import Press
 from softjaw.fem.contact.problem import Control
 from softjaw.fem.errors import ConvergenceError, NotReachedError
@@ -153,7 +153,7 @@ class Crossings:
 
 def following(problem):
     solver = Crossings(problem)
-    return Following(problem, solver, Settings())
+    return Following(problem, solver)
 
 
 @pytest.mark.parametrize("forces", [[3.0], [2.4, 3.0], [0.3, 1.1, 2.49, 2.51, 3.0]])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from softjaw.fem.contact.extract import extract, turned
-from softjaw.fem.contact.load_stepping import Settings, Stepping, Work
+from softjaw.fem.contact.load_stepping import Stepping, Work
 from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.fem.objects.gap import Pose
 from softjaw.fem.shell.facing import FAR, face
@@ -195,7 +195,7 @@ class Jumping:
 
 def stepping(**choices):
     problem = Curve()
-    return Stepping(problem, Jumping(problem, **choices), Settings())
+    return Stepping(problem, Jumping(problem, **choices))
 
 
 @pytest.mark.parametrize("wanted", [0.3, 1.9, 2.1, 2.4, 2.45, 3.5])

@@ -16,8 +16,8 @@ import softjaw
 from softjaw.study import quantities
 from softjaw.study.case.result import CaseResult
 from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, StudyError
-from softjaw.study.quantities import BY_KEY, MODELS, NEEDS, TABLE, Axis
-from softjaw.study.result.layout import VERSION, Derived, Header, Layout, layout_from_options
+from softjaw.study.quantities import BY_KEY, MODELS, NEEDS, TABLE, Axis, Quantity
+from softjaw.study.result.layout import VERSION, Header, Layout, layout_from_options
 from softjaw.study.result.lock import Lock, holder
 from softjaw.study.result.skeleton import axes_of, create, groups, text_bytes, view_slice
 from softjaw.study.result.store import open_result, torn_rows
@@ -206,9 +206,9 @@ def test_an_axis_of_two_values_has_a_name_only_beside_an_uneven_one():
     assert axes_of(uneven, range(3))["angle_indices"] == 1
 
 
-def test_a_sweep_comes_first_and_needs_no_dot_in_its_name(tmp_path):
-    axes = (axis("object.radius", 3, "m"), *small().axes)
-    layout = Layout(axes, 4, 2, False, (Derived("slope", "1", "slope", "a slope", ("object.radius",)),))
+def test_a_sweep_comes_first(tmp_path):
+    axes = (axis("object_radius", 3, "m"), *small().axes)
+    layout = Layout(axes, 4, 2, False, (Quantity("slope", ("object_radius",), "1", "slope", "a slope", "derived"),))
     create(tmp_path / "s.hdf", layout, HEADER)
     with open_result(tmp_path / "s.hdf") as read:
         assert read.layout.shape == (3, 5, 2, 3)
