@@ -96,6 +96,7 @@ class Stepping:
     jumped: bool = False  # whether a step is known to have left the path of equilibria
     off: float = 0.0  # residual over the force on the meshed part where the last state is near enough only
     closed: bool = False  # whether displacement control was needed
+    residual: float = RESIDUAL
 
     def solve(
         self, x: FloatArray, control: Control, work: Work, most: int | None = None, growth: float = np.inf
@@ -112,7 +113,7 @@ class Stepping:
         self.off = 0.0
         try:
             # a tolerance below what rounding leaves would never be met
-            x, iterations = self.solver.solve(x, max(RESIDUAL * scale, floor), most, growth)
+            x, iterations = self.solver.solve(x, max(self.residual * scale, floor), most, growth)
             work.iterations += iterations
         except ConvergenceError as error:
             x, self.off = error.end or (x, np.inf)

@@ -237,7 +237,7 @@ class LoadPath(ABC, Generic[ProblemT]):
             self._begin_afresh(before)
             # all that has led to the state, so that the effort of a case does not depend on others
             work = replace(before.work) if before else Work()
-            self._stepping.settings = replace(self.settings, residual=PATH_RESIDUAL)
+            self._stepping.residual = PATH_RESIDUAL
             try:
                 here = self._next(before.at if before else None, goal, work)
             except (ConvergenceError, CheckError) as error:
