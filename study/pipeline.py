@@ -16,13 +16,13 @@ import numpy as np
 from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.fem.pad.halving import halved
 from softjaw.study.case.build import build_object, forces_apart, own_frame, pad_shape
+from softjaw.study.case.contact import of_fingers, on_faces
 from softjaw.study.case.effects import COUPLING, SCREENED, EffectChoice, Simulated, settled
 from softjaw.study.case.errors import coarse_errors, mesh_errors
 from softjaw.study.case.evaluate import EvaluationSettings, evaluate, settings_of
 from softjaw.study.case.pressing import state_flags
 from softjaw.study.case.result import CaseFailure, CaseResult
 from softjaw.study.case.solver import CandidateSolver, Solution, Solved, join_notes
-from softjaw.study.case.topology import of_fingers, on_faces
 from softjaw.study.case.wall import wall_flags
 from softjaw.study.flags import Flag, flag_sentences
 from softjaw.study.quantities import misses

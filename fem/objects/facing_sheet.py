@@ -22,7 +22,7 @@ from scipy.ndimage import distance_transform_edt, gaussian_filter
 
 from softjaw.fem.objects.gap import FloatArray, Pose
 from softjaw.fem.objects.smooth_triangles import SmoothTriangles
-from softjaw.fem.objects.spline_grid import coefficients, evaluate
+from softjaw.fem.objects.splines import evaluate_grid, grid_coefficients
 from softjaw.fem.objects.triangle_tree import DEPTH, TriangleTree, first_hit
 
 CONE = np.radians(30.0)
@@ -154,7 +154,7 @@ class FacingSheet:
         known = self.signed(x[part].reshape(-1, 3))[0].reshape(x[part].shape[:3])
         known = _with_shadows(known, COARSE * step, STAIRS / COARSE)
         places = np.stack(np.meshgrid(*(np.arange(n) / COARSE for n in x.shape[:3]), indexing="ij"), axis=-1)
-        g = evaluate(coefficients(known), np.zeros(3), 1.0, places.reshape(-1, 3))[0].reshape(x.shape[:3])
+        g = evaluate_grid(grid_coefficients(known), np.zeros(3), 1.0, places.reshape(-1, 3))[0].reshape(x.shape[:3])
         # contact is decided near the sheet, so no sample is interpolated there
         near = np.abs(g) < 5 * step  # steps from the sheet within which every sample is taken
         g[near] = self.signed(x[near])[0]

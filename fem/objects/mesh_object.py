@@ -2,7 +2,7 @@
 
 A finger sees the part of the surface that faces it (`facing_sheet`), with facets made smooth (`smooth_triangles`). The
 distance to it is sampled on a grid in the box where the pad works and interpolated by a tricubic B-spline
-(`spline_grid`): g is twice continuously differentiable and costs the same for every mesh. Real edges are rounded over
+(`splines`): g is twice continuously differentiable and costs the same for every mesh. Real edges are rounded over
 about one step of the grid, which is a quarter of the pad's element; what is finer the pad cannot feel. Errors: that of
 the spline, of fourth order in the step where the surface is smooth, and a two-hundredth of a step of the sheet.
 
@@ -24,7 +24,7 @@ from softjaw.fem.objects.gap import FloatArray, Gap, IntArray, NoContactError, P
 from softjaw.fem.objects.mesh_file import read_triangles
 from softjaw.fem.objects.mesh_holes import centroid
 from softjaw.fem.objects.smooth_triangles import CREASE_ANGLE, SmoothTriangles, smooth_triangles
-from softjaw.fem.objects.spline_grid import coefficients, evaluate
+from softjaw.fem.objects.splines import evaluate_grid, grid_coefficients
 from softjaw.fem.objects.triangle_tree import TriangleTree
 from softjaw.fem.objects.triangles import cleaned, decimated, pieces_of
 
@@ -170,7 +170,7 @@ class MeshObject:
         grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
         samples = sheet.sampled(pose.to_object(grid.reshape(-1, 3)).reshape(grid.shape), step)
         first = np.array([axis[0] for axis in axes])
-        return MeshRegion(sheet, pose, box[0], box[1], step, first, coefficients(samples))
+        return MeshRegion(sheet, pose, box[0], box[1], step, first, grid_coefficients(samples))
 
     def _step(self, size: FloatArray, element: float | None) -> float:
         """Step of the grid over a box of this size [m]."""
@@ -261,5 +261,5 @@ class MeshRegion:
     def _spline(self, y: FloatArray) -> Gap:
         """Interpolation at points ``y (n, 3)`` of the pad's frame, turned into the object's frame."""
         R = self.pose.rotation
-        g, gradient, hessian = evaluate(self.coefficients, self.first, self.grid_step, np.ascontiguousarray(y))
+        g, gradient, hessian = evaluate_grid(self.coefficients, self.first, self.grid_step, np.ascontiguousarray(y))
         return g, gradient @ R.T, R @ hessian @ R.T

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from softjaw.fem.objects.gap import FloatArray, Gap, GapFunction, Pose, Surface, first_touch, grid_triangles
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.fem.objects.outer_surface import OuterSurface
-from softjaw.fem.objects.spline_surface import SplineSurface, spline_surface
+from softjaw.fem.objects.splines import SplineSurface, spline_surface
 from softjaw.fem.shell.facing import FAR, Wall, face
 from softjaw.friction.patch import NEGLIGIBLE
 

@@ -22,7 +22,7 @@ from softjaw.fem.objects.gap import FloatArray
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.fem.objects.outer_surface import Jet, OuterSurface
 from softjaw.fem.objects.profile import joined, lid
-from softjaw.fem.objects.spline_surface import SplineSurface, evaluate, spline_surface
+from softjaw.fem.objects.splines import SplineSurface, evaluate, spline_surface
 from softjaw.fem.objects.traced_outline import (
     FEW,
     Wall,

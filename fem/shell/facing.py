@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from softjaw.fem.objects.gap import FloatArray
-from softjaw.fem.objects.spline_surface import SplineSurface, evaluate
+from softjaw.fem.objects.splines import SplineSurface, evaluate
 
 IntArray = NDArray[np.int32]
 FAR = 1.0  # gap of a point that faces no wall [m]

@@ -26,8 +26,7 @@ from softjaw.fem.objects.outer_surface import Section, Turned, of_sections
 from softjaw.fem.objects.profile import straight_runs
 from softjaw.fem.objects.revolution import Revolution
 from softjaw.fem.objects.shapes import Box, EllipticCylinder, Sphere
-from softjaw.fem.objects.spline_grid import PADDING
-from softjaw.fem.objects.spline_surface import spline_surface
+from softjaw.fem.objects.splines import PADDING, spline_surface
 from softjaw.fem.objects.stacked import Stacked
 from softjaw.fem.objects.traced_outline import cast, centroids, folded
 from softjaw.fem.objects.triangles import cleaned

@@ -12,7 +12,7 @@ from softjaw.fem.objects.gap import NoContactError, Pose, first_touch
 from softjaw.fem.objects.mesh_file import read_triangles
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.fem.objects.shapes import Sphere
-from softjaw.fem.objects.spline_grid import coefficients, evaluate
+from softjaw.fem.objects.splines import evaluate_grid, grid_coefficients
 from softjaw.fem.objects.triangles import cleaned, winding_number
 
 FLASK = Path(__file__).parents[2] / "jobs" / "objects" / "flask.stl"
@@ -47,9 +47,9 @@ def test_spline_alone_is_of_fourth_order():
     for n in (21, 41, 81):
         s = np.linspace(-1, 1, n)
         grid = np.stack(np.meshgrid(s, s, s + 3, indexing="ij"), axis=-1)
-        c = coefficients(np.linalg.norm(grid, axis=-1))
+        c = grid_coefficients(np.linalg.norm(grid, axis=-1))
         y = x + np.array([0, 0, 3])
-        g, gradient, H = evaluate(c, np.array([-1.0, -1.0, 2.0]), s[1] - s[0], y)
+        g, gradient, H = evaluate_grid(c, np.array([-1.0, -1.0, 2.0]), s[1] - s[0], y)
         r, e, exact = Sphere(1.0).gap(y)
         errors.append([np.abs(g - r - 1).max(), np.abs(gradient - e).max(), np.abs(H - exact).max()])
     orders = np.log2(np.array(errors[:-1]) / np.array(errors[1:]))[-1]

@@ -6,7 +6,7 @@ import pytest
 from softjaw.fem.objects.gap import Pose
 from softjaw.fem.objects.outer_surface import Section, of_sections
 from softjaw.fem.objects.shapes import EllipticCylinder, Revolution
-from softjaw.fem.objects.spline_surface import spline_surface
+from softjaw.fem.objects.splines import spline_surface
 from softjaw.fem.objects.stacked import Stacked, wall_surface
 
 PROFILE = [

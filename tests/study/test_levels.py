@@ -12,8 +12,8 @@ from softjaw.fem.contact.press import Press
 from softjaw.fem.errors import ConvergenceError
 from softjaw.friction.patch import ContactPatch
 from softjaw.study import pipeline
+from softjaw.study.case.contact import joined
 from softjaw.study.case.result import CaseFailure
-from softjaw.study.case.topology import joined
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import misses
 from tests.study.scenes import CONE, NO_COUPLING, pose_of, scene_of, units_of

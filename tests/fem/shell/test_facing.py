@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from softjaw.fem.objects.spline_surface import spline_surface
+from softjaw.fem.objects.splines import spline_surface
 from softjaw.fem.shell.facing import FAR, Wall, face
 
 R, LENGTH, STEP = 0.03, 0.1, 1e-7

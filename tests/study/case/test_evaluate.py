@@ -15,11 +15,10 @@ from softjaw.lsfit.ellipsoid import Ellipsoid
 from softjaw.scoring.contact import SoftContact
 from softjaw.scoring.pose import pose_volume
 from softjaw.study.case.build import build_object, centre_of_volume
-from softjaw.study.case.contact import Contact
+from softjaw.study.case.contact import Contact, topology
 from softjaw.study.case.errors import OF_MESHES, OF_VIEWS, estimate, mesh_errors
 from softjaw.study.case.evaluate import FACING, EvaluationSettings, evaluate, lengths, quality
 from softjaw.study.case.task import Task
-from softjaw.study.case.topology import topology
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import MODELS, TABLE, misses
 from softjaw.study.scene.objects import SphereShape
