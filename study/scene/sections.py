@@ -220,7 +220,7 @@ class ScoreKeys(SceneSection):
         "pad", description="what scales soft torques: the pad's length, as in the paper, the object's, or a length"
     )
     epsilon: Literal["facing", "everywhere"] = Field(
-        "facing", description="where epsilon is computed: for antipodal contacts, or in any pose (some 0.1 s each)"
+        "facing", description="where epsilon is computed: for antipodal contacts, or in any pose (some 0.01 s each)"
     )
 
 
