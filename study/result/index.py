@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import h5py
 import numpy as np
 
+from softjaw.study import messages
 from softjaw.study.messages import OTHER_FILE, StudyError, beside
 from softjaw.study.result.hdf5 import StoredFile, opened
 from softjaw.study.result.layout import PROGRAM
@@ -75,6 +76,14 @@ def index_path(file: str | Path) -> Path | None:
 def blank_row(name: str, **values: Any) -> Row:
     """A row with nothing but what is given."""
     return {"object": name, **{c.name: BLANK[c.kind] for c in COLUMNS}, "state": MISSING, **values}
+
+
+def code_of(rows: Sequence[Row]) -> int:
+    """The exit code of a run that ends with these rows; an object without a grasp is an answer."""
+    states = {row["state"] for row in rows}
+    if states & {MISSING, STOPPED}:
+        return messages.STOPPED
+    return messages.SOME_FAILED if states - {DONE, NO_GRASP} else messages.DONE
 
 
 def write_index(path: Path, rows: Sequence[Row], attributes: Mapping[str, Any]) -> None:

@@ -10,12 +10,13 @@ ordinary one, with the same bits as a run of its own.
 from __future__ import annotations
 
 import os
+import sys
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -41,6 +42,8 @@ from softjaw.study.units import in_si
 
 BATCH_PER_RANK, MOST_OPEN_FILES = 4, 128  # objects of a batch: for each rank, and at most
 REASON_LETTERS = 400
+FATAL = (messages.CANNOT_WRITE, messages.IN_USE)  # codes of errors that the objects after it would meet, too
+T = TypeVar("T")
 Study = Callable[[Scene, tuple[str, ...]], tuple[Plan, Work, Growth]]
 
 
@@ -76,6 +79,7 @@ class _ObjectsRun:
         self._retry = retry_failed
         self._rows = on_rank0(comm, _rows_of, folder, out, retry_failed)
         self._mine: dict[int, tuple[Plan, Work, Growth]] = {}
+        self._failed: list[tuple[int, Row]] = []
         self._tried: set[int] = set()
 
     def todo(self) -> list[int]:
@@ -84,10 +88,7 @@ class _ObjectsRun:
 
     def code(self) -> int:
         """The exit code."""
-        states = {row["state"] for row in self._rows}
-        if states & {index.MISSING, index.STOPPED}:
-            return messages.STOPPED
-        return messages.SOME_FAILED if states - {index.DONE, index.NO_GRASP} else messages.DONE
+        return index.code_of(self._rows)
 
     def solve(self, batch: list[int]) -> bool:
         """Solve a batch; whether no signal came."""
@@ -104,10 +105,13 @@ class _ObjectsRun:
         while parts and not stopped:
             stopped = self._cases(parts)
             mine = [part for part in parts if part.number in self._mine]
-            parts = [] if stopped else self._gathered(grown for part in mine if (grown := self._grown(part)))
-        for n, row in self._gathered(self._ending(n, seconds) for n, seconds in names.items() if n in self._mine):
+            grown = [] if stopped else [self._alone(part.number, self._grown, part) for part in mine]
+            parts = self._gathered(part for part in grown if part)
+        ends = [self._alone(n, self._ending, n, seconds) for n, seconds in names.items() if n in self._mine]
+        for n, row in self._gathered([*filter(None, ends), *self._failed]):
             self._rows[n] = row
         self._mine.clear()
+        self._failed.clear()
         self._store()
         return not stopped
 
@@ -127,7 +131,7 @@ class _ObjectsRun:
                 except AbandonedError:
                     break
                 except (Exception, TimeLimitError) as error:  # whatever an object dies of is its row
-                    if isinstance(error, StudyError) and error.code in (messages.CANNOT_WRITE, messages.IN_USE):
+                    if isinstance(error, StudyError) and error.code in FATAL:
                         fatal = error
                         claims.stop()
                     answers[n] = _why(error, stopper.limit)
@@ -162,10 +166,28 @@ class _ObjectsRun:
         for part, number in zip(parts, files.session, strict=True):
             if part.number in self._mine:
                 _, work, _ = self._mine[part.number]
-                finish_alone(work, part.path, part.plan, number, session.signal)
+                end = work, part.path, part.plan, number, session.signal
+                self._alone(part.number, finish_alone, *end)
         # Nobody reads a file that is being finished.
         self._comm.Barrier()
         return code == messages.STOPPED
+
+    def _alone(self, n: int, function: Callable[..., T], *arguments: Any) -> T | None:
+        """What a function gives for an object of this rank; None where it fails, which becomes the object's row."""
+        if any(n == number for number, _ in self._failed):
+            return None
+        try:
+            return function(*arguments)
+        except Exception as error:
+            if isinstance(error, StudyError) and error.code in FATAL:
+                if self._comm.size > 1:  # the others wait for this rank
+                    print(f"error: {error.message}", file=sys.stderr, flush=True)
+                    self._comm.Abort(error.code)
+                raise
+            state, reason = _why(error, self._work.time_limit)
+            row = self._rows[n] | {"state": state, "reason": shortened(reason, REASON_LETTERS)}
+            self._failed.append((n, row))
+            return None
 
     def _grown(self, part: Part) -> Part | None:
         """The object with its next round of further grasps in its file; None where it has enough."""

@@ -11,8 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from softjaw.study.messages import DONE as ENDED
-from softjaw.study.messages import SOME_FAILED, STOPPED, StudyError
+from softjaw.study.messages import STOPPED, StudyError
 from softjaw.study.quantities import MISSING
 from softjaw.study.result import index
 from softjaw.study.result.lock import holder
@@ -71,18 +70,10 @@ def status_text(path: Path, width: int) -> str:
     cases, seconds = (sum(max(np.nan_to_num(row[key]), 0) for row in rows) for key in ("done", "seconds"))
     lines = [f"{path}: {counts_text(rows)}", f"  {cases:.0f} cases solved, {duration(seconds)} on all ranks"]
     lines += [f"running now: {runner}"] if runner else []
-    left = code_of(rows) == STOPPED and not runner
+    left = index.code_of(rows) == STOPPED and not runner
     lines += ["run the same command again to resume"] if left else []
     named = [f"{row['object']}: {row['state']}: {row['reason']}" for row in rows if row["reason"]]
     return "\n".join([*lines, *(wrapped(line, width, "  ", "    ") for line in named)])
-
-
-def code_of(rows: list[Row]) -> int:
-    """The exit code of a run that ends with these rows."""
-    states = {row["state"] for row in rows}
-    if states & {index.MISSING, index.STOPPED}:
-        return STOPPED
-    return SOME_FAILED if states - {index.DONE, index.NO_GRASP} else ENDED
 
 
 def summary(path: Path, width: int, top: int = 10) -> str:
@@ -103,7 +94,7 @@ def watch(path: Path, every: float, sleep: Callable[[float], None] = time.sleep)
             print(f"[{time.strftime('%H:%M:%S')}] {line}", flush=True)
             before = line
         if not runner:
-            return code_of(rows)
+            return index.code_of(rows)
         sleep(every)
 
 

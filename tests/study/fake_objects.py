@@ -1,6 +1,7 @@
 """A folder of objects whose cases are a formula, to be started under mpirun: ``fake_objects.py SCENE OUT [options]``.
 
-An object called ``none`` has no grasp, one called ``bug`` fails while it is planned, ``grows`` gets further stations.
+An object called ``none`` has no grasp, one called ``bug`` fails while it is planned and ``late`` when it is finished,
+``grows`` gets further stations.
 """
 
 from __future__ import annotations
@@ -53,7 +54,7 @@ def study(scene, _overrides):
     name = scene.object.name
     if name == "none":
         raise NoGraspError(USAGE, "nothing fits")
-    work = Work(lambda *_: (), finalise=fake_run.finalise)
+    work = Work(lambda *_: (), finalise=(lambda _: 1 / 0) if name == "late" else fake_run.finalise)
     grown = fake_run.fake_growth(name, 2 + len(name), work) if name == "grows" else None
     growth = Growth(lambda rounds: (plan_of(name, rounds), work), grown.more if grown else lambda _: ())
     return plan_of(name if name != "bug" else 1 / 0), work, growth

@@ -17,7 +17,7 @@ from tests.study.launching import contents, differing, here, launch
 from tests.study.launching import softjaw as command
 
 SCRIPT = Path(__file__).parent / "fake_objects.py"
-NAMES = ("a", "bug", "grows", "longest", "none")
+NAMES = ("a", "bug", "grows", "late", "longest", "none")
 SCENE = """
 [object]
 shape = "mesh"
@@ -32,7 +32,7 @@ normal_force_n = [2]
 
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory):
-    """A scene of five meshes and one that is none."""
+    """A scene of six meshes and one that is none."""
     folder = tmp_path_factory.mktemp("objects")
     (folder / "meshes").mkdir()
     for i, name in enumerate(NAMES):
@@ -86,9 +86,9 @@ def test_every_object_is_a_row_and_none_stops_the_others(solved):
     found = rows(solved)
     states = {name: str(row.state.values) for name, row in found.items()}
     assert states == {"a": "complete", "bug": "failed", "empty": "refused", "grows": "complete",
-                      "longest": "some cases failed", "none": "no grasp"}  # fmt: skip
-    assert all(found[name].reason.values.item() for name in ("bug", "empty", "longest", "none"))
-    assert sorted(path.stem for path in solved.glob("*.hdf")) == ["a", "grows", "index", "longest"]
+                      "late": "failed", "longest": "some cases failed", "none": "no grasp"}  # fmt: skip
+    assert all(found[name].reason.values.item() for name in ("bug", "empty", "late", "longest", "none"))
+    assert sorted(path.stem for path in solved.glob("*.hdf")) == ["a", "grows", "index", "late", "longest"]
     for name in ("a", "grows", "longest"):
         ds = softjaw.open(solved / f"{name}.hdf")
         held = np.nan_to_num(ds.payload.sel(model="ccm").values[..., -1])
@@ -122,7 +122,7 @@ def test_a_signal_stops_in_order_and_the_run_resumes(scene, solved):
 def test_index_answers_commands(solved):
     assert command(0, "status", solved)[0] == DONE
     code, text, _ = command(0, "show", solved, "--csv")
-    assert (code, len(text.splitlines())) == (DONE, 7)
+    assert (code, len(text.splitlines())) == (DONE, len(NAMES) + 2)
     assert command(0, "watch", solved / "index.hdf")[0] == SOME_FAILED
 
 
@@ -149,3 +149,21 @@ def test_a_kill_amid_any_object_loses_nothing_that_is_finished(scene, solved, co
     assert launch(2, SCRIPT, scene, out, "--kill-after", count, "--delay", 0.01)[0] != SOME_FAILED
     assert launch(2, SCRIPT, scene, out)[0] == SOME_FAILED
     same(out, solved)
+
+
+@pytest.mark.long
+def test_an_object_of_a_folder_has_the_bits_of_a_run_of_its_own(tmp_path):
+    text = SCENE + "[gripper]\nelements = [4, 2, 2]\n[accuracy]\nmeshes = 1\n[limit_surface]\nsamples = 80\n"
+    (tmp_path / "scene.toml").write_text(text)
+    (tmp_path / "meshes").mkdir()
+    trimesh.creation.box((0.04, 0.05, 0.06)).export(tmp_path / "meshes/box.stl")
+    trimesh.creation.cylinder(0.02, 0.08).export(tmp_path / "meshes/rod.stl")
+    scene, out = tmp_path / "scene.toml", tmp_path / "out"
+    assert "about 4" in command(0, "plan", scene)[1]
+    assert command(0, "run", scene, "-o", out)[0] == DONE
+    alone = ("--set", "object.mesh=meshes/rod.stl", "--set", "object.name=rod", "-o", tmp_path / "rod.hdf")
+    assert command(0, "run", scene, *alone)[0] == DONE
+    assert differing(out / "rod.hdf", contents(tmp_path / "rod.hdf")) == []
+    assert command(0, "report", out)[0] == DONE
+    assert (out / "index.html").read_text().count("data:image/png") == 2
+    assert command(0, "export", out, "--format", "graspgen", "-o", tmp_path / "set")[0] == DONE
