@@ -93,8 +93,9 @@ class _ObjectsRun:
     def solve(self, batch: list[int]) -> bool:
         """Solve a batch; whether no signal came."""
         self._tried |= set(batch)
-        for n in batch:
-            self._rows[n] = self._rows[n] | {"state": index.STOPPED}
+        for n, row in ((n, self._rows[n]) for n in batch):
+            known = {name: row[name] for name in ("file", "mesh", "key", "mass")}
+            self._rows[n] = index.blank_row(row["object"], state=index.STOPPED, **known)
         self._store(f"objects {self._ended + 1} to {self._ended + len(batch)} of {len(self._rows)}")
         answers, stopped = self._divide(batch, self._prepared)
         failed = {n: answer for n, answer in answers.items() if not isinstance(answer, Part)}
@@ -107,7 +108,7 @@ class _ObjectsRun:
             mine = [part for part in parts if part.number in self._mine]
             grown = [] if stopped else [self._alone(part.number, self._grown, part) for part in mine]
             parts = self._gathered(part for part in grown if part)
-        ends = [self._alone(n, self._ending, n, seconds) for n, seconds in names.items() if n in self._mine]
+        ends = [self._alone(n, self._ending, n, seconds, stopped) for n, seconds in names.items() if n in self._mine]
         for n, row in self._gathered([*filter(None, ends), *self._failed]):
             self._rows[n] = row
         self._mine.clear()
@@ -201,11 +202,13 @@ class _ObjectsRun:
         self._mine[part.number] = plan, work, growth
         return replace(part, plan=plan, torn=())
 
-    def _ending(self, n: int, seconds: float) -> tuple[int, Row]:
+    def _ending(self, n: int, seconds: float, stopped: bool) -> tuple[int, Row]:
         """The row of an object as its file stands, which is packed if nothing is missing there."""
         path, (plan, _, _) = self._out / f"{self._folder.objects[n].name}.hdf", self._mine[n]
         with open_result(path) as result:
             row = self._rows[n] | row_of(result) | {"preparing": seconds}
+        if stopped:  # also where no case is missing, a further round may be
+            row |= {"state": index.STOPPED, "reason": ""}
         if row["state"] != index.STOPPED:
             rewrite(path, plan.layout, plan.header, packed=True)
         return n, row
