@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -38,6 +38,8 @@ TURNS = 4  # rounds of setting a grasp straight; most end after two
 STRAIGHT = math.radians(0.5)  # tilt between two rounds that ends them
 APART, NEAR = 0.5, 0.25  # of the pad's length: grasps that are nearer are at one place; and one, if directions agree
 ALIKE, ROLLED = math.radians(20.0), math.radians(30.0)  # the same for approach and roll
+CLIMBS = (0.25, 0.25, 0.12, 0.06)  # steps of a climb, of the pad's sides; rolls of `ROLLED` go with the first
+WORTHWHILE = 0.01  # gain of payload that is worth a step
 EDGE_COST = 0.05  # of a payload, for which a place off the edges of the object is preferred
 
 
@@ -182,7 +184,36 @@ def antipodal_grasps(
         except NoContactError:
             continue
     # an open box may be held nowhere else
-    return thinned(seen if any(not grasp.state for grasp in seen) else [*seen, *over_holes], count, jaws.pad[0])
+    seen = seen if any(not grasp.state for grasp in seen) else [*seen, *over_holes]
+    best = [grasp for grasp in thinned(seen, count, jaws.pad[0]) if not grasp.state]
+    seen += [climbed((points, triangles), grasp, jaws, task, lids) for grasp in best]
+    return thinned(seen, count, jaws.pad[0])
+
+
+def climbed(
+    surface: tuple[FloatArray, IntArray], grasp: SampledGrasp, jaws: Jaws, task: Task, lids: FloatArray | None = None
+) -> SampledGrasp:
+    """The best grasp by payload that shifts of the pads along their sides and rolls lead to from another one.
+
+    A grasp whose pressure is in the middle of the pads may hold less than one nearer to the centre of mass.
+    """
+    for share in CLIMBS:
+        point, axes = grasp.point, axes_of(grasp.approach, grasp.long_side)
+        shifts = [point + sign * share * jaws.pad[k] * axes[:, k] for k in (0, 1) for sign in (1.0, -1.0)]
+        rolls = [axes[:, 0] + sign * math.tan(share * ROLLED / CLIMBS[0]) * axes[:, 1] for sign in (1.0, -1.0)]
+        frames = [*((place, axes) for place in shifts), *((point, axes_of(axes[:, 2], roll)) for roll in rolls)]
+        for place, turned in frames:
+            try:
+                grip = JawsOnSurface(surface, place, turned, jaws)
+            except NoContactError:
+                continue
+            if lids is not None and grip.over(lids):
+                continue
+            other = judged(grip, task)
+            if not other.state and other.payload > (1.0 + WORTHWHILE) * grasp.payload:
+                middle = 0.5 * (grip.sides[0].touch - grip.sides[1].touch)
+                grasp = replace(other, point=other.point + middle * turned[:, 2])
+    return grasp
 
 
 def sampled(corners: FloatArray, normals: FloatArray, count: int, seed: int) -> list[tuple[FloatArray, FloatArray]]:
