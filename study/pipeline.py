@@ -15,6 +15,7 @@ import numpy as np
 
 from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.fem.pad.halving import halved
+from softjaw.fem.petsc import Seconds
 from softjaw.study.case.build import build_object, forces_apart, own_frame, pad_shape
 from softjaw.study.case.contact import of_fingers, on_faces
 from softjaw.study.case.effects import COUPLING, SCREENED, EffectChoice, Simulated, settled
@@ -70,15 +71,15 @@ class UnitSolver:
 
     def cases(self, wanted: Collection[int]) -> Generator[tuple[int, CaseResult | CaseFailure], None, None]:
         """Cases at these forces, upward."""
-        start = time.perf_counter()
+        start, before = time.perf_counter(), self._solver.seconds
         choice = self._choice = self._choice or EffectChoice(self._solver)
-        choosing = time.perf_counter() - start
         for k, outcome in _outcomes(choice, wanted):
             if isinstance(outcome, CaseFailure):
                 yield k, outcome
             elif k in wanted:
-                yield k, _result(self._settings, choice, k, outcome, self._unit, choosing)
-                choosing = 0.0  # counted once for all forces
+                # the first case has the time in which the effects of all were chosen
+                yield k, _result(self._settings, choice, k, outcome, self._unit, start, before)
+                start, before = time.perf_counter(), self._solver.seconds
 
     def destroy(self) -> None:
         """Give the factors' memory back."""
@@ -86,9 +87,9 @@ class UnitSolver:
 
 
 def _result(
-    settings: EvaluationSettings, choice: EffectChoice, k: int, solved: Solved, unit: Any, choosing: float
+    settings: EvaluationSettings, choice: EffectChoice, k: int, solved: Solved, unit: Any, begun: float, before: Seconds
 ) -> CaseResult:
-    """Values, checks, work, effects and patches of one case; its effects took ``choosing`` seconds to choose."""
+    """Values, checks, work, effects and patches of one case; its clock and the solver's stood at ``begun, before``."""
     scene, fine, coarse = unit.scene, solved.fine, solved.coarse
     finest = unit.finest[k] if unit.finest else FINEST
     start, contacts = time.perf_counter(), fine.contacts
@@ -100,7 +101,10 @@ def _result(
         values["maps/flags"] |= wall_flags(scene, contacts[0].state, values)
     if coarse:
         other = _state_values(coarse)
-        values |= mesh_errors(contacts, coarse.contacts, values, other, settings, coarse.views, solved.weight)
+        values |= mesh_errors(
+            contacts, coarse.contacts, values, other, settings, coarse.views, solved.weight, solved.pairs_of_contacts,
+            solved.floor + choice.skipped_share(k),
+        )  # fmt: skip
         # only where every case has a target: without one the sums at the end say how many cases miss the usual one
         if (target := scene.accuracy.target) is not None and not unit.finest:
             error = values[f"maps/{scene.accuracy.target_of}_error"]
@@ -114,7 +118,7 @@ def _result(
             left_out = effects[COUPLING].indicator
         values |= coarse_errors(contacts, values, fine.views, settings, left_out)
         values["maps/flags"] &= ~Flag.COARSE  # its errors say so
-    values |= _work(solved, time.perf_counter() - start, choosing)
+    values |= _work(choice.solver, solved, start, begun, before)
     if scene.accuracy.target is not None:
         values |= {"maps/pad_elements": math.prod(shape.elements), "work/mesh": finest}
     patches = [on_faces(c, pad_shape(scene.gripper)) for c in contacts]
@@ -173,14 +177,12 @@ def _state_values(solution: Solution) -> dict[str, Any]:
     return values | solution.wall_values
 
 
-def _work(solved: Solved, friction: float, choosing: float) -> dict[str, Any]:
-    """Work of one case, of which friction, fits and scores, and the choice of its effects, took so many seconds."""
+def _work(solver: CandidateSolver, solved: Solved, friction: float, begun: float, before: Seconds) -> dict[str, Any]:
+    """Work of a case: all since clock and solver stood at ``begun, before``, friction and scores since ``friction``."""
     names = (("newton_iterations", "iterations"), ("load_steps", "steps"), ("step_halvings", "halvings"))
-    states = [c.state for c in solved.fine.contacts]
+    states, now, spent = [c.state for c in solved.fine.contacts], time.perf_counter(), solver.seconds
     work: dict[str, Any] = {f"work/{key}": [getattr(s, name) for s in states] for key, name in names}
-    seconds = [state.seconds for state in solved.states]
-    for part in ("assembly", "factorisation"):
-        work[f"work/seconds_{part}"] = sum(getattr(s, part) for s in seconds)
-    total = friction + choosing + sum(s.total for s in seconds)
-    work["work/seconds_rest"] = choosing + sum(s.rest for s in seconds)
-    return work | {"work/seconds_friction": friction, "work/seconds_total": total}
+    parts = {name: getattr(spent, name) - getattr(before, name) for name in ("assembly", "factorisation")}
+    parts |= {"friction": now - friction, "total": now - begun}
+    parts["rest"] = 2.0 * parts["total"] - sum(parts.values())
+    return work | {f"work/seconds_{name}": value for name, value in parts.items()}

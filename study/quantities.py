@@ -100,16 +100,17 @@ REASONS = (
     "the object has no wall",
     "never skipped, because it costs next to nothing",
     "e_n and quality do not depend on it",
-    "measured change of e_n below the target",
-    "measured change of e_n above the target",
-    "measured change of e_n not surely below the target",
-    "left out, though e_n may change by more than the target: it was not solved",
+    "measured changes below the target",
+    "a measured change above the target",
+    "measured changes not surely below the target",
+    "left out, though numbers may change by more than the target: it was not solved",
     "left out on the coarse mesh alone, and part of the errors there",
 )
 MEASURED = {  # parts of an effect that the coarse mesh decides
     "change": "Relative change of e_n (CCM) by the dearer of the two levels that were compared last, on the coarse"
     " mesh; NaN where nothing was measured.",
     "payload_change": "The same of the payload.",
+    "quality_change": "The same of the quality.",
 }
 
 

@@ -2,10 +2,10 @@
 
 A row is an effect. Its steps lead from a level to the next dearer one. Below ``skip`` of a step's indicator the cheaper
 level is good to the target, above ``take`` the dearer one is surely needed. In between the candidate is solved on the
-coarse mesh with and without the effect, and what that changes in e_n decides: the cheaper level is taken where the
-change is surely below the target, ``accuracy.target`` or 1 %. Indicator and change belong to one force, and the coarse
-load path leads through all forces of the scene: nothing depends on which forces are wanted, or on which rank they are
-solved. Effects without steps are exact, or cost next to nothing: ``settled`` says so of a solved case.
+coarse mesh with and without the effect, and what that changes in payload, quality and e_n decides: the cheaper level is
+taken where each change is surely below the target, ``accuracy.target`` or 1 %; the change is then a part of the errors.
+Indicator and changes belong to one force: nothing depends on the other forces, or on which rank they are solved.
+Effects without steps are exact, or cost next to nothing: ``settled`` says so of a solved case.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from softjaw.fem.contact.problem import SpringBed
 from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.friction.patch import FloatArray, NoContactError
 from softjaw.study.case.build import build_object, forces_apart
-from softjaw.study.case.evaluate import settings_of
+from softjaw.study.case.evaluate import quality, settings_of
 from softjaw.study.case.model import contact_rules, pad_of, plate_compliance
 from softjaw.study.case.pressing import PressedContact, grasp_of
 from softjaw.study.case.result import surely_below
-from softjaw.study.case.solver import CandidateSolver, Levels, Solved, join_notes
+from softjaw.study.case.solver import CandidateSolver, Levels, Solution, Solved, join_notes
 from softjaw.study.case.task import payload_alone
 from softjaw.study.case.wall import estimated_indentation, thin_body
 from softjaw.study.flags import Flag
@@ -55,11 +55,8 @@ SURFACES = {
     "full": "fitted ellipsoid",
     "quartic": "convex quartic",
 }
-# What a change of e_n on the coarse mesh is believed to: a part of how it differs at the next forces, and of the change
-# of the payload. In 100 cases of a bottle and 88 of other shapes no effect was skipped then that moves e_n on the fine
-# mesh by more than 1.3 %. With 0.25 of the difference one was, by 2.3 %, without any two, by up to 18 %: at forces of
-# the bottle between changes of either sign.
-OF_NEXT_FORCES, OF_PAYLOAD = 0.4, 0.1
+# Part of the largest change on the coarse mesh that is doubted: the fine one shifts where a change passes through zero.
+DOUBT = 0.3
 # What may be raised where a contact is smaller than a coarse element: that says nothing, and harms no case.
 TOO_SMALL = (ArithmeticError, ConvergenceError, CheckError, NoContactError)
 PAYLOAD_MOTIONS = 100  # whose wrenches bound the payload; both levels err alike
@@ -78,9 +75,9 @@ class Level(NamedTuple):
         NaN where it is not known.
     reason : int
         Index of `study.quantities.REASONS`.
-    change, payload_change : float
-        Relative change of e_n and of the payload by the dearer of the two levels that were compared last, on the coarse
-        mesh; NaN where nothing was measured.
+    change, payload_change, quality_change : float
+        Relative change of e_n, payload and quality by the dearer of the two levels that were compared last, on the
+        coarse mesh; NaN where nothing was measured.
     """
 
     level: str
@@ -88,6 +85,7 @@ class Level(NamedTuple):
     reason: int = ONLY
     change: float = nan
     payload_change: float = nan
+    quality_change: float = nan
 
 
 @dataclass(frozen=True)
@@ -285,7 +283,7 @@ class EffectChoice:
     def __init__(self, solver: CandidateSolver) -> None:
         self.solver, self.count = solver, len(solver.forces)
         self.target = solver.scene.accuracy.target or E_N_TARGET
-        self._changes: dict[tuple[str, str, int], tuple[float, float]] = {}
+        self._changes: dict[tuple[str, str, int], tuple[float, float, float]] = {}
         self._wanted = wanted_levels(solver.scene)
         cheapest = {name: ROWS[name].names[0] for name in Levels._fields}
         self.levels = Levels(*(cheapest[n] if level == "auto" else level for n, level in self._wanted.items()))
@@ -308,7 +306,7 @@ class EffectChoice:
     def _at(self, name: str, row: Row, k: int) -> Level:
         """Level of one effect at the ``k``-th force: each step is skipped, taken, or measured."""
         for step in row.steps:
-            measured = partial(self._measured, name, step, k)
+            measured = partial(self.changes, name, step, k)
             level = decided(name, step, step.indicator(self, k), measured, self.target)
             if level.level == level_named(name, step.low):
                 break
@@ -316,50 +314,51 @@ class EffectChoice:
                 self.levels = self.levels._replace(**{name: step.high})
         return level
 
-    def _measured(self, name: str, step: Step, k: int) -> tuple[float, float, float]:
-        """Relative change of e_n and payload by one step, and how far that of e_n may be off.
+    def changes(self, name: str, step: Step, k: int) -> tuple[float, float, float]:
+        """Relative changes of e_n, payload and quality by one step at the ``k``-th force on the coarse mesh.
 
-        The coarse mesh shifts the forces at which the change passes zero.
-        """
-        change, payload = self.change(name, step, k)
-        beside = [i for i in (k - 1, k + 1) if ROWS[name].each_force and 0 <= i < self.count]
-        differences = [OF_NEXT_FORCES * abs(change - self.change(name, step, i)[0]) for i in beside]
-        # where nothing is known there is nothing to doubt the change by
-        return change, payload, float(np.nanmax([0.0, OF_PAYLOAD * abs(payload), *differences]))
-
-    def change(self, name: str, step: Step, k: int) -> tuple[float, float]:
-        """Relative change of e_n and payload by one step at the ``k``-th force on the coarse mesh; NaN: not known.
-
-        Of effects that all forces share it is the change at the force where e_n changes most.
+        NaN where they are not known. Of effects that all forces share they are those at the force where they are
+        largest.
         """
         if (name, step.high, k) not in self._changes:
             forces = [k] if ROWS[name].each_force else range(self.count)
-            changes = [self._compared(name, step, i) for i in forces]
             # what is not known at some force may be the largest
-            largest = max(changes, key=lambda change: inf if np.isnan(change[0]) else abs(change[0]))
-            self._changes[name, step.high, k] = largest
+            compared = [self._compared(name, step, i) for i in forces]
+            self._changes[name, step.high, k] = max(compared, key=lambda c: inf if np.isnan(largest(c)) else largest(c))
         return self._changes[name, step.high, k]
 
-    def _compared(self, name: str, step: Step, k: int) -> tuple[float, float]:
-        low, high = (self.coarse(k, self.levels._replace(**{name: level})) for level in (step.low, step.high))
-        if low is None or high is None:
-            return nan, nan
+    def _compared(self, name: str, step: Step, k: int) -> tuple[float, float, float]:
+        pair = self._coarse_pair(name, step, k)
         # on a few elements e_n follows from their size, and what other gaps change is no measure of the effect
-        pairs = zip(low, high, strict=True)
-        if any(a.on_few_elements or b.on_few_elements or a.nodal_instead != b.nodal_instead for a, b in pairs):
-            return nan, nan
-        (e_n, payload), (other_e_n, other_payload) = map(self._judged, (low, high))
-        return other_e_n / e_n - 1.0 if e_n > 0 else nan, other_payload / payload - 1.0 if payload > 0 else nan
+        if pair is None or any(
+            a.on_few_elements or b.on_few_elements or a.nodal_instead != b.nodal_instead
+            for a, b in zip(*(side.contacts for side in pair), strict=True)
+        ):
+            return nan, nan, nan
+        low, high = (self._judged(side.contacts) for side in pair)
+        e_n, held, score = (b / a - 1.0 if a > 0 else nan for a, b in zip(low, high, strict=True))
+        return e_n, held, score
 
-    def _judged(self, contacts: Sequence[PressedContact]) -> tuple[float, float]:
-        """e_n of the weaker finger [m] and payload [kg], NaN where that cannot be told."""
-        e_n = min(c.limits["ccm"].e_n for c in contacts)
-        task = settings_of(self.solver.scene, build_object(self.solver.scene.object)).task
-        assert task is not None
+    def _coarse_pair(self, name: str, step: Step, k: int) -> tuple[Solution, Solution] | None:
+        """Solutions on the coarse mesh without and with a step; None where one of them does not exist."""
         try:
-            return e_n, payload_alone(contacts, PAYLOAD_MOTIONS, task)["maps/payload"]
+            low, high = (
+                self.solver.solve(k, COARSE, self.levels._replace(**{name: level})) for level in (step.low, step.high)
+            )
+        except TOO_SMALL:
+            return None
+        return low, high
+
+    def _judged(self, contacts: Sequence[PressedContact]) -> tuple[float, float, float]:
+        """e_n of the weaker finger [m], payload [kg] and quality, NaN where that cannot be told."""
+        e_n = min(c.limits["ccm"].e_n for c in contacts)
+        settings = settings_of(self.solver.scene, build_object(self.solver.scene.object))
+        assert settings.task is not None
+        try:
+            held = payload_alone(contacts, PAYLOAD_MOTIONS, settings.task)["maps/payload"]
+            return e_n, held, quality(contacts, settings)
         except (*TOO_SMALL, RuntimeError, ValueError):  # a contact without torque has no hull
-            return e_n, nan
+            return e_n, nan, nan
 
     def coarse(self, k: int, levels: Levels) -> Sequence[PressedContact] | None:
         """Contacts at the ``k``-th force on the coarse mesh; None where it has none."""
@@ -390,6 +389,15 @@ class EffectChoice:
         ConvergenceError, CheckError
             If there is no acceptable state.
         """
+        solved = self._solved(k)
+        if solved.coarse is None:
+            return solved
+        steps = {"sheet": ROWS["sheet"].steps[0], COUPLING: ROWS[COUPLING].steps[0]}
+        pairs = [self._coarse_pair(n, step, k) for n, step in steps.items() if self.chosen[n][k].reason == LITTLE]
+        return replace(solved, pairs=[*solved.pairs, *filter(None, pairs)])
+
+    def _solved(self, k: int) -> Solved:
+        """A case without what its effects leave out."""
         level, coupled = self.chosen[COUPLING][k], self.levels._replace(friction_pressure_coupling="tangential")
         if level.reason == FORCED or level.level != level_named(COUPLING, "tangential"):
             return self.solver.case(k, self.levels)
@@ -412,8 +420,13 @@ class EffectChoice:
             levels[COUPLING] = levels[COUPLING]._replace(indicator=indicator)
         return levels
 
+    def skipped_share(self, k: int) -> float:
+        """What friction that its indicator left out may change of any number, as a share."""
+        level = self.chosen[COUPLING][k]
+        return E_N_TARGET / SMALL_TRACTION * level.indicator if level.reason == BELOW else 0.0
+
     def flags_at(self, k: int) -> Flag:
-        """Flag of a case that lacks an effect that moves its e_n by more than the target."""
+        """Flag of a case that lacks an effect that moves its numbers by more than the target."""
         return Flag.LEFT_OUT if self.chosen[COUPLING][k].reason == FAILED else Flag(0)
 
 
@@ -424,21 +437,31 @@ def wanted_levels(scene: Scene) -> dict[str, str]:
     return levels | ({} if scene.gripper.tilt_stiffness_nm_per_rad is None else {"sheet": "rigid"})
 
 
+def largest(changes: Sequence[float]) -> float:
+    """The largest of some changes in size; NaN where the first, that of e_n, is not known.
+
+    >>> largest((0.01, -0.02, nan))
+    0.02
+    """
+    return nan if np.isnan(changes[0]) else float(np.nanmax(np.abs(changes)))
+
+
 def decided(
     name: str, step: Step, indicator: float, measured: Callable[[], tuple[float, float, float]], target: float
 ) -> Level:
     """Level of an effect by one step: skipped or taken by its indicator, else by what is measured.
 
-    ``measured`` gives the relative change of e_n, that of the payload, and how far that of e_n may be off; it is called
-    only where the indicator leaves the level open. ``target`` is the relative error of e_n that is good enough.
+    ``measured`` gives the relative changes of e_n, payload and quality; it is called only where the indicator leaves
+    the level open. ``target`` is the relative error that is good enough.
     """
     low, high = (level_named(name, level) for level in (step.low, step.high))
     if surely_below(indicator, step.skip * target / E_N_TARGET):
         return Level(low, indicator, BELOW)
     if indicator > step.take:
         return Level(high, indicator, ABOVE)
-    change, payload, doubt = measured()
-    if surely_below(abs(change) + doubt, target):
-        return Level(low, indicator, LITTLE, change, payload)
+    changes = measured()
+    change = largest(changes)
+    if surely_below((1.0 + DOUBT) * change, target):
+        return Level(low, indicator, LITTLE, *changes)
     # undecided takes the dearer level, which is right in both cases
-    return Level(high, indicator, MUCH if abs(change) > target else UNDECIDED, change, payload)
+    return Level(high, indicator, MUCH if change > target else UNDECIDED, *changes)

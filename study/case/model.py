@@ -211,12 +211,12 @@ def contact_rules(scene: Scene, walled: bool) -> tuple[str, ...]:
     return (chosen,) if chosen == "nodal" else (chosen, "nodal")
 
 
-def press_of(scene: Scene, finger: Finger, coarser: bool) -> Press:
+def press_of(scene: Scene, finger: Finger, coarser: bool, stride: int = 1) -> Press:
     """Pad on its object, with friction where the scene wants it to act back."""
     symmetry = usable_symmetry(scene, finger, pad_shape(scene.gripper, coarser).elements)
     wanted, *others = (pad_of(scene, symmetry, rule, coarser) for rule in contact_rules(scene, walled=False))
     mu = scene.friction.mu if scene.effects.friction_pressure_coupling == "tangential" else None
-    return Press(wanted, finger.gap, dict(scene.petsc), others, mu)
+    return Press(wanted, finger.gap, dict(scene.petsc), others, mu, stride=stride)
 
 
 def check_poses(scene: Scene, points: list[Scene]) -> None:

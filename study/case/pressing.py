@@ -179,14 +179,16 @@ class OnRigid:
         Fingers that are solved, and planes of symmetry of each.
     """
 
-    def __init__(self, scene: Scene, fingers: Sequence[Finger], poses: Sequence[Any], coarser: bool) -> None:
+    def __init__(
+        self, scene: Scene, fingers: Sequence[Finger], poses: Sequence[Any], coarser: bool, stride: int = 1
+    ) -> None:
         self.scene, self.fingers = scene, fingers
         first, second = poses
         if turn_of_pose(first, second, scene.object.axis_symmetry) is not None:
             self.image: tuple[int, int] | None = (1, 1)
         else:
             self.image = image_signs(fingers[0], fingers[1], scene.gripper.pad_size)
-        self.parts = [press_of(scene, finger, coarser) for finger in (fingers[:1] if self.image else fingers)]
+        self.parts = [press_of(scene, finger, coarser, stride) for finger in (fingers[:1] if self.image else fingers)]
         self.fingers_solved, self.planes = 2, min(sum(part.pad.symmetry) for part in self.parts)
 
     def contacts(self, states: Sequence[Any]) -> list[PressedContact]:
@@ -208,10 +210,10 @@ class OnRigid:
 class OnWall:
     """Fingers on a thin wall, which press against each other through it; one part, attributes as of `OnRigid`."""
 
-    def __init__(self, scene: Scene, fingers: Sequence[Finger], coarser: bool) -> None:
+    def __init__(self, scene: Scene, fingers: Sequence[Finger], coarser: bool, stride: int = 1) -> None:
         self.scene, self.fingers = scene, fingers
         self.grasp = grasp_of(scene, fingers, coarser)
-        grip = _grip(scene, fingers, self.grasp, coarser)
+        grip = _grip(scene, fingers, self.grasp, coarser, stride)
         self.parts, self.shell = [grip], grip.problem.model.shell
         self.fingers_solved, self.planes = len(self.grasp.poses), sum(self.grasp.mirrors)
 
@@ -234,17 +236,17 @@ class OnWall:
 
 
 def pressing(
-    scene: Scene, fingers: Sequence[Finger], poses: Sequence[Any], coarser: bool = False
+    scene: Scene, fingers: Sequence[Finger], poses: Sequence[Any], coarser: bool = False, stride: int = 1
 ) -> OnRigid | OnWall:
     """Both fingers at first touch, pressed at the levels that the scene names; an ``auto`` is the cheapest one.
 
-    ``coarser`` halves the elements of every direction.
+    ``coarser`` halves the elements of every direction; ``stride`` is that of a load path with friction acting back.
     """
     if has_wall(scene.object):
         refuse_along_axis(fingers)
         if scene.effects.object.endswith("shell"):
-            return OnWall(scene, fingers, coarser)
-    return OnRigid(scene, fingers, poses, coarser)
+            return OnWall(scene, fingers, coarser, stride)
+    return OnRigid(scene, fingers, poses, coarser, stride)
 
 
 def refuse_along_axis(fingers: Sequence[Finger]) -> None:
@@ -277,7 +279,7 @@ def grasp_of(scene: Scene, fingers: Sequence[Finger], coarser: bool = False) -> 
     return grasp_frame
 
 
-def _grip(scene: Scene, fingers: Sequence[Finger], grasp_frame: Grasp, coarser: bool) -> Grip:
+def _grip(scene: Scene, fingers: Sequence[Finger], grasp_frame: Grasp, coarser: bool, stride: int) -> Grip:
     """Both fingers on the wall."""
     size = WallMesh(*scene.accuracy.wall_sizes)
     mesh = size.halved() if coarser else size
@@ -293,7 +295,7 @@ def _grip(scene: Scene, fingers: Sequence[Finger], grasp_frame: Grasp, coarser: 
         return WallProblem(wall, pads, scene.friction.mu if coupled else None)
 
     problems = [partial(problem, rule) for rule in contact_rules(scene, walled=True)]
-    return Grip(problems, dict(scene.petsc))
+    return Grip(problems, dict(scene.petsc), stride)
 
 
 def _gap(finger: Finger, turned: bool):

@@ -18,9 +18,10 @@ from typing import Any, NamedTuple, TypeVar
 from softjaw.fem.contact.path import Pressed
 from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.fem.objects.gap import Pose
+from softjaw.fem.petsc import Seconds
 from softjaw.study.case.build import build_object, forces_apart, has_wall, pad_elements
 from softjaw.study.case.contact import Contact
-from softjaw.study.case.errors import OF_FINER_MESHES, OF_MESHES, error_of
+from softjaw.study.case.errors import OF_FINER_MESHES, OF_MESHES, edge_floor, error_of
 from softjaw.study.case.evaluate import settings_of
 from softjaw.study.case.model import approach
 from softjaw.study.case.pressing import OnRigid, OnWall, PressedContact, pressing, refuse_along_axis
@@ -28,9 +29,11 @@ from softjaw.study.case.result import surely_below
 from softjaw.study.scene import Scene
 from softjaw.study.scene.sections import COARSE, FINE, FINEST, MOST_ELEMENTS
 
+LONG_STEPS = COARSE - 1  # the coarse mesh, with a load path of half as many steps
 NEGLIGIBLE_FORCE = 1e-3  # of the largest one; below it a failed load step says nothing of the forces above
 MOST_STARTS = 3  # coarse states that a force on the scene's mesh is started from, before it starts from nothing
 NO_ERROR = "the error of the mesh is not known, for on the coarser one {reason}"
+NO_PATH_ERROR = "the error of the load path is not known, for in longer steps {reason}"
 NOT_REFINED = "on a finer mesh, which accuracy.target asks for, it was not solved ({reason})"
 Failure = ConvergenceError | CheckError
 State = TypeVar("State")
@@ -78,10 +81,14 @@ class Solution:
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """Solutions of one case on all its meshes, the finest first, and a note on meshes that have none."""
+    """Solutions of one case on all its meshes, the finest first, and a note on meshes that have none.
+
+    Each of the ``pairs`` on the coarse mesh differs by what the steps of the load path, or an effect, leave.
+    """
 
     meshes: Sequence[Solution]
     note: str = ""
+    pairs: Sequence[tuple[Solution, Solution]] = ()
 
     @property
     def fine(self) -> Solution:
@@ -94,14 +101,19 @@ class Solved:
         return self.meshes[1] if len(self.meshes) > 1 else None
 
     @property
+    def pairs_of_contacts(self) -> list[tuple[Sequence[PressedContact], Sequence[PressedContact]]]:
+        """Contacts of the ``pairs``."""
+        return [(one.contacts, other.contacts) for one, other in self.pairs]
+
+    @property
+    def floor(self) -> float:
+        """Share of a value that meshes can agree on by luck."""
+        return edge_floor(self.fine.contacts, self.fine.contacts[0].state.pad.shape.per_side ** 2)
+
+    @property
     def weight(self) -> float:
         """Weight of the difference between these two in the error."""
         return OF_MESHES if self.fine.mesh == FINE else OF_FINER_MESHES
-
-    @property
-    def states(self) -> list[Pressed]:
-        """States whose work was done for the case; that of two pads on a wall is counted with the first."""
-        return [state for mesh in self.meshes for state in mesh.states]
 
 
 def followed(
@@ -165,7 +177,8 @@ class CandidateSolver:
             if mesh > FINE:
                 gripper = scene.gripper.model_copy(update={"elements": pad_elements(scene, mesh)})
                 scene = scene.model_copy(update={"gripper": gripper})
-            self._pressing[mesh, levels] = pressing(scene, self.fingers, self.poses, coarser=mesh == COARSE)
+            stride = 2 if mesh == LONG_STEPS else 1
+            self._pressing[mesh, levels] = pressing(scene, self.fingers, self.poses, mesh <= COARSE, stride)
         return self._pressing[mesh, levels]
 
     def solve(self, k: int, mesh: int, levels: Levels) -> Solution:
@@ -205,7 +218,22 @@ class CandidateSolver:
             solved = Solved([fine], NO_ERROR.format(reason=failure))
         else:
             solved = Solved([fine, self.solve(k, COARSE, levels)])
+            if levels.friction_pressure_coupling != "none":
+                solved = self._with_long_steps(solved, k, levels)
         return self._refined(solved, k, levels) if isinstance(fine.fingers, OnRigid) else solved
+
+    def _with_long_steps(self, solved: Solved, k: int, levels: Levels) -> Solved:
+        """The case with what the steps of its load path leave: the difference to steps of twice the length."""
+        if failure := self.failure(k, LONG_STEPS, levels):
+            return replace(solved, note=NO_PATH_ERROR.format(reason=failure))
+        assert solved.coarse is not None
+        return replace(solved, pairs=[(solved.coarse, self.solve(k, LONG_STEPS, levels))])
+
+    @property
+    def seconds(self) -> Seconds:
+        """Where the time of all solves so far has gone."""
+        spent = [part.solver.seconds for fingers in self._pressing.values() for part in fingers.parts]
+        return Seconds(*(sum(getattr(s, name) for s in spent) for name in ("assembly", "factorisation", "total")))
 
     def error(self, solved: Solved) -> float:
         """Relative error of the quantity that ``accuracy.target`` is for; NaN where there is one mesh alone."""
@@ -213,7 +241,8 @@ class CandidateSolver:
         if coarse is None:
             return math.nan
         settings = settings_of(self.scene, build_object(self.scene.object))
-        return error_of(name, fine.contacts, coarse.contacts, coarse.views, settings, solved.weight)
+        pairs, floor = solved.pairs_of_contacts, solved.floor
+        return error_of(name, fine.contacts, coarse.contacts, coarse.views, settings, solved.weight, pairs, floor)
 
     def _refined(self, solved: Solved, k: int, levels: Levels) -> Solved:
         """The case as it is where its error is surely below the target, else on further meshes.
@@ -228,7 +257,7 @@ class CandidateSolver:
             if surely_below(self.error(solved), target) or too_large:
                 break
             try:
-                solved = Solved([self.solve(k, mesh, levels), *solved.meshes])
+                solved = replace(solved, meshes=[self.solve(k, mesh, levels), *solved.meshes])
             except (ConvergenceError, CheckError, ArithmeticError) as error:
                 return replace(solved, note=join_notes(solved.note, NOT_REFINED.format(reason=error)))
         return solved

@@ -14,6 +14,7 @@ from softjaw.friction.patch import ContactPatch
 from softjaw.study import pipeline
 from softjaw.study.case.contact import joined
 from softjaw.study.case.result import CaseFailure
+from softjaw.study.case.solver import CandidateSolver, Levels
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import misses
 from tests.study.scenes import CONE, NO_COUPLING, pose_of, scene_of, units_of
@@ -256,3 +257,18 @@ def test_with_friction_acting_back_one_mesh_and_two_give_the_same_case():
                 (("accuracy.meshes=1", "load.normal_force_n=[2]"), ()))  # fmt: skip
     for key in ("maps/payload", "maps/quality", "maps/e_n", "maps/S", "maps/closing"):
         assert np.asarray(one[0].values[key]).tobytes() == np.asarray(two[1].values[key]).tobytes()
+
+
+def test_the_steps_of_the_load_path_are_part_of_the_errors():
+    """In steps of twice the length the same mesh differs by about what its own steps leave."""
+    unit = unit_of(*ROUGH)
+    solver = CandidateSolver(unit.scene, unit.candidate.poses)
+    levels = Levels("rigid", "rigid", "tangential")
+    solved = solver.case(1, levels)
+    [(coarse, longer)] = solved.pairs
+    assert coarse is solved.coarse
+    assert longer.states[0].steps < coarse.states[0].steps
+    change = abs(longer.states[0].closing / coarse.states[0].closing - 1.0)
+    assert 0.0 < change < 0.01
+    solver.destroy()
+    assert whole(ROUGH)[1].values["maps/closing_error"] > change

@@ -16,7 +16,7 @@ from softjaw.scoring.contact import SoftContact
 from softjaw.scoring.pose import pose_volume
 from softjaw.study.case.build import build_object, centre_of_volume
 from softjaw.study.case.contact import Contact, topology
-from softjaw.study.case.errors import OF_MESHES, OF_VIEWS, estimate, mesh_errors
+from softjaw.study.case.errors import OF_MESHES, OF_VIEWS, edge_floor, estimate, mesh_errors
 from softjaw.study.case.evaluate import FACING, EvaluationSettings, evaluate, lengths, quality
 from softjaw.study.case.task import Task
 from softjaw.study.flags import Flag
@@ -113,6 +113,10 @@ def test_contacts_that_lean_are_flagged_and_errors_are_differences_of_meshes():
         expected = abs(other[f"maps/{name}"][0] / values[f"maps/{name}"][0] - 1)
         assert errors[f"maps/{name}_error"] == pytest.approx(expected, rel=1e-9, abs=1e-12)
     assert not any(mesh_errors(fine, fine, values, {}, SETTINGS).values())
+    floor = mesh_errors(fine, fine, values, {}, SETTINGS, floor=0.01)
+    assert [floor[f"maps/{name}_error"] for name in ("e_n", "quality", "p_max")] == pytest.approx([0.01, 0.01, 0.1])
+    # more elements that bear agree by luck to less
+    assert edge_floor(fine, 1) == pytest.approx(0.5 * edge_floor(fine, 4), rel=1e-9)
     task = replace(SETTINGS, task=Task((fine[0].origin + fine[1].origin) / 2))
     held, less = (evaluate(contacts, task)[0]["maps/payload"][0] for contacts in (fine, coarse))
     error = mesh_errors(fine, coarse, {**values, "maps/payload": [held]}, {}, task)["maps/payload_error"]
