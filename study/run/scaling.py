@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.study.messages import OTHER_FILE, StudyError
+from softjaw.study.result.layout import Layout
 from softjaw.study.run.plan import Plan, measured_seconds
 from softjaw.study.run.progress import duration
 from softjaw.study.run.shares import by_cost
@@ -123,6 +124,19 @@ def measured_paths(plan: Plan, seconds: NDArray[np.float64]) -> list[LoadPath]:
     return paths
 
 
+def row_size(layout: Layout) -> tuple[int, int]:
+    """Bytes of a case, and in how many writes they go into the file."""
+    columns = layout.columns
+    # besides its values: begun, checksums, state
+    return sum(int(np.prod(c.shape)) * c.dtype.itemsize for c in columns), len(columns) + 3
+
+
+def machine_of(layout: Layout) -> Machine:
+    """What is assumed of a cluster that solves cases of a layout."""
+    row, writes = row_size(layout)
+    return Machine(PER_NODE, CLAIM, WRITE * writes, max(writes / WRITES_PER_S, row / BYTES_PER_S))
+
+
 def scaling_text(plan: Plan, path: Path, ranks: Sequence[int], repeat: int = 1) -> str:
     """Time and efficiency of a finished study, or of one with ``repeat`` times its candidates, on so many ranks.
 
@@ -135,10 +149,8 @@ def scaling_text(plan: Plan, path: Path, ranks: Sequence[int], repeat: int = 1) 
     paths = [] if seconds is None else measured_paths(plan, seconds) * repeat
     if not paths:
         raise StudyError(OTHER_FILE, f"{path}: no case was timed yet; run the study first, or give -n one number")
-    columns = plan.layout.columns
-    row = sum(int(np.prod(c.shape)) * c.dtype.itemsize for c in columns)
-    writes = len(columns) + 3  # a case besides its values: begun, checksums, state
-    machine = Machine(PER_NODE, CLAIM, WRITE * writes, max(writes / WRITES_PER_S, row / BYTES_PER_S))
+    row, writes = row_size(plan.layout)
+    machine = machine_of(plan.layout)
     replays = [replay(paths, n, machine) for n in ranks]
     times = [sum(load_path.seconds) for load_path in paths]
     rows = plan.layout.rows * repeat

@@ -1,0 +1,44 @@
+"""Time of studies of 10^3 to 10^6 cases on 1 to 4096 ranks: ``python -m tests.benchmark.scaling RESULT FIGURE.png``.
+
+The measured times of a finished file are replayed by the rules that hand out the work.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+
+from softjaw.study.result.store import open_result
+from softjaw.study.run.scaling import LoadPath, machine_of, replay
+
+RANKS = [4**k for k in range(7)]
+CASES = (10**3, 10**4, 10**5, 10**6)
+
+
+def main(result: Path, figure: Path) -> None:
+    """Print the table of hours, and draw it."""
+    mpl.use("Agg")
+    from matplotlib import pyplot as plt
+
+    with open_result(result) as file:
+        seconds, machine = file.read("work/seconds_total").ravel(), machine_of(file.layout)
+    seconds = np.sort(seconds[np.isfinite(seconds)])[::-1]
+    _, axes = plt.subplots(figsize=(6, 4))
+    for cases in CASES:
+        # beyond 10^5 cases all that counts is a sum: the replay of each tenth of them takes a tenth of the time
+        part = max(cases // 10**5, 1)
+        paths = [LoadPath((float(t),), 1.0) for t in np.resize(seconds, cases // part)]
+        times = [part * replay(paths, ranks, machine).seconds for ranks in RANKS]
+        print(f"{cases:>8} cases", *(f"{t:12.0f} s" for t in times))
+        axes.loglog(RANKS, times, "o-", label=f"{cases:,} cases")
+    axes.set(xlabel="ranks", ylabel="time [s]", title=f"{seconds.mean():.2g} s a case, one file")
+    axes.legend()
+    axes.grid(True, which="both", alpha=0.3)
+    plt.savefig(figure, dpi=80, bbox_inches="tight")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), Path(sys.argv[2]))
