@@ -26,7 +26,7 @@ from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.pad.shape import PadShape
 from softjaw.study.case.model import Finger, touching
 from softjaw.study.doctor import launch_environment, mpirun
-from tests.benchmark import kernels, other_code
+from tests.benchmark import kernels, other_code, users
 from tests.benchmark.table import fastest, line, title
 
 ROOT = Path(__file__).parents[2]
@@ -114,6 +114,7 @@ def main() -> None:
         "contact": contact_solve,
         "getfem": other_code.compare,
         "map": lambda: whole_map(options.scene),
+        "users": users.every_mesh,
     }
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("part", nargs="*", choices=[*parts, []], help="default: all")
