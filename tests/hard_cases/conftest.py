@@ -8,7 +8,7 @@ from pathlib import Path
 from tests.hard_cases.hard_case import CASES, HardCase, Outcome
 from tests.hard_cases.verdict import Verdict
 
-HEAD = ("case", "what is hard", "outcome", "compared with", "difference")
+HEAD = ("case", "what is hard", "outcome", "difference")
 INTRODUCTION = """# Hard cases
 
 Small scenes at the edges of what can be simulated. `make hard-cases` solves those of `tests/hard_cases/cases.toml`,
@@ -16,8 +16,8 @@ each together with a second number from elsewhere, and writes this page.
 
 * **outcome**: solved, failed or refused, each as it should. `gap` is a known fault, or a number that the second one
   does not confirm; gaps do not count as ok.
-* **compared with**: where the second number comes from; `source` in `cases.toml` says which one.
-* **difference**: the largest relative one of closing displacement, e_n and S (or of what `source` names). `cases.toml`
+* **difference**: the largest relative one of closing displacement, e_n and S (or of what `source` in `cases.toml`
+  names: another element, mesh or formulation, an independent code, a closed form, a limit, an invariance). `cases.toml`
   has the one that is allowed, with its reason. Force balance, tension and penetration are checked at every force.
 """
 ROW = "hard case"
@@ -29,9 +29,8 @@ _rows: dict[str, list[str]] = {}
 def row(case: HardCase, outcome: Outcome, verdict: Verdict) -> list[str]:
     """Cells of one case."""
     difference = "" if verdict.difference is None else f"{verdict.difference:.0e}"
-    source = case.source.kind if case.source else "none"
     word = outcome.text if verdict.word == OK else f"{outcome.text}; {verdict.word}"
-    return [case.name, case.hard, word, source, difference]
+    return [case.name, case.hard, word, difference]
 
 
 def table_text(rows: dict[str, list[str]]) -> str:
