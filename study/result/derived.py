@@ -69,8 +69,8 @@ def _of_force_range(scene: Scene) -> list[Quantity]:
                      "task.safety, between the solved forces by straight lines, and from 0 at 0 N. NaN: none of them"
                      " holds it.", "derived"),
             Quantity(LOW_ERROR, over, "N", "error of the force to use",
-                     "What the bend of safety_factor over the solved forces may move it; NaN where fewer than two of "
-                     "them are solved up to it.", "derived"),
+                     "What the stated error of the payload and the bend of safety_factor over the solved forces may "
+                     "move it; NaN where fewer than two of them are solved up to it.", "derived"),
         ]  # fmt: skip
     if getattr(scene.object, "wall", None) is not None:
         bounds.append(Quantity(
@@ -92,7 +92,9 @@ def _fill_force_range(writer: Any, scene: Scene) -> None:
     if LOW in wanted:
         factor = np.where(done, writer.read("safety_factor/ccm"), np.nan)
         writer.write_derived(LOW, first_crossing(forces, factor, scene.task.safety))
-        writer.write_derived(LOW_ERROR, crossing_error(forces, factor, scene.task.safety))
+        known = scene.accuracy.meshes > 1
+        stated = np.where(done, writer.read("payload_error/payload_error"), np.nan) if known else np.zeros(done.shape)
+        writer.write_derived(LOW_ERROR, crossing_error(forces, factor, scene.task.safety, stated))
     if HIGH in wanted:
         writer.write_derived(HIGH, _largest(writer, scene, forces, done))
 
@@ -109,18 +111,24 @@ def _largest(writer: Any, scene: Scene, forces: FloatArray, done: NDArray[np.boo
     return np.fmin.reduce([solved, *crossings])
 
 
-def crossing_error(forces: ArrayLike, values: ArrayLike, limit: float) -> FloatArray:
+def crossing_error(forces: ArrayLike, values: ArrayLike, limit: float, stated: ArrayLike = 0.0) -> FloatArray:
     """Error of `first_crossing` [N]: that of a straight line in a curve that bends as much as the values beside it do.
+
+    The errors of the values move the crossing, too: by their share of the limit over the slope.
 
     Parameters
     ----------
     forces, values, limit
         As for `first_crossing`; NaN where no three values, the one at no force counted, lie about the crossing.
+    stated : (..., k) array, optional
+        Relative errors of the values; the larger of those beside the crossing counts, NaN where neither is known.
 
     Examples
     --------
     >>> crossing_error([1.0, 2.0], [[1.0, 4.0]], 2.5).round(3).tolist()  # x^2, which passes at 1.581 and not at 1.5
     [0.083]
+    >>> crossing_error([1.0, 2.0], [[1.0, 4.0]], 2.5, [[0.02, 0.03]]).round(3).tolist()  # 3 % of 2.5 over 3
+    [0.108]
     """
     x = np.concatenate([[0.0], np.asarray(forces, float)])
     values = np.asarray(values, float)
@@ -134,10 +142,12 @@ def crossing_error(forces: ArrayLike, values: ArrayLike, limit: float) -> FloatA
     k = np.clip(np.searchsorted(x, at) - 1, 0, len(step) - 1)[..., None]  # interval of the crossing
     # the ends of the interval that have a bend
     ends = [np.take_along_axis(bend, np.clip(k + shift, 0, bend.shape[-1] - 1), -1)[..., 0] for shift in (-1, 0)]
+    rise, stated = np.take_along_axis(slope, k, -1)[..., 0], np.broadcast_to(stated, values.shape)
+    # the errors at both ends of the interval; at no force there is none
+    shares = [np.take_along_axis(stated, np.clip(k + shift, 0, stated.shape[-1] - 1), -1)[..., 0] for shift in (-1, 0)]
     k = k[..., 0]
-    rise = np.take_along_axis(slope, k[..., None], -1)[..., 0]
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(np.fmax(*ends) / 2 * (at - x[k]) * (x[k + 1] - at) / rise)
+        return np.asarray((np.fmax(*ends) / 2 * (at - x[k]) * (x[k + 1] - at) + np.fmax(*shares) * limit) / rise)
 
 
 def first_crossing(forces: ArrayLike, values: ArrayLike, limit: float) -> FloatArray:

@@ -288,9 +288,8 @@ def force_to_use(ds: xr.Dataset, index: Index) -> tuple[float, float]:
     Friction bears in proportion to mu, so a share by which mu is off moves the force by that share.
     """
     low = float(ds["force_low"].values[index[:-1]]) if "force_low" in ds else float("nan")
-    curve = float(ds["force_low_error"].values[index[:-1]]) if "force_low_error" in ds else 0.0
-    shares = [0.0 if np.isnan(share) else share * low for share in (at(ds, "payload_error", index), MU_ERROR)]
-    return low, float(np.linalg.norm([0.0 if np.isnan(curve) else curve, *shares]))
+    error = float(ds["force_low_error"].values[index[:-1]]) if "force_low_error" in ds else 0.0
+    return low, float(np.hypot(np.nan_to_num(error), MU_ERROR * low))
 
 
 def _force(ds: xr.Dataset, index: Index, why: str) -> tuple[str, str]:
