@@ -32,7 +32,7 @@ from softjaw.study.show.status import RESUME, aim, counts, largest_error, no_gra
 from softjaw.study.table import Column, Row, Table, as_text, number, terminal_width, with_error, wrapped
 from softjaw.study.units import GRAVITY, in_si, shown, shown_text, shown_unit
 
-NOTES_WIDTH, OTHERS_WIDTH, LABEL_WIDTH = 11, 16, 20  # characters
+NOTES_WIDTH, OTHERS_WIDTH, LABEL_WIDTH = 13, 16, 20  # characters
 MU_ERROR = 0.1  # of mu, by which it is off where nothing is known of it
 LEVER, LEVER_SHARE = 1e-3, 0.1  # [m] and loss of payload, below which the lever of the weight is not worth a word
 BRIEF = ("payload", "quality", "e_n", "opening")  # maps of a table in a terminal
@@ -71,7 +71,8 @@ def best(
     if not order:
         return Table(f"no candidate is solved at {forces(ds)[k]:g} N{why}{_solved_elsewhere(ds)}", table.columns, ())
     rows = [row | {"others": folded_text(ds, place)} for row, place in zip(table.rows, places, strict=False)]
-    columns = [*table.columns[:-1], Column("others", programs=False, wrap=OTHERS_WIDTH), table.columns[-1]]
+    others = [Column("others", programs=False, wrap=OTHERS_WIDTH)] * any(row["others"] for row in rows)
+    columns = [*table.columns[:-1], *others, table.columns[-1]]
     what = "places" if lines else "candidates"
     title = f"best {len(listed)} {what} of {len(order)} solved candidates by {score} at {forces(ds)[k]:g} N"
     first = (*unravelled(order[0], shape), k)

@@ -188,7 +188,7 @@ def flags_of(ds: xr.Dataset, index: Index) -> list[Flag]:
 
 def words_of(ds: xr.Dataset, index: Index) -> str:
     """Flags of a case in words."""
-    return flag_words(int(ds.variables["flags"].values[index]), at(ds, "misalignment", index))
+    return flag_words(int(ds.variables["flags"].values[index]))
 
 
 def check(ds: xr.Dataset, name: str, index: Index) -> float:

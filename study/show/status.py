@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import tomllib
 from argparse import Namespace
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 
 from softjaw.study.case.result import TIE
 from softjaw.study.flags import LOST, flag_sentences, flags_in
-from softjaw.study.quantities import DONE, E_N_TARGET, FAILED, MISSING, NO_GRASP, PARTS, STATES, map_row, misses
+from softjaw.study.quantities import DONE, FAILED, MISSING, NO_GRASP, PARTS, STATES, map_row, misses
 from softjaw.study.result.lock import holder
 from softjaw.study.result.store import open_result, place_text
 from softjaw.study.run.progress import duration
@@ -166,24 +167,24 @@ def unfinished(result: Any) -> bool:
 
 
 def largest_mesh_error(result: Any) -> str:
-    """The largest error by the mesh so far of what the scene's target is for."""
+    """The largest stated error so far of what the scene's target is for."""
     row = map_row(aim(result)[0]).of_error
     errors = result.read(f"{row.name}/{row.name}") if row in result.layout.quantities else None
     return largest_error(errors, result, result.axes, result.labels, meshes(result))
 
 
 def aim(cases: Any) -> tuple[str, float]:
-    """What the target of a file's scene is for, and the relative error; e_n and the usual one where it names none."""
+    """What the target of a file's scene is for, and the relative error; e_n and infinity where it names none."""
     accuracy = tomllib.loads(cases.scene).get("accuracy", {})
     if "target" not in accuracy:
-        return "e_n", E_N_TARGET
+        return "e_n", math.inf
     return accuracy["target_of"], accuracy["target"]
 
 
 def largest_error(
     errors: NDArray[np.float64] | None, cases: Any, axes: Sequence[Any], labels: Any, mesh: Any = None
 ) -> str:
-    """The largest error by the mesh, how many are above the target, and how many solved cases have none.
+    """The largest stated error, how many are above a target that the scene names, and how many solved cases have none.
 
     Parameters
     ----------
@@ -207,7 +208,7 @@ def largest_error(
         return f"errors of the mesh: none of {solved} solved cases has one"
     worst = tuple(map(int, np.unravel_index(int(np.nanargmax(known)), status.shape)))
     name, target = aim(cases)
-    parts = [f"largest error of {name} by the mesh: {100 * known[worst]:.2g} % ({place_text(axes, labels, worst)})"]
+    parts = [f"largest stated error of {name}: {100 * known[worst]:.2g} % ({place_text(axes, labels, worst)})"]
     if above := int(np.count_nonzero(misses(known, target))):
         parts.append(f"{above} of {count} cases above {100 * target:g} %")
     if count < solved:
