@@ -23,6 +23,7 @@ from softjaw.fem.objects.mesh_holes import border_loops, lid_corners, with_holes
 from softjaw.fem.objects.triangle_tree import TriangleTree
 
 SMALLEST, LARGEST = 1e-3, 2.0  # plausible largest extent of an object that a gripper holds [m]
+HUGE_COORDINATE = 1e12  # of a coordinate, in any unit
 ROUNDED = 5e-7  # of the largest coordinate: corners this close are one; files hold numbers of single precision (6e-8)
 MOST_TRIANGLES, DECIMATED_TO = 500_000, 200_000
 UNITS = {name: times / over for name, (times, over) in LENGTHS.items()}
@@ -121,7 +122,8 @@ def _finite(points: FloatArray, triangles: IntArray) -> tuple[IntArray, list[str
         raise MeshError("the mesh is empty: it holds no triangles; export it as a surface mesh")
     if ((triangles < 0) | (triangles >= len(points))).any():
         raise MeshError(f"a triangle refers to a point beyond the {len(points)} there are; export the file again")
-    good = np.isfinite(points).all(axis=1)[triangles].all(axis=1)
+    # what lies beyond is no coordinate in any unit, and its square overflows
+    good = (np.abs(points) < HUGE_COORDINATE).all(axis=1)[triangles].all(axis=1)
     if not good.any():
         raise MeshError("no triangle of the mesh has finite coordinates; repair the file")
     return triangles[good], [] if good.all() else [f"dropped {np.sum(~good)} triangles without finite coordinates"]

@@ -86,7 +86,7 @@ def test_every_mesh_is_read_from_every_format(tmp_path):
         ending = FORMATS[len(name) % len(FORMATS)]
         if kind != "very many triangles":
             make().export(tmp_path / f"mesh.{ending}")
-            assert len(MeshObject.from_file(tmp_path / f"mesh.{ending}", "m").triangles) >= 10, name
+            assert len(MeshObject.from_file(tmp_path / f"mesh.{ending}", "m").triangles) >= 8, name  # a wedge
 
 
 @pytest.mark.long
