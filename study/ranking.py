@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -17,6 +16,7 @@ from softjaw.study.flags import BORNE, LOST, Flag, flags_in
 from softjaw.study.quantities import DONE, LEAST_FORCE, REALISATION
 from softjaw.study.result.between import at_force, half_width
 from softjaw.study.result.read import mesh_error, values_of
+from softjaw.study.scene.text import scene_table
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -41,8 +41,7 @@ def judged(ds: Any) -> IntArray:
 
 def task_keys(ds: Any, section: str = "task") -> dict[str, Any]:
     """Keys of a section of the scene, defaults filled in; nothing where there is no scene."""
-    found: dict[str, Any] = tomllib.loads(ds.attrs.get("scene", "")).get(section, {})
-    return found
+    return scene_table(ds.attrs.get("scene", ""), section)
 
 
 def falling(values: np.ndarray) -> np.ndarray:

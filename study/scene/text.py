@@ -152,3 +152,12 @@ def _values(text: str) -> dict[str, Any]:
 def value_text(value: Any) -> str:
     """A value of a scene in a few words."""
     return "not set" if value is None else shown(value, WIDTH)
+
+
+def scene_table(text: str, section: str) -> dict[str, Any]:
+    """A section of a stored scene; empty where there is none, or where somebody wrote another text into the file."""
+    try:
+        table = tomllib.loads(text).get(section, {})
+    except (tomllib.TOMLDecodeError, RecursionError):
+        return {}
+    return table if isinstance(table, dict) else {}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-import tomllib
 from argparse import Namespace
 from collections.abc import Callable, Sequence
 from datetime import datetime
@@ -21,6 +20,7 @@ from softjaw.study.result.store import open_result, place_text
 from softjaw.study.run.progress import duration
 from softjaw.study.run.refine import about
 from softjaw.study.scene.sections import COARSE, FINE, FINEST
+from softjaw.study.scene.text import scene_table
 from softjaw.study.table import (
     MOST_NOTES,
     PAPER,
@@ -175,10 +175,7 @@ def largest_mesh_error(result: Any) -> str:
 
 def aim(cases: Any) -> tuple[str, float]:
     """What the target of a file's scene is for, and the relative error; e_n and infinity where it names none."""
-    try:
-        accuracy = tomllib.loads(cases.scene).get("accuracy", {})
-    except (tomllib.TOMLDecodeError, RecursionError):  # a text that somebody wrote into the file
-        accuracy = {}
+    accuracy = scene_table(cases.scene, "accuracy")
     if "target" not in accuracy:
         return "e_n", math.inf
     return accuracy["target_of"], accuracy["target"]
