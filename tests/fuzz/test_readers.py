@@ -108,6 +108,7 @@ def test_many_spoilt_files_are_read_or_refused_in_time_and_in_little_memory(tmp_
     judged()
 
 
+@pytest.mark.long
 def test_hostile_meshes_are_read_or_refused_in_time_and_in_little_memory(tmp_path):
     wrong = {}
     read_triangles(ROOT / "jobs" / "objects" / "flask.stl")  # and everything is imported
