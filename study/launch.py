@@ -16,12 +16,12 @@ from softjaw.study.case.model import check_petsc, check_poses
 from softjaw.study.result import derived
 from softjaw.study.result.read import dataset
 from softjaw.study.run.finer import next_cases
+from softjaw.study.run.object_folder import ObjectFolder
 from softjaw.study.run.objects import run_objects
 from softjaw.study.run.plan import make_plan
 from softjaw.study.run.refine import Rounds, added_cases, next_round, refined
 from softjaw.study.run.session import Growth, Work, on_rank0, run_study
 from softjaw.study.scene import Scene
-from softjaw.study.scene.folder import ObjectFolder
 from softjaw.study.show.best_grasps import summary
 from softjaw.study.show.report.verdict import plain_report
 

@@ -17,9 +17,9 @@ MODEL_NAMES = dict(zip(MODELS, ("CCM", "PCM", "PCM scaled by F_N"), strict=True)
 FINGERS = 2
 AROUND, ALONG = 48, 40  # places at which a deformed wall is stored
 # States of a case, by these codes. From WIDE on there is no grasp worth a solve: neither solved nor failed.
-STATES = ("not computed", "complete", "failed", "too wide", "collides", "slips", "not among the best")
-MISSING, DONE, FAILED, WIDE, COLLIDES, SLIPS, WORSE = range(len(STATES))
-NO_GRASP = (WIDE, COLLIDES, SLIPS, WORSE)
+STATES = ("not computed", "complete", "failed", "too wide", "collides", "slips")
+MISSING, DONE, FAILED, WIDE, COLLIDES, SLIPS = range(len(STATES))
+NO_GRASP = (WIDE, COLLIDES, SLIPS)
 RIMS = (1, 2, 4, 8)  # bits of the rims of a pad that carry load: its ends at -x and +x, its sides at -y and +y
 REALISATION = "realisation"  # dimension of the samples of uncertain inputs; the first has the scene's own
 E_N_TARGET = 0.01  # relative error of e_n that is good enough where a scene names none

@@ -27,7 +27,7 @@ from softjaw.study.export.cases import MEANING, cases
 from softjaw.study.export.selection import GripperFrame, gripper_frame, holds
 from softjaw.study.flags import LOST
 from softjaw.study.messages import USAGE, StudyError, beside, write_file
-from softjaw.study.quantities import COLLIDES, DONE, SLIPS, WIDE
+from softjaw.study.quantities import DONE, NO_GRASP
 from softjaw.study.ranking import judged, task_keys
 from softjaw.study.result.index import read_index, write_arrays
 from softjaw.study.result.read import maps_in, open
@@ -188,7 +188,7 @@ def grasp_arrays(ds: xr.Dataset, gripper: GripperFrame) -> Arrays:
     ds = ds.assign(flags=(ds.status.dims, flags, ds["flags"].attrs))
     status = ds.status.values
     solved = [tuple(map(int, at)) for at in np.argwhere(status == DONE)]
-    refused = [tuple(map(int, at)) for at in np.argwhere(np.isin(status, (WIDE, COLLIDES, SLIPS)))]
+    refused = [tuple(map(int, at)) for at in np.argwhere(np.isin(status, NO_GRASP))]
     poses = _poses(ds)
     refused = [at for at in refused if at[-3] < len(poses)]
     listed = list(cases(ds, "ccm", [*solved, *refused]))

@@ -18,7 +18,6 @@ from softjaw.study import messages
 from softjaw.study.messages import OTHER_FILE, StudyError, beside
 from softjaw.study.result.hdf5 import StoredFile, opened
 from softjaw.study.result.layout import PROGRAM
-from softjaw.study.scene.folder import INDEX
 from softjaw.study.table import Row
 
 DONE, SOME_FAILED, NO_GRASP, FAILED, REFUSED, STOPPED, MISSING = STATES = (
@@ -26,7 +25,7 @@ DONE, SOME_FAILED, NO_GRASP, FAILED, REFUSED, STOPPED, MISSING = STATES = (
 )  # fmt: skip
 ENDED = (DONE, SOME_FAILED, NO_GRASP, FAILED, REFUSED)  # states of objects that a run is through with
 SOLVED = (DONE, SOME_FAILED)
-INDEX_VERSION = 1
+INDEX, INDEX_VERSION = "index", 1  # name of its file, which no object's has
 
 
 class IndexColumn(NamedTuple):

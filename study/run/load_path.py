@@ -41,7 +41,7 @@ def rows_again(units: Iterable[Any], codes: np.ndarray, torn: Iterable[int], ret
 def settle(writer: Any, units: Iterable[Any], torn: Iterable[int], retry_failed: bool) -> np.ndarray:
     """Decide by one process what is missing: torn rows again, failed ones on demand, no grasps and deadly ones never.
 
-    A case that an earlier run left out and this one asks for, as without ``candidates.solve_best``, is missing again.
+    A case that an earlier run left out and this one tries is missing again.
 
     Returns
     -------

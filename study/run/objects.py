@@ -32,11 +32,11 @@ from softjaw.study.result.store import open_result
 from softjaw.study.run.batch import Files, ObjectsSession, Part, settled
 from softjaw.study.run.limits import AbandonedError, Stopper, limited_memory
 from softjaw.study.run.load_path import sentence
+from softjaw.study.run.object_folder import ObjectFolder, key_of
 from softjaw.study.run.plan import Plan
 from softjaw.study.run.schedule import Claims
 from softjaw.study.run.session import Growth, Work, file_of, finish_alone, locked, on_rank0, rounds_in
 from softjaw.study.scene import Scene, SceneError
-from softjaw.study.scene.folder import INDEX, ObjectFolder, key_of
 from softjaw.study.table import Row
 from softjaw.study.units import in_si
 
@@ -60,7 +60,7 @@ def run_objects(
     StudyError, SceneError
         On every rank: what is wrong for all objects alike, ``out`` is in use, of another scene, or cannot be written.
     """
-    with locked(out / f"{INDEX}.hdf", comm):
+    with locked(out / f"{index.INDEX}.hdf", comm):
         run = _ObjectsRun(folder, out, study, work, comm, retry_failed)
         batch = min(max(BATCH_PER_RANK * comm.size, BATCH_PER_RANK), MOST_OPEN_FILES)
         while todo := run.todo()[:batch]:
@@ -228,12 +228,12 @@ class _ObjectsRun:
         if text and self._comm.rank == 0:
             print(text, flush=True)
         about = {"scene_file": self._folder.scene_file, "overrides": "\n".join(self._folder.overrides)}
-        on_rank0(self._comm, index.write_index, self._out / f"{INDEX}.hdf", self._rows, about)
+        on_rank0(self._comm, index.write_index, self._out / f"{index.INDEX}.hdf", self._rows, about)
 
 
 def _rows_of(folder: ObjectFolder, out: Path, retry_failed: bool) -> list[Row]:
     """A row for every object: what an earlier run has stored, or nothing yet; by one process."""
-    path = out / f"{INDEX}.hdf"
+    path = out / f"{index.INDEX}.hdf"
     known = {row["object"]: row for row in index.read_index(path)[0]} if path.exists() else {}
     again = {index.FAILED, index.REFUSED, index.NO_GRASP, index.SOME_FAILED} if retry_failed else set()
     rows = []

@@ -85,7 +85,7 @@ def next_poses(result: Any, values: FloatArray, scene: Scene, each: int) -> tupl
         if poses := _neighbours(scene, rounds, values, share):
             return tuple(poses[: min(left, POSES_PER_ROUND)])
         before = given + sum(len(some) for some in rounds if some[0][0] > share)
-        if share < 1.0 and gained(values, before) < where.refine_within * (1 + UNDECIDED):
+        if share < 1.0 and gained(values, before) < scene.accuracy.refined_within * (1 + UNDECIDED):
             return ()
         share /= 2
     return ()

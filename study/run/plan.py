@@ -103,10 +103,10 @@ def make_plan(
     axes = tuple(grasps.axes(scene))
     placed = own_frame(scene.object)
     units: Sequence[Any] = decided(grasps.units(scene, lambda point: point.axis_symmetry))
-    if ordered or scene.candidates.solve_best is not None:
-        from softjaw.study.case.promise import chosen  # compiled loops, which most scenes are planned without
+    if ordered:
+        from softjaw.study.case.promise import hopeless_marked  # compiled loops, which scenes are planned without
 
-        units = chosen(scene, units)
+        units = hopeless_marked(units)
     if scene.candidates.sampled and forces_apart(scene):
         units = [_with_meshes(unit, scene, rounds) for unit in units]
     header = Header(
@@ -254,8 +254,7 @@ def _rounds(plan: Plan, scene: Any) -> str:
         return ""
     each = added_cases(plan.units, plan.layout)
     what = "poses" if scene.candidates.poses else "stations"
-    text = f"up to {asked // each} more {what}, {each} cases each, {scene.candidates.refined_until}"
-    return f"{text}; not in the numbers above and below"
+    return f"up to {asked // each} more {what}, {each} cases each; not in the numbers above and below"
 
 
 def _time(plan: Plan, scene: Any, path: Path, ranks: int) -> str:

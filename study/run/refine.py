@@ -35,24 +35,15 @@ def refined(scene: Scene, rounds: Rounds) -> Scene:
         return scene
     where, given = scene.candidates, scene.candidates.station_values_mm
     if where.poses:
-        return _with_poses(scene, rounds)
+        grown: dict[str, Any] = {"poses": with_places(where.poses, rounds), "refine": None}
+        return scene.model_copy(update={"candidates": where.model_copy(update=grown)})
     stations = tuple(sorted({*given, *(s for added in rounds for s in added)}))
-    fixed: dict[str, Any] = {"stations": None, "stations_mm": stations, "refine": None}
-    # What was left out as not among the best stays so in the file; the added stations are all solved.
-    fixed["solve_best"] = "holding" if where.solve_best == "holding" else None
-    parts: dict[str, Any] = {"candidates": where.model_copy(update=fixed)}
+    grown = {"stations": None, "stations_mm": stations, "refine": None}
+    parts: dict[str, Any] = {"candidates": where.model_copy(update=grown)}
     if not isinstance(names := scene.limit_surface.wrench_samples, str):
         samples = _renumbered(where.numbers(names), given, stations, len(where.angles_deg))
         parts["limit_surface"] = scene.limit_surface.model_copy(update={"wrench_samples": samples})
     return scene.model_copy(update=parts)
-
-
-def _with_poses(scene: Scene, rounds: Rounds) -> Scene:
-    where = scene.candidates
-    poses = with_places(where.poses, rounds)
-    # What was left out as not among the best stays so in the file; the added poses are all solved.
-    fixed = {"poses": poses, "refine": None, "solve_best": "holding" if where.solve_best == "holding" else None}
-    return scene.model_copy(update={"candidates": where.model_copy(update=fixed)})
 
 
 def _renumbered(
@@ -159,7 +150,7 @@ def next_stations(result: Any, scene: Scene, each: int) -> tuple[float, ...]:
     stations = sorted({*given, *added})
     # share of the largest chance: intervals with at least that are divided in the same round
     widest = 0.5 * float(chance.max(initial=0.0))
-    limit = max(where.refine_within * (1 + UNDECIDED), widest * (1 - UNDECIDED))
+    limit = max(scene.accuracy.refined_within * (1 + UNDECIDED), widest * (1 - UNDECIDED))
     # Rounded, so that chances that are equal but for rounding come in the order of their stations.
     order = np.lexsort((np.arange(len(chance)), -chance.round(6)))
     chosen = [i for i in order if chance[i] > limit][: max(left, 0)]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar
 
 from pydantic import AfterValidator, BeforeValidator, Field
 
@@ -20,7 +20,7 @@ POSE = [{"point_mm": [0, 0, 20], "approach": [1, 0, 0], "long_side": [0, 0, 1]}]
 EXAMPLE = "for example `stations = 35` with `stations_mm = [25, 175]`"
 BUDGET = 120  # cases of a refinement
 # keys that stations, poses and a sampler share
-OF_EVERY_KIND = ("roll_deg", "shift_mm", "refine", "refine_within", "solve_best")
+OF_EVERY_KIND = ("roll_deg", "shift_mm", "refine")
 ALONG = 0.996  # cosine between approach and long side from which they are parallel
 
 
@@ -111,16 +111,6 @@ class Candidates(SceneSection):
         f" around the best; true is {BUDGET}",
         examples=[BUDGET],
     )
-    refine_within: float = Field(
-        0.02,
-        ge=0.001,
-        le=0.5,
-        description="refining stops when no station is expected to beat the best by more than this share, or when a"
-        " finer step between poses gained less",
-    )
-    solve_best: Annotated[int, Field(ge=1, le=100_000)] | Literal["holding"] | None = Field(
-        None, description="solve only so many candidates, the best on a bed of springs, or those that do not slip on it"
-    )
     angles, roll, station_values = si("angles_deg"), si("roll_deg"), si("station_values_mm")
     shift: ClassVar[Any] = si("shift_mm")
 
@@ -143,14 +133,6 @@ class Candidates(SceneSection):
     def total(self) -> int:
         """Number of candidates; of a sampler that has not run as many as it may give."""
         return len(self.poses) or self.sampled or len(self.station_values_mm) * len(self.angles_deg)
-
-    @property
-    def refined_until(self) -> str:
-        """What ends a refinement, in words."""
-        share = self.refine_within
-        if self.poses or self.sampled:
-            return f"until a finer step between poses gains less than {share:.2g} of the best"
-        return f"until the best is known to {share:.2g} of itself"
 
     def numbers(self, names: Sequence[int | str]) -> tuple[int, ...]:
         """Numbers of the candidates that are given by number or label, each once, in the order given."""

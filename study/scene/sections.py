@@ -319,6 +319,11 @@ class Accuracy(SceneSection):
         return sizes
 
     @property
+    def refined_within(self) -> float:
+        """Gain, as a share of the best grasp, for which ``candidates.refine`` solves further ones."""
+        return self.target or 0.02
+
+    @property
     def most_meshes(self) -> int:
         """On how many meshes a case is solved at most."""
         return self.meshes if self.target is None else MOST_MESHES

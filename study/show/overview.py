@@ -45,7 +45,7 @@ def scene_text(scene: Any, file: str) -> str:
 
 def _refinement(where: Any) -> str:
     """What a refinement may add; empty without one."""
-    return f"at most {where.refine} more cases, {where.refined_until}" if where.refine else ""
+    return f"at most {where.refine} more cases" if where.refine else ""
 
 
 def _meshes(accuracy: Any) -> str:

@@ -73,9 +73,9 @@ def main(arguments=None):
     from mpi4py import MPI
 
     from softjaw.study.messages import StudyError, complain
+    from softjaw.study.run.object_folder import folder_of
     from softjaw.study.run.objects import run_objects
     from softjaw.study.run.session import Work
-    from softjaw.study.scene.folder import folder_of
 
     solved = 0
     nothing = SimpleNamespace(hang=-1, stuck=-1, greedy=-1, unplug=-1, remove=-1, kill=-1, raises=-1, fail=7001)

@@ -64,8 +64,8 @@ def fake_growth(digest, stations, work):
     from softjaw.study.run.session import Growth
 
     given = (1e3 * np.linspace(0, 0.1, stations)).tolist()
-    asked = SimpleNamespace(refine=36, refine_within=0.01, station_values_mm=given)
-    scene = SimpleNamespace(candidates=asked)
+    asked = SimpleNamespace(refine=36, station_values_mm=given)
+    scene = SimpleNamespace(candidates=asked, accuracy=SimpleNamespace(refined_within=0.01))
     return Growth(
         lambda rounds: (fake_plan(digest, stations, rounds=rounds), work),
         lambda result: next_stations(result, scene, 2 * FORCES),

@@ -11,7 +11,7 @@ import trimesh
 import softjaw
 from softjaw.study.messages import DONE, OTHER_FILE, SOME_FAILED, STOPPED, USAGE, StudyError
 from softjaw.study.result.index import open_index
-from softjaw.study.scene.folder import folder_of
+from softjaw.study.run.object_folder import folder_of
 from tests.study import fake_objects
 from tests.study.launching import contents, differing, here, launch
 from tests.study.launching import softjaw as command

@@ -34,8 +34,8 @@ def tent(x, peak, width):
 
 def rounds_until_known(formula, budget=30):
     """Stations that are added before nothing is expected to be better, by the rule of a study."""
-    asked = SimpleNamespace(refine=budget, refine_within=BEST_WITHIN)
-    scene = SimpleNamespace(candidates=asked)
+    asked = SimpleNamespace(refine=budget)
+    scene = SimpleNamespace(candidates=asked, accuracy=SimpleNamespace(refined_within=BEST_WITHIN))
     asked.station_values_mm = GIVEN.tolist()
     added = []
     while True:
@@ -94,7 +94,6 @@ elements = [8, 4, 2]
 stations_mm = [28, 38, 46, 54, 64]
 angles_deg = [0, 90]
 refine = 12
-refine_within = 0.02
 [load]
 normal_force_n = [1, 2]
 [limit_surface]
@@ -195,7 +194,6 @@ elements = [8, 4, 2]
 max_opening_mm = 65
 [candidates]
 refine = BUDGET
-refine_within = 0.02
 PLACES
 [load]
 normal_force_n = [1, 2]
@@ -205,8 +203,8 @@ wrench_samples = ["wide"]
 """.replace("PLACES\n", pose_of((0, 0, 8), label="wide") + pose_of((0, 0, -20), (0, 1, 0), (1, 0, 0)))
 
 
-def scene_with(budget, best_within=0.02):
-    return parse_scene(POSES.replace("BUDGET", str(budget)).replace("0.02", str(best_within), 1))
+def scene_with(budget):
+    return parse_scene(POSES.replace("BUDGET", str(budget)))
 
 
 def turned(axis, degrees):

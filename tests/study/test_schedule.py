@@ -13,7 +13,7 @@ import pytest
 
 from softjaw.fem.objects.shapes import Sphere
 from softjaw.study.doctor import launch_environment
-from softjaw.study.quantities import DONE, MISSING, WIDE, WORSE
+from softjaw.study.quantities import DONE, MISSING, SLIPS, WIDE
 from softjaw.study.run.estimate import CASE, ELEMENT, FACE_GRID, FIRST_FORCE_FACTOR, HARD, estimated, heights
 from softjaw.study.run.load_path import settle
 from softjaw.study.run.plan import Plan, make_plan, makespan, sensible_ranks, unit_seconds
@@ -189,7 +189,7 @@ def test_a_replay_finds_each_limit_where_its_closed_form_is():
 def test_a_case_that_an_earlier_run_left_out_is_missing_once_it_is_asked_for():
     class Writer:
         def __init__(self):
-            self.rows, self.forgotten = np.array([DONE, WORSE, WORSE, WIDE]), []
+            self.rows, self.forgotten = np.array([DONE, SLIPS, SLIPS, WIDE]), []
 
         def codes(self):
             return self.rows.copy()
@@ -204,9 +204,9 @@ def test_a_case_that_an_earlier_run_left_out_is_missing_once_it_is_asked_for():
             raise AssertionError("nothing is torn")
 
     writer = Writer()
-    wanted = {(0, 1): MISSING, (2,): WORSE, (3,): WIDE}
+    wanted = {(0, 1): MISSING, (2,): SLIPS, (3,): WIDE}
     units = [SimpleNamespace(rows=(rows,), state=state, apart=False, reason="") for rows, state in wanted.items()]
-    assert settle(writer, units, [], False).tolist() == [DONE, MISSING, WORSE, WIDE]
+    assert settle(writer, units, [], False).tolist() == [DONE, MISSING, SLIPS, WIDE]
     assert writer.forgotten == [1]
 
 

@@ -17,11 +17,11 @@ from typing import Any
 
 from softjaw.fem.objects.mesh_file import ENDINGS
 from softjaw.study.messages import USAGE, StudyError
+from softjaw.study.result.index import INDEX
 from softjaw.study.scene.model import Scene, file_digest, load_scene, parse_scene, put_overrides
 from softjaw.study.scene.objects import Mesh
 from softjaw.study.scene.text import parse_toml, read_text
 
-INDEX = "index"  # name of the table of all objects, which no object's file has
 TEXTS = ("mesh", "name", "unit", "axis")  # columns whose cells are texts, whatever they look like
 EXPECTED = "expected a pattern that mesh files match, as `meshes/*.stl`, or a CSV file with a column `mesh`"
 
