@@ -34,7 +34,7 @@ RUN = $(MPIRUN) $(BIN)/softjaw run $(SCENE) -o $(RESULT)
 .PHONY: help setup map figures effects test test-long bench hard-cases objects docs lint doctor
 
 help:
-	@echo 'make map        the grasp map of $(SCENE) on $(RANKS) ranks, with report and picture'
+	@echo 'make map        the grasp map of $(SCENE) on $(RANKS) ranks, with its report'
 	@echo 'make figures    the figures of the paper, into $(FIGURES)'
 	@echo 'make effects    indicators of the effects against true errors, into results/effects.csv and .png'
 	@echo 'make test       the tests: on one rank, then on several what can depend on ranks; five minutes'

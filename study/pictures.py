@@ -1,7 +1,6 @@
-"""The only door to matplotlib: figures, their files, and the drawing habits that all pictures of a study share.
+"""The only door to matplotlib: figures, their files, and the colours that all pictures of a study share.
 
-Every picture can be read without colour: maps grow evenly in lightness, models differ by line and marker, failed cases
-are crossed out. Nothing here needs a display.
+Maps grow evenly in lightness, so that they can be read without colour. Nothing here needs a display.
 """
 
 from __future__ import annotations
@@ -17,14 +16,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-from softjaw.study.quantities import MODEL_NAMES
-
-INK, SOFT, EMPTY = "#1d2429", "#6b747b", "#e7e9eb"
-MODEL_LOOKS = {  # name, colour, line, marker
-    "ccm": (MODEL_NAMES["ccm"], "#12436d", "-", "o"),
-    "pcm": (MODEL_NAMES["pcm"], "#c05a00", "--", "s"),
-    "pcm_projected": (MODEL_NAMES["pcm_projected"], "#2a8c82", ":", "^"),
-}
+INK, SOFT = "#1d2429", "#6b747b"
 COLOURS = {
     "payload": "viridis",
     "quality": "viridis",
@@ -98,17 +90,6 @@ def span(values: Any) -> tuple[float, float]:
     return low - room, high + room
 
 
-def heat(axes: Any, x: np.ndarray, y: np.ndarray, values: np.ndarray, failed: np.ndarray, **look: Any) -> Any:
-    """Cells ``values (len(y) - 1, len(x) - 1)`` as colours, between borders ``x`` and ``y``.
-
-    Failed cells are grey with a cross; cells without a value are grey.
-    """
-    axes.set_facecolor(EMPTY)
-    i, j = np.nonzero(failed)
-    axes.plot(0.5 * (x[j] + x[j + 1]), 0.5 * (y[i] + y[i + 1]), "x", color=SOFT, ms=4)
-    return axes.pcolormesh(x, y, np.ma.masked_invalid(np.where(failed, np.nan, values)), **look)
-
-
 def thumbnail(corners: Sequence[np.ndarray], colours: np.ndarray, pixels: int = 208) -> bytes:
     """A small square PNG of polygons ``(k, 2)`` in the order in which they cover each other, each of one colour."""
     drawn = Figure(figsize=(1, 1), dpi=pixels)
@@ -121,13 +102,3 @@ def thumbnail(corners: Sequence[np.ndarray], colours: np.ndarray, pixels: int = 
     axes.set(xlim=middle[0] + half * np.array([-1, 1]), ylim=middle[1] + half * np.array([-1, 1]))
     axes.set_axis_off()
     return _saved(drawn, format="png", facecolor="white", metadata={"Software": None})
-
-
-def colour_bar(drawn: Any, mappable: Any, axes: Any, label: str, beside: bool = False) -> None:
-    """A colour bar with its quantity and unit; ``beside`` keeps it as high as axes that have an aspect of their own."""
-    if beside:
-        place = {"cax": axes.inset_axes([1.03, 0.0, 0.035, 1.0])}
-    else:
-        place = {"ax": axes, "aspect": 10 * drawn.get_figheight(), "pad": 0.015}
-    bar = drawn.colorbar(mappable, label=label, **place)
-    bar.outline.set_visible(False)

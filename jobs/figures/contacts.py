@@ -94,7 +94,7 @@ def candidates(ds: xr.Dataset) -> tuple[Any, str]:
     mapped = _front(axes[0, 1], pad, top)
     place = f"station {number(1e3 * ds.station.values[0])} mm, {number(forces(ds)[-1])} N"
     axes[0, 1].set_title(f"pressure on its pad: {place}")
-    pictures.colour_bar(drawn, mapped, axes[0, 1], "pressure [kPa]", beside=True)
+    drawing.scale_beside(drawn, mapped, axes[0, 1], "pressure [kPa]")
     off = 1e3 * float(np.linalg.norm(pad.own(pad.origin)[:2]))
     return drawn, f"the contact's origin lies {number(off)} mm from the middle of the pad: pressure is not symmetric"
 

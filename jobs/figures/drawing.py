@@ -11,15 +11,17 @@ from matplotlib.collections import PolyCollection
 from matplotlib.patheffects import withStroke
 
 from softjaw.study import pictures
+from softjaw.study.show.plots import MODELS
 from softjaw.study.show.view import window as solids
 
 PAPER, MARGIN = 250, 6  # grey level from which a pixel is empty paper, and pixels that are kept round what is drawn
+LINES = {"ccm": ("-", "o"), "pcm": ("--", "s"), "pcm_projected": (":", "^")}  # of the friction models
 
 
 def model_look(model: str, **more: Any) -> dict[str, Any]:
     """How the line of a friction model looks, with its name as label."""
-    name, colour, line, marker = pictures.MODEL_LOOKS[model]
-    return {"label": name, "color": colour, "linestyle": line, "marker": marker, **more}
+    line, marker = LINES[model]
+    return {"label": MODELS[model][0], "color": MODELS[model][1], "linestyle": line, "marker": marker, **more}
 
 
 def polygons(axes: Any, corners: np.ndarray, values: np.ndarray, limits: tuple[float, float], **look: Any) -> Any:
@@ -49,6 +51,12 @@ def scale(drawn: Any, axes: Any, label: str, colours: str, limits: tuple[float, 
     some = np.ravel(axes)
     mapped = some[0].scatter([], [], c=[], cmap=colours, vmin=limits[0], vmax=limits[1])
     bar = drawn.colorbar(mapped, ax=list(some), location="bottom", label=label, shrink=0.6, aspect=30, pad=0.02)
+    bar.outline.set_visible(False)
+
+
+def scale_beside(drawn: Any, mapped: Any, axes: Any, label: str) -> None:
+    """A colour bar as high as axes that have an aspect of their own."""
+    bar = drawn.colorbar(mapped, label=label, cax=axes.inset_axes([1.03, 0.0, 0.035, 1.0]))
     bar.outline.set_visible(False)
 
 

@@ -12,6 +12,7 @@ from jobs.figures.contacts import WIDTH, outline
 from softjaw.study import pictures
 from softjaw.study.quantities import MODELS
 from softjaw.study.ranking import largest
+from softjaw.study.show import plots
 from softjaw.study.show.grasps import WIDE, field, forces, number, place
 from softjaw.study.show.object_surface import NOBODY
 from softjaw.study.show.view import window as solids
@@ -36,7 +37,7 @@ def curvature(ds: xr.Dataset) -> tuple[Any, str]:
                 values, error = _overestimate(ds, name, model, k)
                 look = {"alpha": 1.0, "lw": 1.6} if k == last else {"alpha": 0.55, "lw": 1.0, "mfc": "white"}
                 axis.errorbar(x[order], values[order], error[order], capsize=2, elinewidth=0.8, ls=line, marker=mark,
-                              color=pictures.MODEL_LOOKS[model][1], label=f"{label}, {number(force)} N",
+                              color=plots.MODELS[model][1], label=f"{label}, {number(force)} N",
                               **look)  # fmt: skip
         axis.set(xlabel="a / b, semi-axis along the approach over across [-]", ylabel="1 - CCM / PCM [%]", title=title)
     axes[0, 0].set_title(f"(c) {AGAINST['pcm']}")

@@ -26,7 +26,7 @@ def choice(options: Namespace) -> tuple[int | None, tuple[float | None, float | 
 def report(options: Namespace) -> str:
     """Write one page with everything."""
     page = Path(options.output or Path(options.file).with_suffix(".html"))
-    return "\n".join(f"written: {path}" for path in write_report(Path(options.file), page, *choice(options)))
+    return f"written: {write_report(Path(options.file), page, *choice(options))}"
 
 
 def view(options: Namespace) -> None:

@@ -14,13 +14,15 @@ import plotly.graph_objects as go
 from plotly.colors import get_colorscale
 from plotly.subplots import make_subplots
 
-from softjaw.study.pictures import COLOURS, EMPTY, INK, MODEL_LOOKS, SOFT, span
+from softjaw.study.pictures import COLOURS, INK, SOFT, span
+from softjaw.study.quantities import MODEL_NAMES
 
-__all__ = ["EMPTY", "INK", "SOFT", "span"]  # besides what is defined here
-GRID = "#e3e6e8"
-DASHES, SYMBOLS = {"-": "solid", "--": "dash", ":": "dot"}, {"o": "circle", "s": "square", "^": "triangle-up"}
+__all__ = ["INK", "SOFT", "span"]  # besides what is defined here
+GRID, EMPTY = "#e3e6e8", "#e7e9eb"
 MODELS = {  # name, colour, line, marker
-    model: (name, colour, DASHES[line], SYMBOLS[mark]) for model, (name, colour, line, mark) in MODEL_LOOKS.items()
+    "ccm": (MODEL_NAMES["ccm"], "#12436d", "solid", "circle"),
+    "pcm": (MODEL_NAMES["pcm"], "#c05a00", "dash", "square"),
+    "pcm_projected": (MODEL_NAMES["pcm_projected"], "#2a8c82", "dot", "triangle-up"),
 }
 MARGIN = {"l": 60, "r": 20, "t": 58, "b": 50}
 FLAT = {"lighting": {"ambient": 1, "diffuse": 0, "specular": 0}, "flatshading": True}  # colours are those of the bar

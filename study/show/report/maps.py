@@ -1,4 +1,4 @@
-"""Maps of a report: every quantity over station, angle and force, CCM beside PCM; levels, safe forces, and effort."""
+"""Maps of a report: every quantity over station, angle and force, CCM beside PCM; levels and safe forces."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from softjaw.study.page import Block, label, plot
-from softjaw.study.quantities import DONE, EFFECTS, FAILED, FIRST, MISSING, MODELS, NO_GRASP, PARTS, STATES, TABLE
+from softjaw.study.quantities import DONE, EFFECTS, FAILED, FIRST, MISSING, MODELS, NO_GRASP, STATES, TABLE
 from softjaw.study.ranking import largest
 from softjaw.study.show import plots
 from softjaw.study.show.grasps import (
@@ -34,7 +34,6 @@ MORE = ("quality_fitted", "epsilon", "f_x_max", "f_y_max", "tau_z_max", "safety_
         "closing", "curvature_loss", "fit_error", "overclaim", "overclaim_ellipsoid",
         "indentation", "wall_stress", "support_force", *(q.of_error.name for q in TABLE if q.error and q.rank))
 LEVEL_COLOURS = ("#e9eef2", "#8fb4cf", "#12436d")  # light to dark with the cost of a level
-PART_COLOURS = ("#12436d", "#6f9cc0", "#c05a00", "#c9ced2")  # as PARTS
 MARKS = (((FAILED,), "x-thin-open", 8), (NO_GRASP, "line-ew-open", 8), ((MISSING,), "circle", 3))  # of states; size
 NOT_SOLVED = {DONE: "", MISSING: STATES[MISSING], **{state: f"{STATES[state]}: " for state in (FAILED, *NO_GRASP)}}
 
@@ -248,35 +247,3 @@ def levels(ds: xr.Dataset, index: Index) -> Block | None:
     counts = ", ".join(f"{name}: {int(np.sum(top == k))}" for k, name in enumerate(EFFECTS["object"]) if k in top)
     caption = f"Level of the object by candidate ({counts}); point at a cell for its indicator."
     return plot(made, caption, f"Level of the object by candidate: {counts}.", 120 + 34 * min(len(top), 8))
-
-
-def effort(ds: xr.Dataset, index: Index) -> Block | None:
-    """Newton iterations, halved load steps and seconds of every candidate, all forces and angles together."""
-    x = main_axis(ds)
-    if ds.status.shape[x] < 2 or field(ds, "work_newton_iterations") is None:
-        return None
-    values, settings = ticks(ds, x)
-    sums = [_sums(ds, f"work_{name}", x, index) for name in ("newton_iterations", "step_halvings")]
-    made = plots.figure(1, 3, ("Newton iterations", "halved load steps", "seconds"))
-    for column, counts in enumerate(sums, start=1):
-        made.add_bar(x=values, y=counts, marker_color=plots.MODELS["ccm"][1], row=1, col=column, showlegend=False)
-    for part, colour in zip(PARTS, PART_COLOURS, strict=False):
-        made.add_bar(x=values, y=_sums(ds, f"work_seconds_{part}", x, index), name=part, marker_color=colour, row=1,
-                     col=3)  # fmt: skip
-    made.update_layout(barmode="stack", legend={"y": -0.3}).update_xaxes(**settings)
-    iterations, halvings = (number(np.nansum(counts_of), 6) for counts_of in sums)
-    summary = f"{iterations} Newton iterations and {halvings} halved load steps in all"
-    caption = f"Sums over all forces and angles, images of a grasp included though they are solved once: {summary}."
-    return plot(made, caption, f"Effort over {spoken(str(ds.status.dims[x]))}: {summary}.", 320)
-
-
-def _sums(ds: xr.Dataset, name: str, x: int, index: Index) -> np.ndarray:
-    """Sums over forces and angles along the main axis, of two fingers the larger count; NaN where nothing is known."""
-    found = field(ds, name)
-    if found is None:
-        return np.full(ds.status.shape[x], np.nan)
-    found = found.max(axis=-1) if found.ndim > len(index) else found
-    last = len(index) - 2
-    cut = tuple(slice(None) if i == x or i >= last else k for i, k in enumerate(index))
-    values = found[cut].reshape(ds.status.shape[x], -1)
-    return np.where(np.isfinite(values).any(axis=1), np.nansum(values, axis=1), np.nan)
