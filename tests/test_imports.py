@@ -29,7 +29,7 @@ ALLOWED = {
 ALLOWED["study"] |= {f"softjaw.{name}" for name in OWN}
 PICTURES = {
     "fem/objects/triangles.py",
-    "study/show/view/window.py",
+    "study/show/view/solids.py",
     "study/show/vtk.py",
 }
 DOORS = {

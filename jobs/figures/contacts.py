@@ -14,7 +14,7 @@ from softjaw.study import pictures
 from softjaw.study.case.build import outer_surface
 from softjaw.study.scene import load_scene
 from softjaw.study.show.grasps import at, forces, number
-from softjaw.study.show.view import window as solids
+from softjaw.study.show.view import solids
 from softjaw.study.show.view.model import FORCE, NEUTRAL, View
 from softjaw.study.show.view.pads import Pad
 
@@ -83,8 +83,8 @@ def candidates(ds: xr.Dataset) -> tuple[Any, str]:
     def whole(plotter: Any) -> None:
         solids.surface(plotter, 1e3 * view.surface.points, view.surface.triangles, color=NEUTRAL)
         solids.dots(plotter, 1e3 * marks, MARK, color=FORCE)
-        for k, finger in enumerate(both):
-            solids.block(plotter, finger, f"pad {k}")
+        for finger in both:
+            solids.block(plotter, finger)
             solids.pressures(plotter, finger, top)
 
     drawn, axes = pictures.figure(WIDTH, 3.5, 1, 2, width_ratios=[1, 1.7])

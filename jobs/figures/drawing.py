@@ -12,7 +12,7 @@ from matplotlib.patheffects import withStroke
 
 from softjaw.study import pictures
 from softjaw.study.show.plots import MODELS
-from softjaw.study.show.view import window as solids
+from softjaw.study.show.view import solids
 
 PAPER, MARGIN = 250, 6  # grey level from which a pixel is empty paper, and pixels that are kept round what is drawn
 LINES = {"ccm": ("-", "o"), "pcm": ("--", "s"), "pcm_projected": (":", "^")}  # of the friction models

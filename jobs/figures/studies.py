@@ -15,7 +15,7 @@ from softjaw.study.ranking import largest
 from softjaw.study.show import plots
 from softjaw.study.show.grasps import WIDE, field, forces, number, place
 from softjaw.study.show.object_surface import NOBODY
-from softjaw.study.show.view import window as solids
+from softjaw.study.show.view import solids
 from softjaw.study.show.view.model import View, read_scene
 
 COMPONENTS = {"f_y": ("across, f_y", "-", "o"), "tau_z": ("torque, tau_z", "--", "s"), "f_x": ("along, f_x", ":", "^")}

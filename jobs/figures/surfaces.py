@@ -26,7 +26,7 @@ from softjaw.study.show.stored_surface import (
     sphere,
     stored_surface,
 )
-from softjaw.study.show.view import window as solids
+from softjaw.study.show.view import solids
 from softjaw.study.show.view.model import View
 
 MODELS = ("pcm", "ccm")

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import sys
 from argparse import Namespace
 from pathlib import Path
 
@@ -11,7 +9,7 @@ from softjaw.study.messages import CANNOT_WRITE, USAGE, StudyError, beside, writ
 from softjaw.study.result.read import open
 from softjaw.study.show.grasps import judge
 from softjaw.study.show.report.writing import write_report
-from softjaw.study.show.view import model, object3d, window
+from softjaw.study.show.view import model, object3d, solids
 from softjaw.study.units import in_si
 
 ENDINGS = {"screenshot": (".png",), "html": (".html", ".htm")}
@@ -29,36 +27,25 @@ def report(options: Namespace) -> str:
     return f"written: {write_report(Path(options.file), page, *choice(options))}"
 
 
-def view(options: Namespace) -> None:
-    """Show a result in three dimensions: write what was asked for, or else open a window.
+def view(options: Namespace) -> str:
+    """Write a result in three dimensions: a page, a picture, or both; by default a page beside the file.
 
     Raises
     ------
     StudyError
-        If a file cannot be written, or there is neither a file to write nor a screen for a window.
+        If a file cannot be written, or there is no such case or map.
     """
+    if options.html is None and options.screenshot is None:
+        options.html = str(Path(options.file).with_suffix("")) + "-3d.html"
     paths = {name: _target(options, name) for name in ENDINGS if getattr(options, name) is not None}
-    if not paths and not has_screen():
-        text = "no screen for a window: found neither --html nor --screenshot, expected one of them"
-        raise StudyError(USAGE, text)
-    found, index = model.view_of(judge(open(options.file)), *choice(options), options.force)
-    quantity, written = model.quantity_of(found.ds, options.quantity), []
+    shown, index = model.view_of(judge(open(options.file)), *choice(options), options.force)
+    quantity = model.quantity_of(shown.ds, options.quantity)
     if "screenshot" in paths:
         with beside(paths["screenshot"]) as part:
-            window.save_picture(found, index, part, quantity, options.motion)
-        written.append(paths["screenshot"])
+            solids.save_picture(shown, index, part, quantity, options.motion)
     if "html" in paths:
-        html = object3d.view_page(found, index, quantity, options.motion)
-        written.append(write_file(paths["html"], html))
-    for path in written:
-        print(f"written: {path}")
-    if not written:
-        window.show_window(found, index, quantity, options.motion)
-
-
-def has_screen() -> bool:
-    """Whether a window can be opened."""
-    return sys.platform in ("darwin", "win32") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+        write_file(paths["html"], object3d.view_page(shown, index, quantity, options.motion))
+    return "\n".join(f"written: {path}" for path in paths.values())
 
 
 def _target(options: Namespace, name: str) -> Path:

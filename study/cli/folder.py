@@ -128,7 +128,9 @@ def _index(options: Namespace) -> Path:
 
 def watch(options: Namespace) -> int:
     """Follow a run until it ends."""
-    return objects.watch(_index(options), options.every)
+    from softjaw.study.show.watch import watch  # xarray
+
+    return watch(lambda: objects.look(_index(options)), options.every)
 
 
 def status(options: Namespace) -> str:

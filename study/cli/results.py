@@ -9,10 +9,11 @@ from softjaw.study.messages import OTHER_FILE, USAGE, StudyError
 from softjaw.study.result.read import open
 from softjaw.study.result.store import open_result, torn_rows
 from softjaw.study.scene import SceneError
-from softjaw.study.show import watch as watching
 from softjaw.study.show.best_grasps import best, best_text
 from softjaw.study.show.compare import compare as compared
 from softjaw.study.show.compare import compare_text
+from softjaw.study.show.watch import file_look
+from softjaw.study.show.watch import watch as watched
 from softjaw.study.table import as_csv, as_json, terminal_width
 
 FORMS = {"json": as_json, "csv": as_csv}
@@ -20,7 +21,7 @@ FORMS = {"json": as_json, "csv": as_csv}
 
 def watch(options: Namespace) -> int:
     """Follow a run until it ends."""
-    return watching.watch(Path(options.file), options.every)
+    return watched(file_look(Path(options.file)), options.every)
 
 
 def show(options: Namespace) -> str:

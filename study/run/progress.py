@@ -67,6 +67,11 @@ class Progress:
         self._share = 0.0
         self._first: tuple[float, int, float] | None = None  # when the first cases were done, how many, their weight
 
+    @property
+    def rows(self) -> int:
+        """Number of cases."""
+        return len(self._todo)
+
     def due(self) -> bool:
         """Whether it is time to look at the states again; cheap, to be asked often."""
         # Reading the states costs the file system something, so it is done seldom.

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-import time
 from collections import Counter
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -81,21 +79,14 @@ def summary(path: Path, width: int, top: int = 10) -> str:
     return f"{as_text(index_table(path, top), width)}\n{status_text(path, width)}"
 
 
-def watch(path: Path, every: float, sleep: Callable[[float], None] = time.sleep) -> int:
-    """Print a line for every change of the objects that are done until the run ends; its exit code."""
-    before = ""
-    while True:
-        runner = holder(path)  # asked first: what a run writes before it ends is then read below
-        rows, _ = index.read_index(path)
-        under_way = [cases for row in rows if row["state"] == index.STOPPED and (cases := _cases(path, row))]
-        done, whole = (sum(some) for some in zip(*under_way, strict=True)) if under_way else (0, 0)
-        now = f"; {done}/{whole} cases of {len(under_way)} objects that are solved now" if whole else ""
-        if (line := f"{counts_text(rows)}{now}") != before:
-            print(f"[{time.strftime('%H:%M:%S')}] {line}", flush=True)
-            before = line
-        if not runner:
-            return index.code_of(rows)
-        sleep(every)
+def look(path: Path) -> tuple[list[str], int | None]:
+    """Counts of the objects and of what is solved now, and the exit code of a run that has ended; for `show.watch`."""
+    runner = holder(path)  # asked first: what a run writes before it ends is then read below
+    rows, _ = index.read_index(path)
+    under_way = [cases for row in rows if row["state"] == index.STOPPED and (cases := _cases(path, row))]
+    done, cases = (sum(counts) for counts in zip(*under_way, strict=True)) if under_way else (0, 0)
+    now = f"; {done}/{cases} cases of {len(under_way)} objects that are solved now" if cases else ""
+    return [f"{counts_text(rows)}{now}"], None if runner else index.code_of(rows)
 
 
 def _cases(path: Path, row: Row) -> tuple[int, int] | None:

@@ -6,13 +6,14 @@ import base64
 import json
 import math
 import re
+import shutil
 
 import matplotlib
 import numpy as np
 import pytest
 
 from softjaw.fem.objects.shapes import EllipticCylinder
-from softjaw.study.cli import drawings, main
+from softjaw.study.cli import main
 from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, USAGE, StudyError
 from softjaw.study.quantities import ALONG, AROUND
 from softjaw.study.result.read import dataset
@@ -266,16 +267,9 @@ def test_the_command_writes_the_page(file, tmp_path, capsys):
     start = json.loads(text)["layout"]["meta"]["object3d"]["start"]
     assert start == {"force": 0, "candidate": 4, "quantity": "quality"}
     assert [p.name for p in tmp_path.iterdir()] == ["a.html"]
-
-
-def test_a_window_needs_a_screen(file, monkeypatch, capsys):
-    used = []
-    monkeypatch.setattr("softjaw.study.show.view.window.show_window", lambda *_: used.append("window"))
-    for screen, code in ((False, USAGE), (True, 0)):
-        monkeypatch.setattr(drawings, "has_screen", lambda screen=screen: screen)
-        assert main(["view", str(file)]) == code
-    assert used == ["window"]
-    assert "--screenshot" in capsys.readouterr().err
+    shutil.copy(file, tmp_path / "b.hdf")
+    assert main(["view", str(tmp_path / "b.hdf")]) == 0
+    assert (tmp_path / "b-3d.html").exists()
 
 
 # --- what is seen -----------------------------------------------------------------------------------------------------
