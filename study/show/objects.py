@@ -83,8 +83,8 @@ def look(path: Path) -> tuple[list[str], int | None]:
     """Counts of the objects and of what is solved now, and the exit code of a run that has ended; for `show.watch`."""
     runner = holder(path)  # asked first: what a run writes before it ends is then read below
     rows, _ = index.read_index(path)
-    under_way = [cases for row in rows if row["state"] == index.STOPPED and (cases := _cases(path, row))]
-    done, cases = (sum(counts) for counts in zip(*under_way, strict=True)) if under_way else (0, 0)
+    under_way = [counts for row in rows if row["state"] == index.STOPPED and (counts := _cases(path, row))]
+    done, cases = (sum(part) for part in zip(*under_way, strict=True)) if under_way else (0, 0)
     now = f"; {done}/{cases} cases of {len(under_way)} objects that are solved now" if cases else ""
     return [f"{counts_text(rows)}{now}"], None if runner else index.code_of(rows)
 

@@ -12,8 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from softjaw.study.case.result import TIE
-from softjaw.study.flags import LOST, flag_sentences, flags_in
+from softjaw.study.flags import flag_sentences, flags_in
 from softjaw.study.quantities import DONE, FAILED, MISSING, NO_GRASP, PARTS, STATES, map_row, misses
 from softjaw.study.result.lock import holder
 from softjaw.study.result.store import open_result, place_text
@@ -30,10 +29,8 @@ from softjaw.study.table import (
     as_csv,
     as_json,
     terminal_width,
-    with_error,
     wrapped,
 )
-from softjaw.study.units import shown, shown_unit
 
 MOST_PLACES = 2
 NO_ERRORS = "errors of the mesh: not known; accuracy.meshes = 2 in the scene gives them"
@@ -76,9 +73,8 @@ def status_table(result: Any) -> Table:
         rows.append(where | ({"label": str(result.labels[index[-3:-1]])} if poses else {}))
     counts = {name.replace(" ", "_"): int(np.sum(result.status == code)) for code, name in enumerate(STATES)}
     facts: Row = {"file": str(result.path), "running": holder(result.path) or None, **counts}
-    if known := rivals(result):
-        facts |= {f"rivals_{name}": value for name, value in known._asdict().items()}
-    facts |= {"largest_error": largest_mesh_error(result), **_added(result), "sessions": list(result.sessions)}
+    facts |= {"largest_error": largest_mesh_error(result), "waiting": waits(result), **_added(result)}
+    facts["sessions"] = list(result.sessions)
     notes = [reason.text(lambda index: place(result, index)) for reason in reasons_in(result)]
     return Table(result.title, columns, rows, notes, facts, "cases")
 
@@ -87,62 +83,13 @@ def status_text(result: Any, width: int = PAPER) -> str:
     """Answer of ``softjaw status``; the file may be growing meanwhile."""
     runner = holder(result.path)
     state = f"running now: {runner}" if runner else RESUME if unfinished(result) else ""
-    known = [wrapped(text, width, "  ", "  ") for text in (rivals_text(result), largest_mesh_error(result)) if text]
+    waiting = f"{n} cases wait for a finer mesh" if (n := waits(result)) else ""
+    known = [wrapped(text, width, "  ", "  ") for text in (largest_mesh_error(result), waiting) if text]
     lines = [counts(result), *known, *[wrapped(state, width)] * bool(state), *reasons(result, width)]
     return "\n".join([*lines, *sessions(result, bool(runner), width)])
 
 
-# --- how well the best is known --------------------------------------------------------------------------------------
-
-
-class Rivals(NamedTuple):
-    """The best payload [kg] with its error, the force [N], and of the other usable grasps there how many may be better.
-
-    ``coarse`` of all are solved on the coarse mesh alone.
-    """
-
-    best: float
-    error: float
-    force: float
-    better: int
-    others: int
-    coarse: int
-
-
-def rivals(result: Any) -> Rivals | None:
-    """How well the best payload is known at the largest force with a usable grasp; None without errors.
-
-    Images of the best grasp, which hold as much, are no rivals.
-    """
-    if "payload_error" not in {q.name for q in result.layout.quantities}:
-        return None
-    value, error = result.read("payload/ccm"), result.read("payload_error/payload_error")
-    flags = np.nan_to_num(result.read("flags/flags")).astype(int)
-    usable = (result.status == DONE) & np.isfinite(value) & (flags & LOST == 0)
-    if not usable.any():
-        return None
-    k = int(np.flatnonzero(usable.reshape(-1, usable.shape[-1]).any(axis=0))[-1])
-    value, error = (part[..., k][usable[..., k]] for part in (value, np.nan_to_num(error * value, nan=np.inf)))
-    top, mesh = int(value.argmax()), meshes(result)
-    other = value < value[top] * (1.0 - TIE)
-    better = other & (value + error > value[top] - error[top])
-    coarse = 0 if mesh is None else int(np.sum(mesh[..., k][usable[..., k]] == COARSE))
-    force = float(result.axes[-1].values[k])
-    return Rivals(float(value[top]), float(error[top]), force, int(better.sum()), int(other.sum()), coarse)
-
-
-def rivals_text(result: Any) -> str:
-    """The same in a line; empty where nothing is known."""
-    if (known := rivals(result)) is None:
-        return ""
-    value, error = (float(v) for v in shown(np.array([known.best, known.error]), "kg"))
-    text = with_error(value, error) if np.isfinite(error) else f"{value:.4g}"
-    coarse = f"; {known.coarse} are on the coarse mesh alone" * bool(known.coarse)
-    waiting = f"; {n} wait for a finer mesh" if (n := waits(result)) else ""
-    return (
-        f"best payload at {known.force:g} N: {text} {shown_unit('kg')}; {known.better} of {known.others} other grasps"
-        f" may hold more within the errors of the mesh{coarse}{waiting}"
-    )
+# --- errors of the mesh ----------------------------------------------------------------------------------------------
 
 
 def meshes(result: Any) -> NDArray[np.float64] | None:
