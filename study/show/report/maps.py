@@ -1,4 +1,4 @@
-"""Maps of a report: every quantity over station, angle and force, CCM beside PCM; levels and safe forces."""
+"""Maps of a report: every quantity over station, angle and force, CCM beside PCM; and safe forces."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from softjaw.study.page import Block, label, plot
-from softjaw.study.quantities import DONE, EFFECTS, FAILED, FIRST, MISSING, MODELS, NO_GRASP, STATES, TABLE
+from softjaw.study.quantities import DONE, FAILED, FIRST, MISSING, MODELS, NO_GRASP, STATES, TABLE
 from softjaw.study.ranking import largest
 from softjaw.study.show import plots
 from softjaw.study.show.grasps import (
@@ -33,7 +33,6 @@ MOST_PANELS, MOST_LABELS, MOST_NOTES = 6, 16, 8000
 MORE = ("quality_fitted", "epsilon", "f_x_max", "f_y_max", "tau_z_max", "safety_factor", "contact_area", "p_max",
         "closing", "curvature_loss", "fit_error", "overclaim", "overclaim_ellipsoid",
         "indentation", "wall_stress", "support_force", *(q.of_error.name for q in TABLE if q.error and q.rank))
-LEVEL_COLOURS = ("#e9eef2", "#8fb4cf", "#12436d")  # light to dark with the cost of a level
 MARKS = (((FAILED,), "x-thin-open", 8), (NO_GRASP, "line-ew-open", 8), ((MISSING,), "circle", 3))  # of states; size
 NOT_SOLVED = {DONE: "", MISSING: STATES[MISSING], **{state: f"{STATES[state]}: " for state in (FAILED, *NO_GRASP)}}
 
@@ -146,7 +145,8 @@ def _on_cells(made: Any, ds: xr.Dataset, cuts: Any, x: int, y: int) -> None:
 
 def _names(ds: xr.Dataset) -> list[str]:
     """Maps with values, and the error estimates of the first ones; quality where nothing is known."""
-    names = dict.fromkeys((ds.attrs["score"], *FIRST, *MORE))
+    walled = ["effect_object_level"] * ("wall" in ds.attrs["has"])
+    names = dict.fromkeys((ds.attrs["score"], *FIRST, *MORE, *walled))
     return [name for name in names if field(ds, name) is not None] or ["quality"]
 
 
@@ -225,25 +225,3 @@ def safe_forces(ds: xr.Dataset, index: Index) -> Block | None:
     bars = "Bars: from the force that holds (CCM; 0 without a mass) to the one that the wall bears."
     caption = f"{bars} No bar: no force is safe; triangles mark the force that holds (up) and that is borne (down)."
     return plot(made, caption, f"Safe force ranges: {int(np.sum(low <= high))} of {high.size} grasps have one.", 300)
-
-
-def levels(ds: xr.Dataset, index: Index) -> Block | None:
-    """Level at which each candidate's wall was simulated; None where it is nowhere chosen."""
-    level, indicator = field(ds, "effect_object_level"), field(ds, "effect_object_indicator")
-    if "wall" not in ds.attrs["has"] or level is None or max(level.shape[-3:-1]) == 1:
-        return None
-    x, y = main_axis(ds), len(index) - 2
-    indicator = np.full(level.shape, np.nan) if indicator is None else indicator
-    # one value of a candidate at all its forces
-    top, depth = (plane(np.fmax.reduce(array, axis=-1), x, y, index) for array in (level, indicator))
-    (xv, xs), (yv, ys) = ticks(ds, x), ticks(ds, y)
-    steps = [[(i + s) / 3, c] for i, c in enumerate(LEVEL_COLOURS) for s in (0, 1)]
-    bar = {"tickvals": [0, 1, 2], "ticktext": list(EFFECTS["object"]), "thickness": 14}
-    made = plots.figure()
-    made.add_heatmap(x=xv, y=yv, z=plots.with_gaps(top), zmin=-0.5, zmax=2.5, colorscale=steps, colorbar=bar,
-                     customdata=depth,
-                     hovertemplate="%{x}, %{y}: level %{z}, indicator %{customdata:.3g}<extra></extra>")  # fmt: skip
-    made.update_xaxes(**xs).update_yaxes(**ys).update_layout(plot_bgcolor=plots.EMPTY)
-    counts = ", ".join(f"{name}: {int(np.sum(top == k))}" for k, name in enumerate(EFFECTS["object"]) if k in top)
-    caption = f"Level of the object by candidate ({counts}); point at a cell for its indicator."
-    return plot(made, caption, f"Level of the object by candidate: {counts}.", 120 + 34 * min(len(top), 8))
