@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from softjaw.friction.patch import CANCEL, NEGLIGIBLE, ContactPatch, FloatArray, slivers
@@ -15,16 +15,10 @@ SAME = 1e-6  # of a usual face's size: corners no farther apart are one
 UNLOADED = 0.01  # weight of a face's own normal, in mean loads of all faces: the object's counts where there is load
 
 
-class Foot(NamedTuple):
-    """Point of a contact area on a line, the numbers of the faces that hold it, and whether the line misses all."""
+def foot(faces: ContactPatch, start: FloatArray, N: FloatArray) -> tuple[FloatArray, NDArray[np.intp], bool]:
+    """Where the line ``start + s N`` meets the faces, the numbers of these, and whether it misses all.
 
-    point: FloatArray
-    met: np.ndarray
-    missed: bool
-
-
-def foot(faces: ContactPatch, start: FloatArray, N: FloatArray) -> Foot:
-    """Where the line ``start + s N`` meets the faces, with the least ``abs(s)``; without corners the nearest centre.
+    Of several places the one with the least ``abs(s)``; without corners the nearest centre.
 
     Of two places that are equally near the one along ``N`` counts. A line through an edge meets the faces on both
     sides; slivers are met by none. A line that meets nothing has its foot on the plane of the face, or the mean of the
@@ -46,10 +40,10 @@ def foot(faces: ContactPatch, start: FloatArray, N: FloatArray) -> Foot:
         margin = NEGLIGIBLE * np.ptp(q, axis=1).max(axis=1) + warp
         nearest = met[_nearest(s[met], margin)]
         met = met[np.abs(s[met] - s[nearest]) <= margin]
-        return Foot(start + s[nearest] * N, met, False)
+        return start + s[nearest] * N, met, False
     # all centres that are equally near count, or which one does would hang on rounding
     met = np.flatnonzero(away <= away.min() + NEGLIGIBLE * np.sqrt(faces.area.max()))
-    return Foot(start + s[met].mean() * N, met, True)
+    return start + s[met].mean() * N, met, True
 
 
 def _nearest(s: FloatArray, margin: FloatArray) -> int:

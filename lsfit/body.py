@@ -12,15 +12,7 @@ from scipy.spatial import ConvexHull
 
 from softjaw.lsfit.form import directions
 from softjaw.lsfit.samples import checked_wrenches, sample_rank
-from softjaw.lsfit.surface import (
-    OUT_OF_SPAN,
-    ZERO_SHARE,
-    FitFlag,
-    LimitSurface,
-    checked_factors,
-    rows,
-    supported_shadow,
-)
+from softjaw.lsfit.surface import OUT_OF_SPAN, ZERO_SHARE, rows, supported_shadow
 
 FloatArray = NDArray[np.float64]
 
@@ -38,12 +30,12 @@ def hull_volume(W: ArrayLike) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class ExactSurface(LimitSurface):
+class ExactSurface:
     """Limit surface of a contact as friction gives it: every wrench is the one for its motion.
 
     The support of the body in the direction of a motion is the power ``w(t) . t`` of the wrench, exact to rounding.
-    What needs the surface between motions (`value`, `gradient`, `holds`) takes the hull of ``count`` wrenches and their
-    opposites, which lies inside and misses in proportion to ``1 / count``.
+    `radius`, which needs the surface between motions, takes the hull of ``count`` wrenches and their opposites, which
+    lies inside and misses in proportion to ``1 / count``.
 
     Parameters
     ----------
@@ -53,16 +45,11 @@ class ExactSurface(LimitSurface):
         Length of the contact by which the motions of the samples are spread evenly; 1 for normalised wrenches.
     count : int
         Number of samples for hulls.
-    flag : FitFlag
-        What the reader should know.
     """
 
     wrench: Callable[[FloatArray], FloatArray]
     rho: float = 1.0
     count: int = 8000
-    flag: FitFlag = FitFlag.CLEAN
-    degree = 1
-    dimension = 3
 
     def samples(self, count: int | None = None) -> FloatArray:
         """Wrenches for evenly spread motions of one sense of rotation, ``(count, 3)``."""
@@ -113,23 +100,22 @@ class ExactSurface(LimitSurface):
         h[moving] = (np.asarray(self.wrench(T[moving])) * T[moving]).sum(axis=1)
         return h
 
-    def value(self, w: ArrayLike) -> FloatArray:
-        """Smallest factor of the sampled hull that holds ``w``, ``(m, 3) -> (m,)``; infinite out of a flat body."""
-        return self._largest(w)[0]
+    @cached_property
+    def semi_axes(self) -> FloatArray:
+        """Largest reach ``(3,)`` along each component."""
+        return self.support(np.eye(3))
 
-    def gradient(self, w: ArrayLike) -> FloatArray:
-        """Direction of motion at ``w``: the normal of the face of the sampled hull over it, ``(m, 3) -> (m, 3)``."""
-        return self._facets[self._largest(w)[1]]
-
-    def scaled(self, factors: ArrayLike) -> ExactSurface:
-        """Image of the body under ``w -> factors * w``, ``(3,)``, factors not zero."""
-        f = checked_factors(factors, 3)
-        # rho is a torque over a force; the geometric mean stands for two factors of force
-        force = float(np.sqrt(abs(f[0] * f[1])))
-        # the image has the support h(f t), so its wrench for t is f times the one for f t
-        return ExactSurface(
-            lambda t: f * np.asarray(self.wrench(t * f)), self.rho * abs(float(f[2])) / force, self.count, self.flag
-        )
+    def radius(self, u: ArrayLike) -> FloatArray:
+        """Factor that brings ``u`` onto the sampled hull, ``(m, 3) -> (m,)``; 0 out of a flat body."""
+        W, B = rows(u, 3), self.span
+        value = np.empty(len(W))
+        # a product with all facets at once would take gigabytes for thousands of wrenches
+        for part in range(0, len(W), 200):
+            value[part : part + 200] = (W[part : part + 200] @ self._facets.T).max(axis=1)
+        # facets do not see the part across a flat body
+        value[np.linalg.norm(W - W @ B @ B.T, axis=1) > OUT_OF_SPAN * np.linalg.norm(W, axis=1)] = np.inf
+        with np.errstate(divide="ignore"):
+            return 1 / value
 
     @cached_property
     def _hull_samples(self) -> FloatArray:
@@ -141,23 +127,8 @@ class ExactSurface(LimitSurface):
         B = self.span
         # Qhull needs two dimensions at least
         if self.rank == 1:
-            return B.T / np.abs(self._hull_samples @ B).max()
+            return np.vstack([B.T, -B.T]) / np.abs(self._hull_samples @ B).max()
         Y = self._hull_samples @ B
         size = np.abs(Y).max(axis=0)  # a hull of very unequal lengths loses facets
         hull = ConvexHull(np.vstack([Y, -Y]) / size)
         return hull.equations[:, :-1] / -hull.equations[:, -1:] / size @ B.T
-
-    def _largest(self, w: ArrayLike) -> tuple[FloatArray, NDArray[np.int64]]:
-        W = rows(w, 3)
-        P, at = np.empty(len(W)), np.empty(len(W), dtype=np.int64)
-        # a product with all facets at once would take gigabytes for thousands of wrenches
-        for part in range(0, len(W), 200):
-            product = W[part : part + 200] @ self._facets.T
-            # a segment has one normal in the list, which stands for both its ends
-            product = np.abs(product) if self.rank == 1 else product
-            at[part : part + 200] = product.argmax(axis=1)
-            P[part : part + 200] = product.max(axis=1)
-        # facets do not see the part across a flat body
-        away = W - W @ self.span @ self.span.T
-        P[np.linalg.norm(away, axis=1) > OUT_OF_SPAN * np.linalg.norm(W, axis=1)] = np.inf
-        return P, at

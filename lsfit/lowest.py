@@ -8,7 +8,6 @@ rises by at most ``8 M h^2`` within the angle ``h``, which bounds what samples n
 from __future__ import annotations
 
 import math
-from enum import Enum
 from functools import lru_cache
 
 import numpy as np
@@ -126,64 +125,21 @@ def _missed(dimension: int) -> float:
     return rise / (1 - rise)
 
 
-class Closed(Enum):
-    """Whether a level set is closed."""
+def refuse_open(coefficients: FloatArray, dimension: int, placed: FloatArray) -> None:
+    """Refuse a quartic form whose level set ``P = 1`` is not closed, or not known to be.
 
-    YES = "yes"
-    NO = "no"
-    UNDECIDED = "undecided"
-
-
-def closed(coefficients: FloatArray, dimension: int) -> tuple[Closed, float, FloatArray]:
-    """Whether ``P = 1`` is closed for a quartic form, with the value of ``P`` that decides and its direction.
-
-    A form of the sum of forms in variables of their own is closed if each of these is; so a short axis beside long
-    ones is judged by its own size where no monomial mixes them.
-
-    Parameters
-    ----------
-    coefficients : (k,) array
-        In the order of ``exponents(dimension, 4)``.
+    It is closed if ``P`` exceeds `ZERO_SHARE` of its largest value all over the sphere, and open if it is below minus
+    that somewhere or does not depend on a variable at all. A form of the sum of forms in variables of their own is
+    closed if each of these is; so a short axis beside long ones is judged by its own size where no monomial mixes them.
 
     Coefficients of 16 digits that were turned or fitted are off by some 1e-15 of the largest. A body that reaches 1000
     times as far as its narrowest width is at the margin, since the reach is ``P^(-1/4)``.
 
-    Returns
-    -------
-    Closed
-        `YES` if ``P`` exceeds `ZERO_SHARE` of its largest value all over the sphere, `NO` if it is below minus that
-        somewhere or does not depend on a variable at all, else `UNDECIDED`.
-    float
-        Smallest value of ``P`` on the sphere of the variables that decide; where it is `YES` the margin.
-    (d,) array
-        Where it is; 0 where it is `YES`.
-    """
-    E = exponents(dimension, 4)
-    answer = Closed.YES, 0.0, np.zeros(dimension)
-    for group in _groups(coefficients, E):
-        form = coefficients[(E[:, ~group] == 0).all(axis=1)]
-        n = int(group.sum())
-        # the margin follows the size of the group's own form: a short axis is not lost in the rounding of long ones
-        margin = ZERO_SHARE * float(np.abs(half_sphere_monomials(n, 200) @ form).max())
-        if margin > 0 and lies_above(form, n, margin):
-            continue
-        value, u = smallest_value(form, n)
-        direction = np.zeros(dimension)
-        direction[group] = u
-        if value < -margin or margin == 0:
-            return Closed.NO, value, direction
-        answer = Closed.UNDECIDED, value, direction
-    return answer
-
-
-def refuse_open(coefficients: FloatArray, dimension: int, placed: FloatArray | None = None) -> None:
-    """Refuse a quartic form whose level set is not closed, or not known to be.
-
     Parameters
     ----------
     coefficients : (k,) array
         In the order of ``exponents(dimension, 4)``.
-    placed : (d, d) array, optional
+    placed : (d, d) array
         Map from the variables to those that the message is to name.
 
     Raises
@@ -193,17 +149,26 @@ def refuse_open(coefficients: FloatArray, dimension: int, placed: FloatArray | N
     UndecidedError
         If its smallest value is too small to be distinct from zero.
     """
-    answer, value, u = closed(coefficients, dimension)
-    if answer is Closed.YES:
-        return
-    along = u if placed is None else placed @ u / np.linalg.norm(placed @ u)
-    where = f"P is {value:.3g} along {along.round(6).tolist()}"
-    if answer is Closed.NO:
-        raise OpenBodyError(f"{where}: the level set is not closed, so it bounds no body")
-    raise UndecidedError(
-        f"{where}, less than rounding can tell from zero ({ZERO_SHARE:g} of its largest value): whether the level set "
-        "is closed is undecided; if its axes differ by more than a factor of 1000, give their sizes as units"
-    )
+    E, undecided = exponents(dimension, 4), ""
+    for group in _groups(coefficients, E):
+        form = coefficients[(E[:, ~group] == 0).all(axis=1)]
+        n = int(group.sum())
+        # the margin follows the size of the group's own form: a short axis is not lost in the rounding of long ones
+        margin = ZERO_SHARE * float(np.abs(half_sphere_monomials(n, 200) @ form).max())
+        if margin > 0 and lies_above(form, n, margin):
+            continue
+        value, u = smallest_value(form, n)
+        along = placed[:, group] @ u
+        where = f"P is {value:.3g} along {(along / np.linalg.norm(along)).round(6).tolist()}"
+        if value < -margin or margin == 0:
+            raise OpenBodyError(f"{where}: the level set is not closed, so it bounds no body")
+        undecided = where
+    if undecided:
+        raise UndecidedError(
+            f"{undecided}, less than rounding can tell from zero ({ZERO_SHARE:g} of its largest value): whether the "
+            "level set is closed is undecided; if its axes differ by more than a factor of 1000, give their sizes as "
+            "units"
+        )
 
 
 def _groups(coefficients: FloatArray, E: NDArray[np.int64]) -> list[NDArray[np.bool_]]:

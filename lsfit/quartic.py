@@ -89,15 +89,6 @@ class Quartic(LimitSurface):
         cubic = monomials(rows(w, self.dimension), exponents(self.dimension, 3))
         return cubic @ (derivative(self.dimension, 4) @ self.coefficients).T
 
-    def hessian(self, w: ArrayLike) -> FloatArray:
-        """Second derivatives of ``P``, ``(m, d) -> (m, d, d)``."""
-        return _second(self.tensor, rows(w, self.dimension))[0]
-
-    @cached_property
-    def tensor(self) -> FloatArray:
-        """Symmetric ``Q (d, d, d, d)`` with the second derivatives ``H_ij(w) = Q_ijkl w_k w_l``."""
-        return hessian_tensor(self.coefficients, self.dimension)
-
     @cached_property
     def frame(self) -> FloatArray:
         """Map ``L (d, d)`` from a body that is nearly round onto this one.
@@ -165,7 +156,7 @@ class Quartic(LimitSurface):
         # unit normals: the tolerances of the search are those of a problem of size one
         T = T[moving] / length[moving, None]
         out = np.zeros((len(moving), self.dimension))
-        out[moving] = farthest_points(self._round.tensor, T, self._starts(T)) @ self.frame.T
+        out[moving] = farthest_points(self._tensor, T, self._starts(T)) @ self.frame.T
         return out
 
     def _starts(self, T: FloatArray) -> FloatArray:
@@ -191,6 +182,10 @@ class Quartic(LimitSurface):
     @cached_property
     def _round(self) -> Quartic:
         return Quartic(substitute(self.coefficients, self.exponents, self.frame), self.exponents)
+
+    @cached_property
+    def _tensor(self) -> FloatArray:
+        return hessian_tensor(self._round.coefficients, self.dimension)
 
     @cached_property
     def _surface_points(self) -> FloatArray:

@@ -17,22 +17,15 @@ from softjaw.lsfit.ellipsoid import MAX_REACH_RATIO, full_ellipsoid, nearest_sol
 from softjaw.lsfit.form import exponents, powers, substitute
 from softjaw.lsfit.lowest import lies_above
 from softjaw.lsfit.quartic import Quartic
-from softjaw.lsfit.samples import Fit, checked_motions, principal_frame
-from softjaw.lsfit.sos import (
-    MIN_EIGENVALUE,
-    ball_coefficients,
-    ball_freedom,
-    convex_least_squares,
-    gram_matrix,
-    smallest,
-)
+from softjaw.lsfit.samples import checked_motions, principal_frame
+from softjaw.lsfit.sos import MIN_EIGENVALUE, ball_gram, convex_least_squares, gram_matrix, smallest
 from softjaw.lsfit.surface import FitError, FitFlag, Image
 
 FloatArray = NDArray[np.float64]
 
 
-def convex_quartic(W: ArrayLike, T: ArrayLike | None = None, beta: float = 1.0, gamma: float = 0.01) -> Fit:
-    """Convex quartic with the least ``mean (beta (P - 1)^2 + gamma |(I - t t') grad P|^2)``, with its certificate.
+def convex_quartic(W: ArrayLike, T: ArrayLike, gamma: float = 0.01) -> tuple[Quartic | Image, str]:
+    """Convex quartic with the least ``mean ((P - 1)^2 + gamma |(I - t t') grad P|^2)``, and what proves it convex.
 
     The quartic of the linear equations is taken if a positive definite Gram matrix proves it convex. Only otherwise
     the semidefinite programme is solved, which asks for eigenvalues of at least `MIN_EIGENVALUE`, so that rounding
@@ -44,10 +37,17 @@ def convex_quartic(W: ArrayLike, T: ArrayLike | None = None, beta: float = 1.0, 
     W : (m, d) array
         Normalised wrenches [-].
     T : (m, d) array
-        Unit motions; needed unless ``gamma`` is 0 [-].
-    beta, gamma : float
-        Weights of wrenches and of motions. A little weight on the motions bends the surface the right way between
-        samples; with 1 and 1 the directions are bought with radii that are off by some per cent.
+        Unit motions [-].
+    gamma : float
+        Weight of the motions. A little bends the surface the right way between samples; with 1 the directions are
+        bought with radii that are off by some per cent.
+
+    Returns
+    -------
+    surface : Quartic or Image
+        In the coordinates of the wrenches; flat, and flagged, if the samples are.
+    certificate : str
+        ``least squares`` if the best quartic is convex by itself, else ``semidefinite programme``.
 
     Raises
     ------
@@ -58,10 +58,11 @@ def convex_quartic(W: ArrayLike, T: ArrayLike | None = None, beta: float = 1.0, 
     """
     samples = round_samples(W, T)
     r = samples.B.shape[1]
-    N, b = normal_equations(samples, beta, gamma)
-    v, flag = nearest_solution(N, b, ball_coefficients(r))
+    N, b = normal_equations(samples, gamma)
+    ball = ball_gram(r)
+    v, flag = nearest_solution(N, b, ball[: len(b)])
     # free numbers of the ball prove many quartics near it, without a programme
-    loose, free, by = bool(flag), ball_freedom(r), "least squares"
+    loose, free, by = bool(flag), ball[len(b) :], "least squares"
     gram = gram_matrix(v, free, r)
     if smallest(gram) < MIN_EIGENVALUE:
         bound, free = convex_least_squares(N, b, r, loose)
@@ -81,7 +82,7 @@ def convex_quartic(W: ArrayLike, T: ArrayLike | None = None, beta: float = 1.0, 
     # the programme promises half of the margin; the rest is room for rounding on the way
     if low < MIN_EIGENVALUE / 4:
         raise FitError(f"the Gram matrix of the convex quartic has the eigenvalue {low:.2e}: report these samples")
-    return Fit(surface, gram, samples.B, by)
+    return surface, by
 
 
 class RoundSamples(NamedTuple):
@@ -92,23 +93,22 @@ class RoundSamples(NamedTuple):
     """
 
     Y: FloatArray
-    T: FloatArray | None
+    T: FloatArray
     B: FloatArray
     inverse: FloatArray
     flag: FitFlag
 
 
-def round_samples(W: ArrayLike, T: ArrayLike | None) -> RoundSamples:
+def round_samples(W: ArrayLike, T: ArrayLike) -> RoundSamples:
     """Samples in the frame of their ellipsoid, in which forms of degree 4 have coefficients of one size."""
     W, T = checked_motions(W, T)
     ball = full_ellipsoid(W)
     B, inverse = ball.F, ball.inverse
-    assert B is not None
     if ball.flag & FitFlag.BOUNDED:  # the samples' own lengths are a better scale than an ellipsoid far outside them
         B = principal_frame(W)[0] * np.sqrt(ball.rank)
         inverse = np.linalg.pinv(B)
     # across its span a flat body carries nothing: only the part of a motion within has a normal to it
-    if T is not None and ball.rank < ball.dimension:
+    if ball.rank < ball.dimension:
         T = T @ ball.span @ ball.span.T
         length = np.linalg.norm(T, axis=1, keepdims=True)
         # what rounding leaves of a motion across the span has no direction: zero takes it out of the fit
@@ -117,24 +117,19 @@ def round_samples(W: ArrayLike, T: ArrayLike | None) -> RoundSamples:
     return RoundSamples(W @ inverse.T, T, B, inverse, ball.flag & ~FitFlag.UNDERDETERMINED)
 
 
-def normal_equations(samples: RoundSamples, beta: float, gamma: float) -> tuple[FloatArray, FloatArray]:
+def normal_equations(samples: RoundSamples, gamma: float) -> tuple[FloatArray, FloatArray]:
     """Matrix ``N (k, k)`` and right side ``b (k,)`` of the least squares.
 
     Gradients are in the wrench's components, coefficients in the coordinates of the samples.
     """
     Y, T, _, inverse, _ = samples
-    if gamma != 0 and T is None:
-        raise ValueError(f"gamma is {gamma:g}, which weighs the directions of motion: give T, or gamma = 0")
-    if min(beta, gamma) < 0:
-        raise ValueError(f"beta is {beta} and gamma is {gamma}: weights must not be negative")
     E, m = exponents(Y.shape[1], 4), len(Y)
     # residuals per coefficient: of the wrenches, then of the directions across the motions
-    out = np.empty((len(E), 1 if T is None or gamma == 0 else T.shape[1], m))
-    arrays = (np.ascontiguousarray(x) for x in (Y, Y if T is None else T, inverse))
-    fill_residuals(*arrays, E, float(beta), float(gamma), out)
+    out = np.empty((len(E), T.shape[1], m))
+    fill_residuals(*(np.ascontiguousarray(x) for x in (Y, T, inverse)), E, float(gamma), out)
     R = out.reshape(len(E), -1)
-    # only the residual of P has a target, sqrt(beta); those of the slopes are to vanish
-    return R @ R.T / m, R[:, :m] @ np.full(m, math.sqrt(beta) / m)
+    # only the residual of P has a target, 1; those of the slopes are to vanish
+    return R @ R.T / m, R[:, :m] @ np.full(m, 1 / m)
 
 
 def placed(v: FloatArray, samples: RoundSamples, flag: FitFlag) -> Quartic | Image:
@@ -156,8 +151,8 @@ def placed(v: FloatArray, samples: RoundSamples, flag: FitFlag) -> Quartic | Ima
 
 
 @njit(cache=True)
-def fill_residuals(Y, T, inverse, E, beta, gamma, out):  # pragma: no cover - compiled
-    """Write what ``sqrt(beta) P`` and ``sqrt(gamma) (I - t t') grad P`` are per coefficient, for every sample.
+def fill_residuals(Y, T, inverse, E, gamma, out):  # pragma: no cover - compiled
+    """Write what ``P`` and ``sqrt(gamma) (I - t t') grad P`` are per coefficient, for every sample.
 
     In ``d`` dimensions the ``d - 1`` directions across a motion hold all of the latter: columns of the reflection that
     takes the motion to the last axis.
@@ -172,19 +167,17 @@ def fill_residuals(Y, T, inverse, E, beta, gamma, out):  # pragma: no cover - co
         Pseudo-inverse of B, which takes gradients along ``y`` to those along ``w``.
     E : (k, r) array of int
         Exponents of degree 4.
-    out : (k, d, m) or (k, 1, m) array
-        Receives P and then its slopes, if there is room for them.
+    out : (k, d, m) array
+        Receives P and then its slopes.
     """
     (k, r), d, m = E.shape, T.shape[1], len(Y)
     power = powers(Y, E)
     for j in range(k):
-        out[j, 0] = math.sqrt(beta) * power[0, E[j, 0]]
+        out[j, 0] = power[0, E[j, 0]]
         for i in range(1, r):
             out[j, 0] *= power[i, E[j, i]]
     # slopes are added up below, and the array comes uninitialised
     out[:, 1:] = 0.0
-    if out.shape[1] == 1:
-        return
     along, slope = np.empty((r, d - 1, m)), np.empty(m)
     for c in range(d - 1):
         for n in range(m):

@@ -42,10 +42,8 @@ def normalised_samples(wrench: ArrayLike, twist: ArrayLike, force: float, rho: f
     return _normalised(w[:, [0, 1, 5]] if w.shape[1] == 6 else w, t, force, rho)
 
 
-def six_samples(
-    wrench: ArrayLike, twist: ArrayLike, force: float, rho: float, point: ArrayLike = (0.0, 0.0, 0.0)
-) -> tuple[FloatArray, FloatArray]:
-    """Wrenches ``(f, tau / rho) / force`` and unit motions ``(v, rho omega) / |.|`` of a reference point.
+def six_samples(wrench: ArrayLike, twist: ArrayLike, force: float, rho: float) -> tuple[FloatArray, FloatArray]:
+    """Wrenches ``(f, tau / rho) / force`` and unit motions ``(v, rho omega) / |.|`` of the origin.
 
     Parameters
     ----------
@@ -55,21 +53,15 @@ def six_samples(
         ``mu S`` [N].
     rho : float
         Length of the contact [m].
-    point : (3,) array
-        Reference point in the contact frame, such as the centre of pressure [m]; the power of no sample changes.
 
     Returns
     -------
     W, T : (m, 6) array
         Wrenches and unit motions [-].
     """
-    w, t = np.atleast_2d(np.array(wrench, float)), np.atleast_2d(np.array(twist, float))
+    w, t = np.atleast_2d(np.asarray(wrench, float)), np.atleast_2d(np.asarray(twist, float))
     if w.shape != t.shape or w.shape[1] != 6:
         raise ValueError(f"wrench has shape {w.shape} and twist {t.shape}: expected (m, 6) for both")
-    p = np.asarray(point, float)
-    # torque and velocity change together, so that w . t is the same about either point
-    w[:, 3:] -= np.cross(p, w[:, :3])
-    t[:, :3] += np.cross(t[:, 3:], p)
     return _normalised(w, t, force, rho)
 
 
@@ -102,18 +94,10 @@ def sphere_motions(count: int, dimension: int = 6) -> FloatArray:
     return x / np.linalg.norm(x, axis=1, keepdims=True)
 
 
-def sample_rank(W: ArrayLike, tolerance: float = FLAT_RATIO) -> int:
-    """Dimension of the space that the samples span; below 3, no limit surface can be fitted to them alone.
-
-    Parameters
-    ----------
-    W : (m, d) array
-        Normalised wrenches [-].
-    tolerance : float
-        Singular values below this share of the largest count as zero.
-    """
+def sample_rank(W: ArrayLike) -> int:
+    """Dimension of the space that wrenches ``(m, d)`` span; `FLAT_RATIO` of the largest singular value is none."""
     values = np.linalg.svd(np.asarray(W, float), compute_uv=False)
-    return int((values > tolerance * values.max(initial=0.0)).sum())
+    return int((values > FLAT_RATIO * values.max(initial=0.0)).sum())
 
 
 def checked_wrenches(W: ArrayLike, dimension: int | None = None) -> FloatArray:
@@ -135,10 +119,8 @@ def checked_wrenches(W: ArrayLike, dimension: int | None = None) -> FloatArray:
     return W if pressed.all() else W[pressed]
 
 
-def checked_motions(W: ArrayLike, T: ArrayLike | None) -> tuple[FloatArray, FloatArray | None]:
-    """`checked_wrenches` with their motions ``(m, d)``, which must have the length 1, or without."""
-    if T is None:
-        return checked_wrenches(W), None
+def checked_motions(W: ArrayLike, T: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """`checked_wrenches` with their motions ``(m, d)``, which must have the length 1."""
     W, T = np.asarray(W, float), np.asarray(T, float)
     if W.shape != T.shape:
         raise ValueError(f"W has shape {W.shape} and T {T.shape}: every wrench needs its motion")
@@ -195,41 +177,6 @@ class FitErrors(NamedTuple):
     Edir: float
 
 
-class Fit(NamedTuple):
-    """A fitted limit surface, with what proves that it is convex, or how good it is.
-
-    Parameters
-    ----------
-    surface : LimitSurface
-        In the coordinates of the wrenches; flat, and flagged, if the samples are.
-    gram : (r * r, r * r) array
-        Of a quartic of least squares: ``Q`` with ``z' Hess p(y) z = (z x y)' Q (z x y)`` for ``p(y) = P(B y)`` and the
-        products ``z_i y_j``. Without negative eigenvalues ``P`` is convex.
-    frame : (d, r) array
-        ``B``, of a quartic of least squares.
-    certificate : str
-        ``least squares`` if the best quartic is convex by itself, else ``semidefinite programme``.
-    errors : FitErrors
-        Of a fit in the span of its samples, in its scaled coordinates, where the axes have a like length; in the others
-        a soft axis decides every angle.
-    objective, rates : float, (m,) array
-        Of a fit with Zhou's objective: its value in the scaled coordinates, and the ``s_i`` of the samples.
-    """
-
-    surface: LimitSurface
-    gram: FloatArray = np.empty((0, 0))
-    frame: FloatArray = np.empty((0, 0))
-    certificate: str = ""
-    errors: FitErrors = FitErrors(math.nan, math.nan, math.nan)
-    objective: float = math.nan
-    rates: FloatArray = np.empty(0)
-
-    @property
-    def gram_eigenvalue(self) -> float:
-        """Smallest eigenvalue of ``gram``."""
-        return float(np.linalg.eigvalsh(self.gram)[0])
-
-
 def fit_error(model: LimitSurface, W: ArrayLike, T: ArrayLike) -> FitErrors:
     """Errors of ``model`` on wrenches ``W (m, d)`` with unit motions ``T (m, d)``.
 
@@ -244,7 +191,6 @@ def fit_error(model: LimitSurface, W: ArrayLike, T: ArrayLike) -> FitErrors:
         If a sample is not finite, a motion has not the length 1, or all wrenches are zero.
     """
     W, motions = checked_motions(W, T)
-    assert motions is not None
     P, G = model.value(W), model.gradient(W)
     # the usual case is one compiled loop; a flat model has no angle of its own to most motions
     if model.rank == model.dimension:
@@ -264,8 +210,7 @@ def overclaim(model: LimitSurface, W: ArrayLike) -> float:
 
     0 where it claims nowhere more, infinite where it has no end. Samples without a wrench are left out.
     """
-    W, _ = checked_motions(W, None)
-    P = model.value(W)
+    P = model.value(checked_wrenches(W))
     with np.errstate(divide="ignore"):
         radius = np.where(P > ZERO_SHARE, P, 0.0) ** (-1 / model.degree)
     return max(float(radius.max()) - 1.0, 0.0)

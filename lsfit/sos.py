@@ -91,16 +91,6 @@ def quadratic_parts(dimension: int) -> tuple[FloatArray, csr_array]:
     return A.toarray(), upper_triangle(A)
 
 
-def ball_coefficients(dimension: int) -> FloatArray:
-    """Coefficients ``(k,)`` of ``|y|^4``."""
-    return ball_gram(dimension)[: len(exponents(dimension, 4))]
-
-
-def ball_freedom(dimension: int) -> FloatArray:
-    """Free numbers ``(f,)`` of the Gram matrix of ``|y|^4`` that make it most definite."""
-    return ball_gram(dimension)[len(exponents(dimension, 4)) :]
-
-
 def gram_matrix(v: FloatArray, free: FloatArray, dimension: int) -> FloatArray:
     """Gram matrix ``(d * d, d * d)`` of the quartic with coefficients ``v (k,)`` and free numbers ``(f,)``."""
     return (_maps(dimension)[0] @ np.concatenate([v, free])).reshape(dimension**2, dimension**2)
@@ -179,7 +169,7 @@ def least_in_cone(N: FloatArray, b: FloatArray, triangle: csr_array, floor: floa
     column, row = np.tril_indices(size)
     right = np.where(row == column, -floor, 0.0)
     # Clarabel reads the upper triangle of the objective only
-    return conic_solution(csc_array(np.triu(N)), -b, -triangle, right, [clarabel.PSDTriangleConeT(size)])[0]
+    return conic_solution(csc_array(np.triu(N)), -b, -triangle, right, [clarabel.PSDTriangleConeT(size)])
 
 
 def side(triangle: csr_array) -> int:
@@ -187,8 +177,8 @@ def side(triangle: csr_array) -> int:
     return round((np.sqrt(8 * triangle.shape[0] + 1) - 1) / 2)
 
 
-def conic_solution(P: csc_array, q: FloatArray, A: csr_array, b: FloatArray, cones: list) -> tuple[FloatArray, float]:
-    """Minimiser of ``x' P x / 2 + q . x`` with ``b - A x`` in the cones, and its value, by Clarabel.
+def conic_solution(P: csc_array, q: FloatArray, A: csr_array, b: FloatArray, cones: list) -> FloatArray:
+    """Minimiser of ``x' P x / 2 + q . x`` with ``b - A x`` in the cones, by Clarabel.
 
     Raises
     ------
@@ -207,4 +197,4 @@ def conic_solution(P: csc_array, q: FloatArray, A: csr_array, b: FloatArray, con
             f"Clarabel stopped with {answer.status} and errors of {short:.1e} after {answer.iterations} iterations on "
             f"{len(q)} unknowns: look at the samples for outliers and components of very different size"
         )
-    return np.array(answer.x), float(answer.obj_val)
+    return np.array(answer.x)

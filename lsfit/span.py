@@ -32,11 +32,14 @@ from softjaw.lsfit.form import exponents, monomial_gradients, monomials
 from softjaw.lsfit.lowest import lies_above, smallest_value
 from softjaw.lsfit.quartic import Quartic
 from softjaw.lsfit.quartic_fit import convex_quartic
-from softjaw.lsfit.samples import FLAT_RATIO, THIN_RATIO, Fit, fit_error
+from softjaw.lsfit.samples import FLAT_RATIO, THIN_RATIO, FitErrors, fit_error
 from softjaw.lsfit.sos import conic_solution, gram_map, quadratic_map, side, upper_triangle
 from softjaw.lsfit.surface import FitError, FitFlag, Image, LimitSurface
 
 FloatArray = NDArray[np.float64]
+# lam, beta and gamma of Zhou's objective, those of the authors for six components. With all 1, as published for three,
+# the errors of the gradients, longer than those of P, may be worth more than all of P - 1: no surface at all is best.
+ZHOU_WEIGHTS = 1.0, 10.0, 1.0
 
 
 class SpanSamples(NamedTuple):
@@ -58,19 +61,17 @@ class SpanSamples(NamedTuple):
         return self.B.shape[1]
 
 
-def span_samples(W: ArrayLike, T: ArrayLike, even: bool = True) -> SpanSamples:
+def span_samples(W: ArrayLike, T: ArrayLike) -> SpanSamples:
     """Samples within their span, scaled.
 
-    A plane patch gives wrenches of rank 3 among the six components, a curved one of rank 6. Motions that meet no
-    friction (no component above ``tolerance`` of its largest) are left out.
+    A plane patch gives wrenches of rank 3 among the six components, a curved one of rank 6. Every component is divided
+    by its largest magnitude (as in the published fits in six dimensions), or every principal direction if the samples
+    do not span all components that they use. Motions that meet no friction are left out.
 
     Parameters
     ----------
     W, T : (m, d) array
         Normalised wrenches and unit motions [-].
-    even : bool
-        Whether every component is divided by its largest magnitude (as in the published fits in six dimensions), or
-        every principal direction if the samples do not span all components that they use; else lengths are kept.
 
     Raises
     ------
@@ -85,7 +86,7 @@ def span_samples(W: ArrayLike, T: ArrayLike, even: bool = True) -> SpanSamples:
     largest = np.abs(wrenches).max(axis=0, initial=0.0)
     if not largest.any():
         raise ValueError("all wrenches are zero: a contact without friction has no limit surface to fit")
-    B, flag = _map(wrenches, largest, even)
+    B, flag = _map(wrenches, largest)
     # a motion that meets no friction has a wrench of rounding, whose direction means nothing
     used = largest > FLAT_RATIO * largest.max()
     moving = (np.abs(wrenches[:, used]) > FLAT_RATIO * largest[used]).any(axis=1)
@@ -93,7 +94,7 @@ def span_samples(W: ArrayLike, T: ArrayLike, even: bool = True) -> SpanSamples:
     return SpanSamples(Y, slip / np.linalg.norm(slip, axis=1, keepdims=True), B, flag)
 
 
-def _map(W: FloatArray, largest: FloatArray, even: bool) -> tuple[FloatArray, FitFlag]:
+def _map(W: FloatArray, largest: FloatArray) -> tuple[FloatArray, FitFlag]:
     """Columns ``B (d, r)`` of the coordinates, and whether the samples are flat or thin."""
     used = np.flatnonzero(largest > FLAT_RATIO * largest.max())
     scale = largest[used]
@@ -105,41 +106,30 @@ def _map(W: FloatArray, largest: FloatArray, even: bool) -> tuple[FloatArray, Fi
     B = np.zeros((W.shape[1], r))
     # a diagonal map keeps the surface a quartic of the components, which files and look-ups can hold
     if r == len(used):
-        B[used] = np.diag(scale if even else np.ones(r))
+        B[used] = np.diag(scale)
         return B, flag
     B[used] = scale[:, None] * V[:r].T
-    if even:
-        return B * np.abs(W[:, used] / scale @ V[:r].T).max(axis=0), flag
-    # an orthonormal frame of the span changes no length
-    return np.linalg.qr(B)[0], flag
+    return B * np.abs(W[:, used] / scale @ V[:r].T).max(axis=0), flag
 
 
-def span_ellipsoid(W: ArrayLike, T: ArrayLike) -> Fit:
-    """Ellipsoid of least squares ``min sum (w' A w - 1)^2``, 21 coefficients in six dimensions.
+def span_ellipsoid(W: ArrayLike, T: ArrayLike) -> tuple[LimitSurface, FitErrors]:
+    """Ellipsoid of least squares ``min sum (w' A w - 1)^2``, 21 coefficients in six dimensions, and its errors.
 
-    The scaling has a part in the errors only; where samples leave the ellipsoid open, see `full_ellipsoid`.
+    These are in the scaled coordinates, where the axes have a like length; in the others a soft axis decides every
+    angle. Where samples leave the ellipsoid open, see `full_ellipsoid`.
     """
     samples = span_samples(W, T)
     surface = full_ellipsoid(samples.Y)
-    return Fit(placed(surface, samples), errors=fit_error(surface, samples.Y, samples.T))
+    return placed(surface, samples), fit_error(surface, samples.Y, samples.T)
 
 
-def span_quartic(W: ArrayLike, T: ArrayLike, gamma: float = 0.01) -> Fit:
-    """Convex quartic with the least ``mean ((P - 1)^2 + gamma |(I - t t') grad P|^2)`` in the scaled coordinates.
+def span_quartic(W: ArrayLike, T: ArrayLike) -> LimitSurface:
+    """`convex_quartic` in the scaled coordinates.
 
-    Parameters
-    ----------
-    W, T : (m, d) array
-        Normalised wrenches and unit motions [-]; at least 1000 for six dimensions, as 126 coefficients follow the
-        noise of few.
-    gamma : float
-        Weight of the motions. Gradients grow with the surface's smallness, so a weight of 1 shifts it outwards by some
-        percent in six dimensions; 0.01 gives the same directions without that.
+    Six dimensions take at least 1000 samples ``W, T (m, d)``, as 126 coefficients follow the noise of few.
     """
     samples = span_samples(W, T)
-    fit = convex_quartic(samples.Y, samples.T, gamma=gamma)
-    errors = fit_error(fit.surface, samples.Y, samples.T)
-    return fit._replace(surface=placed(fit.surface, samples), errors=errors)
+    return placed(convex_quartic(samples.Y, samples.T)[0], samples)
 
 
 def placed(surface: LimitSurface, samples: SpanSamples) -> LimitSurface:
@@ -157,27 +147,12 @@ def placed(surface: LimitSurface, samples: SpanSamples) -> LimitSurface:
     return Image(surface, samples.B, flag)
 
 
-
-
 class CollapsedFitError(FitError):
     """The fitted surface does not pass near the samples, or nothing holds it in some direction."""
 
 
-def zhou_quartic(
-    W: ArrayLike, T: ArrayLike, lam: float = 1.0, beta: float = 10.0, gamma: float = 1.0, even: bool = True
-) -> Fit:
-    """Sos-convex quartic with the least objective, see the head of this file.
-
-    Parameters
-    ----------
-    W, T : (m, d) array
-        Normalised wrenches and unit motions [-].
-    lam, beta, gamma : float
-        Weights of the coefficients, of the wrenches and of the motions, by default those that the authors use for six
-        components. With all 1, as published for three, the errors of the gradients, longer than those of ``P``, may be
-        worth more than all of ``P - 1``: then no surface at all is best, which is refused.
-    even : bool
-        Whether the fit is in components of one size, see `span_samples`; the objective depends on it.
+def zhou_quartic(samples: SpanSamples, weights: tuple[float, float, float] = ZHOU_WEIGHTS) -> LimitSurface:
+    """Sos-convex quartic with the least objective, see the head of this file, in the coordinates of the samples.
 
     Raises
     ------
@@ -186,33 +161,30 @@ def zhou_quartic(
     FitError
         If the solver fails.
     """
-    samples = span_samples(W, T, even)
     r, E = samples.rank, exponents(samples.rank, 4)
     M, G = monomials(samples.Y, E), monomial_gradients(samples.Y, r, 4)
-    v, rates, objective = _solve(samples, M, G, gram_map(r), np.ones(len(E)), (lam, beta, gamma))
-    return _fit(Quartic(v, E), objective, rates, samples)
+    surface = Quartic(_solve(samples, M, G, gram_map(r), np.ones(len(E)), weights), E)
+    refuse_runaway(surface, samples.Y)
+    # the bound from samples is cheap and settles most cases; only the others need a search
+    if not lies_above(surface.coefficients, r, _least(samples.Y, 4)):
+        refuse_endless(*smallest_value(surface.coefficients, r), samples.Y, 4)
+    return placed(surface, samples)
 
 
-def zhou_ellipsoid(
-    W: ArrayLike, T: ArrayLike, lam: float = 1.0, beta: float = 10.0, gamma: float = 1.0, even: bool = True
-) -> Fit:
+def zhou_ellipsoid(samples: SpanSamples, weights: tuple[float, float, float] = ZHOU_WEIGHTS) -> LimitSurface:
     """Ellipsoid of any orientation with the least objective; parameters and errors of `zhou_quartic`."""
-    samples = span_samples(W, T, even)
     r = samples.rank
     M, G = monomials(samples.Y, exponents(r, 2)), monomial_gradients(samples.Y, r, 2) / 2
     A = quadratic_map(r)
     # The length of v is to be the Frobenius norm of A, which holds every mixed coefficient twice, halved.
-    v, rates, objective = _solve(samples, M, G, A, np.sqrt((A.toarray() ** 2).sum(axis=0)), (lam, beta, gamma))
-    matrix = (A @ v).reshape(r, r)
+    size = np.sqrt((A.toarray() ** 2).sum(axis=0))
+    matrix = (A @ _solve(samples, M, G, A, size, weights)).reshape(r, r)
     values, V = np.linalg.eigh(matrix)
     # an open form makes no ellipsoid, so it is refused before one is made
     refuse_endless(float(values[0]), V[:, 0], samples.Y, 2)
-    return _fit(TiltedEllipsoid(matrix), objective, rates, samples)
-
-
-def _fit(surface: Quartic | TiltedEllipsoid, objective: float, rates: FloatArray, samples: SpanSamples) -> Fit:
+    surface = TiltedEllipsoid(matrix)
     refuse_runaway(surface, samples.Y)
-    return Fit(placed(surface, samples), objective=objective, rates=rates)
+    return placed(surface, samples)
 
 
 def _solve(
@@ -222,15 +194,13 @@ def _solve(
     A: csr_array,
     size: FloatArray,
     weights: tuple[float, float, float],
-) -> tuple[FloatArray, FloatArray, float]:
-    """Coefficients ``v (k,)``, rates ``s (m,)`` and objective.
+) -> FloatArray:
+    """Coefficients ``v (k,)``.
 
     The unknowns are ``[v, free, s, p, r, n]``: free numbers of the Gram matrix, bounds on ``|P - 1|``, on the length
     of the gradient's error and on ``|v|``. Clarabel asks for ``b - A x`` in a product of cones.
     """
     lam, beta, gamma = weights
-    if min(weights) < 0 or not np.isfinite(weights).all():
-        raise ValueError(f"lam, beta, gamma are {weights}: expected finite numbers, none negative")
     (m, k), d, f = M.shape, samples.rank, A.shape[1] - M.shape[1]
     unit, none = eye_array(m), csr_array((m, f))
     slip = [[-G[:, :, i], none, diags_array(samples.T[:, i]), None, None, None] for i in range(d)]
@@ -257,8 +227,7 @@ def _solve(
     b[: 3 * m] = np.repeat([1.0, -1.0, 0.0], m)
     slope = np.repeat([0.0, beta, gamma, lam], [k + f + m, m, m, 1])
     none_squared = csc_array((len(slope),) * 2)
-    x, objective = conic_solution(none_squared, slope, rows[order], b, _cones(m, d, k, side(S)))
-    return x[:k], x[k + f : k + f + m], objective
+    return conic_solution(none_squared, slope, rows[order], b, _cones(m, d, k, side(S)))[:k]
 
 
 def _cones(m: int, d: int, k: int, size: int) -> list:
@@ -271,20 +240,14 @@ def _cones(m: int, d: int, k: int, size: int) -> list:
 
 
 def refuse_runaway(surface: Quartic | TiltedEllipsoid, Y: FloatArray) -> None:
-    """Raise `CollapsedFitError` if ``surface`` lies twice as far out as the samples ``Y``, or is nearly endless."""
+    """Raise `CollapsedFitError` if ``surface`` lies twice as far out as the samples ``Y``."""
     with np.errstate(divide="ignore"):
         # the median, as single bad samples may lie anywhere
         median = float(np.median(np.maximum(surface.value(Y), 0.0)) ** (-1 / surface.degree))
     if median > 2:
         raise CollapsedFitError(
-            f"the surface lies {median:.3g} times as far out as half of the samples: the regulariser outweighs the "
-            f"{len(Y)} samples; lower lam, raise beta, or give more samples"
+            f"the surface lies {median:.3g} times as far out as half of the {len(Y)} samples: give more of them"
         )
-    if isinstance(surface, TiltedEllipsoid):
-        return  # `refuse_endless` was asked before its matrix made an ellipsoid
-    # the bound from samples is cheap and settles most cases; only the others need a search
-    if not lies_above(surface.coefficients, surface.dimension, _least(Y, 4)):
-        refuse_endless(*smallest_value(surface.coefficients, surface.dimension), Y, 4)
 
 
 def refuse_endless(P: float, u: FloatArray, Y: FloatArray, degree: int) -> None:
@@ -295,7 +258,7 @@ def refuse_endless(P: float, u: FloatArray, Y: FloatArray, degree: int) -> None:
         reach = MAX_REACH_RATIO * (least / max(P, 1e-300)) ** (1 / degree)
         raise CollapsedFitError(
             f"the surface reaches {reach:.3g} times as far as the samples along {np.round(u, 3).tolist()} (scaled "
-            "coordinates), where no sample holds it: sample more motions, lower lam, or raise beta"
+            "coordinates), where no sample holds it: sample more motions"
         )
 
 

@@ -130,30 +130,19 @@ def checked_factors(factors: ArrayLike, dimension: int) -> FloatArray:
     return f
 
 
-def shadow_area(support: FloatArray) -> float:
-    """Area of a plane convex body from its support function, ``1/2 int (h^2 - h'^2) dphi``.
-
-    Parameters
-    ----------
-    support : (k,) array
-        ``h`` at ``k`` equal steps of the full turn. For the shadow on the plane of the forces these are the supports of
-        the translations ``(cos phi, sin phi, 0)``.
-    """
-    h = np.asarray(support, float)
-    c = np.fft.rfft(h) / len(h)
-    order = np.arange(len(c))
-    # the transform leaves out the conjugate half, which order 0 and the last of an even count do not have
-    twice = np.where((order == 0) | (2 * order == len(h)), 1.0, 2.0)
-    # by Parseval h^2 - h'^2 becomes a factor 1 - n^2, without a difference quotient
-    return float(np.pi * (twice * (1 - order**2) * np.abs(c) ** 2).sum())
-
-
 def supported_shadow(support: Callable[[FloatArray], FloatArray], dimension: int, n: int = 1024) -> float:
-    """`shadow_area` on the first two components of a body in ``d`` dimensions with this support function."""
-    t = np.zeros((n, dimension))
-    phi = 2 * np.pi * np.arange(n) / n
+    """Area of a body's shadow on its first two components, ``1/2 int (h^2 - h'^2) dphi``.
+
+    ``support`` takes vectors ``(m, d)``; ``h`` are its values at ``n`` equal steps of the full turn, an even number.
+    """
+    t, phi = np.zeros((n, dimension)), 2 * np.pi * np.arange(n) / n
     t[:, 0], t[:, 1] = np.cos(phi), np.sin(phi)
-    return shadow_area(support(t))
+    c = np.fft.rfft(support(t)) / n
+    order = np.arange(len(c))
+    # the transform leaves out the conjugate half, which the first and the last order do not have
+    twice = np.where((order == 0) | (2 * order == n), 1.0, 2.0)
+    # by Parseval h^2 - h'^2 becomes a factor 1 - k^2, without a difference quotient
+    return float(np.pi * (twice * (1 - order**2) * np.abs(c) ** 2).sum())
 
 
 @dataclass(frozen=True, eq=False)

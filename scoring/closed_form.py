@@ -40,31 +40,29 @@ from numpy.typing import NDArray
 Axes = Sequence[float] | NDArray[np.float64]
 
 
-def volume_linf(V1: float, A1: float, V2: float, A2: float, d: float, rho: float = 1.0) -> float:
-    """Volume of the L-infinity grasp wrench space, ``7/12 d^2 (V1 A2 + A1 V2) / rho^3``.
+def volume_linf(V1: float, A1: float, V2: float, A2: float, d: float) -> float:
+    """Volume of the L-infinity grasp wrench space, ``7/12 d^2 (V1 A2 + A1 V2)``.
 
     Parameters
     ----------
     V1, V2 : float
-        Volumes of the limit surfaces in ``(f_x, f_y, tau_z)`` per unit normal force.
+        Volumes of the limit surfaces in ``(f_x, f_y, tau_z)`` per unit normal force, torques divided by their length.
     A1, A2 : float
         Areas of their shadows on the plane of the forces.
     d : float
-        Distance of the contacts.
-    rho : float
-        Length by which all torques are divided.
+        Distance of the contacts, divided by the length for arms.
 
     Notes
     -----
     The bodies can be ellipsoids, polytopes or exact limit surfaces. The volume does not depend on where the object's
     centre of mass lies.
     """
-    return 7 / 12 * d**2 * (V1 * A2 + A1 * V2) / rho**3
+    return 7 / 12 * d**2 * (V1 * A2 + A1 * V2)
 
 
-def volume_l1(V1: float, A1: float, V2: float, A2: float, d: float, rho: float = 1.0) -> float:
-    """Volume of the L1 grasp wrench space, ``1/30 d^2 (V1 A2 + A1 V2) / rho^3``; parameters as in `volume_linf`."""
-    return 1 / 30 * d**2 * (V1 * A2 + A1 * V2) / rho**3
+def volume_l1(V1: float, A1: float, V2: float, A2: float, d: float) -> float:
+    """Volume of the L1 grasp wrench space, ``1/30 d^2 (V1 A2 + A1 V2)``; parameters as in `volume_linf`."""
+    return 1 / 30 * d**2 * (V1 * A2 + A1 * V2)
 
 
 def epsilon_linf(contact1: Axes, contact2: Axes, arm1: float, arm2: float) -> float:

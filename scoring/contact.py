@@ -249,8 +249,7 @@ class SoftContact:
         # a left-handed frame would turn the torque about the normal round
         if np.abs(axes @ axes.T - np.eye(3)).max() > 1e-9 or np.linalg.det(axes) < 0:
             raise ValueError(
-                f"axes is {axes.tolist()}: rows x, y, N must be perpendicular unit vectors with x cross y = N; "
-                "contact_axes(N, hint) gives such rows"
+                f"axes is {axes.tolist()}: rows x, y, N must be perpendicular unit vectors with x cross y = N"
             )
         axes.flags.writeable = False
         object.__setattr__(self, "axes", axes)
@@ -284,34 +283,6 @@ class SoftContact:
         C[:3, :3], C[3:, :3] = forces.T, np.cross(arm, forces).T
         C[3:, 3] = N / contact_length
         return C
-
-
-def contact_axes(N: ArrayLike, hint: ArrayLike) -> FloatArray:
-    """Rows x, y, N of a contact frame whose x is the hint, projected on the plane across N.
-
-    Parameters
-    ----------
-    N : (3,) array
-        Direction in which the finger presses, of any length.
-    hint : (3,) array
-        Direction near x, not parallel to N.
-
-    Examples
-    --------
-    >>> contact_axes([2, 0, 0], hint=[1, 0, 1]).tolist()
-    [[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]]
-    """
-    normal, towards = _vector("N", N), _vector("hint", hint)
-    length = np.linalg.norm(normal)
-    if length == 0:
-        raise ValueError("N is zero: a contact presses in some direction")
-    normal = normal / length
-    x = towards - (towards @ normal) * normal
-    # a hint along N leaves rounding, whose direction means nothing
-    if np.linalg.norm(x) <= 1e-9 * np.linalg.norm(towards):
-        raise ValueError(f"hint {towards.tolist()} is parallel to N: take a direction across it")
-    x = x / np.linalg.norm(x)
-    return np.vstack([x, np.cross(normal, x), normal])
 
 
 def _vector(name: str, value: ArrayLike | Sequence[float]) -> FloatArray:

@@ -94,14 +94,6 @@ def epsilon(
     The bounds hold up to rounding. A body that is no ellipsoid is replaced by an ellipsoid inside it for the lower
     bound, which leaves a gap as large as its fit error; the upper bound uses its own support.
 
-    Examples
-    --------
-    >>> from softjaw.lsfit.ellipsoid import Ellipsoid
-    >>> from softjaw.scoring.contact import SoftContact, contact_axes
-    >>> body = Ellipsoid([1, 1, 0.2])
-    >>> pads = [SoftContact([x, 0, 0], contact_axes([-x, 0, 0], [0, 0, 1]), body) for x in (-0.5, 0.5)]
-    >>> round(epsilon(pads, 1.0, 1.0).upper, 6) == round(0.4 / 1.04**0.5, 6)
-    True
     """
     if kind not in ("linf", "l1"):
         raise ValueError(f"kind is {kind!r}: take 'linf' or 'l1'")
@@ -219,14 +211,12 @@ def _weakest_of_bodies(C: FloatArray, bodies: Sequence[Body], u: FloatArray, kin
     return best, at
 
 
-def facet_of_bodies(
-    C: FloatArray, bodies: Sequence[Body], w: FloatArray, kind: str, tolerance: float = 1e-5
-) -> FloatArray:
+def facet_of_bodies(C: FloatArray, bodies: Sequence[Body], w: FloatArray, kind: str) -> FloatArray:
     """Unit normal ``(6,)`` of the facet that the ray along ``w`` meets, for contacts ``C (n, 6, 4)`` with any bodies.
 
     By cutting planes: points of a body span a polytope inside it, and the reach of those polytopes along ``w`` is a
     linear programme in ``(u, s)``. Its value is a lower bound, the bodies' own support for its direction an upper one,
-    and that direction asks for the next points, until the bounds are closer than the tolerance.
+    and that direction asks for the next points, until the bounds are close.
     """
     k = 1 if kind == "l1" else len(C)
     far = 1e4 / np.linalg.norm(w)  # of the directions that are looked for: the first polytopes may not hold w at all
@@ -247,7 +237,7 @@ def facet_of_bodies(
         if h < upper:
             best, upper = u, h
         # a value that the bounds of u took part in proves nothing
-        if np.abs(u).max() < 0.99 * far and upper - optimum.fun <= tolerance * abs(upper):
+        if np.abs(u).max() < 0.99 * far and upper - optimum.fun <= 1e-5 * abs(upper):
             break
         # a point between the last and the best direction cuts deeper than either
         rows = np.vstack([rows, *(_cuts(C, bodies, v @ C[:, :, 1:], k) for v in (u, (u + best) / 2))])

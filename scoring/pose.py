@@ -98,21 +98,9 @@ def pose_volume(
     PoseVolume
         Both volumes [-], extrapolated, and the difference left between divisions.
     """
-    com = np.asarray(centre_of_mass, float)
-    C1, C2 = (c.wrench_map(object_length, contact_length, com) for c in (contact1, contact2))
-    return cone_volume(C1, contact1.body, C2, contact2.body, relative_error, with_l1)
-
-
-def cone_volume(
-    C1: FloatArray,
-    body1: Body,
-    C2: FloatArray,
-    body2: Body,
-    relative_error: float = 1e-5,
-    with_l1: bool = True,
-) -> PoseVolume:
-    """Volumes for contacts given by their wrench maps ``(6, 4)``; parameters as in `pose_volume`."""
-    (C1, body1), (C2, body2) = _evened(C1, body1), _evened(C2, body2)
+    (C1, body1), (C2, body2) = (
+        _evened(c.wrench_map(object_length, contact_length, centre_of_mass), c.body) for c in (contact1, contact2)
+    )
     spans = _spans(C1, body1, C2, body2)
     if spans is None:
         return PoseVolume(0.0, 0.0, 0.0)

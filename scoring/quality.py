@@ -63,9 +63,8 @@ def score(
     distance: float,
     object_length: float,
     contact_length: float,
-    centre_of_mass: float = 0.0,
 ) -> Score:
-    """Score of two soft contacts that face each other.
+    """Score of two soft contacts that face each other, about a centre of mass halfway between them.
 
     Parameters
     ----------
@@ -78,8 +77,6 @@ def score(
         Length by which the arms of the contacts are divided [m].
     contact_length : float
         Length by which the torques about the normals are divided [m].
-    centre_of_mass : float
-        Its place on the line of the contacts, from the midpoint towards contact 2 [m]; only epsilon depends on it.
 
     Examples
     --------
@@ -90,11 +87,9 @@ def score(
     L = _positive("object_length", object_length)
     d = _positive("distance", distance) / L
     a, b = _scaled("contact1", contact1, rho), _scaled("contact2", contact2, rho)
-    x = centre_of_mass / L
     (V1, A1), (V2, A2) = _volume_and_shadow(a), _volume_and_shadow(b)
     linf, l1 = volume_linf(V1, A1, V2, A2, d), volume_l1(V1, A1, V2, A2, d)
-    arms = -d / 2 - x, d / 2 - x
-    return Score(linf, l1, epsilon_linf(a, b, *arms), _lacking(a, b), epsilon_l1(a, b, *arms))
+    return Score(linf, l1, epsilon_linf(a, b, -d / 2, d / 2), _lacking(a, b), epsilon_l1(a, b, -d / 2, d / 2))
 
 
 def contact_flag(bodies: Sequence[Body], contact_length: float) -> ScoreFlag:
@@ -162,15 +157,6 @@ def grasp_score(
     Score
         Epsilon is the lower bound if `scoring.epsilon` left a gap.
 
-    Examples
-    --------
-    >>> from softjaw.lsfit.ellipsoid import Ellipsoid
-    >>> from softjaw.scoring.contact import contact_axes
-    >>> body = Ellipsoid([1, 1, 0.2])
-    >>> pads = [SoftContact([x, 0, 0], contact_axes([-x, 0, 0], [0, 0, 1]), body) for x in (-0.5, 0.5)]
-    >>> grasp = grasp_score(pads, object_length=1.0, contact_length=1.0)
-    >>> grasp.method, abs(grasp.quality / (14 / 9 * math.pi**2 * 0.2) - 1) < 1e-12
-    ('antipodal', True)
     """
     if len(contacts) != 2:
         raise ValueError(f"contacts: found {len(contacts)}, expected the two of a parallel gripper")

@@ -9,9 +9,9 @@ from softjaw.friction.wrench import friction_limits, friction_wrench
 from softjaw.lsfit.body import hull_volume
 from softjaw.lsfit.ellipsoid import nearest_solution
 from softjaw.lsfit.form import hessian_tensor
-from softjaw.lsfit.quartic_fit import normal_equations, placed, round_samples
+from softjaw.lsfit.quartic_fit import convex_quartic, normal_equations, placed, round_samples
 from softjaw.lsfit.samples import normalised_samples
-from softjaw.lsfit.sos import ball_coefficients
+from softjaw.lsfit.sos import ball_gram
 
 
 def samples(patch, K=500, rho=2.0, twist=None):
@@ -26,11 +26,29 @@ def body_volume(coarse, fine):
     return inner + (inner - hull_volume(coarse)) / (gain - 1)
 
 
-def least_squares_quartic(W, T=None, beta=1.0, gamma=0.01):
-    """Quartic with the least ``mean (beta (P - 1)^2 + gamma |(I - t t') grad P|^2)``, convex or not."""
-    samples = round_samples(W, T)
-    v, flag = nearest_solution(*normal_equations(samples, beta, gamma), ball_coefficients(samples.B.shape[1]))
+def some_motions(W):
+    """Motions that do not count, for fits of wrenches alone."""
+    W = np.asarray(W, float)
+    return W / np.maximum(np.linalg.norm(W, axis=1, keepdims=True), 1e-300)
+
+
+def wrenches_alone(W):
+    """Convex quartic of wrenches without their motions, and what proves it convex."""
+    return convex_quartic(W, some_motions(W), gamma=0.0)
+
+
+def least_squares_quartic(W, T=None, gamma=0.0):
+    """Quartic with the least ``mean ((P - 1)^2 + gamma |(I - t t') grad P|^2)``, convex or not."""
+    samples = round_samples(W, some_motions(W) if T is None else T)
+    N, b = normal_equations(samples, gamma)
+    v, flag = nearest_solution(N, b, ball_gram(samples.B.shape[1])[: len(b)])
     return placed(v, samples, samples.flag | flag)
+
+
+def least_curvature(surface, w):
+    """Smallest eigenvalue of a quartic's second derivative at the places ``w (m, d)``."""
+    H = np.einsum("ijkl,mk,ml->mij", hessian_tensor(surface.coefficients, surface.dimension), w, w)
+    return np.linalg.eigvalsh(H).min()
 
 
 def smallest_curvature(v, d, turns=100):

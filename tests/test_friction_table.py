@@ -23,19 +23,32 @@ from softjaw.lsfit.quartic import Quartic
 from softjaw.lsfit.quartic_fit import convex_quartic
 from softjaw.lsfit.samples import fit_error, normalised_samples, sample_rank, six_samples
 from softjaw.lsfit.span import zhou_ellipsoid, zhou_quartic
-from softjaw.lsfit.surface import FitFlag, shadow_area
+from softjaw.lsfit.surface import FitFlag, supported_shadow
 from softjaw.scoring.closed_form import epsilon_l1, epsilon_linf, volume_l1, volume_linf
-from softjaw.scoring.contact import PolytopeBody, SoftContact, contact_axes, fibonacci_vertices
+from softjaw.scoring.contact import PolytopeBody, SoftContact, fibonacci_vertices
 from softjaw.scoring.epsilon import epsilon
 from softjaw.scoring.pose import pose_volume
 from softjaw.scoring.quality import score
-from tests.generators import build, bump, cyl_mesh, grid_mesh, lcg_noise, lcg_patch, lcg_sphere, mesh_patch, screw_twist
+from tests.generators import (
+    build,
+    bump,
+    cyl_mesh,
+    grid_mesh,
+    lcg_noise,
+    lcg_patch,
+    lcg_sphere,
+    mesh_patch,
+    moved,
+    screw_twist,
+)
+from tests.lsfit.test_zhou import as_they_are, objective
 from tests.oracles import body_volume, least_squares_quartic
+from tests.scoring.grasps import contact_axes
 
 TABLE = json.loads((Path(__file__).parent / "data" / "friction_table.json").read_text())["cases"]
 CASES = {case["id"]: case for case in TABLE}
 MODEL = {"ccm": "ccm", "pcm_flat": "pcm", "pcm_projected": "pcm_projected"}
-X_HINT = [0.0, 0.0, 1.0]  # of the contacts of a grasp, to be projected on their tangent planes
+X_HINT = np.array([0.0, 0.0, 1.0])  # of the contacts of a grasp, to be projected on their tangent planes
 
 
 # Maxima and wrenches -------------------------------------------------------------------------------------------------
@@ -128,15 +141,15 @@ def fits(inputs, names):
     if "lam" in inputs:
         return zhou_fits(inputs, W, T)
     quartic = least_squares_quartic(W, T, gamma=0.0)
-    convex = convex_quartic(W, T, gamma=inputs.get("gamma", 0.0))
+    convex = convex_quartic(W, T, gamma=inputs.get("gamma", 0.0))[0]
     full = full_ellipsoid(W)
     found = {"ell_full.A": full.A, "quartic_ls.obj_mean_sq": mean_square(quartic, W)}
     found["obj_unconstrained"] = found["quartic_ls.obj_mean_sq"]
-    found["obj_sos"] = mean_square(convex.surface, W)
+    found["obj_sos"] = mean_square(convex, W)
     # A quartic of least squares that is convex is the convex quartic of least squares.
     found["quartic_ls.convex"] = found["obj_sos"] <= found["obj_unconstrained"] * (1 + 1e-9)
     surfaces = {"ell3": three, "ell_diag": axis_aligned_ellipsoid(W), "ell_full": full, "quartic_ls": quartic}
-    surfaces |= {"quartic_sos": convex.surface, "quartic_sdp": convex.surface}
+    surfaces |= {"quartic_sos": convex, "quartic_sdp": convex}
     for name, surface in surfaces.items():
         found |= errors_of(name, surface, W, T)
     return found
@@ -145,8 +158,8 @@ def fits(inputs, names):
 def zhou_fits(inputs, W, T):
     weights, found = [inputs[name] for name in ("lam", "beta", "gamma")], {}
     for name, method in (("quartic", zhou_quartic), ("ellipsoid", zhou_ellipsoid)):
-        fit = method(W, T, *weights, even=False)
-        found |= {f"{name}.objective": fit.objective} | errors_of(name, fit.surface, W, T)
+        surface = method(as_they_are(W, T), tuple(weights))
+        found |= {f"{name}.objective": objective(surface, W, T, *weights)} | errors_of(name, surface, W, T)
     return found
 
 
@@ -155,8 +168,8 @@ def fits_in_six_dimensions(inputs, _):
     unit = lcg_sphere(sampling["d"], sampling["K"], sampling["seed"])
     point = np.array(inputs["ref_point"], float)
     twist = unit / [1, 1, 1, rho, rho, rho]
-    twist[:, :3] -= np.cross(twist[:, 3:], point)  # motions are those of the reference point
-    W, T = six_samples(friction_wrench(patch, twist, mu), twist, mu * friction_limits(patch, mu).S, rho, point)
+    about = moved(patch, np.eye(3), -point)  # motions are those of the reference point
+    W, T = six_samples(friction_wrench(about, twist, mu), twist, mu * friction_limits(patch, mu).S, rho)
     full = full_ellipsoid(W)
     E = exponents(6, 4)
     M = monomials(W, E)
@@ -174,8 +187,8 @@ def bodies(inputs):
     return [Ellipsoid(inputs[f"semi_axes{i}"]) for i in (1, 2)]
 
 
-def measures(bodies):
-    return [measure for body in bodies for measure in (body.volume, body.shadow_area)]
+def measures(bodies, rho):
+    return [measure for body in bodies for measure in (body.volume / rho, body.shadow_area)]
 
 
 def linearised(axes, kind, m=None):
@@ -186,12 +199,12 @@ def grasps(inputs, names):
     if "N1" in inputs:
         return any_pose(inputs, names)
     d, rho = inputs["d"], inputs["rho"]
-    smooth = measures(bodies(inputs))
-    found = {"volume_Linf": volume_linf(*smooth, d, rho), "volume_L1": volume_l1(*smooth, d, rho)}
+    smooth = *measures(bodies(inputs), rho), d / rho
+    found = {"volume_Linf": volume_linf(*smooth), "volume_L1": volume_l1(*smooth)}
     if "vertices" in inputs:
         shapes = [linearised(inputs[f"semi_axes{i}"], inputs["vertices"], inputs["m"]) for i in (1, 2)]
-        found["volume_Linf_polytope"] = volume_linf(*measures(shapes), d, rho)
-        found["volume_L1_polytope"] = volume_l1(*measures(shapes), d, rho)
+        polytopes = *measures(shapes, rho), d / rho
+        found["volume_Linf_polytope"], found["volume_L1_polytope"] = volume_linf(*polytopes), volume_l1(*polytopes)
         found["ratio_to_smooth"] = found["volume_Linf_polytope"] / found["volume_Linf"]
     centre = np.array(inputs.get("com", [0, 0, 0]), float)
     if centre[1:].any():
@@ -232,9 +245,7 @@ def end_to_end(inputs, _):
         normalised_samples(friction_wrench(patch, twist, mu), twist, S, rho)[0]
         for twist in (fibonacci_twists(2000, rho), fibonacci_twists(8000, rho))
     )
-    phi = 2 * np.pi * np.arange(256) / 256
-    translation = np.column_stack([np.cos(phi), np.sin(phi), 0 * phi])
-    V, A = body_volume(coarse, fine), shadow_area(friction_support(patch, translation, mu) / S)
+    V, A = body_volume(coarse, fine), supported_shadow(lambda t: friction_support(patch, t, mu) / S, 3, 256)
     found |= {"V_exact_LS_normalised": V / mu**3, "A_exact_shadow_normalised": A / mu**2}
     return found | {"score_ccm_exact_LS": volume_linf(V, A, V, A, inputs["d"] / inputs["object_length"])}
 
@@ -273,7 +284,7 @@ def colinear(inputs, description):
     twist = cor_twists(np.column_stack([x, 0 * x]))
     S = friction_limits(patch, inputs["mu"]).S
     W, T = normalised_samples(friction_wrench(patch, twist, inputs["mu"]), twist, inputs["mu"] * S, 2.0)
-    surfaces = [axis_aligned_ellipsoid(W), full_ellipsoid(W), least_squares_quartic(W, T), convex_quartic(W, T).surface]
+    surfaces = [axis_aligned_ellipsoid(W), full_ellipsoid(W), least_squares_quartic(W, T), convex_quartic(W, T)[0]]
     ranks = {sample_rank(W), *(surface.rank for surface in surfaces)}
     assert len(ranks) == 1
     return {"rank": ranks.pop(), "flagged": all(surface.flag & FitFlag.RANK_DEFICIENT for surface in surfaces)}

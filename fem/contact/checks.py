@@ -9,12 +9,15 @@ import numpy as np
 from softjaw.fem.contact.problem import ContactPoints
 from softjaw.fem.errors import CheckError, ConvergenceError, NotReachedError
 from softjaw.fem.pad.foam import FloatArray, Foam
+from softjaw.friction.motion import fibonacci_twists
 
 BALANCE = 1e-8  # of the normal force
 # of an element's size, of the largest pressure, of their product: a hundred times what the tolerance of the solve
 # leaves at the smallest contacts of practice, and far below what a result can show
 CONTACT_LAWS = 1e-6
 ALTERNATING = 1e-4  # the same where the nodes in contact alternate for ever: still far below the error of any mesh
+# In which the acoustic tensor is formed: half of all are enough, because it is even in its direction.
+DIRECTIONS = fibonacci_twists(24, 1.0)
 BARELY_ELLIPTIC = 0.1  # eigenvalue of the acoustic tensor over the shear modulus at which foam gives way somewhere
 
 
@@ -98,18 +101,6 @@ def check(
             error.law = law
             raise error
     return checks
-
-
-def _hemisphere(n: int) -> FloatArray:
-    """Unit vectors spread evenly over a hemisphere ``(n, 3)`` (Fibonacci)."""
-    # half of all directions is enough: the acoustic tensor is even in its direction
-    z = (np.arange(n) + 0.5) / n
-    # the golden angle: directions never line up, whatever their number
-    phi = np.arange(n) * np.pi * (3.0 - np.sqrt(5.0))
-    return np.column_stack([np.sqrt(1 - z * z) * np.cos(phi), np.sqrt(1 - z * z) * np.sin(phi), z])
-
-
-DIRECTIONS = _hemisphere(24)  # in which the acoustic tensor is formed
 
 
 def explained(error: ConvergenceError, foam: Foam, x: FloatArray, force: float) -> ConvergenceError:

@@ -26,7 +26,7 @@ from softjaw.lsfit.ellipsoid import (
 from softjaw.lsfit.quartic import Quartic
 from softjaw.lsfit.quartic_fit import convex_quartic
 from softjaw.lsfit.samples import FitErrors, fit_error, normalised_samples, overclaim, six_samples, sphere_motions
-from softjaw.lsfit.span import span_ellipsoid, span_quartic, zhou_ellipsoid, zhou_quartic
+from softjaw.lsfit.span import span_ellipsoid, span_quartic, span_samples, zhou_ellipsoid, zhou_quartic
 from softjaw.lsfit.surface import FitError, LimitSurface
 from softjaw.study.case.contact import Contact
 from softjaw.study.flags import Flag
@@ -128,11 +128,11 @@ def fitted(ellipsoid: Ellipsoid, W: FloatArray, T: FloatArray, model: str, objec
             case "full", "least_squares":
                 return full_ellipsoid(W), ELLIPSOID
             case "full", _:
-                return zhou_ellipsoid(W, T).surface, ELLIPSOID
+                return zhou_ellipsoid(span_samples(W, T)), ELLIPSOID
             case _, "least_squares":
-                fit = convex_quartic(W, T)
-                return fit.surface, AS_FITTED if fit.certificate == "least squares" else PROGRAMME
-        return zhou_quartic(W, T).surface, PROGRAMME
+                surface, certificate = convex_quartic(W, T)
+                return surface, AS_FITTED if certificate == "least squares" else PROGRAMME
+        return zhou_quartic(span_samples(W, T)), PROGRAMME
     # A surface that stands in keeps the case valid; the certificate and a flag tell.
     except FitError:
         return ellipsoid, STANDS_IN
@@ -209,11 +209,11 @@ def six_ellipsoid(patch: ContactPatch, rho: float, S: float) -> tuple[FloatArray
     """
     W, T = _six_samples(patch, rho, S, "ccm", SIX_MOTIONS)
     try:
-        fit = span_ellipsoid(W, T)
+        surface, errors = span_ellipsoid(W, T)
     except FitError:
         return np.full((6, 6), np.nan), 0, FitErrors(np.nan, np.nan, np.nan)
-    assert isinstance(fit.surface, TiltedEllipsoid)
-    return fit.surface.A, fit.surface.rank, fit.errors._replace(Edir=float(np.radians(fit.errors.Edir)))
+    assert isinstance(surface, TiltedEllipsoid)
+    return surface.A, surface.rank, errors._replace(Edir=float(np.radians(errors.Edir)))
 
 
 def six_quartic(contact: Contact, model: str, samples: int) -> tuple[LimitSurface, FitErrors, float]:
@@ -221,7 +221,7 @@ def six_quartic(contact: Contact, model: str, samples: int) -> tuple[LimitSurfac
     S = contact.unit_limits[model].S
     W, T = _six_samples(contact.local, contact.rho, S, model, samples + INDEPENDENT)
     fitted_to, others = slice(samples), slice(samples, None)
-    surface = span_quartic(W[fitted_to], T[fitted_to]).surface
+    surface = span_quartic(W[fitted_to], T[fitted_to])
     errors = fit_error(surface, W[others], T[others])
     size = contact.mu * S * np.repeat([1.0, contact.rho], 3)
     errors = errors._replace(Edir=float(np.radians(errors.Edir)))

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from softjaw.friction.patch import ContactPatch, FloatArray
 from softjaw.friction.wrench import FrictionLimits
 from softjaw.friction.wrench import friction_wrench as wrench_in_frame
+from softjaw.lsfit.body import ExactSurface
 from softjaw.lsfit.samples import FitErrors
 from softjaw.lsfit.surface import FitError, LimitSurface
 from softjaw.scoring.quality import Score, grasp_score
@@ -320,7 +321,7 @@ def grasp_quality(
     return grasp_score(soft(contacts, [bodies[0], bodies[-1]]), arms, torques, middle)
 
 
-def _body(contact: Contact, kind: str, model: str) -> LimitSurface:
+def _body(contact: Contact, kind: str, model: str) -> LimitSurface | ExactSurface:
     """Limit surface of a contact per unit of S [-, -, m]."""
     if kind == "exact":
         return exact_surface(contact, model)

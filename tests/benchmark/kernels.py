@@ -13,13 +13,14 @@ from softjaw.friction.wrench import friction_limits, friction_wrench, pure_torqu
 from softjaw.lsfit.ellipsoid import Ellipsoid, full_ellipsoid
 from softjaw.lsfit.quartic_fit import convex_quartic
 from softjaw.lsfit.samples import normalised_samples, six_samples
-from softjaw.lsfit.span import span_quartic, zhou_quartic
-from softjaw.scoring.contact import SoftContact, contact_axes
+from softjaw.lsfit.span import span_quartic, span_samples, zhou_quartic
+from softjaw.scoring.contact import SoftContact
 from softjaw.scoring.epsilon import epsilon
 from softjaw.scoring.pose import pose_volume
 from softjaw.scoring.quality import score
 from tests.benchmark.table import fastest, line, span, title
 from tests.generators import cyl_mesh, cylinder_grid, disc_polar, lcg_noise, lcg_patch, lcg_sphere, mesh_patch
+from tests.scoring.grasps import contact_axes
 
 FACES, MOTIONS = 2400, 441
 
@@ -53,7 +54,7 @@ def limit_surfaces() -> dict[str, tuple[Work, str]]:
         "ellipsoid of any orientation": (lambda: full_ellipsoid(W), "at most 0.1 ms"),
         "convex quartic with its certificate": (lambda: convex_quartic(W, T, gamma=0.0), "at most 1 ms"),
         "the same where convexity binds": (lambda: convex_quartic(noisy, few[1], gamma=0.0), "at most 5 ms"),
-        "quartic of Zhou et al., 100 samples": (lambda: zhou_quartic(*many, even=False), ""),
+        "quartic of Zhou et al., 100 samples": (lambda: zhou_quartic(span_samples(*many)), ""),
         "convex quartic in six dimensions, 1024 samples": (lambda: span_quartic(*six), "at most 3 s"),
     }
 
@@ -61,7 +62,7 @@ def limit_surfaces() -> dict[str, tuple[Work, str]]:
 def scores() -> dict[str, tuple[Work, str]]:
     body, angle = Ellipsoid((0.8, 0.6, 0.15)), math.radians(10)
     c, s = math.cos(angle), math.sin(angle)
-    pair = [SoftContact([-x / 2, 0, 0], contact_axes([x * c, s, 0], [0, 0, 1]), body) for x in (1.0, -1.0)]
+    pair = [SoftContact([-x / 2, 0, 0], contact_axes([x * c, s, 0], np.eye(3)[2]), body) for x in (1.0, -1.0)]
     one, two = np.array([0.8, 0.7, 0.012]), np.array([0.8, 0.75, 0.011])
     return {
         "antipodal: volumes and epsilons": (lambda: score(one, two, 0.06, 0.2, 0.05), "at most 50 us"),

@@ -123,7 +123,7 @@ def test_of_two_crossings_the_nearer_one_counts_and_of_equal_ones_that_along_the
     for z, expected in ((0.0, 1.0), (1e-12, 1.0), (-1e-12, 1.0), (-0.1, -1.0), (0.1, 1.0)):
         start = np.array([0.3, 0.2, z])
         assert face.foot(start, N)[0][2] == pytest.approx(expected, abs=1e-12)
-        assert foot(patch, start, N).point[2] == pytest.approx(expected, abs=1e-12)
+        assert foot(patch, start, N)[0][2] == pytest.approx(expected, abs=1e-12)
 
 
 def test_steps_that_lead_to_and_fro_are_halved():

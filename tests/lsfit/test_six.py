@@ -5,25 +5,25 @@ import pytest
 
 from softjaw.friction.wrench import friction_support, friction_wrench
 from softjaw.lsfit.ellipsoid import full_ellipsoid
-from softjaw.lsfit.form import exponents, monomials
+from softjaw.lsfit.form import exponents, hessian_tensor, monomials
 from softjaw.lsfit.quartic import Quartic
 from softjaw.lsfit.quartic_fit import convex_quartic
 from softjaw.lsfit.samples import fit_error, sample_rank, six_samples, sphere_motions
 from softjaw.lsfit.sos import ball_gram, gram_map
 from softjaw.lsfit.span import span_ellipsoid, span_quartic, span_samples
 from softjaw.lsfit.surface import FitFlag
-from tests.generators import cap_polar, cylinder_grid, heightfield, lcg_patch, points_patch, rect_grid
-from tests.oracles import least_squares_quartic, smallest_curvature
+from tests.generators import cap_polar, cylinder_grid, heightfield, points_patch, rect_grid
+from tests.oracles import least_curvature, least_squares_quartic, smallest_curvature, wrenches_alone
 
 RHO = 2.0
 SIX = np.array([1, 1, 1, RHO, RHO, RHO])
 
 
-def samples(patch, K, point=(0, 0, 0), unit=1.0):
+def samples(patch, K, unit=1.0):
     """Samples of ``K`` motions; ``unit`` is the size of the caller's unit of length."""
     motion = sphere_motions(K)
     twist = motion / (SIX * [1, 1, 1, unit, unit, unit])
-    return six_samples(friction_wrench(patch, twist, 0.5), twist, 0.5 * patch.load.sum(), RHO * unit, point)
+    return six_samples(friction_wrench(patch, twist, 0.5), twist, 0.5 * patch.load.sum(), RHO * unit)
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +46,7 @@ def test_a_gram_matrix_gives_the_second_derivatives_whatever_its_free_numbers(d,
     assert A.shape == (d**4, unknowns)
     x, w, z = rng.normal(size=unknowns), rng.normal(size=d), rng.normal(size=d)
     Q = (A @ x).reshape(d * d, d * d)
-    curvature = z @ Quartic(x[: len(E)], E).hessian(w)[0] @ z
+    curvature = np.einsum("ijkl,i,j,k,l", hessian_tensor(x[: len(E)], d), z, z, w, w)
     assert np.kron(z, w) @ Q @ np.kron(z, w) == pytest.approx(curvature, rel=1e-12)
     np.testing.assert_allclose(Q, Q.T, atol=1e-14 * np.abs(Q).max())
 
@@ -61,10 +61,10 @@ def test_the_start_is_the_ball_with_a_definite_matrix(d):
 
 def test_a_nearly_flat_patch_ends_where_rounding_lets_it():
     """Torques follow from forces within a thousandth: the axes of the components suit badly."""
-    fit = span_quartic(*samples(cylinder_grid(1, 0.05, 2, 12, 12), 30))
-    assert fit.surface.rank == 6
-    assert fit.gram_eigenvalue > 0
-    assert fit.errors.Erad < 2e-3
+    W, T = samples(cylinder_grid(1, 0.05, 2, 12, 12), 30)
+    surface = span_quartic(W, T)
+    assert surface.rank == 6
+    assert fit_error(surface, W, T).Erad < 2e-3
 
 
 def plane_samples(c, K=60):
@@ -80,20 +80,19 @@ def plane_samples(c, K=60):
 @pytest.mark.parametrize("c", [0.5, 3.0, 5.5])
 def test_a_convex_quartic_is_found_again(c):
     W, T = plane_samples(c)
-    fit = convex_quartic(W, T, gamma=1.0)
-    np.testing.assert_allclose(fit.surface.coefficients, [1, 0, c, 0, 1], atol=1e-4)
-    np.testing.assert_allclose(fit_error(fit.surface, W, T), 0, atol=1e-3)
-    assert fit.gram_eigenvalue > 0
+    surface, _ = convex_quartic(W, T, gamma=1.0)
+    np.testing.assert_allclose(surface.coefficients, [1, 0, c, 0, 1], atol=1e-4)
+    np.testing.assert_allclose(fit_error(surface, W, T), 0, atol=1e-3)
 
 
 def test_a_quartic_that_is_not_convex_becomes_one_that_hardly_is():
     W, T = plane_samples(9.0)
-    free, fit = least_squares_quartic(W, gamma=0), convex_quartic(W, T, gamma=0.0)
+    free, surface = least_squares_quartic(W), wrenches_alone(W)[0]
     assert fit_error(free, W, T).E1 < 1e-12
-    assert np.linalg.eigvalsh(free.hessian(W)).min() < -1
-    assert np.linalg.eigvalsh(fit.surface.hessian(W)).min() > 0
-    assert smallest_curvature(fit.surface.coefficients, 2) == pytest.approx(0, abs=0.05)
-    assert fit_error(fit.surface, W, T).E1 > 1e-2
+    assert least_curvature(free, W) < -1
+    assert least_curvature(surface, W) > 0
+    assert smallest_curvature(surface.coefficients, 2) == pytest.approx(0, abs=0.05)
+    assert fit_error(surface, W, T).E1 > 1e-2
 
 
 # Motions, samples and spans ------------------------------------------------------------------------------------------
@@ -104,20 +103,6 @@ def test_motions_cover_the_sphere_evenly():
     np.testing.assert_allclose(np.linalg.norm(u, axis=1), 1, rtol=1e-14)
     np.testing.assert_allclose(u.T @ u / len(u), np.eye(6) / 6, atol=5e-3)
     np.testing.assert_allclose(u.mean(axis=0), 0, atol=5e-3)
-
-
-def test_the_reference_point_changes_neither_power_nor_the_ellipsoid():
-    """With ``w' = M w`` the ellipsoid ``A`` of least squares becomes ``M^-T A M^-1``."""
-    patch, p = lcg_patch(6, 60), np.array([0.3, -0.2, 0.5])
-    (W, T), (V, S) = samples(patch, 200), samples(patch, 200, p)
-    cross = np.array([[0, -p[2], p[1]], [p[2], 0, -p[0]], [-p[1], p[0], 0]]) / RHO
-    M = np.eye(6)
-    M[3:, :3] = -cross
-    np.testing.assert_allclose(V, W @ M.T, atol=1e-14)
-    ratio = (W * T).sum(axis=1) / (V * S).sum(axis=1)  # motions have length one about either point
-    np.testing.assert_allclose(ratio, np.linalg.norm(T @ np.linalg.inv(M), axis=1), rtol=1e-12)
-    A, B = (span_ellipsoid(*s).surface.A for s in ((W, T), (V, S)))
-    np.testing.assert_allclose(np.linalg.inv(M).T @ A @ np.linalg.inv(M), B, rtol=1e-8, atol=1e-8 * np.abs(B).max())
 
 
 @pytest.mark.parametrize("unit", [1e-3, 1e3])
@@ -138,23 +123,22 @@ def test_samples_do_not_depend_on_the_unit_of_length(unit):
         (cap_polar(1, 1.0, 6, 12), 6),
     ],
 )
-@pytest.mark.parametrize("even", [True, False])
-def test_rank_of_plane_and_curved_patches(patch, rank, even):
+def test_rank_of_plane_and_curved_patches(patch, rank):
     W, T = samples(patch, 200)
-    fit, inside = span_ellipsoid(W, T), span_samples(W, T, even)
-    assert inside.rank == fit.surface.rank == rank == sample_rank(W)
-    assert (FitFlag.RANK_DEFICIENT in fit.surface.flag) == (rank < 6)
+    (surface, _), inside = span_ellipsoid(W, T), span_samples(W, T)
+    assert inside.rank == surface.rank == rank == sample_rank(W)
+    assert (FitFlag.RANK_DEFICIENT in surface.flag) == (rank < 6)
     np.testing.assert_allclose(inside.Y @ inside.B.T, W, atol=1e-13)
     missing = np.linalg.svd(W)[2][rank:]
-    np.testing.assert_allclose(fit.surface.support(missing), 0, atol=1e-7)
-    assert np.isfinite(fit.surface.semi_axes).all()
+    np.testing.assert_allclose(surface.support(missing), 0, atol=1e-7)
+    assert np.isfinite(surface.semi_axes).all()
 
 
 def test_a_plane_patch_has_the_ellipsoid_of_three_components():
     patch = rect_grid(2, 1, 6, 6)
     W, T = samples(patch, 300)
     three = full_ellipsoid(W[:, [0, 1, 5]])
-    flat = span_ellipsoid(W, T).surface
+    flat = span_ellipsoid(W, T)[0]
     np.testing.assert_allclose(flat.A[np.ix_([0, 1, 5], [0, 1, 5])], three.A, rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(flat.semi_axes, [*three.semi_axes[:2], 0, 0, 0, three.semi_axes[2]], atol=1e-9)
 
@@ -162,16 +146,15 @@ def test_a_plane_patch_has_the_ellipsoid_of_three_components():
 def test_quartics_of_plane_patches_are_flat():
     patch = points_patch([[-1, 0, 0.4], [1, 0, 0.4], [0, 1, 0.4]], [1, 2, 1])
     W, T = samples(patch, 200)
-    fit = span_quartic(W, T)
+    surface = span_quartic(W, T)
     missing = np.linalg.svd(W)[2][3:]
-    assert (fit.surface.rank, fit.surface.dimension) == (3, 6)
-    assert FitFlag.RANK_DEFICIENT in fit.surface.flag
-    assert fit.errors.Erad < 0.02
-    assert fit.gram_eigenvalue > 0
-    np.testing.assert_allclose(fit.surface.support(missing), 0, atol=1e-12)
-    np.testing.assert_array_equal(fit.surface.value(W[:3] + 1e-3 * missing[:1]), np.inf)
-    np.testing.assert_array_equal(fit.surface.radius(missing), 0)
-    assert fit.surface.holds(0.9 * W).all()
+    assert (surface.rank, surface.dimension) == (3, 6)
+    assert FitFlag.RANK_DEFICIENT in surface.flag
+    assert fit_error(surface, W, T).Erad < 0.02
+    np.testing.assert_allclose(surface.support(missing), 0, atol=1e-12)
+    np.testing.assert_array_equal(surface.value(W[:3] + 1e-3 * missing[:1]), np.inf)
+    np.testing.assert_array_equal(surface.radius(missing), 0)
+    assert surface.holds(0.9 * W).all()
 
 
 def test_motions_without_friction_are_left_out():
@@ -195,30 +178,29 @@ def test_motions_without_friction_are_left_out():
 def test_errors_of_fits_to_curved_patches(patch, ellipsoid, quartic):
     """Figures of an independent implementation for other motions (and another saddle), hence the tolerance."""
     W, T = samples(patch, 1024)
-    assert span_ellipsoid(W, T).errors[:2] == pytest.approx(ellipsoid, rel=0.12)
-    assert fit_error(least_squares_quartic(W, gamma=0), W, T)[:2] == pytest.approx(quartic, rel=0.15)
+    assert span_ellipsoid(W, T)[1][:2] == pytest.approx(ellipsoid, rel=0.12)
+    assert fit_error(least_squares_quartic(W), W, T)[:2] == pytest.approx(quartic, rel=0.15)
 
 
 def test_directions_are_judged_with_axes_of_like_length(cylinder):
     """31.9 and 10.7 degrees, by an independent implementation and other motions."""
     assert fit_error(full_ellipsoid(cylinder[0]), *cylinder).Edir == pytest.approx(31.9, rel=0.1)
-    assert span_ellipsoid(*cylinder).errors.Edir == pytest.approx(10.7, rel=0.1)
+    assert span_ellipsoid(*cylinder)[1].Edir == pytest.approx(10.7, rel=0.1)
 
 
 def test_the_convex_quartic_predicts_friction_for_other_motions(convex):
     patch = cylinder_grid(1, np.pi / 3, 2, 24, 24)
     motion = np.random.default_rng(1).normal(size=(200, 6))
     H = friction_support(patch, motion / SIX, 0.5) / (0.5 * patch.load.sum())
-    np.testing.assert_allclose(convex.surface.support(motion), H, rtol=0.08)
-    assert np.abs(convex.surface.support(motion) / H - 1).mean() < 0.015
+    np.testing.assert_allclose(convex.support(motion), H, rtol=0.08)
+    assert np.abs(convex.support(motion) / H - 1).mean() < 0.015
 
 
 def test_a_surface_that_nothing_holds_is_bounded_and_flagged():
     """All samples on two parallel lines: the best quartic is ``f_x^4``, endless along the lines."""
     y = np.linspace(-1, 1, 20)
     W, T = np.column_stack([np.ones(20), y]), np.column_stack([np.ones(20), 0 * y])
-    for fit in (span_ellipsoid, span_quartic):
-        bounded = fit(W, T).surface
+    for bounded in (span_ellipsoid(W, T)[0], span_quartic(W, T)):
         assert FitFlag.BOUNDED in bounded.flag
         assert bounded.semi_axes.max() < 15
 
@@ -227,8 +209,3 @@ def test_a_surface_that_nothing_holds_is_bounded_and_flagged():
 def test_bad_samples_are_refused(W, T):
     with pytest.raises(ValueError, match="wrenches"):
         span_samples(W, T)
-
-
-def test_weights_are_not_negative(cylinder):
-    with pytest.raises(ValueError, match="gamma"):
-        convex_quartic(*cylinder, gamma=-1.0)

@@ -10,7 +10,6 @@ from softjaw.lsfit.ellipsoid import Ellipsoid
 from softjaw.scoring.contact import (
     PolytopeBody,
     SoftContact,
-    contact_axes,
     ellipsoid_matrix,
     fibonacci_vertices,
     hull_volume,
@@ -19,6 +18,7 @@ from softjaw.scoring.contact import (
 from softjaw.scoring.epsilon import epsilon, separating_wrench
 from softjaw.scoring.pose import pose_volume
 from softjaw.scoring.quality import ScoreFlag, contact_flag, grasp_score, score
+from tests.scoring.grasps import facing
 from tests.turns import TURNS, shaken
 
 LENGTHS = 0.2, 0.05
@@ -29,13 +29,7 @@ CLEAN, NO_TORQUE, NO_FORCE = ScoreFlag.CLEAN, ScoreFlag.NO_TORQUE, ScoreFlag.NO_
 
 
 def pair(one, two, tilt=0.0, apart=0.06):
-    """Contacts on the x axis, their normals turned away from facing by an angle."""
-    bodies = [Ellipsoid(b) if np.ndim(b) == 1 else PolytopeBody(b) for b in (one, two)]
-    c, s = np.cos(tilt), np.sin(tilt)
-    return [
-        SoftContact([side * apart / 2, 0, 0], contact_axes([-side * c, s, 0], [0, 0, 1]), body)
-        for side, body in zip((-1, 1), bodies, strict=True)
-    ]
+    return facing(one, two, apart, tilt)
 
 
 def moved(rng, contacts):

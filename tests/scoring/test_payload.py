@@ -7,8 +7,9 @@ import pytest
 from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 
-from softjaw.scoring.contact import PolytopeBody, SoftContact, contact_axes, fibonacci_vertices
+from softjaw.scoring.contact import PolytopeBody, SoftContact, fibonacci_vertices
 from softjaw.scoring.payload import BOUND_GAP, payload
+from tests.scoring.grasps import contact_axes
 
 F, MU, E, D = 5.0, 0.8, 0.006, 0.06
 AXES = F * np.array([MU, MU, MU * E])
@@ -19,11 +20,10 @@ MIDDLE = (0.0, 0.0, 0.0)
 
 def pair(offset=0.0, body=CORNERS, tilt=0.0):
     """Contacts at x = -D/2 and D/2 that press towards each other, ``offset`` apart along z, tilted about y [rad]."""
-    one = contact_axes([np.cos(tilt), 0, np.sin(tilt)], [0, 1, 0])
-    two = contact_axes([-np.cos(tilt), 0, np.sin(tilt)], [0, 1, 0])
+    c, s, y = np.cos(tilt), np.sin(tilt), np.eye(3)[1]
     return [
-        SoftContact(np.array([-D / 2, 0, offset / 2]), one, body),
-        SoftContact(np.array([D / 2, 0, -offset / 2]), two, body),
+        SoftContact(side * np.array([D / 2, 0, -offset / 2]), contact_axes([-side * c, 0, s], y), body)
+        for side in (-1, 1)
     ]
 
 

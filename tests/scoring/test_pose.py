@@ -12,7 +12,6 @@ from softjaw.scoring.closed_form import volume_l1, volume_linf
 from softjaw.scoring.contact import (
     PolytopeBody,
     SoftContact,
-    contact_axes,
     ellipsoid_matrix,
     fibonacci_vertices,
     polytope_volume,
@@ -20,9 +19,8 @@ from softjaw.scoring.contact import (
 )
 from softjaw.scoring.fibre import fan_area, sphere_mesh, surface_mesh
 from softjaw.scoring.pose import joint_pairs, mixed_area, pose_volume
+from tests.scoring.grasps import A, B, facing
 
-A, B = (0.8, 0.6, 0.15), (0.5, 0.9, 0.25)
-PADS = Ellipsoid(A), Ellipsoid(B)
 POSES = [(0, 0, (0, 0, 0)), (10, 10, (0, 0, 0)), (30, -20, (0.1, 0.3, 0.2)), (60, 5, (0, 0.2, 0.4)),
          (80, 85, (0, 0.2, 0.1)), (20, 160, (0, 0.2, 0.1)), (90, 0, (0, 0, 0.3)), (0, 180, (0, 0.1, 0))]  # fmt: skip
 
@@ -32,12 +30,9 @@ def rotation(rng):
     return Q * np.linalg.det(Q)
 
 
-def tilted(angle1, angle2, offset=(0, 0, 0), bodies=PADS, d=1.3):
-    """Contacts at -d/2 and d/2 + offset on the x axis, their normals turned about z away from facing, in degrees."""
-    a, b = np.radians([angle1, angle2])
-    N1, N2 = (math.cos(a), math.sin(a), 0), (-math.cos(b), math.sin(b), 0)
-    one = SoftContact([-d / 2, 0, 0], contact_axes(N1, [0, 0, 1]), bodies[0])
-    return one, SoftContact(np.array([d / 2, 0, 0]) + offset, contact_axes(N2, [0, 0, 1]), bodies[1])
+def tilted(angle1, angle2, offset=(0, 0, 0), bodies=(A, B), d=1.3):
+    """Contacts whose normals are turned away from facing, in degrees."""
+    return facing(*bodies, d, np.radians([angle1, angle2]), offset)
 
 
 def anywhere(rng, body1, body2):
@@ -101,10 +96,10 @@ def test_facing_contacts_have_the_closed_form_however_they_are_turned_about_thei
     x, y, N = two.axes
     c, s = math.cos(turn), math.sin(turn)
     two = SoftContact(two.position, [c * x + s * y, c * y - s * x, N], two.body)
-    sizes = [size for body in bodies for size in (body.volume, body.shadow_area)]
-    found = pose_volume(one, two, 0.7, 0.7)
-    assert found.linf == pytest.approx(volume_linf(*sizes, 1.3, 0.7), rel=1e-9)
-    assert found.l1 == pytest.approx(volume_l1(*sizes, 1.3, 0.7), rel=1e-8)
+    sizes = [size for body in bodies for size in (body.volume / 0.7, body.shadow_area)]
+    volume = pose_volume(one, two, 0.7, 0.7)
+    assert volume.linf == pytest.approx(volume_linf(*sizes, 1.3 / 0.7), rel=1e-9)
+    assert volume.l1 == pytest.approx(volume_l1(*sizes, 1.3 / 0.7), rel=1e-8)
 
 
 @pytest.mark.parametrize("pose", POSES[1::2])

@@ -10,8 +10,7 @@ from scipy.spatial import ConvexHull
 from softjaw.scoring.closed_form import epsilon_l1, epsilon_linf, volume_l1, volume_linf
 from softjaw.scoring.contact import fibonacci_vertices, polytope_volume
 from softjaw.scoring.quality import ScoreFlag, score
-
-A, B = (0.8, 0.6, 0.15), (0.5, 0.9, 0.25)
+from tests.scoring.grasps import A, B, unit
 
 
 def wrenches(contact_wrench, side, d, rho):
@@ -35,7 +34,8 @@ def test_the_volume_of_polytopes_is_that_of_their_hull_in_six_dimensions(vertice
     P, Q = vertices(A), vertices(B)
     K1, K2 = (np.vstack([np.zeros(6), wrenches(v, side, d, rho)]) for v, side in ((P, -1), (Q, 1)))
     linf = np.array([a + b for a, b in itertools.product(K1, K2)])
-    sizes = *polytope_volume(P), *polytope_volume(Q), d, rho
+    (V1, A1), (V2, A2) = polytope_volume(P), polytope_volume(Q)
+    sizes = V1 / rho, A1, V2 / rho, A2, d / rho
     assert volume_linf(*sizes) == pytest.approx(ConvexHull(linf).volume, rel=1e-9)
     assert volume_l1(*sizes) == pytest.approx(ConvexHull(np.vstack([K1, K2])).volume, rel=1e-9)
 
@@ -58,10 +58,6 @@ def support(u, contacts, arms, join):
         felt = [f_x * (u[:, 2] - arm * u[:, 4]), f_y * (u[:, 1] + arm * u[:, 5]), tau * u[:, 3]]
         along.append(np.maximum(0, sign * u[:, 0] + np.linalg.norm(felt, axis=0)))
     return join(along)
-
-
-def unit(u):
-    return u / np.linalg.norm(u, axis=1, keepdims=True)
 
 
 LINF, L1 = (epsilon_linf, lambda h: h[0] + h[1]), (epsilon_l1, lambda h: np.maximum(h[0], h[1]))
@@ -114,8 +110,8 @@ def test_a_contact_without_torque_scores_nothing_and_says_so():
 
 
 def test_the_score_has_no_unit():
-    metre = score((0.8, 0.7, 0.012), (0.8, 0.6, 0.01), 0.06, 0.2, 0.05, 0.01)
-    milli = score((0.8, 0.7, 12.0), (0.8, 0.6, 10.0), 60.0, 200.0, 50.0, 10.0)
+    metre = score((0.8, 0.7, 0.012), (0.8, 0.6, 0.01), 0.06, 0.2, 0.05)
+    milli = score((0.8, 0.7, 12.0), (0.8, 0.6, 10.0), 60.0, 200.0, 50.0)
     np.testing.assert_allclose(
         [milli.quality, milli.quality_l1, milli.epsilon, milli.epsilon_l1],
         [metre.quality, metre.quality_l1, metre.epsilon, metre.epsilon_l1],
