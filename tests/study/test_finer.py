@@ -55,6 +55,13 @@ def test_rivals_are_those_that_may_be_better_than_the_last_of_the_list_or_than_t
     assert rivals([Place(0, [1], 0.0, [])], np.array([1.0, 0.99]), np.array([0.05, 0.02])) == [1]
 
 
+def test_what_seems_lost_on_the_coarse_mesh_is_a_rival_if_it_may_hold_more_than_the_best():
+    places, value = [Place(0, [], 0.0, []), Place(1, [], 0.0, [])], np.array([1.0, 0.5, 0.3, 0.4, 0.0])
+    error = np.array([0.05, 0.02, 0.7, 0.3, np.inf])
+    assert rivals(places, value, error, [2, 3, 4]) == [2, 4]
+    assert rivals([], value, error, [2, 3, 4]) == [3, 2, 4]
+
+
 def test_a_case_keeps_its_coarse_values_until_finer_ones_replace_them(scene, tmp_path):
     made = with_sampled_grasps(load_scene(scene))
     first, path = make_plan(made), tmp_path / "a.hdf"
