@@ -1,4 +1,4 @@
-"""The surfaces of a result's object: cut along the cells of its candidates, and where its wall's stored places lie.
+"""The surfaces of a result's object: cut along its candidates' cells or pads, and where its wall's stored places lie.
 
 Positions are in the object's frame [m]. Every display and the export for ParaView draw from here.
 """
@@ -6,11 +6,13 @@ Positions are in the object's frame [m]. Every display and the export for ParaVi
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from softjaw.fem.objects.gap import Pose
 from softjaw.friction.patch import NEGLIGIBLE
 from softjaw.study.case.build import build_object, has_wall, middle_of, outer_surface, surface_triangles
 from softjaw.study.quantities import ALONG, AROUND
@@ -28,8 +30,16 @@ class Surface(NamedTuple):
     candidate: np.ndarray
 
 
-def surface_of(scene: Any, axes: Any) -> Surface:
-    """The surface of a scene's object, cut along its candidates' cells.
+class Foot(NamedTuple):
+    """A pad as it first touches the object, of a candidate, and how far it closes from there [m]."""
+
+    candidate: int
+    pose: Pose
+    closing: float
+
+
+def surface_of(scene: Any, axes: Any, feet: Iterable[Foot] = ()) -> Surface:
+    """The surface of a scene's object, cut along its candidates' cells; with explicit poses below their ``feet``.
 
     Raises
     ------
@@ -42,8 +52,10 @@ def surface_of(scene: Any, axes: Any) -> Surface:
     # Triangles without area show nothing and would only be cut further.
     corners = corners[areas(corners) > 0]
     cell = np.full(len(corners), NOBODY)
-    # Explicit poses have no unit on the station axis, and no cells.
-    if axes[-3].units:
+    # Explicit poses have no unit on the station axis.
+    if not axes[-3].units:
+        corners, cell = pressed(corners, feet, scene.gripper.pad_size[:2])
+    else:
         middle = middle_of(scene)
         corners = middle.straightened(corners) if middle else corners
         corners, cell = coloured(corners, cells_of(scene, axes, body.axis_symmetry))
@@ -54,6 +66,28 @@ def surface_of(scene: Any, axes: Any) -> Surface:
     # After the cuts, corners of neighbours differ by rounding: 1 nm makes them one point again.
     points, inverse = np.unique(np.round(corners.reshape(-1, 3), 9), axis=0, return_inverse=True)
     return Surface(points, inverse.reshape(-1, 3), cell)
+
+
+def pressed(corners: np.ndarray, feet: Iterable[Foot], size: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles ``(m, 3, 3)`` cut along what pads of a ``size`` [m] meet, and the candidate ``(m,)`` of each.
+
+    A pad meets what lies before its undeformed face, as deep as it closes. Where pads overlap the first one has it.
+    """
+    cell = np.full(len(corners), NOBODY)
+    for foot in feet:
+        # what stands before first touch is rounding [m]
+        low, high = np.array([*(-0.5 * np.array(size)), -1e-3]), np.array([*(0.5 * np.array(size)), foot.closing])
+        local = foot.pose.to_pad(corners)
+        near = (local.min(axis=1) < high).all(axis=1) & (local.max(axis=1) > low).all(axis=1) & (cell == NOBODY)
+        pieces = corners[near]
+        for axis, bound in ((0, low), (0, high), (1, low), (1, high), (2, high)):
+            normal = foot.pose.rotation[:, axis]
+            pieces = cut(pieces, normal, float(foot.pose.origin @ normal + bound[axis]))
+        middle = foot.pose.to_pad(pieces.mean(axis=1))
+        met = ((middle > low) & (middle < high)).all(axis=1)
+        corners = np.concatenate([corners[~near], pieces])
+        cell = np.concatenate([cell[~near], np.where(met, foot.candidate, NOBODY)])
+    return corners, cell
 
 
 def scene_at(scene: Any, index: tuple[int, ...]) -> Any:

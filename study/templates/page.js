@@ -60,18 +60,14 @@ function object3d(div, all) {
       into[3].push(v == null ? all.colours[[1, 0, 2][state(c)] ?? 0] : v);
     }
     const names = Array.from(owner, told), base = {x: part(place, 0), y: part(place, 1), z: part(place, 2), text: names};
-    const [cmin, cmax] = q ? q.limits[at.force] : [], scale = q ? {cmin, cmax, colorscale: q.scale} : {}, [one, other, marks] = div.data;
+    const [cmin, cmax] = q ? q.limits[at.force] : [], scale = q ? {cmin, cmax, colorscale: q.scale} : {}, [one, other] = div.data;
     Object.assign(one, base, {i: shown[0], j: shown[1], k: shown[2], intensity: shown[3], visible: shown[3].length > 0}, scale);
     Object.assign(other, base, {i: rest[0], j: rest[1], k: rest[2], facecolor: rest[3], visible: rest[3].length > 0});
-    const balls = all.marks.points, of = all.marks.owner;
-    Object.assign(marks, {visible: balls.length > 0, text: of.map(told), x: balls.map((p) => p[0]), y: balls.map((p) => p[1]),
-      z: balls.map((p) => p[2])});
-    Object.assign(marks.marker, scale, {color: of.map((c) => q && q.values[at.force][c]), showscale: balls.length > 0});
-    for (const trace of [one, marks.marker]) trace.colorbar = {...trace.colorbar, title: {text: q ? q.label : "", side: "right"}};
+    one.colorbar = {...one.colorbar, title: {text: q ? q.label : "", side: "right"}};
   }
 
   function contact(one) {
-    const [pressed, lines, arrows, tips, limit] = div.data.slice(3);
+    const [pressed, lines, arrows, tips, limit] = div.data.slice(2);
     const steps = new Int16Array(bytes(one && one.faces || "")), a = Float32Array.from(steps, (v) => v * one.step);
     const p = floats(one && one.pressure), i = [], j = [], k = [], value = [];
     p.forEach((v, f) => { i.push(4 * f, 4 * f); j.push(4 * f + 1, 4 * f + 2); k.push(4 * f + 2, 4 * f + 3); value.push(v, v); });
@@ -109,8 +105,11 @@ function object3d(div, all) {
   choice.addEventListener("change", () => { at.quantity = choice.value; paint(); });
   force.addEventListener("input", () => { at.force = +force.value; paint(); });
   div.on("plotly_click", (event) => {
-    const p = event.points[0], of = p.curveNumber === 2 ? all.marks.owner : owner;
-    if (p.curveNumber < 3 && of[p.pointNumber] >= 0) { at.candidate = of[p.pointNumber]; paint(); }
+    const p = event.points[0], of = owner[p.pointNumber];
+    if (p.curveNumber < 2 && of >= 0) { at.candidate = of; paint(); }
   });
+  // the bars at the left keep clear of the object on a narrow screen, too
+  const {domain} = div.layout.scene, high = domain && domain.x ? domain.x[1] : 1;
+  div.layout.scene.domain = {...domain, x: [Math.min(0.3 * high, 75 / div.clientWidth), high]};
   return paint();
 }

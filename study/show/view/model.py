@@ -5,6 +5,7 @@ Positions are in m in the object's frame unless a unit is named.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cached_property
 from typing import Any
 
@@ -21,7 +22,7 @@ from softjaw.study.ranking import nearest
 from softjaw.study.result.read import axes_of, read_field, read_patch
 from softjaw.study.scene import SceneError, parse_scene
 from softjaw.study.show.grasps import Index, at, candidate_of, field, forces, number, order, place, quantity, unravelled
-from softjaw.study.show.object_surface import NOBODY, Surface, moved, on_wall, scene_at, surface_of, undeformed
+from softjaw.study.show.object_surface import NOBODY, Foot, Surface, moved, on_wall, scene_at, surface_of, undeformed
 from softjaw.study.show.stored_surface import body, stored_surface, weaker
 from softjaw.study.show.view.pads import Faces, Pad, pads_of
 
@@ -105,7 +106,7 @@ class View:
             self.note = "the object is not drawn: this version cannot read the scene in the file"
             return nothing
         try:
-            points, corners, candidate = surface_of(self.scene, axes_of(self.ds))
+            points, corners, candidate = surface_of(self.scene, axes_of(self.ds), self._feet())
         except (ValueError, OSError) as error:
             self.note = f"the object is not drawn: {error}"
             return nothing
@@ -120,17 +121,18 @@ class View:
         owners[self.surface.triangles] = self.surface.candidate[:, None]
         return owners
 
-    @cached_property
-    def marks(self) -> tuple[np.ndarray, np.ndarray]:
-        """Where the fingers of explicit poses first touch ``(k, 3)``, and the candidate of each ``(k,)``."""
-        origin = field(self.ds, "finger_pose_origin") if self.ds.attrs["poses"] else None
-        if origin is None:
-            return np.empty((0, 3)), np.empty(0, int)
-        known = origin[self.point].reshape(self.candidates, -1, *origin.shape[-2:])
-        solved = np.isfinite(known).all(axis=(2, 3))
-        of = np.flatnonzero(solved.any(axis=1))
-        first = known[of, solved[of].argmax(axis=1)].reshape(-1, 3)
-        return self.placed.to_pad(first), np.repeat(of, origin.shape[-2])
+    def _feet(self) -> Iterator[Foot]:
+        """Pads of explicit poses at the force that is nearest to the one shown, the best grasp first."""
+        names, seen = ("finger_pose_rotation", "finger_pose_origin", "finger_closing"), set[int]()
+        if not self.ds.attrs["poses"] or any(name not in self.ds for name in names):
+            return
+        level = self.ds.attrs["level"]
+        for k in sorted(range(len(forces(self.ds))), key=lambda k: abs(k - level)):
+            here = (i for i in order(self.ds, k) if i[:-3] == self.point)
+            for i in (i for i in here if self.candidate(i) not in seen):
+                seen.add(self.candidate(i))
+                for R, x, closing in zip(*(self.ds[name].values[i] for name in names), strict=True):
+                    yield Foot(self.candidate(i), Pose(self.placed.rotation.T @ R, self.placed.to_pad(x)), closing)
 
     @cached_property
     def wall(self) -> np.ndarray | None:
@@ -214,7 +216,7 @@ class View:
         """What colours and marks of the picture of a case mean."""
         marks = "light grey: no candidate there, or no grasp"
         if self.ds.attrs["poses"]:
-            marks = "balls: where the fingers first touch"
+            marks = "colours: where the pads of a grasp bear, of the better one where two overlap"
         wall = ["the wall is deformed as computed, not exaggerated"] * (self.displacement(index) is not None)
         return [f"blue: friction of the pads' faces against {SLIPS[motion]}", marks, "dark grey: failed",
                 "grey: not computed", *wall, *[self.note] * bool(self.note)]  # fmt: skip

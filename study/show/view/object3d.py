@@ -20,7 +20,7 @@ from softjaw.study.result.layout import DONE
 from softjaw.study.show import plots
 from softjaw.study.show.grasps import Index, field, forces, label_of, note, order, place
 from softjaw.study.show.stored_surface import NAMES
-from softjaw.study.show.view.model import ARROW_MM, CROSSED, FORCE, NEUTRAL, OPEN, PAD, View
+from softjaw.study.show.view.model import ARROW_MM, CROSSED, FORCE, NEUTRAL, OPEN, View
 
 MOST = 24_000_000  # bytes of pads, walls and limit surfaces; beyond it, those of the worst grasps are left out
 CHOICES = ("quality", "quality_fitted", "e_n", "epsilon", "f_x_max", "f_y_max", "tau_z_max", "safety_factor", "F_N",
@@ -34,7 +34,7 @@ def object_block(
 
     ``whole`` adds the limit surface of the weaker finger.
     """
-    if not len(view.surface.points) and not len(view.marks[0]):
+    if not len(view.surface.points):
         return None
     content, left_out = payload(view, index, quantity, cases, motion, whole)
     made = go.Figure([*_traces(whole)])
@@ -74,7 +74,6 @@ def payload(
     levels = range(len(forces(ds)))
     every = {f"{k} {c}": view.index(c, k) for k in levels for c in range(view.candidates)}
     surface, wall = view.surface, view.wall
-    where, of = view.marks
     content = {
         "start": {"force": index[-1], "candidate": view.candidate(index), "quantity": quantity},
         "forces": forces(ds).tolist(),
@@ -87,7 +86,6 @@ def payload(
         "points": _packed(1e3 * surface.points, "<f4"),
         "triangles": _packed(surface.triangles, "<i4"),
         "owner": _packed(view.owner, "<i4"),
-        "marks": {"points": (1e3 * where).round(4).tolist(), "owner": of.tolist()},
         "grid": [AROUND, ALONG],
         "around": "" if wall is None else _packed(np.nan_to_num(wall[:, 0], nan=-1e9), "<f4"),
         "along": "" if wall is None else _packed(np.nan_to_num(wall[:, 1]), "<f4"),
@@ -135,17 +133,16 @@ def _choice(view: View, name: str) -> dict[str, Any]:
 
 
 def _traces(whole: bool) -> list[Any]:
-    """Empty traces in the script's order: object, rest, marks, pressure, lines, arrows, tips, limit surface."""
-    soft = {"lighting": {"ambient": 0.65, "diffuse": 0.5, "specular": 0.02, "roughness": 0.9}, "flatshading": False}
+    """Empty traces in the script's order: object, rest, pressure, lines, arrows, tips, limit surface."""
+    soft = {"lighting": {"ambient": 0.8, "diffuse": 0.3, "specular": 0.02, "roughness": 0.9}, "flatshading": False}
     bar = plots.bars("", len=0.5, y=0.76, x=0.0)
     low = plots.bars("contact pressure [kPa]", len=0.5, y=0.24, x=0.0)
     made = [
         go.Mesh3d(intensitymode="cell", hoverinfo="text", colorbar=bar, **soft),
         go.Mesh3d(hoverinfo="text", **soft),
-        go.Scatter3d(mode="markers", hoverinfo="text", marker={"size": 9, "colorbar": bar}),
         go.Mesh3d(intensitymode="cell", hoverinfo="skip", colorbar=low, colorscale=plots.colours("pressure"),
                   **plots.FLAT),
-        go.Scatter3d(mode="lines", hoverinfo="skip", line={"color": PAD, "width": 4}),
+        go.Scatter3d(mode="lines", hoverinfo="skip", line={"color": plots.INK, "width": 5}),
         go.Scatter3d(mode="lines", hoverinfo="skip", line={"color": FORCE, "width": 4}),
         go.Scatter3d(mode="markers", hoverinfo="skip", marker={"color": FORCE, "size": 2.5}),
     ]  # fmt: skip

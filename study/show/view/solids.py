@@ -68,10 +68,6 @@ def _object(plotter: Any, view: View, index: Index, quantity: str) -> None:
             surface(plotter, x, corners[chosen], color=colour)
     if known.any():
         surface(plotter, x, corners[known], values[cell[known]], **colours)
-    places, owner = view.marks
-    if len(places):
-        # radius of the balls where fingers of explicit poses touch [mm]
-        dots(plotter, 1e3 * places, 4.0, values[owner], **colours)
 
 
 def _pads(plotter: Any, view: View, index: Index, motion: str) -> None:
@@ -166,16 +162,6 @@ def arrows(plotter: Any, ends: np.ndarray, **look: Any) -> None:
         shape = pv.Arrow(tip_length=0.35, tip_radius=0.14, shaft_radius=0.06, tip_resolution=10, shaft_resolution=8)
         glyphs = cloud.glyph(orient="vector", scale="vector", geom=shape)
         plotter.add_mesh(glyphs, color=FORCE, lighting=False, **look)
-
-
-def dots(plotter: Any, places: np.ndarray, radius: float, values: Any = None, **look: Any) -> None:
-    """Balls at ``places (n, 3)``, of one colour or in those of values."""
-    cloud = pv.PolyData(places)
-    if values is not None:
-        cloud["value"] = values
-        look = {"scalars": "value", "nan_color": NEUTRAL, **look}
-    ball = pv.Sphere(radius=radius, theta_resolution=12, phi_resolution=12)
-    plotter.add_mesh(cloud.glyph(geom=ball, scale=False, orient=False), **{**LIGHT, **look})
 
 
 def labels(plotter: Any, places: np.ndarray, texts: list[str], size: int = 34, **look: Any) -> None:
