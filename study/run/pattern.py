@@ -16,17 +16,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.friction.patch import NoContactError
+from softjaw.study.case.bed import JawsOnSurface, held
 from softjaw.study.case.build import build_object, own_frame, shapes_of, surface_triangles
 from softjaw.study.case.fit import jaws_of
 from softjaw.study.case.poses import STANDOFF, explicit_poses
 from softjaw.study.case.result import UNDECIDED
+from softjaw.study.case.sampler import lids_of
+from softjaw.study.case.task import task_of
 from softjaw.study.quantities import NO_GRASP
+from softjaw.study.ranking import largest
+from softjaw.study.run.refine import Place, gained, next_stations, scores_of_poses, with_places
 from softjaw.study.scene import Scene
 from softjaw.study.scene.grasps import GraspPose
 
 FloatArray = NDArray[np.float64]
 Frame = tuple[FloatArray, FloatArray]  # a point [m]; long side, short side and approach as columns
-Place = tuple[float, ...]  # share of the first step, then point [mm], approach and long side, as a scene gives them
 FIRST_STEP_SHARE = 0.25  # first step of a shift, of the pad's side
 ROLL, TILT = math.radians(15.0), math.radians(5.0)  # first steps of a turn about the approach and of a tilt of it
 FINEST_STEP_SHARE = 1 / 8  # of the first step: 1.6 mm along a pad of 50 mm, 0.6 degrees of tilt
@@ -34,31 +38,20 @@ SAME_POSE_STEPS = 0.5  # of a step, within which two poses are one
 POSES_PER_ROUND = 4  # poses of a round: few, so that the next ones start from the better of them
 
 
-def with_places(poses: Sequence[GraspPose], rounds: Sequence[Sequence[Place]]) -> tuple[GraspPose, ...]:
-    """The poses of a scene, then those that rounds added, which are named by round and place."""
-    made = [
-        (GraspPose(point_mm=x[1:4], approach=x[4:7], long_side=x[7:10]), f"round {r}")  # type: ignore[arg-type]
-        for r, added in enumerate(rounds, start=1)
-        for x in added
-    ]
-    return (*poses, *(pose.model_copy(update={"label": f"{name}: {pose.place}"}) for pose, name in made))
-
-
 def best_places(values: FloatArray) -> list[int]:
     """Numbers of the best poses, each once; ``values (poses, columns)`` with NaN where a grasp cannot be used."""
-    from softjaw.study.ranking import largest  # loads xarray, which answers about a run do without
-
     known = [column for column in values.T if np.nanmax(column, initial=0.0) > 0.0]
     return list(dict.fromkeys(largest(column) for column in known))
 
 
-def gained(values: FloatArray, before: int) -> float:
-    """By which share the poses after the first ``before`` are better than those, in the column where that is most."""
-    if before >= len(values):
-        return 0.0
-    old, new = (np.fmax.reduce(part, axis=0, initial=0.0) for part in (values[:before], values[before:]))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return max(0.0, float(np.nan_to_num(new / old - 1.0, nan=0.0, posinf=np.inf).max(initial=0.0)))
+def next_round(result: Any, scene: Scene, each: int) -> tuple[Any, ...]:
+    """What the next round solves; nothing where the best is known well enough or the budget is spent.
+
+    ``each`` is the number of cases that are solved at a station, or of a pose.
+    """
+    if scene.candidates.poses:
+        return next_poses(result, scores_of_poses(result), scene, each)
+    return next_stations(result, scene, each)
 
 
 def next_poses(result: Any, values: FloatArray, scene: Scene, each: int) -> tuple[Place, ...]:
@@ -93,10 +86,6 @@ def next_poses(result: Any, values: FloatArray, scene: Scene, each: int) -> tupl
 
 def _neighbours(scene: Scene, rounds: Any, values: FloatArray, share: float) -> list[Place]:
     """Neighbours of the best grasps that are not known yet, those first that a bed of springs finds the better."""
-    from softjaw.study.case.bed import JawsOnSurface, held  # compiled loops, which a plan is made without
-    from softjaw.study.case.sampler import lids_of
-    from softjaw.study.case.task import task_of
-
     shape, jaws = shapes_of(scene)[0], jaws_of(scene)
     placed, surface, obj = own_frame(shape), surface_triangles(shape), build_object(shape)
     lids, task = lids_of(obj), task_of(scene, obj)

@@ -86,13 +86,8 @@ class Plan:
         return sum(len(unit.rows) for unit in self.units)
 
 
-def make_plan(
-    scene: Any, scene_file: str = "", overrides: Sequence[str] = (), ordered: bool = False, rounds: Rounds = ()
-) -> Plan:
-    """The plan of a scene, with what ``rounds`` of refinement added; builds its objects.
-
-    ``ordered`` marks units that come last.
-    """
+def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = (), rounds: Rounds = ()) -> Plan:
+    """The plan of a scene, with what ``rounds`` of refinement added; builds its objects."""
     # First, because all that follows builds the object and would fail less clearly.
     check_object(scene)
     digest, text = scene.digest, scene.effective_toml()
@@ -103,10 +98,6 @@ def make_plan(
     axes = tuple(grasps.axes(scene))
     placed = own_frame(scene.object)
     units: Sequence[Any] = decided(grasps.units(scene, lambda point: point.axis_symmetry))
-    if ordered:
-        from softjaw.study.case.promise import hopeless_marked  # compiled loops, which scenes are planned without
-
-        units = hopeless_marked(units)
     if scene.candidates.sampled and forces_apart(scene):
         units = [_with_meshes(unit, scene, rounds) for unit in units]
     header = Header(

@@ -19,11 +19,12 @@ from softjaw.study.case.result import UNDECIDED
 from softjaw.study.flags import LOST
 from softjaw.study.quantities import DONE, MISSING
 from softjaw.study.result.layout import is_case
-from softjaw.study.run.pattern import gained, next_poses, with_places
 from softjaw.study.scene import Scene
+from softjaw.study.scene.grasps import GraspPose
 
 FloatArray = NDArray[np.float64]
 Rounds = tuple[tuple[Any, ...], ...]  # as `study.result.layout.Layout.rounds`
+Place = tuple[float, ...]  # share of the first step, then point [mm], approach and long side, as a scene gives them
 STEEPER_SLOPE = 1.5  # how much steeper a score may be than its slopes between stations show
 FINEST_SPACING_SHARE = 1 / 64  # of the scene's mean distance of stations; nearer ones would only follow a jump
 
@@ -44,6 +45,16 @@ def refined(scene: Scene, rounds: Rounds) -> Scene:
         samples = _renumbered(where.numbers(names), given, stations, len(where.angles_deg))
         parts["limit_surface"] = scene.limit_surface.model_copy(update={"wrench_samples": samples})
     return scene.model_copy(update=parts)
+
+
+def with_places(poses: Sequence[GraspPose], rounds: Sequence[Sequence[Place]]) -> tuple[GraspPose, ...]:
+    """The poses of a scene, then those that rounds added, which are named by round and place."""
+    made = [
+        (GraspPose(point_mm=x[1:4], approach=x[4:7], long_side=x[7:10]), f"round {r}")  # type: ignore[arg-type]
+        for r, added in enumerate(rounds, start=1)
+        for x in added
+    ]
+    return (*poses, *(pose.model_copy(update={"label": f"{name}: {pose.place}"}) for pose, name in made))
 
 
 def _renumbered(
@@ -105,7 +116,7 @@ def _scores(result: Any) -> tuple[FloatArray, NDArray[np.bool_]]:
     return values, np.isfinite(values) & (flags & LOST == 0)
 
 
-def _of_poses(result: Any) -> FloatArray:
+def scores_of_poses(result: Any) -> FloatArray:
     """The same of every pose at every force and point of the sweep, NaN where a grasp cannot be used."""
     values, sound = _scores(result)
     return np.moveaxis(np.where(sound, values, np.nan), 1, 0).reshape(values.shape[1], -1)
@@ -116,6 +127,15 @@ def _cases(result: Any, values: np.ndarray) -> np.ndarray:
     return values.reshape(-1, *result.layout.shape[-3:])
 
 
+def gained(values: FloatArray, before: int) -> float:
+    """By which share the poses after the first ``before`` are better than those, in the column where that is most."""
+    if before >= len(values):
+        return 0.0
+    old, new = (np.fmax.reduce(part, axis=0, initial=0.0) for part in (values[:before], values[before:]))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return max(0.0, float(np.nan_to_num(new / old - 1.0, nan=0.0, posinf=np.inf).max(initial=0.0)))
+
+
 def added_cases(units: Sequence[Any], layout: Any) -> int:
     """Cases that are solved at each station of a plan; images by symmetry lie at the station of what is solved.
 
@@ -124,16 +144,6 @@ def added_cases(units: Sequence[Any], layout: Any) -> int:
     if not layout.axes[-3].units:
         return int(layout.rows // layout.shape[-3])
     return len(units) * layout.shape[-1] // layout.shape[-3]
-
-
-def next_round(result: Any, scene: Scene, each: int) -> tuple[Any, ...]:
-    """What the next round solves; nothing where the best is known well enough or the budget is spent.
-
-    ``each`` is the number of cases that are solved at a station, or of a pose.
-    """
-    if scene.candidates.poses:
-        return next_poses(result, _of_poses(result), scene, each)
-    return next_stations(result, scene, each)
 
 
 def next_stations(result: Any, scene: Scene, each: int) -> tuple[float, ...]:
@@ -177,7 +187,7 @@ def about(result: Any) -> str:
     if (result.status == MISSING).any():
         return f"{text}, the last of which is not complete"
     if what == "poses":
-        by = gained(_of_poses(result), stations - count)
+        by = gained(scores_of_poses(result), stations - count)
         return f"{text}, the last by {rounds[-1][0][0]:g} of the first step; the best gained {by:.1%} at most"
     chance = float(chances_in(result).max(initial=0.0))
     known = f"; between them the best may be beaten by {chance:.1%} at most, judged by the slopes beside"

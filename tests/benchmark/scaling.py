@@ -12,7 +12,7 @@ import matplotlib as mpl
 import numpy as np
 
 from softjaw.study.result.store import open_result
-from softjaw.study.run.scaling import LoadPath, machine_of, replay
+from softjaw.study.run.scaling import row_writes, scaled
 
 RANKS = [4**k for k in range(7)]
 CASES = (10**3, 10**4, 10**5, 10**6)
@@ -24,14 +24,14 @@ def main(result: Path, figure: Path) -> None:
     from matplotlib import pyplot as plt
 
     with open_result(result) as file:
-        seconds, machine = file.read("work/seconds_total").ravel(), machine_of(file.layout)
+        seconds, (write, service, _) = file.read("work/seconds_total").ravel(), row_writes(file.layout)
     seconds = np.sort(seconds[np.isfinite(seconds)])[::-1]
     _, axes = plt.subplots(figsize=(6, 4))
     for cases in CASES:
-        # beyond 10^5 cases all that counts is a sum: the replay of each tenth of them takes a tenth of the time
+        # beyond 10^5 cases all that counts is a sum: a tenth of them takes a tenth of the time
         part = max(cases // 10**5, 1)
-        paths = [LoadPath((float(t),), 1.0) for t in np.resize(seconds, cases // part)]
-        times = [part * replay(paths, ranks, machine).seconds for ranks in RANKS]
+        some = np.resize(seconds, cases // part)
+        times = [part * scaled(some, np.ones(len(some)), ranks, write, service)[0] for ranks in RANKS]
         print(f"{cases:>8} cases", *(f"{t:12.0f} s" for t in times))
         axes.loglog(RANKS, times, "o-", label=f"{cases:,} cases")
     axes.set(xlabel="ranks", ylabel="time [s]", title=f"{seconds.mean():.2g} s a case, one file")

@@ -18,7 +18,7 @@ from softjaw.study.run.estimate import CASE, ELEMENT, FACE_GRID, FIRST_FORCE_FAC
 from softjaw.study.run.load_path import settle
 from softjaw.study.run.plan import Plan, make_plan, makespan, sensible_ranks, unit_seconds
 from softjaw.study.run.progress import Progress
-from softjaw.study.run.scaling import LoadPath, Machine, replay, replayed
+from softjaw.study.run.scaling import scaled
 from softjaw.study.run.shares import by_cost, shares
 from softjaw.study.scene import load_scene
 from tests.study.launching import ROOT
@@ -162,28 +162,14 @@ def test_times_of_unsolved_units_follow_from_their_cost():
     assert unit_seconds(plan, np.full(6, np.nan)) == []
 
 
-def test_a_replay_without_delays_takes_what_list_scheduling_takes():
-    random = np.random.default_rng(2)
-    paths = [LoadPath(tuple(own), own.sum()) for own in random.random((50, 4))]
-    for ranks in (1, 3, 16, 70):
-        expected = makespan([own.cost for own in paths], ranks)
-        assert replayed(paths, ranks, Machine(100, 0.0, 0.0, 0.0)) == pytest.approx(expected, rel=1e-12)
-
-
-def test_a_replay_finds_each_limit_where_its_closed_form_is():
-    """64 load paths of four seconds on 64 ranks: 4 s, and what the counter or the file system adds to that."""
-    paths = [LoadPath((1.0,) * 4, 4.0)] * 64
-    assert replay(paths, 64, Machine(64, 0.0, 0.0, 0.0)).efficiency == 1.0
-    slow_counter = replay(paths, 64, Machine(64, 0.5, 0.0, 0.0))
-    assert (slow_counter.seconds, slow_counter.limit) == (64 * 0.5 + 4, "counter")
-    slow_files = replay(paths, 64, Machine(64, 0.0, 0.1, 0.1))  # 256 cases, one after another, after the first second
-    assert (slow_files.seconds, slow_files.limit) == (pytest.approx(1 + 256 * 0.1), "file system")
-    too_many = replay(paths, 128, Machine(64, 0.0, 0.0, 0.0))
-    assert (too_many.seconds, too_many.efficiency, too_many.limit) == (4.0, 0.5, "longest load path")
-    uneven = replay(paths, 60, Machine(60, 0.0, 0.0, 0.0))
-    assert (uneven.seconds, uneven.limit) == (8.0, "division of load paths")
-    # three nodes get every third ladder: 22, 21 and 21 of them for 20 ranks each
-    assert replayed(paths, 60, Machine(20, 0.0, 0.0, 0.0)) == 8.0
+def test_each_limit_of_many_ranks_is_found_where_its_closed_form_is():
+    """64 load paths of four seconds and four rows."""
+    seconds, served = [4.0] * 64, [4] * 64
+    assert scaled(seconds, served, 64, 0.0, 0.0) == (4.0, "-")
+    assert scaled(seconds, served, 64, 0.5, 0.0) == (6.0, "-")
+    assert scaled(seconds, served, 64, 0.1, 0.1) == (pytest.approx(256 * 0.1), "file system")
+    assert scaled(seconds, served, 128, 0.0, 0.0) == (4.0, "longest load path")
+    assert scaled(seconds, served, 60, 0.0, 0.0) == (8.0, "division of load paths")
 
 
 def test_a_case_that_an_earlier_run_left_out_is_missing_once_it_is_asked_for():

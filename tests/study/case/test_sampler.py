@@ -10,9 +10,9 @@ from softjaw.study.case.bed import CRUSHED, GRID, JawsOnSurface, height_fields, 
 from softjaw.study.case.fit import Jaws, fit_of
 from softjaw.study.case.sampler import antipodal_grasps, axes_of, same_grasp, with_sampled_grasps
 from softjaw.study.case.task import Task
+from softjaw.study.launch import ordered_plan
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.quantities import COLLIDES, MISSING, WIDE
-from softjaw.study.run.plan import make_plan
 from softjaw.study.run.shares import shares
 from softjaw.study.scene import SceneError, parse_scene
 from softjaw.study.units import GRAVITY
@@ -211,7 +211,7 @@ def test_a_contact_that_slips_comes_last():
     poses = "".join(pose_of((0, y, 0)) for y in (22, 0))
     for mu, first in ((3.0, 0), (0.3, 1)):
         changes = "gripper.pad_length_mm=20", f"friction.mu={mu}", "object.length_mm=100"
-        units = make_plan(scene_of(ROUND, *changes, where=f"{poses}\n", forces="[1, 2]"), ordered=True).units
+        units = ordered_plan(scene_of(ROUND, *changes, where=f"{poses}\n", forces="[1, 2]"), "", ()).units
         assert [u.state for u in units] == [MISSING] * 2
         assert [u.hopeless for u in units] == [first == 1, False]
         assert shares(units, np.full(100, MISSING), 1)[0].unit.index == first
