@@ -12,7 +12,7 @@ from mpi4py import MPI
 from softjaw.study import pipeline
 from softjaw.study.case.build import told
 from softjaw.study.case.candidates import with_sampled_grasps
-from softjaw.study.case.model import check_petsc, check_poses
+from softjaw.study.case.model import check_petsc
 from softjaw.study.case.promise import hopeless_marked
 from softjaw.study.result import derived
 from softjaw.study.result.read import dataset
@@ -83,7 +83,6 @@ def solve_objects(folder: ObjectFolder, out: Path, comm: Any, *, retry_failed: b
     def study(scene: Scene, overrides: tuple[str, ...]) -> tuple[Any, Work, Growth]:
         scene = with_sampled_grasps(scene)
         plan = ordered_plan(scene, folder.scene_file, overrides)
-        check_poses(scene, [unit.scene for unit in plan.units])
         return plan, work(scene), _growth(scene, plan, MPI.COMM_SELF)
 
     common = on_rank0(comm, folder.check)
@@ -114,7 +113,6 @@ def prepare(scene: Scene, scene_file: str, overrides: Sequence[str]) -> Any:
     # A wrong option would fail every case alike, after hours of a large study.
     check_petsc(dict(scene.petsc))
     plan = ordered_plan(scene, scene_file, overrides)
-    check_poses(scene, [unit.scene for unit in plan.units])
     for line in told(scene):
         print(line, flush=True)
     return plan

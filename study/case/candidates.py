@@ -23,16 +23,19 @@ from softjaw.study.case.build import (
     middle_of,
     own_frame,
     pad_shape,
+    shapes_of,
     surface_triangles,
     with_mass,
 )
-from softjaw.study.case.fit import doubt, fit_of, jaws_of
+from softjaw.study.case.fit import doubt, extremes, fit_of, jaws_of
 from softjaw.study.case.poses import axis_poses, explicit_poses, moved, turn_of_pose
+from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.quantities import MISSING, REALISATION, Axis
 from softjaw.study.scene import Scene
 from softjaw.study.units import UNITS, in_si, split_unit
 
 FloatArray = NDArray[np.float64]
+MOST_NAMED = 5  # poses that a message names
 
 
 @dataclass(frozen=True)
@@ -70,6 +73,32 @@ def candidates(scene: Scene) -> list[Candidate]:
         )
         for (station, angle), label in zip(places, where.labels, strict=True)
     ]  # fmt: skip
+
+
+def check_poses(scene: Scene) -> None:
+    """Refuse explicit poses whose pads pass the object.
+
+    Raises
+    ------
+    StudyError
+        With the numbers and labels of the poses.
+    """
+    if not scene.candidates.poses or scene.object.shape == "plane":  # which has no end
+        return
+    missed: dict[int, str] = {}
+    for shape in shapes_of(scene):
+        points, triangles = surface_triangles(shape)
+        length, width = (side + 2.0 * doubt(points) for side in scene.gripper.pad_size[:2])
+        for number, place in enumerate(candidates(scene)):
+            pose = place.poses[0]  # finger 2 comes along the same line
+            low, _ = extremes((points - pose.origin) @ pose.rotation, triangles, (length, width))
+            if not math.isfinite(low):
+                missed[number] = f"candidates.poses[{number}]: found '{place.label}', where the pads miss the object"
+    if missed:
+        lines = [*missed.values()][:MOST_NAMED]
+        lines += [f"{len(missed) - MOST_NAMED} more poses miss it"] if len(missed) > MOST_NAMED else []
+        remedy = "expected lines of approach that meet it; point_mm is in mm, in the frame of the object's own file"
+        raise StudyError(USAGE, "\n".join([*lines, remedy]))
 
 
 def turn_between(first: Candidate, second: Candidate, axis_symmetry: int) -> float | None:

@@ -11,15 +11,14 @@ from numpy.typing import NDArray
 
 from softjaw.fem.contact.press import Press
 from softjaw.fem.materials import Material, material
-from softjaw.fem.objects.gap import GapFunction, GapObject, NoContactError, Pose, first_touch
+from softjaw.fem.objects.gap import GapFunction, GapObject, Pose, first_touch
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.fem.pad.backing_plate import relative_compliance
 from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.pad.shape import BackingPlate, TiltingMount
 from softjaw.fem.petsc import PETSc, unknown_options
 from softjaw.friction.patch import NEGLIGIBLE
-from softjaw.study.case.build import build_object, pad_shape
-from softjaw.study.case.candidates import candidates
+from softjaw.study.case.build import pad_shape
 from softjaw.study.case.fit import extremes
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.scene import Scene
@@ -27,7 +26,6 @@ from softjaw.study.scene.sections import Gripper
 
 FloatArray = NDArray[np.float64]
 MIRRORED = 2e-5  # of the pad's length, to which images agree: files are of single precision, e_n moves by less
-MOST_TRIED, MOST_NAMED = 1000, 5  # pads brought to the object beforehand (the others fail as cases), and sentences
 STEPS_BACK = (0.1, 0.4, 1.6)  # of the pad's thickness: where it stands before it is brought to the smooth surface
 ROUNDED_OFF = 2e-5  # so far a smooth surface may lie behind the triangles it is made of where a pad touches first [m]
 PLATE_POISSON = 0.3  # of the backing plate; the modulus is what a scene gives
@@ -217,54 +215,6 @@ def press_of(scene: Scene, finger: Finger, coarser: bool, stride: int = 1) -> Pr
     wanted, *others = (pad_of(scene, symmetry, rule, coarser) for rule in contact_rules(scene, walled=False))
     mu = scene.friction.mu if scene.effects.friction_pressure_coupling == "tangential" else None
     return Press(wanted, finger.gap, dict(scene.petsc), others, mu, stride=stride)
-
-
-def check_poses(scene: Scene, points: list[Scene]) -> None:
-    """Refuse explicit poses of which a pad passes the object; stations lie on the object anyway.
-
-    Parameters
-    ----------
-    scene : Scene
-        The scene as it stands in the file.
-    points : list of Scene
-        The scenes of all points of the sweep.
-
-    Raises
-    ------
-    StudyError
-        With the labels of the poses.
-    """
-    if not scene.candidates.poses:
-        return
-    places = candidates(scene)[: MOST_TRIED // 2]
-    missed: dict[int, str] = {}
-    tried = 0
-    # Only object and pad decide whether a pad passes, so points that share both are tried once.
-    for shape, size in dict.fromkeys((point.object, point.gripper.pad_size) for point in points):
-        obj = build_object(shape)
-        for number, place in enumerate(places):
-            if number not in missed and tried < MOST_TRIED:
-                tried += 2
-                passing = [k + 1 for k, pose in enumerate(place.poses) if _passes(obj, pose, size)]
-                if passing:
-                    missed[number] = f"finger {passing[0]} misses" if len(passing) == 1 else "both fingers miss"
-    if missed:
-        lines = [
-            f"candidates.poses[{i}]: found '{places[i].label}', where {who} the object; expected a line of"
-            " approach on which both pads meet it; change point_mm (in mm, in the frame of the object's own file) or"
-            " approach"
-            for i, who in list(missed.items())[:MOST_NAMED]
-        ]
-        more = [f"and {len(missed) - MOST_NAMED} more poses miss the object"] if len(missed) > MOST_NAMED else []
-        raise StudyError(USAGE, "\n".join(lines + more))
-
-
-def _passes(obj: GapObject, pose: Pose, size: tuple[float, float, float]) -> bool:
-    try:
-        touching(obj, pose, size)
-    except NoContactError:
-        return True
-    return False
 
 
 def check_petsc(wanted: dict[str, Any]) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from softjaw.study.case.build import build_object, check_object, geometry, mesh_notes, told
-from softjaw.study.case.candidates import with_sampled_grasps
+from softjaw.study.case.candidates import check_poses, with_sampled_grasps
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.run.object_folder import ObjectFolder, folder_of
 from softjaw.study.run.plan import make_plan, plan_text
@@ -56,6 +56,7 @@ def check(options: Namespace) -> str:
     """Find every error of a scene, or say what would be run."""
     scene = with_sampled_grasps(scene_of(options))
     check_object(scene)
+    check_poses(scene)
     return hanging(scene_text(scene, options.scene), terminal_width())
 
 

@@ -90,6 +90,7 @@ def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = (), r
     """The plan of a scene, with what ``rounds`` of refinement added; builds its objects."""
     # First, because all that follows builds the object and would fail less clearly.
     check_object(scene)
+    grasps.check_poses(scene)
     digest, text = scene.digest, scene.effective_toml()
     if rounds:
         scene = refined(scene, rounds)

@@ -57,18 +57,6 @@ class GraspPose(SceneSection):
         if max(map(abs, self.point_mm)) > LARGEST_MM:
             yield wrong(self.point_mm, f"a point within {LARGEST_MM:g} mm of the origin, in mm", "point_mm")
 
-    def clearance_mm(self, spans: dict[str, Span], gripper: Gripper) -> float:
-        """Distance at which a pad passes the box round the object along one of its sides [mm]; <= 0 where it meets."""
-        width = _cross(self.approach, self.long_side)
-        length = _cross(width, self.approach)
-        passing = []
-        for side, size in ((length, gripper.pad_length_mm), (width, gripper.pad_width_mm)):
-            axis = dict(zip("xyz", _unit(side), strict=True))
-            point = dict(zip("xyz", self.point_mm, strict=True))
-            off = sum((point[k] - sum(spans[k]) / 2) * axis[k] for k in "xyz")
-            passing.append(abs(off) - size / 2 - sum((spans[k][1] - spans[k][0]) / 2 * abs(axis[k]) for k in "xyz"))
-        return max(passing)
-
 
 def _budget(given: Any) -> Any:
     """The default number of cases for true, none for false."""
@@ -163,14 +151,6 @@ class Candidates(SceneSection):
             if abs(math.cos(math.radians(angle))) < 0.5:
                 yield wrong(angle, "angles within 60 of 0 or 180: the two planes face x", "angles_deg")
 
-    def pose_rules(self, shape: Shape, gripper: Gripper) -> Errors:
-        """Pads that pass the box round the object miss the object too; those within it are tried when a run starts."""
-        for i, pose in enumerate(self.poses if len(shape.spans_mm) == 3 else ()):
-            if (distance := pose.clearance_mm(shape.spans_mm, gripper)) > 0:
-                label = f" of '{pose.label}'" if pose.label else ""
-                expected = f"a pad{label} that touches the object; it misses by {distance:.3g} mm"
-                yield wrong(pose.point_mm, f"{expected} (in mm, in the frame of the shape)", "poses", i, "point_mm")
-
     def name_rules(self, key: str, wanted: Any) -> Errors:
         """Numbers and labels that no candidate has, in another section's list ``key`` of candidates."""
         labels = self.labels
@@ -215,7 +195,3 @@ def _listed(places: Sequence[float]) -> str:
 
 def _unit(vector: Sequence[float]) -> tuple[float, ...]:
     return tuple(v / math.hypot(*vector) for v in vector)
-
-
-def _cross(a: Sequence[float], b: Sequence[float]) -> tuple[float, float, float]:
-    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])

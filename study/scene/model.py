@@ -69,7 +69,7 @@ JOINT: dict[str, tuple[tuple[Rule, tuple[str, ...]], ...]] = {
     "effects": ((Effects.object_rules, ("object",)),),
     "gripper": ((Gripper.symmetry_rules, ("effects",)), (Gripper.support_rules, ("effects", "accuracy"))),
     "friction": ((Friction.used_rules, ("effects",)),),
-    "candidates": ((Candidates.rules_on, ("object",)), (Candidates.pose_rules, ("object", "gripper"))),
+    "candidates": ((Candidates.rules_on, ("object",)),),
     "limit_surface": (
         (lambda surface, c: c.name_rules("wrench_samples", surface.wrench_samples), ("candidates",)),
     ),

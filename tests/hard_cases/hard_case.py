@@ -13,8 +13,7 @@ import numpy as np
 
 from softjaw.study import pipeline
 from softjaw.study.case.build import build_object, check_object
-from softjaw.study.case.candidates import units
-from softjaw.study.case.model import check_poses
+from softjaw.study.case.candidates import check_poses, units
 from softjaw.study.case.result import CaseFailure, CaseResult
 from softjaw.study.messages import StudyError
 from softjaw.study.quantities import NEEDS, quantities
@@ -221,7 +220,7 @@ def outcome_of(made_scene: Callable[[], Scene], begin_only: bool = False) -> Out
         scene = made_scene()
         check_object(scene)
         made = units(scene, lambda point: build_object(point.object).axis_symmetry)
-        check_poses(scene, [unit.scene for unit in made])
+        check_poses(scene)
     except SceneError as error:
         return Outcome(
             "\n".join(f"{p.key}: found {p.found}, expected {p.expected}; {p.remedy}" for p in error.problems)

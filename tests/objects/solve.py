@@ -24,8 +24,7 @@ from softjaw.fem.objects.gap import Pose
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.study import pipeline
 from softjaw.study.case.build import build_object, check_object
-from softjaw.study.case.candidates import units, with_sampled_grasps
-from softjaw.study.case.model import check_poses
+from softjaw.study.case.candidates import check_poses, units, with_sampled_grasps
 from softjaw.study.case.result import CaseResult
 from softjaw.study.cli import main as softjaw
 from softjaw.study.flags import flags_in
@@ -130,7 +129,7 @@ def solve(outcome: Outcome, seed: int, folder: Path) -> None:
     obj: Any = build_object(scene.object)
     outcome.notes = list(getattr(obj, "notes", ()))
     made = units(scene, lambda _: obj.axis_symmetry)
-    check_poses(scene, [unit.scene for unit in made])
+    check_poses(scene)
     for unit in made:
         forces, results = unit.scene.load.normal_force, []
         outcome.cases += len(forces)
