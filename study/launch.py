@@ -13,14 +13,13 @@ from softjaw.study import pipeline
 from softjaw.study.case.build import told
 from softjaw.study.case.candidates import with_sampled_grasps
 from softjaw.study.case.model import check_petsc
-from softjaw.study.case.promise import hopeless_marked
 from softjaw.study.result import derived
 from softjaw.study.result.read import dataset
 from softjaw.study.run.finer import next_cases
 from softjaw.study.run.object_folder import ObjectFolder
 from softjaw.study.run.objects import run_objects
 from softjaw.study.run.pattern import next_round
-from softjaw.study.run.plan import Plan, make_plan
+from softjaw.study.run.plan import make_plan
 from softjaw.study.run.refine import Rounds, added_cases, refined
 from softjaw.study.run.session import Growth, Work, on_rank0, run_study
 from softjaw.study.scene import Scene
@@ -82,7 +81,7 @@ def solve_objects(folder: ObjectFolder, out: Path, comm: Any, *, retry_failed: b
 
     def study(scene: Scene, overrides: tuple[str, ...]) -> tuple[Any, Work, Growth]:
         scene = with_sampled_grasps(scene)
-        plan = ordered_plan(scene, folder.scene_file, overrides)
+        plan = make_plan(scene, folder.scene_file, overrides)
         return plan, work(scene), _growth(scene, plan, MPI.COMM_SELF)
 
     common = on_rank0(comm, folder.check)
@@ -96,23 +95,17 @@ def _growth(scene: Scene, plan: Any, comm: Any) -> Growth:
     each, about = added_cases(plan.units, plan.layout), (plan.header.scene_file, plan.header.overrides)
 
     def study(rounds: Rounds) -> tuple[Any, Work]:
-        made = on_rank0(comm, ordered_plan, scene, *about, rounds)
+        made = on_rank0(comm, make_plan, scene, *about, rounds)
         return made, work(refined(scene, rounds))
 
     return Growth(study, lambda result: next_round(result, scene, each) or next_cases(result, scene))
-
-
-def ordered_plan(scene: Scene, scene_file: str, overrides: Sequence[str], rounds: Rounds = ()) -> Plan:
-    """The plan of a run, with a mark on the units that come last."""
-    plan = make_plan(scene, scene_file, overrides, rounds)
-    return replace(plan, units=tuple(hopeless_marked(plan.units)))
 
 
 def prepare(scene: Scene, scene_file: str, overrides: Sequence[str]) -> Any:
     """The plan of a run, after everything has been tried that would fail every case alike; by one rank."""
     # A wrong option would fail every case alike, after hours of a large study.
     check_petsc(dict(scene.petsc))
-    plan = ordered_plan(scene, scene_file, overrides)
+    plan = make_plan(scene, scene_file, overrides)
     for line in told(scene):
         print(line, flush=True)
     return plan

@@ -88,12 +88,11 @@ def check_poses(scene: Scene) -> None:
     missed: dict[int, str] = {}
     for shape in shapes_of(scene):
         points, triangles = surface_triangles(shape)
-        length, width = (side + 2.0 * doubt(points) for side in scene.gripper.pad_size[:2])
         for number, place in enumerate(candidates(scene)):
             pose = place.poses[0]  # finger 2 comes along the same line
-            low, _ = extremes((points - pose.origin) @ pose.rotation, triangles, (length, width))
+            low, _ = extremes((points - pose.origin) @ pose.rotation, triangles, scene.gripper.pad_size[:2])
             if not math.isfinite(low):
-                missed[number] = f"candidates.poses[{number}]: found '{place.label}', where the pads miss the object"
+                missed[number] = f"candidates.poses[{number}].point_mm: found '{place.label}', where the pads miss the object"
     if missed:
         lines = [*missed.values()][:MOST_NAMED]
         lines += [f"{len(missed) - MOST_NAMED} more poses miss it"] if len(missed) > MOST_NAMED else []
@@ -184,8 +183,6 @@ class Unit:
         Work, in element solves; only ratios mean something.
     state, reason : int, str
         One of `study.quantities.NO_GRASP` and why, for a candidate that is not solved; else `MISSING`, not computed.
-    hopeless : bool
-        Whether a bed of springs says that it cannot hold, or bears on a pad's rim: it comes last in the order of work.
     finest : tuple of int
         Finest mesh of each force, as `study.case.solver` numbers them; empty where the scene alone says it.
     """
@@ -199,7 +196,6 @@ class Unit:
     cost: float
     state: int = MISSING
     reason: str = ""
-    hopeless: bool = False
     finest: tuple[int, ...] = ()
 
     @property

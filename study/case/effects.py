@@ -175,14 +175,6 @@ def _traction(choice: EffectChoice, k: int) -> float:
     return nan if contacts is None else max(neglected_traction(c.state, c.mu) for c in contacts)
 
 
-def may_bend(scene: Scene) -> bool:
-    """Whether some candidates may be simulated with an elastic backing plate."""
-    if (sheet := wanted_levels(scene)["sheet"]) != "auto":
-        return sheet == "elastic"
-    bound = STIFF_PLATE * (scene.accuracy.target or E_N_TARGET) / E_N_TARGET
-    return not surely_below(plate_compliance(scene.gripper), bound)
-
-
 def dropped_share(wrench: FloatArray, rho: float) -> float:
     """Mean share of a wrench that its three components f_z, tau_x and tau_y make up, of ``wrench (m, 6)``."""
     w = wrench / [1, 1, 1, rho, rho, rho]

@@ -143,20 +143,16 @@ class CandidateSolver:
         Its levels of effects do not count: they are asked for.
     poses : two Pose
         Of the pads before they touch; ``fingers`` are they at first touch.
-    forces : sequence of float, optional
-        The load path: those of the scene, or others [N]; rising. Forces are asked for by their number in it.
     finest : sequence of int
         Finest mesh of each force that ``accuracy.target`` may ask for; `FINEST` where it is empty.
     """
 
-    def __init__(
-        self, scene: Scene, poses: Sequence[Pose], forces: Sequence[float] | None = None, finest: Sequence[int] = ()
-    ) -> None:
+    def __init__(self, scene: Scene, poses: Sequence[Pose], finest: Sequence[int] = ()) -> None:
         self.scene, self.poses, self.walled = scene, poses, has_wall(scene.object)
         self.fingers = [approach(build_object(scene.object), pose, scene.gripper) for pose in poses]
         if self.walled:
             refuse_along_axis(self.fingers)
-        self.forces = tuple(scene.load.normal_force if forces is None else forces)
+        self.forces = tuple(scene.load.normal_force)  # the load path; forces are asked for by their number in it
         self.finest = tuple(finest) or (FINEST,) * len(self.forces)
         self._pressing: dict[tuple[int, Levels], OnRigid | OnWall] = {}
         self._paths: dict[tuple[int, Levels, int], Iterator[Any]] = {}

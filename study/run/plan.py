@@ -158,15 +158,15 @@ def makespan(costs: Sequence[float], ranks: int) -> float:
     return float(busy.max())
 
 
-def sensible_ranks(costs: Sequence[float], efficiency: float = 0.8) -> int:
-    """Largest number of ranks that are busy for at least this share of the time.
+def sensible_ranks(costs: Sequence[float]) -> int:
+    """Largest number of ranks that are busy for at least 80 % of the time.
 
     >>> sensible_ranks([1.0] * 10)
     10
     """
     total = sum(costs)
     # Beyond the number of costs no further rank finds work; the other bound keeps this quick.
-    good = [n for n in range(1, min(len(costs), 4096) + 1) if total >= efficiency * n * makespan(costs, n)]
+    good = [n for n in range(1, min(len(costs), 4096) + 1) if total >= 0.8 * n * makespan(costs, n)]
     return max(good, default=1)
 
 

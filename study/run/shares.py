@@ -65,9 +65,8 @@ def shares(units: Iterable[Any], codes: np.ndarray, ranks: int) -> list[Share]:
 
 
 def _in_order(listed: Sequence[Share]) -> list[Share]:
-    """The costliest first, so that no rank ends long after the others; what cannot hold comes after all others."""
-    order = sorted(by_cost([share.cost for share in listed]), key=lambda i: listed[i].unit.hopeless)
-    return [listed[i] for i in order]
+    """The costliest first, so that no rank ends long after the others."""
+    return [listed[i] for i in by_cost([share.cost for share in listed])]
 
 
 def _missing(unit: Any, codes: np.ndarray) -> tuple[int, ...]:

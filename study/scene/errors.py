@@ -39,7 +39,7 @@ MOVED = {  # keys of the last version, and what stands for them
     "object.base": "write `object.open_ends = \"both\"` for a tube",
     "object.springs_n_per_mm": "leave it out: it is 1 N/mm",
     "candidates.station_range_mm": "write `candidates.stations_mm`, with the number of stations in `stations`",
-    "candidates.skip_hopeless": "leave it out: what cannot hold is solved last",
+    "candidates.skip_hopeless": "leave it out",
     "candidates.solve_best": "write `candidates.sampled`: finer meshes go to the grasps that may be among the best",
     "candidates.refine_within": "leave it out: it is `accuracy.target`, or 2 %",
     "candidates.sampler": "write `candidates.sampled`, the number of grasps",

@@ -34,7 +34,6 @@ class FakeUnit:
     first: int
     state: int
     reason: str
-    hopeless: bool
     apart: bool
     finest: tuple
 

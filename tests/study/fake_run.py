@@ -48,7 +48,7 @@ def fake_plan(digest="scene", stations=6, derived=True, wide=-1, rounds=(), apar
         for a in [(0, 1)] if name % 2 == 0 else [(0,), (1,)]:
             served = tuple(rows[i] for i in a)
             unit = SimpleNamespace(index=len(units), rows=served, cost=float(1 + name % 3))
-            unit.first, unit.state, unit.reason, unit.hopeless = (2 * name + a[0]) * FORCES, 0, "", False
+            unit.first, unit.state, unit.reason = (2 * name + a[0]) * FORCES, 0, ""
             unit.apart, unit.finest = apart, ()
             units.append(unit)
     if wide >= 0:

@@ -100,7 +100,7 @@ def units_of(costs, forces=6, apart=True):
     """Units that serve two candidates each."""
     rows = np.arange(len(costs) * 2 * forces).reshape(len(costs), 2, forces).tolist()
     return [
-        SimpleNamespace(index=i, rows=own, cost=cost, apart=apart, hopeless=False, state=0, finest=())
+        SimpleNamespace(index=i, rows=own, cost=cost, apart=apart, state=0, finest=())
         for i, (own, cost) in enumerate(zip(rows, costs, strict=True))
     ]
 

@@ -10,14 +10,12 @@ from softjaw.study.case.bed import CRUSHED, GRID, JawsOnSurface, height_fields, 
 from softjaw.study.case.fit import Jaws, fit_of
 from softjaw.study.case.sampler import antipodal_grasps, axes_of, same_grasp, with_sampled_grasps
 from softjaw.study.case.task import Task
-from softjaw.study.launch import ordered_plan
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.quantities import COLLIDES, MISSING, WIDE
-from softjaw.study.run.shares import shares
 from softjaw.study.scene import SceneError, parse_scene
 from softjaw.study.units import GRAVITY
 from tests.objects.bodies import hollow_bowl
-from tests.study.scenes import BOX, OVAL, pose_of, scene_of, text_of
+from tests.study.scenes import BOX, text_of
 
 PAD = (0.05, 0.022, 0.015)
 JAWS = Jaws(PAD, stiffness=8e6, mu=0.8, force=5.0)
@@ -198,20 +196,3 @@ def test_a_sampler_excludes_stations(more):
     with pytest.raises(SceneError) as refused:
         sampled_scene(more=more)
     assert any("candidates" in problem for problem in map(str, refused.value.problems))
-
-
-# --- which candidates are solved --------------------------------------------------------------------------------------
-
-
-ROUND = OVAL.replace("25", "30").replace("20", "30", 1)
-
-
-def test_a_contact_that_slips_comes_last():
-    """A pad beside the middle of a round section meets it askew: the normals lean out of the cone of friction."""
-    poses = "".join(pose_of((0, y, 0)) for y in (22, 0))
-    for mu, first in ((3.0, 0), (0.3, 1)):
-        changes = "gripper.pad_length_mm=20", f"friction.mu={mu}", "object.length_mm=100"
-        units = ordered_plan(scene_of(ROUND, *changes, where=f"{poses}\n", forces="[1, 2]"), "", ()).units
-        assert [u.state for u in units] == [MISSING] * 2
-        assert [u.hopeless for u in units] == [first == 1, False]
-        assert shares(units, np.full(100, MISSING), 1)[0].unit.index == first
