@@ -85,19 +85,20 @@ def check_poses(scene: Scene) -> None:
     """
     if not scene.candidates.poses or scene.object.shape == "plane":  # which has no end
         return
-    missed: dict[int, str] = {}
+    labels: dict[int, str] = {}
     for shape in shapes_of(scene):
         points, triangles = surface_triangles(shape)
         for number, place in enumerate(candidates(scene)):
             pose = place.poses[0]  # finger 2 comes along the same line
             low, _ = extremes((points - pose.origin) @ pose.rotation, triangles, scene.gripper.pad_size[:2])
             if not math.isfinite(low):
-                missed[number] = f"candidates.poses[{number}].point_mm: found '{place.label}', where the pads miss the object"
-    if missed:
-        lines = [*missed.values()][:MOST_NAMED]
-        lines += [f"{len(missed) - MOST_NAMED} more poses miss it"] if len(missed) > MOST_NAMED else []
-        remedy = "expected lines of approach that meet it; point_mm is in mm, in the frame of the object's own file"
-        raise StudyError(USAGE, "\n".join([*lines, remedy]))
+                labels[number] = place.label
+    if labels:
+        remedy = "expected a line of approach that meets it; change point_mm, in mm in the frame of the object's own file"
+        found = [f"candidates.poses[{i}].point_mm: found '{label}', where the pads miss the object; {remedy}"
+                 for i, label in labels.items()]  # fmt: skip
+        more = [f"and {len(found) - MOST_NAMED} more poses miss it"] if len(found) > MOST_NAMED else []
+        raise StudyError(USAGE, "\n".join([*found[:MOST_NAMED], *more]))
 
 
 def turn_between(first: Candidate, second: Candidate, axis_symmetry: int) -> float | None:
