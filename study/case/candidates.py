@@ -94,7 +94,7 @@ def check_poses(scene: Scene) -> None:
             if not math.isfinite(low):
                 labels[number] = place.label
     if labels:
-        remedy = "expected a line of approach that meets it; change point_mm, in mm in the frame of the object's own file"
+        remedy = "expected a line of approach that meets it; point_mm is in mm, in the frame of the object's own file"
         found = [f"candidates.poses[{i}].point_mm: found '{label}', where the pads miss the object; {remedy}"
                  for i, label in labels.items()]  # fmt: skip
         more = [f"and {len(found) - MOST_NAMED} more poses miss it"] if len(found) > MOST_NAMED else []
