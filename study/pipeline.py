@@ -18,7 +18,7 @@ from softjaw.fem.pad.halving import halved
 from softjaw.fem.petsc import Seconds
 from softjaw.study.case.build import build_object, forces_apart, own_frame, pad_shape
 from softjaw.study.case.contact import of_fingers, on_faces
-from softjaw.study.case.effects import COUPLING, SCREENED, EffectChoice, Simulated, settled
+from softjaw.study.case.effects import COUPLING, SCREENED, EffectChoice, settled
 from softjaw.study.case.errors import coarse_errors, mesh_errors
 from softjaw.study.case.evaluate import EvaluationSettings, evaluate, settings_of
 from softjaw.study.case.pressing import state_flags
@@ -109,8 +109,7 @@ def _result(
         if (target := scene.accuracy.target) is not None and not unit.finest:
             error = values[f"maps/{scene.accuracy.target_of}_error"]
             values["maps/flags"] |= Flag.COARSE * bool(misses(error, target))
-    case = Simulated(choice.solver.scene, contacts, fits, fine.fingers.planes, fine.fingers.fingers_solved)
-    effects = choice.effects_at(k, contacts) | settled(case)
+    effects = choice.effects_at(k, contacts) | settled(choice.solver.scene, fine, fits)
     if finest == COARSE:
         left_out = 0.0
         if scene.effects.friction_pressure_coupling == "auto":

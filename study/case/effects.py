@@ -1,6 +1,6 @@
 """Effects: one table of what a case may be simulated with, and the choice of their levels for one candidate.
 
-A row is an effect. Its steps lead from a level to the next dearer one. Below ``skip`` of a step's indicator the cheaper
+The steps of an effect lead from a level to the next dearer one. Below ``skip`` of a step's indicator the cheaper
 level is good to the target, above ``take`` the dearer one is surely needed. In between the candidate is solved on the
 coarse mesh with and without the effect, and what that changes in payload, quality and e_n decides: the cheaper level is
 taken where each change is surely below the target, ``accuracy.target`` or 1 %; the change is then a part of the errors.
@@ -23,6 +23,7 @@ from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.friction.patch import FloatArray, NoContactError
 from softjaw.study.case.build import build_object, forces_apart
 from softjaw.study.case.evaluate import quality, settings_of
+from softjaw.study.case.limit_surface import SurfaceFit
 from softjaw.study.case.model import contact_rules, pad_of, plate_compliance
 from softjaw.study.case.pressing import PressedContact, grasp_of
 from softjaw.study.case.result import surely_below
@@ -89,17 +90,6 @@ class Level(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Simulated:
-    """A solved case: contacts of both fingers, their limit surfaces by friction model, and what solved it."""
-
-    scene: Scene
-    contacts: Sequence[Any]
-    fits: Sequence[Mapping[str, Any]]
-    planes: int
-    fingers_solved: int
-
-
-@dataclass(frozen=True)
 class Step:
     """From one level to the next dearer one.
 
@@ -119,30 +109,6 @@ class Step:
     indicator: Callable[[EffectChoice, int], float]
     skip: float
     take: float
-
-
-@dataclass(frozen=True)
-class Row:
-    """An effect.
-
-    Parameters
-    ----------
-    steps : sequence of Step
-        From the cheapest level on.
-    each_force : bool
-        Whether every force has a level of its own; else all have that which the highest one needs.
-    settled : callable, optional
-        Level of a solved case, for effects whose choice costs nothing.
-    """
-
-    steps: Sequence[Step] = ()
-    each_force: bool = False
-    settled: Callable[[Simulated], Level] | None = None
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Levels by their names in a scene, the cheapest first."""
-        return (self.steps[0].low, *(step.high for step in self.steps)) if self.steps else ()
 
 
 # --- indicators -------------------------------------------------------------------------------------------------------
@@ -184,60 +150,37 @@ def dropped_share(wrench: FloatArray, rho: float) -> float:
 # --- effects that are exact, or free ----------------------------------------------------------------------------------
 
 
-def _forced(case: Simulated, name: str, otherwise: int) -> int:
-    """The reason of a level: the scene's word, or ``otherwise`` where it leaves the choice."""
-    return otherwise if getattr(case.scene.effects, name) == "auto" else FORCED
-
-
-def _model_size(case: Simulated) -> Level:
-    return Level(MODEL_SIZES[case.planes], reason=_forced(case, "model_size", SYMMETRY))
-
-
-def _fingers(case: Simulated) -> Level:
-    """One finger where a plane of symmetry lies between two that press on one wall."""
-    if case.fingers_solved == 1:
-        return Level("one", reason=SYMMETRY)
-    return Level("two", reason=ONLY)
-
-
-def _friction(case: Simulated) -> Level:
-    S, F_N = (sum(getattr(c.limits["ccm"], name) for c in case.contacts) for name in ("S", "F_N"))
-    return Level("ccm", 1.0 - F_N / S, CHEAP)
-
-
-def _wrench(case: Simulated) -> Level:
-    dropped = max(dropped_share(finger["ccm"].wrench, finger["ccm"].rho) for finger in case.fits)
-    wanted = case.scene.effects.wrench
-    return Level("3-D" if wanted == "auto" else wanted, dropped, _forced(case, "wrench", APART))
-
-
-def _limit_surface(case: Simulated) -> Level:
-    """An ellipsoid, whose quality is 5 to 10 % off, only where the scene asks for it."""
-    model = case.scene.limit_surface.model
-    error = float(np.max([finger["ccm"].fit_error.Erad for finger in case.fits]))
-    return Level(SURFACES[model], error, CHEAP if model == "quartic" else FORCED)
+def settled(scene: Scene, solution: Solution, fits: Sequence[Mapping[str, SurfaceFit]]) -> dict[str, Level]:
+    """Levels of a solved case whose choice costs nothing; ``fits`` are both fingers' limit surfaces."""
+    S, F_N = (sum(getattr(c.limits["ccm"], name) for c in solution.contacts) for name in ("S", "F_N"))
+    curved = [finger["ccm"] for finger in fits]
+    wrench, surface = scene.effects.wrench, scene.limit_surface.model
+    dropped = max(dropped_share(fit.wrench, fit.rho) for fit in curved)
+    error = float(np.max([fit.fit_error.Erad for fit in curved]))
+    return {
+        "model_size": Level(
+            MODEL_SIZES[solution.fingers.planes], reason=SYMMETRY if scene.effects.model_size == "auto" else FORCED
+        ),
+        # one where a plane of symmetry lies between two that press on one wall
+        "fingers": Level("one", reason=SYMMETRY) if solution.fingers.fingers_solved == 1 else Level("two"),
+        "friction": Level("ccm", 1.0 - F_N / S, CHEAP),
+        "wrench": Level("3-D", dropped, APART) if wrench == "auto" else Level(wrench, dropped, FORCED),
+        # an ellipsoid, whose quality is 5 to 10 % off, only where the scene asks for it
+        "limit_surface": Level(SURFACES[surface], error, CHEAP if surface == "quartic" else FORCED),
+    }
 
 
 # --- the table, in the order of choosing ------------------------------------------------------------------------------
 
-ROWS: dict[str, Row] = {
-    "sheet": Row((Step("rigid", "elastic", _plate, STIFF_PLATE, SOFT_PLATE),)),
-    "object": Row(
-        (
-            Step("rigid", "linear_shell", lambda c, _: c.indentation[0], STIFF_WALL, 0.0),
-            Step("linear_shell", "nonlinear_shell", lambda c, _: c.indentation[1], SMALL_INDENTATION, 0.0),
-        ),
+STEPS: dict[str, tuple[Step, ...]] = {
+    "sheet": (Step("rigid", "elastic", _plate, STIFF_PLATE, SOFT_PLATE),),
+    "object": (
+        Step("rigid", "linear_shell", lambda c, _: c.indentation[0], STIFF_WALL, 0.0),
+        Step("linear_shell", "nonlinear_shell", lambda c, _: c.indentation[1], SMALL_INDENTATION, 0.0),
     ),
-    "friction_pressure_coupling": Row(
-        (Step("none", "tangential", _traction, SMALL_TRACTION, inf),),
-        each_force=True,
-    ),
-    "model_size": Row(settled=_model_size),
-    "fingers": Row(settled=_fingers),
-    "friction": Row(settled=_friction),
-    "wrench": Row(settled=_wrench),
-    "limit_surface": Row(settled=_limit_surface),
+    COUPLING: (Step("none", "tangential", _traction, SMALL_TRACTION, inf),),
 }
+EACH_FORCE = (COUPLING,)  # effects of which every force has a level of its own; else all have that of the highest one
 
 
 def level_named(effect: str, name: str) -> str:
@@ -246,12 +189,8 @@ def level_named(effect: str, name: str) -> str:
     >>> level_named("sheet", "elastic")
     'elastic plate'
     """
-    return EFFECTS[effect][ROWS[effect].names.index(name)]
-
-
-def settled(case: Simulated) -> dict[str, Level]:
-    """Levels of a solved case whose choice costs nothing."""
-    return {name: row.settled(case) for name, row in ROWS.items() if row.settled is not None}
+    steps = STEPS[effect]
+    return EFFECTS[effect][[steps[0].low, *(step.high for step in steps)].index(name)]
 
 
 # --- the choice -------------------------------------------------------------------------------------------------------
@@ -277,32 +216,32 @@ class EffectChoice:
         self.target = solver.scene.accuracy.target or E_N_TARGET
         self._changes: dict[tuple[str, str, int], tuple[float, float, float]] = {}
         self._wanted = wanted_levels(solver.scene)
-        cheapest = {name: ROWS[name].names[0] for name in Levels._fields}
+        cheapest = {name: STEPS[name][0].low for name in Levels._fields}
         self.levels = Levels(*(cheapest[n] if level == "auto" else level for n, level in self._wanted.items()))
-        self.chosen = {name: self._chosen(name, ROWS[name]) for name in Levels._fields}
+        self.chosen = {name: self._chosen(name) for name in Levels._fields}
 
-    def _chosen(self, name: str, row: Row) -> list[Level]:
+    def _chosen(self, name: str) -> list[Level]:
         """Level of one effect at every force; what all forces share is noted in ``levels``."""
-        wanted = self._wanted[name]
+        wanted, steps = self._wanted[name], STEPS[name]
         if name == "object" and not self.solver.walled:
-            return [Level(level_named(name, row.names[0]), reason=NO_WALL)] * self.count
+            return [Level(level_named(name, steps[0].low), reason=NO_WALL)] * self.count
         if wanted != "auto":
             # of a force by itself the solved state tells it, see `effects_at`: nothing is solved for it here
-            indicator = nan if row.each_force else row.steps[-1].indicator(self, self.count - 1)
+            indicator = nan if name in EACH_FORCE else steps[-1].indicator(self, self.count - 1)
             return [Level(level_named(name, wanted), indicator, FORCED)] * self.count
-        forces = range(self.count) if row.each_force else [self.count - 1]
+        forces = range(self.count) if name in EACH_FORCE else [self.count - 1]
         # what is stated is the last step's indicator, whichever step was decided last
-        levels = [self._at(name, row, k)._replace(indicator=row.steps[-1].indicator(self, k)) for k in forces]
-        return levels if row.each_force else levels * self.count
+        levels = [self._at(name, k)._replace(indicator=steps[-1].indicator(self, k)) for k in forces]
+        return levels if name in EACH_FORCE else levels * self.count
 
-    def _at(self, name: str, row: Row, k: int) -> Level:
+    def _at(self, name: str, k: int) -> Level:
         """Level of one effect at the ``k``-th force: each step is skipped, taken, or measured."""
-        for step in row.steps:
+        for step in STEPS[name]:
             measured = partial(self.changes, name, step, k)
             level = decided(name, step, step.indicator(self, k), measured, self.target)
             if level.level == level_named(name, step.low):
                 break
-            if not row.each_force:
+            if name not in EACH_FORCE:
                 self.levels = self.levels._replace(**{name: step.high})
         return level
 
@@ -313,7 +252,7 @@ class EffectChoice:
         largest.
         """
         if (name, step.high, k) not in self._changes:
-            forces = [k] if ROWS[name].each_force else range(self.count)
+            forces = [k] if name in EACH_FORCE else range(self.count)
             # what is not known at some force may be the largest
             compared = [self._compared(name, step, i) for i in forces]
             self._changes[name, step.high, k] = max(compared, key=lambda c: inf if np.isnan(largest(c)) else largest(c))
@@ -384,8 +323,8 @@ class EffectChoice:
         solved = self._solved(k)
         if solved.coarse is None:
             return solved
-        steps = {"sheet": ROWS["sheet"].steps[0], COUPLING: ROWS[COUPLING].steps[0]}
-        pairs = [self._coarse_pair(n, step, k) for n, step in steps.items() if self.chosen[n][k].reason == LITTLE]
+        names = [name for name in ("sheet", COUPLING) if self.chosen[name][k].reason == LITTLE]
+        pairs = [self._coarse_pair(name, STEPS[name][0], k) for name in names]
         return replace(solved, pairs=[*solved.pairs, *filter(None, pairs)])
 
     def _solved(self, k: int) -> Solved:

@@ -113,9 +113,9 @@ def test_a_grasp_that_just_holds_is_not_too_weak(seed):
 @pytest.mark.parametrize("ulp", ULPS[::4])
 def test_an_indicator_on_its_limit_takes_the_dearer_level(ulp):
     """On the bound below which nothing is measured it is measured; on the target it is taken."""
-    from softjaw.study.case.effects import DOUBT, ROWS, STIFF_PLATE, decided
+    from softjaw.study.case.effects import DOUBT, STEPS, STIFF_PLATE, decided
 
-    on, [step] = 1.0 + ulp, ROWS["sheet"].steps
+    on, [step] = 1.0 + ulp, STEPS["sheet"]
     for change, level in ((0.01 / (1 + DOUBT) * on, "elastic plate"), (0.0099 / (1 + DOUBT), "rigid")):
         assert decided("sheet", step, STIFF_PLATE * on, lambda: (change, 0.0, 0.0), 0.01).level == level  # noqa: B023
 

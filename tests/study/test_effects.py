@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import time
+from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -13,7 +14,7 @@ import pytest
 from softjaw.fem.errors import ConvergenceError
 from softjaw.study import pipeline
 from softjaw.study.case import effects, model
-from softjaw.study.case.effects import FORCED, LITTLE, MUCH, ROWS, UNDECIDED, EffectChoice, neglected_traction
+from softjaw.study.case.effects import FORCED, LITTLE, MUCH, STEPS, UNDECIDED, EffectChoice, neglected_traction
 from softjaw.study.case.effects import STIFF_PLATE as STIFF
 from softjaw.study.case.result import CaseFailure
 from softjaw.study.case.solver import COARSE, Solved
@@ -129,13 +130,10 @@ def test_what_is_measured_on_a_few_elements_is_not_known(choice):
     assert np.isnan(level.change)
 
 
-def test_every_effect_is_a_row_with_steps_or_settled():
-    assert ROWS.keys() == EFFECTS.keys()
-    for name, row in ROWS.items():
-        assert bool(row.steps) != (row.settled is not None)
-        assert not row.steps or len(row.names) == len(EFFECTS[name])
-        # a step begins where the one before it ends
-        assert all(one.high == two.low for one, two in zip(row.steps, row.steps[1:], strict=False))
+def test_steps_lead_from_each_level_to_the_next():
+    for name, steps in STEPS.items():
+        assert len(steps) == len(EFFECTS[name]) - 1
+        assert all(one.high == two.low for one, two in pairwise(steps))
 
 
 def test_friction_is_left_out_on_a_wall_whose_coarse_path_with_it_has_ended(choice):
