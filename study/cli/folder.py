@@ -13,8 +13,9 @@ from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.result.index import index_path
 from softjaw.study.run.estimate import START_S, estimated
 from softjaw.study.run.object_folder import Listed, ObjectFolder
-from softjaw.study.run.plan import free_bytes, make_plan, makespan, memory
+from softjaw.study.run.plan import free_bytes, make_plan, memory
 from softjaw.study.run.progress import duration
+from softjaw.study.run.shares import makespan
 from softjaw.study.scene import SceneError
 from softjaw.study.show import objects
 from softjaw.study.table import as_csv, as_json, as_text, hanging, terminal_width

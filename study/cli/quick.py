@@ -11,9 +11,9 @@ from typing import Any
 from softjaw.study.case.build import build_object, check_object, geometry, mesh_notes, told
 from softjaw.study.case.candidates import check_poses, with_sampled_grasps
 from softjaw.study.messages import USAGE, StudyError
+from softjaw.study.run.estimate import scaling_text
 from softjaw.study.run.object_folder import ObjectFolder, folder_of
 from softjaw.study.run.plan import make_plan, plan_text
-from softjaw.study.run.scaling import scaling_text
 from softjaw.study.scene import Scene, SceneError, load_scene, start
 from softjaw.study.scene.objects import Mesh
 from softjaw.study.show.overview import scene_text

@@ -1,22 +1,31 @@
-"""Seconds that load paths will take, from a bed of springs and a calibration, before anything is solved.
+"""Seconds of a study: of load paths on a bed of springs, before anything is solved; of measured ones on many ranks.
 
 A force costs what its elements cost, whose number follows from symmetry, and symmetry from what the pads meet: heights
 of the object over a coarse grid on each pad, without compiled loops, because a plan answers at once.
+
+On many ranks every case ends with its writes: one after another for the rank, and through a file system that serves all
+ranks in the order in which they come. The counter that hands out the work takes 20 us a load path, which is left out.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from softjaw.study.case.build import surface_triangles
 from softjaw.study.case.candidates import meshes_cost
 from softjaw.study.case.fit import bed_closing, doubt, jaws_of
 from softjaw.study.case.poses import turn_of_pose
+from softjaw.study.messages import OTHER_FILE, StudyError
+from softjaw.study.result.layout import Layout
+from softjaw.study.result.store import open_result
+from softjaw.study.run.progress import duration
+from softjaw.study.run.shares import makespan
 
 FloatArray = NDArray[np.float64]
 FACE_GRID = (13, 7)  # points of a pad's face
@@ -29,6 +38,10 @@ REGION_S = 0.7  # seconds until the distance to a mesh is known round both pads
 # times as dear with friction that acts back, everywhere or where it is found to matter
 COUPLED = {"none": 1.0, "auto": 2.2, "tangential": 2.2}
 DEEP, HARD = 0.4, 4.0  # closing over the pad's thickness from which forces are cut into steps, and how much that costs
+
+WRITE_S = 1.5e-5  # seconds of one write of a rank, measured on one machine with a local disk
+WRITES_PER_S, BYTES_PER_S = 5e4, 1e9  # what a file system is assumed to take from all ranks together
+GOOD_EFFICIENCY = 0.8
 
 
 def estimated(units: Sequence[Any]) -> list[float]:
@@ -96,3 +109,113 @@ def heights(
     low = np.where(over, z, np.inf).min(axis=1, initial=np.inf)
     high = np.where(over, z, -np.inf).max(axis=1, initial=-np.inf)
     return low.reshape(FACE_GRID), high.reshape(FACE_GRID)
+
+
+# --- from measured times ----------------------------------------------------------------------------------------------
+
+
+def unit_seconds(plan: Any, seconds: np.ndarray) -> list[float]:
+    """Expected time of every unit that is tried [s]; empty where nothing was measured.
+
+    ``seconds (rows,)`` are the measured times of some cases, NaN for the others. Measured units keep their
+    time, the others are judged by their cost.
+    """
+    # Candidates served by symmetry have no times, so the solved one speaks for the unit. A load path that is measured
+    # in part has none either: it would be taken for a cheap one.
+    times, costs = np.array([seconds[list(unit.rows[0])].sum() for unit in plan.tried]), np.array(plan.costs)
+    known = np.isfinite(times)
+    if not costs[known].sum():
+        return []
+    rate = times[known].sum() / costs[known].sum()
+    return np.where(known, times, rate * costs).tolist()
+
+
+def measured_seconds(layout: Layout, path: Path) -> Any:
+    """Seconds of every case ``(rows,)`` in a result file of this shape; None where there is no such file.
+
+    Stations that a refinement added are left out.
+    """
+    if not path.is_file():
+        return None
+    with open_result(path) as result:
+        planned = np.flatnonzero(np.isin(result.axes[-3].values, layout.axes[-3].values))
+        seconds = result.read("work/seconds_total").take(planned, axis=-3)
+        # A file of another shape has other cases in the same places.
+        return seconds.ravel() if seconds.shape == layout.shape else None
+
+
+def scaled(seconds: ArrayLike, served: ArrayLike, ranks: int, write: float, service: float) -> tuple[float, str]:
+    """Seconds until the last case is stored, and what keeps that from being shorter.
+
+    Parameters
+    ----------
+    seconds, served : (n,) arrays
+        Of load paths, or of forces that ranks may divide: time of solving [s], and rows that are stored.
+    ranks : int
+    write, service : float
+        Time that the writes of a row take from its rank, and from the file system [s].
+
+    Examples
+    --------
+    >>> scaled([4.0] * 64, [4] * 64, 64, 0.0, 0.0), scaled([4.0] * 64, [4] * 64, 64, 0.1, 0.1)
+    ((4.0, '-'), (25.6, 'file system'))
+    """
+    work, files = np.asarray(seconds) + write * np.asarray(served), service * float(np.sum(served))
+    time, even, longest = makespan(work.tolist(), ranks), work.sum() / ranks, work.max()
+    if files > time:
+        return files, "file system"
+    # share of the time below which something does not count as the limit
+    limits = {"longest load path": longest - even, "division of load paths": time - max(longest, even)}
+    worst = max(limits, key=lambda name: limits[name])
+    return time, worst if limits[worst] > 0.05 * time else "-"
+
+
+def row_writes(layout: Layout) -> tuple[float, float, str]:
+    """Time that the writes of a case take from its rank, and from the file system [s], and what they are, in words."""
+    columns = layout.columns
+    # besides its values: begun, checksums, state
+    size, writes = sum(int(np.prod(c.shape)) * c.dtype.itemsize for c in columns), len(columns) + 3
+    text = f"{writes} writes of {size / 1e3:.3g} kB together, {1e3 * WRITE_S:g} ms each"
+    return WRITE_S * writes, max(writes / WRITES_PER_S, size / BYTES_PER_S), text
+
+
+def _parts(plan: Any, seconds: NDArray[np.float64]) -> list[tuple[float, int]]:
+    """Time of each load path, or of its forces where ranks may divide them, from the cases' ``(rows,)``, and rows."""
+    parts = []
+    for unit in plan.tried:
+        times = seconds[list(unit.rows[0])]
+        times = times[np.isfinite(times)]  # the forces above a failed one were not tried
+        each = times if unit.apart else [times.sum()] * bool(times.size)
+        parts += [(float(t), len(unit.rows) * (1 if unit.apart else times.size)) for t in each]
+    return parts
+
+
+def scaling_text(plan: Any, path: Path, ranks: Sequence[int], repeat: int) -> str:
+    """Time and efficiency of a finished study, or of one with ``repeat`` times its candidates, on so many ranks.
+
+    Raises
+    ------
+    StudyError
+        If the file at ``path`` holds no times of this plan.
+    """
+    known = measured_seconds(plan.layout, path)
+    parts = [] if known is None else _parts(plan, known) * repeat
+    if not parts:
+        raise StudyError(OTHER_FILE, f"{path}: no case was timed yet; run the study first, or give -n one number")
+    seconds, served = np.transpose(parts)
+    write, service, text = row_writes(plan.layout)
+    lines, good = [f"{'ranks':>6}  {'time':>13}  {'efficiency':>10}  limit"], [0]
+    for n in ranks:
+        time, limit = scaled(seconds, served, n, write, service)
+        efficiency = seconds.sum() / n / time
+        lines.append(f"{n:>6}  {duration(time):>13}  {efficiency:>10.1%}  {limit}")
+        good += [n] * (efficiency >= GOOD_EFFICIENCY)
+    return "\n".join([
+        f"{path}: {plan.layout.rows * repeat} cases in {len(parts)} parts, {duration(seconds.sum())} of solving",
+        f"  parts      {seconds.min():.3g} to {seconds.max():.3g} s, {seconds.mean():.3g} s in the mean",
+        f"  a case     {text}",
+        f"  assumed    {WRITES_PER_S:g} writes/s and {BYTES_PER_S / 1e6:g} MB/s to one file",
+        "  left out   starting the ranks, and cores that share caches and memory",
+        *lines,
+        f"at least {GOOD_EFFICIENCY:.0%} efficient up to {max(good)} ranks",
+    ])  # fmt: skip

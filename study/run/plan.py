@@ -28,11 +28,10 @@ from softjaw.study.case.candidates import decided
 from softjaw.study.quantities import ALONG, AROUND, NO_GRASP, STATES
 from softjaw.study.result.derived import derived
 from softjaw.study.result.layout import Header, Layout, is_case
-from softjaw.study.result.store import open_result
-from softjaw.study.run.estimate import START_S, estimated
+from softjaw.study.run.estimate import START_S, estimated, measured_seconds, unit_seconds
 from softjaw.study.run.progress import duration
 from softjaw.study.run.refine import Rounds, added_cases, refined
-from softjaw.study.run.shares import by_cost
+from softjaw.study.run.shares import makespan, sensible_ranks
 from softjaw.study.scene.sections import COARSE, FINE, FINEST
 
 LIBRARY_BYTES = 3e8  # bytes of a rank that has loaded PETSc, numba and scipy and nothing else
@@ -146,61 +145,17 @@ def has(scene: Any) -> tuple[str, ...]:
     return tuple(name for name, wanted in asked.items() if wanted)
 
 
-def makespan(costs: Sequence[float], ranks: int) -> float:
-    """Time until the last unit ends when ranks take the most expensive remaining unit whenever they are free.
-
-    >>> makespan([3.0, 3.0, 2.0, 2.0, 2.0], 2)
-    7.0
-    """
-    busy = np.zeros(max(ranks, 1))
-    for i in by_cost(costs):
-        busy[busy.argmin()] += costs[i]
-    return float(busy.max())
-
-
-def sensible_ranks(costs: Sequence[float]) -> int:
-    """Largest number of ranks that are busy for at least 80 % of the time.
-
-    >>> sensible_ranks([1.0] * 10)
-    10
-    """
-    total = sum(costs)
-    # Beyond the number of costs no further rank finds work; the other bound keeps this quick.
-    good = [n for n in range(1, min(len(costs), 4096) + 1) if total >= 0.8 * n * makespan(costs, n)]
-    return max(good, default=1)
-
-
 def memory(scene: Any) -> float:
     """Rough memory of one rank [bytes]: the libraries, the factors of the whole pad's stiffness, those of a wall."""
     pad = 8.0 * FILL_FACTOR * (3.0 * _pad_nodes(scene, scene.accuracy.most_meshes - 1)) ** (4.0 / 3.0)
-    wall = wall_size(scene) if shells(scene) else None
-    return LIBRARY_BYTES + pad + (wall.memory if wall else 0.0)
+    size = wall_unknowns(scene) if shells(scene) else {}
+    linear = BYTES_PER_UNKNOWN * size.get("whole", 0) + 8.0 * DENSE_COPIES * float(size.get("touched", 0)) ** 2
+    return LIBRARY_BYTES + pad + max(BYTES_PER_UNKNOWN * size.get("shell", 0), linear)
 
 
 def shells(scene: Any) -> bool:
     """Whether the object's wall may be simulated as a shell."""
     return has_wall(scene.object) and scene.effects.object != "rigid"
-
-
-def unit_seconds(plan: Plan, seconds: np.ndarray) -> list[float]:
-    """Expected time of every unit that is tried [s]; empty where nothing was measured.
-
-    ``seconds (rows,)`` are the measured times of some cases, NaN for the others. Measured units keep their
-    time, the others are judged by their cost.
-    """
-    known = [_measured(unit, seconds) for unit in plan.tried]
-    pairs = [(t, cost) for t, cost in zip(known, plan.costs, strict=True) if t is not None]
-    if not pairs or not sum(cost for _, cost in pairs):
-        return []
-    rate = sum(t for t, _ in pairs) / sum(cost for _, cost in pairs)
-    return [rate * cost if t is None else t for t, cost in zip(known, plan.costs, strict=True)]
-
-
-def _measured(unit: Any, seconds: np.ndarray) -> float | None:
-    # Candidates served by symmetry have no times, so the solved one speaks for the unit.
-    times = seconds[list(unit.rows[0])]
-    # A load path that is measured in part would be taken for a cheap one.
-    return None if np.isnan(times).any() else float(times.sum())
 
 
 def plan_text(plan: Plan, scene: Any, path: Path, ranks: int) -> str:
@@ -275,25 +230,13 @@ def _estimated_time(plan: Plan, scene: Any, ranks: int) -> str:
 
 def _wall_seconds(plan: Plan, scene: Any) -> list[float]:
     """Seconds of a force at the levels that a wall may be solved with, rising; empty where that is not known."""
-    wall = wall_size(scene) if plan.tried and shells(scene) else None
-    if wall is None:
+    size = wall_unknowns(scene) if plan.tried and shells(scene) else {}
+    if not size:
         return []
-    level = {"linear_shell": wall.seconds[1:2], "nonlinear_shell": wall.seconds[2:]}
-    return sorted(level.get(scene.effects.object, wall.seconds))
-
-
-def measured_seconds(layout: Layout, path: Path) -> Any:
-    """Seconds of every case ``(rows,)`` in a result file of this shape; None where there is no such file.
-
-    Stations that a refinement added are left out.
-    """
-    if not path.is_file():
-        return None
-    with open_result(path) as result:
-        planned = np.flatnonzero(np.isin(result.axes[-3].values, layout.axes[-3].values))
-        seconds = result.read("work/seconds_total").take(planned, axis=-3)
-        # A file of another shape has other cases in the same places.
-        return seconds.ravel() if seconds.shape == layout.shape else None
+    rigid = SECONDS_PER_UNKNOWN * size["pads"]
+    linear, shell = rigid + SECONDS_PER_CUBE * size["touched"] ** 3, rigid + SECONDS_PER_UNKNOWN * size["shell"]
+    level = {"linear_shell": [linear], "nonlinear_shell": [shell]}
+    return level.get(scene.effects.object, sorted([rigid, linear, shell]))
 
 
 def free_bytes(path: Path) -> int:
@@ -305,42 +248,16 @@ def free_bytes(path: Path) -> int:
     return -1
 
 
-@dataclass(frozen=True)
-class WallSize:
-    """Unknowns of one candidate.
+def wall_unknowns(scene: Any) -> dict[str, int]:
+    """Unknowns of a candidate in the middle of the scene's stations; none where the wall has no outline to divide.
 
-    Attributes
-    ----------
-    pad, shell : int
-        Of the pads that are solved, and of the nonlinear shell.
-    whole, touched : int
-        Of the linear shell that all candidates share, and of its part that pads can touch.
+    ``pads`` that are solved, nonlinear ``shell``, linear shell that all candidates share, ``whole`` and ``touched`` by
+    pads.
     """
-
-    pad: int
-    shell: int
-    whole: int
-    touched: int
-
-    @property
-    def seconds(self) -> tuple[float, float, float]:
-        """Time of one force on a rigid object, a linear and a nonlinear shell [s]."""
-        rigid = SECONDS_PER_UNKNOWN * self.pad
-        return rigid, rigid + SECONDS_PER_CUBE * self.touched**3, rigid + SECONDS_PER_UNKNOWN * self.shell
-
-    @property
-    def memory(self) -> float:
-        """Memory of the costlier of both shells [bytes]."""
-        linear = BYTES_PER_UNKNOWN * self.whole + 8.0 * DENSE_COPIES * float(self.touched) ** 2
-        return max(BYTES_PER_UNKNOWN * self.shell, linear)
-
-
-def wall_size(scene: Any) -> WallSize | None:
-    """Unknowns of a candidate in the middle of the scene's stations; None where the wall has no outline to divide."""
     try:
         surface, is_round = outer_surface(scene.object)
     except (AttributeError, ValueError):
-        return None
+        return {}
     angle = 0.0 if scene.candidates.poses else scene.candidates.angles[0]
     turned = Turned(surface, angle, is_round)
     mirrors = _mirrors(scene, turned.symmetric)
@@ -353,7 +270,11 @@ def wall_size(scene: Any) -> WallSize | None:
     beside = np.abs(np.sin(theta)) * radius[(z >= low) & (z <= high)].max(initial=half) <= half
     ends = 4 >> sum(mirrors)  # one more line beside each end of a region
     touched = (np.count_nonzero(beside) + ends) * (np.count_nonzero((z >= low) & (z <= high)) + 2)
-    return WallSize(_pad(scene, mirrors), 6 * len(theta) * len(s), 6 * len(wide) * len(tall), 6 * touched)
+    # of the pads from the nodes of a whole one, of which a plane of symmetry leaves one finger, or half of both
+    pads = round(3 * _pad_nodes(scene) * (1 if mirrors[0] else 2) * (0.5 if mirrors[1] else 1.0))
+    return {
+        "pads": pads, "shell": 6 * len(theta) * len(s), "whole": 6 * len(wide) * len(tall), "touched": 6 * int(touched)
+    }  # fmt: skip
 
 
 def _mirrors(scene: Any, symmetric: tuple[bool, bool]) -> tuple[bool, bool]:
@@ -379,12 +300,6 @@ def _heights(surface: Any) -> tuple[float, float]:
     first, last = surface.wall
     z = surface.curve.derivative(np.linspace(first, last, 257))[:, 0]
     return float(z.min()), float(z.max())
-
-
-def _pad(scene: Any, mirrors: tuple[bool, bool]) -> int:
-    """Unknowns of the pads that are solved, from the nodes of the whole pad."""
-    fingers = 1 if mirrors[0] else 2
-    return round(3 * _pad_nodes(scene) * fingers * (0.5 if mirrors[1] else 1.0))
 
 
 def _pad_nodes(scene: Any, mesh: int = 1) -> int:

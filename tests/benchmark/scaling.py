@@ -12,7 +12,7 @@ import matplotlib as mpl
 import numpy as np
 
 from softjaw.study.result.store import open_result
-from softjaw.study.run.scaling import row_writes, scaled
+from softjaw.study.run.estimate import row_writes, scaled
 
 RANKS = [4**k for k in range(7)]
 CASES = (10**3, 10**4, 10**5, 10**6)

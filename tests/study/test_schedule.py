@@ -14,12 +14,21 @@ import pytest
 from softjaw.fem.objects.shapes import Sphere
 from softjaw.study.doctor import launch_environment
 from softjaw.study.quantities import DONE, MISSING, SLIPS, WIDE
-from softjaw.study.run.estimate import CASE, ELEMENT, FACE_GRID, FIRST_FORCE_FACTOR, HARD, estimated, heights
+from softjaw.study.run.estimate import (
+    CASE,
+    ELEMENT,
+    FACE_GRID,
+    FIRST_FORCE_FACTOR,
+    HARD,
+    estimated,
+    heights,
+    scaled,
+    unit_seconds,
+)
 from softjaw.study.run.load_path import settle
-from softjaw.study.run.plan import Plan, make_plan, makespan, sensible_ranks, unit_seconds
+from softjaw.study.run.plan import Plan, make_plan
 from softjaw.study.run.progress import Progress
-from softjaw.study.run.scaling import scaled
-from softjaw.study.run.shares import by_cost, shares
+from softjaw.study.run.shares import by_cost, makespan, sensible_ranks, shares
 from softjaw.study.scene import load_scene
 from tests.study.launching import ROOT
 from tests.study.scenes import OVAL, QUICK, scene_of

@@ -20,7 +20,7 @@ from softjaw.study.result.read import dataset
 from softjaw.study.result.skeleton import create
 from softjaw.study.result.store import open_result
 from softjaw.study.result.write import ResultWriter, record
-from softjaw.study.run.plan import make_plan, memory, wall_size
+from softjaw.study.run.plan import make_plan, memory, wall_unknowns
 from softjaw.study.scene import parse_scene
 from softjaw.study.show.best_grasps import best, safe_range
 from softjaw.study.show.grasps import at, judge
@@ -83,15 +83,15 @@ def changed(path, folder, name, values, index=...):
 
 def test_the_size_of_a_shell_is_that_of_the_mesh_that_is_solved(solved):
     scene = solved[0]
-    size = wall_size(scene)
+    size = wall_unknowns(scene)
     unit = make_plan(scene).units[1]  # the middle station of an even number
     solver = CandidateSolver(scene, unit.candidate.poses)
     fingers = solver.pressing(FINE, EffectChoice(solver).levels)
-    assert size.shell == pytest.approx(6 * fingers.shell.nodes, rel=0.1)  # the axis is one node
+    assert size["shell"] == pytest.approx(6 * fingers.shell.nodes, rel=0.1)  # the axis is one node
     solver.destroy()
-    fine = wall_size(scene.with_values({"accuracy.wall_element_mm": 1.5}))
-    assert fine.shell > 4 * size.shell
-    assert fine.memory > 4 * size.memory
+    fine = scene.with_values({"accuracy.wall_element_mm": 1.5})
+    assert wall_unknowns(fine)["shell"] > 4 * size["shell"]
+    assert memory(fine) > memory(scene)
     assert memory(scene) > memory(scene.with_values({"effects.object": "rigid"}))
 
 
