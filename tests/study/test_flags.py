@@ -76,13 +76,6 @@ def test_the_message_of_a_case_tells_its_flags():
     assert case.message == flag_sentences(case.values["maps/flags"])
 
 
-STUDY = Path(__file__).parents[2] / "study"
-# Folders whose modules take their factors from the table; the others follow as they are rebuilt.
-KEPT = ("result", "lookup", "scene", "show/tables", "table.py", "quantities.py", "flags.py")
-FILES = sorted(f for f in (p.relative_to(STUDY).as_posix() for p in STUDY.rglob("*.py")) if f.startswith(KEPT))
-FACTORS = {1e3, 1e-3, 180 / math.pi, math.pi / 180}
-
-
 @pytest.mark.parametrize(
     ("key", "value", "si"),
     [("a_mm", 25, 0.025), ("a_inch", 1, 0.0254), ("a_cm", 3, 0.03), ("e_gpa", 2, 2e9), ("p_kpa", 40, 4e4),
@@ -102,11 +95,3 @@ def test_all_units_of_a_kind_share_their_si_unit_and_what_people_read_comes_back
     assert shown(np.array([1.0, 2.0]), "Pa") == pytest.approx([1e-3, 2e-3], rel=1e-15)
     assert {shown_unit(si) for si in ("Pa", "m", "rad")} == {"kPa", "mm", "deg"}
     assert shown_text(math.pi, "rad") == "180 deg"
-
-
-@pytest.mark.parametrize("file", FILES)
-def test_nobody_else_multiplies_by_a_thousand(file):
-    for node in ast.walk(ast.parse((STUDY / file).read_text())):
-        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mult | ast.Div):
-            values = {part.value for part in (node.left, node.right) if isinstance(part, ast.Constant)}
-            assert not FACTORS & {v for v in values if isinstance(v, int | float)}, (file, node.lineno)

@@ -141,28 +141,17 @@ def test_status_and_the_import_of_softjaw_do_not_wait_for_xarray(half):
 # --- safe force range -------------------------------------------------------------------------------------------------
 
 
-CROSSED = [1.0, 2.0, 4.0, 8.0]
-
-
-def test_a_value_proportional_to_the_force_is_crossed_where_it_says():
-    values = 0.3 * np.array(CROSSED)
-    for limit in (0.1, 0.3, 0.45, 2.3):
-        assert first_crossing(CROSSED, values, limit) == pytest.approx(limit / 0.3, rel=1e-12)
-
-
-def test_a_value_that_falls_again_is_crossed_the_first_time():
-    assert first_crossing(CROSSED, [0.0, 2.0, 0.5, 3.0], 1.0) == pytest.approx(1.5)
-
-
-def test_below_the_first_force_it_is_a_line_from_nothing():
-    assert first_crossing(CROSSED, [2.0, 3.0, 4.0, 5.0], 1.0) == pytest.approx(0.5)
-
-
-@pytest.mark.parametrize("values", [[0.1, 0.2, 0.3, 0.4], [np.nan] * 4, [0.1, np.nan, 5.0, 5.0]])
-def test_what_is_never_passed_or_not_known_has_no_force(values):
-    assert np.isnan(first_crossing(CROSSED, values, 1.0))
-
-
-def test_it_works_on_whole_maps_and_finds_limits_that_are_met_exactly():
-    values = np.stack([np.array(CROSSED), 0.5 * np.array(CROSSED)]).reshape(2, 1, 4)
-    np.testing.assert_allclose(first_crossing(CROSSED, values, 2.0), [[2.0], [4.0]], rtol=1e-14)
+@pytest.mark.parametrize(
+    ("values", "limit", "force"),
+    [
+        ([0.3, 0.6, 1.2, 2.4], 0.1, 1 / 3),  # proportional to the force: on a line from nothing, ...
+        ([0.3, 0.6, 1.2, 2.4], 0.45, 1.5),  # ... and between solved ones
+        ([[1.0, 2.0, 4.0, 8.0], [0.5, 1.0, 2.0, 4.0]], 2.0, [2.0, 4.0]),  # met exactly, in a whole map
+        ([0.0, 2.0, 0.5, 3.0], 1.0, 1.5),  # falls again: the first time counts
+        ([0.1, 0.2, 0.3, 0.4], 1.0, np.nan),
+        ([np.nan] * 4, 1.0, np.nan),
+        ([0.1, np.nan, 5.0, 5.0], 1.0, np.nan),
+    ],
+)
+def test_the_force_at_which_a_limit_is_crossed(values, limit, force):
+    assert first_crossing([1.0, 2.0, 4.0, 8.0], values, limit) == pytest.approx(force, rel=1e-12, nan_ok=True)
