@@ -32,24 +32,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from softjaw.study.export.point_contact import (
-    PAD_MASS,
-    PLATE,
-    RADIUS,
-    Cell,
-    PointContact,
-    carried,
-    cell,
-    heading,
-    numbers,
-)
-from softjaw.study.export.rigid_body import RigidBody, places, weight
+from softjaw.study.export.point_contact import PointContact, cell, numbers, rendered
+from softjaw.study.export.rigid_body import RigidBody, weight
 from softjaw.study.export.selection import FloatArray, RankedGrasp, quaternion
 
 ALONG = 1e-6  # sine between a tangent and an axis of the contact below which they are one
 STIFF = 'solref="0.004 1" solimp="0.9999 0.9999 0.001"'
 HIDDEN = 'contype="0" conaffinity="0" group="3"'  # viewers do not draw this group unless they are asked
-SEEN = 'contype="0" conaffinity="0" rgba="0.3 0.4 0.5 0.6"'
 
 
 def tangents(normal: FloatArray) -> FloatArray:
@@ -75,83 +64,17 @@ def friction(contact: PointContact) -> tuple[float, float, float]:
 
 def as_mjcf(grasp: RankedGrasp, body: RigidBody) -> str:
     """A MuJoCo model of one grasp of an object, with gravity."""
-    contacts = cell(grasp, body.down)
-    return "\n".join(
-        [
-            f'<mujoco model="{grasp.name}">',
-            *(f"  <!-- {line} -->" for line in heading(grasp, body)),
-            f'  <option timestep="0.001" gravity="{numbers(*contacts.rotation @ weight(1.0, body))}" cone="elliptic"'
-            ' impratio="100" noslip_iterations="50"/>',
-            "  <asset>",
-            f'    <mesh name="object" inertia="shell" vertex="{places(body.points)}" face="{places(body.triangles)}"/>',
-            "  </asset>",
-            "  <worldbody>",
-            *_object(contacts, carried(grasp, body)),
-            '    <body name="hand">',
-            *(line for f in (1, 2) for line in _finger(f, contacts, body.pad)),
-            "    </body>",
-            "  </worldbody>",
-            "  <contact>",
-            *(
-                f'    <pair name="finger{f}" geom1="pad{f}" geom2="plate{f}" condim="4" '
-                f'friction="{numbers(*friction(contact))} 0 0" solref="0.004 1"/>'
-                for f, contact in enumerate(contacts.contacts, 1)
-            ),
-            "  </contact>",
-            "  <equality>  <!-- the drive: equal strokes, and the sum of both forces stays -->",
-            f'    <joint name="drive" joint1="close1" joint2="close2" {STIFF}/>',
-            "  </equality>",
-            "  <actuator>  <!-- the normal force at control 0, and more or less of it otherwise -->",
-            *(
-                f'    <general name="press{f}" joint="close{f}" gainprm="1" biastype="affine" '
-                f'biasprm="{numbers(grasp.force)} 0 0"/>'
-                for f in (1, 2)
-            ),
-            "  </actuator>",
-            "</mujoco>",
-        ]
-    )
 
+    def foam(contact: PointContact) -> tuple[FloatArray, FloatArray]:
+        """The undeformed pad that a ball stands for, in the contact frame."""
+        middle = contact.pad_origin - body.pad[2] / 2 * contact.pad_rotation[:, 2] - contact.origin
+        return contact.rotation.T @ contact.pad_rotation, contact.rotation.T @ middle
 
-def _object(contacts: Cell, body: RigidBody) -> list[str]:
-    """The object with its surface, in the frame of its own file."""
-    inertia = numbers(*body.inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]])
-    return [
-        f'    <body name="object" {_pose(contacts.rotation, contacts.origin)}>',
-        '      <freejoint name="object"/>',
-        f'      <inertial pos="{numbers(*body.centre)}" mass="{numbers(body.mass)}" fullinertia="{inertia}"/>',
-        '      <geom name="object" type="mesh" mesh="object"/>',
-        *(_plate(f, contact, contacts) for f, contact in enumerate(contacts.contacts, 1)),
-        "    </body>",
-    ]
+    gravity = cell(grasp, body.down).rotation @ weight(1.0, body)
+    parts = {"pose": _pose, "foam": foam, "friction": friction, "stiff": STIFF, "hidden": HIDDEN}
+    return rendered("grasp.xml", grasp, body, gravity=gravity, **parts)
 
 
 def _pose(rotation: FloatArray, origin: FloatArray) -> str:
     turn = quaternion(rotation)
     return f'pos="{numbers(*origin)}" quat="{numbers(turn[3], *turn[:3])}"'
-
-
-def _plate(f: int, contact: PointContact, contacts: Cell) -> str:
-    """The object's side of a contact, in the object's own frame: a hidden plate whose face is the contact plane."""
-    centre = contact.origin + PLATE * contact.rotation[:, 2]
-    placed = _pose(contacts.rotation.T @ contact.rotation, contacts.rotation.T @ (centre - contacts.origin))
-    size = numbers(2 * RADIUS, 2 * RADIUS, PLATE)
-    return f'      <geom name="plate{f}" type="box" size="{size}" {placed} {HIDDEN}/>'
-
-
-def _finger(f: int, contacts: Cell, pad: FloatArray) -> list[str]:
-    """A hidden ball on a rail along the closing axis, and the undeformed pad that it stands for."""
-    contact = contacts.contacts[f - 1]
-    rail = contact.rotation.T @ contacts.closing * (1.0 if f == 1 else -1.0)
-    # Fingers that have lost the object meet in the middle, and open as far.
-    reach = 0.5 * float(np.linalg.norm(contacts.contacts[1].origin - contacts.contacts[0].origin))
-    middle = contact.pad_origin - pad[2] / 2 * contact.pad_rotation[:, 2] - contact.origin
-    placed = _pose(contact.rotation.T @ contact.pad_rotation, contact.rotation.T @ middle)
-    return [
-        f"      <!-- finger {f}, in its contact frame: z is the normal, into the object -->",
-        f'      <body name="finger{f}" {_pose(contact.rotation, contact.origin)}>',
-        f'        <joint name="close{f}" type="slide" axis="{numbers(*rail)}" range="{-reach} {reach}"/>',
-        f'        <geom name="pad{f}" type="sphere" size="{RADIUS}" pos="0 0 {-RADIUS}" mass="{PAD_MASS}" {HIDDEN}/>',
-        f'        <geom name="foam{f}" type="box" size="{numbers(*pad / 2)}" {placed} mass="0" {SEEN}/>',
-        "      </body>",
-    ]

@@ -17,10 +17,11 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any
 
+import jinja2
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from softjaw.study.export.rigid_body import DENSITY, RigidBody
+from softjaw.study.export.rigid_body import DENSITY, RigidBody, places
 from softjaw.study.export.selection import FloatArray, RankedGrasp
 from softjaw.study.messages import USAGE, StudyError
 
@@ -66,6 +67,21 @@ class Cell:
     rotation: FloatArray
     origin: FloatArray
     closing: FloatArray
+
+    @property
+    def reach(self) -> float:
+        """Way of each finger to the middle [m], where fingers that have lost the object meet."""
+        return 0.5 * float(np.linalg.norm(self.contacts[1].origin - self.contacts[0].origin))
+
+    def rail(self, f: int) -> FloatArray:
+        """Direction in which finger 1 or 2 closes, in its contact frame ``(3,)``."""
+        return self.contacts[f - 1].rotation.T @ self.closing * (1.0 if f == 1 else -1.0)
+
+    def plate(self, f: int) -> tuple[FloatArray, FloatArray]:
+        """Rotation and middle of a plate of the object whose face is the contact plane, in the object's own frame."""
+        contact = self.contacts[f - 1]
+        centre = contact.origin + PLATE * contact.rotation[:, 2]
+        return self.rotation.T @ contact.rotation, self.rotation.T @ (centre - self.origin)
 
 
 def cell(grasp: RankedGrasp, down: FloatArray = DOWN) -> Cell:
@@ -134,3 +150,18 @@ def heading(grasp: RankedGrasp, body: RigidBody) -> list[str]:
         "friction: the ellipsoid from three motions; the payload follows from all sampled motions",
     ]
     return [line.replace("--", "- -") for line in lines]  # two dashes would end a comment of XML
+
+
+def rendered(template: str, grasp: RankedGrasp, body: RigidBody, **parts: Any) -> str:
+    """The file of a grasp that a simulator opens, from a template of `study.templates` and what is its own."""
+    made, weighed = cell(grasp, body.down), carried(grasp, body)
+    fingers = [*enumerate(made.contacts, start=1)]
+    moments, axes = np.linalg.eigh(weighed.inertia)
+    axes[:, 2] *= np.linalg.det(axes)  # a rotation, no reflection
+    inertia = {f"i{'xyz'[i]}{'xyz'[j]}": weighed.inertia[i, j] for i in range(3) for j in range(i, 3)}
+    loader = jinja2.Environment(loader=jinja2.PackageLoader("softjaw.study"), trim_blocks=True, lstrip_blocks=True)
+    return loader.get_template(template).render(
+        grasp=grasp, body=weighed, heading=heading(grasp, body), cell=made, fingers=fingers,
+        moments=moments, axes=axes, inertia=inertia, numbers=numbers, places=places, RADIUS=RADIUS, PLATE=PLATE,
+        PAD_MASS=PAD_MASS, **parts,
+    )  # fmt: skip
