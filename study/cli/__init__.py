@@ -18,7 +18,7 @@ from softjaw.study.run.limits import is_out_of_memory, no_room, require_room
 
 UNWRITABLE = {errno.EPIPE, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}  # what standard output can answer
 SOLVING = ("run", "cost")
-OF_SCENES, OF_FOLDERS = ("check", "plan", "run"), ("watch", "status", "show", "report", "export")  # of many objects
+OF_SCENES = ("check", "plan", "run")  # whose scene may name many objects
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -70,8 +70,6 @@ def command(options: Namespace) -> int:
     options.folder = _module("cli.quick").objects_of(options) if options.command in OF_SCENES else None
     if options.command in SOLVING and not options.folder:  # a wrong scene is refused before the solvers are loaded
         options.scene_read = _module("cli.quick").scene_of(options)
-    if options.folder or (options.command in OF_FOLDERS and _module("result.index").index_path(options.file)):
-        options.module = "cli.folder"
     answer = getattr(_module(options.module), options.command)(options)
     if isinstance(answer, str):
         say(answer)

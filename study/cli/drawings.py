@@ -6,8 +6,10 @@ from argparse import Namespace
 from pathlib import Path
 
 from softjaw.study.messages import CANNOT_WRITE, USAGE, StudyError, beside, write_file
+from softjaw.study.result.index import index_path
 from softjaw.study.result.read import open
 from softjaw.study.show.grasps import judge
+from softjaw.study.show.report.objects_page import write_objects_page
 from softjaw.study.show.report.writing import write_report
 from softjaw.study.show.view import model, object3d, solids
 from softjaw.study.units import in_si
@@ -22,7 +24,9 @@ def choice(options: Namespace) -> tuple[int | None, tuple[float | None, float | 
 
 
 def report(options: Namespace) -> str:
-    """Write one page with everything."""
+    """Write one page with everything, of a file or of all objects of a folder."""
+    if index := index_path(options.file):
+        return f"written: {write_objects_page(index, Path(options.output or index.with_suffix('.html')))}"
     page = Path(options.output or Path(options.file).with_suffix(".html"))
     return f"written: {write_report(Path(options.file), page, *choice(options))}"
 

@@ -6,9 +6,9 @@ import sys
 from argparse import Namespace
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 from softjaw.study.export.cases import as_csv, as_json
+from softjaw.study.export.data_set import FORMS, write_data_set
 from softjaw.study.export.mjcf import as_mjcf
 from softjaw.study.export.physx import as_usd
 from softjaw.study.export.planners import CLOSING, as_graspgen, as_isaac_grasp, as_moveit
@@ -17,6 +17,7 @@ from softjaw.study.export.sdf import as_sdf, as_stl
 from softjaw.study.export.selection import GripperFrame, Selection, chosen, grasps, usable
 from softjaw.study.grippers import Hand, gripper_file
 from softjaw.study.messages import USAGE, StudyError, write_file
+from softjaw.study.result.index import index_path
 from softjaw.study.result.read import open
 from softjaw.study.units import in_si
 
@@ -28,11 +29,21 @@ DATA_SETS = ("acronym", "webdataset")  # of folders alone
 
 def export(options: Namespace) -> str:
     """Write grasps for planners and simulators; files that were written, or the text itself."""
+    index = index_path(options.file)
+    if index and options.form not in FORMS:
+        known = ", ".join(FORMS)
+        raise StudyError(USAGE, f"--format: found '{options.form}', expected one of {known} for a folder of objects")
+    if options.output is None and (index or options.form == "vtk"):
+        raise StudyError(USAGE, f"--format {options.form}: name what to write with -o")
+    if index:
+        return write_data_set(index, Path(options.output), options.form, gripper_of(options))
     if options.form in DATA_SETS:
         raise StudyError(USAGE, f"--format {options.form}: found '{options.file}', expected a folder of objects")
     ds = open(options.file)
     if options.form == "vtk":
-        return f"written: {_vtk(options, ds)}"
+        from softjaw.study.show.vtk import write_vtk  # slow to load
+
+        return f"written: {write_vtk(ds, Path(options.output), options.force)}"
     few = options.top if options.top is not None else 1 if options.form in SIMULATORS else 0
     choice = Selection(options.model, options.force, options.by, few, dict(options.least))
     if options.form in TABLES:
@@ -64,14 +75,6 @@ def gripper_of(options: Namespace) -> GripperFrame:
     approaches = tuple(options.approaches or (("x",) if options.form in SIMULATORS else ()))
     closing = CLOSING.get(options.form, "")
     return GripperFrame(hand, approaches, closing, in_si("wider_mm", options.wider), options.frame)
-
-
-def _vtk(options: Namespace, ds: Any) -> Path:
-    from softjaw.study.show.vtk import write_vtk  # slow to load
-
-    if options.output is None:
-        raise StudyError(USAGE, "--format vtk: name the file with -o")
-    return write_vtk(ds, Path(options.output), options.force)
 
 
 def _written(options: Namespace, texts: list[str]) -> str:

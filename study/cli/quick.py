@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 from argparse import Namespace
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from softjaw.study.case.build import build_object, check_object, geometry, mesh_notes, told
 from softjaw.study.case.candidates import check_poses, with_sampled_grasps
+from softjaw.study.cli.folder import objects_text, results_folder
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.run.estimate import scaling_text
 from softjaw.study.run.object_folder import ObjectFolder, folder_of
@@ -54,6 +56,11 @@ def _measured(options: Namespace) -> start.Measured:
 
 def check(options: Namespace) -> str:
     """Find every error of a scene, or say what would be run."""
+    if options.folder:
+        text, listed = scene_text(checked(options.folder), options.scene), options.folder.objects
+        names = ", ".join(one.name for one in listed[:5]) + ", ..." * (len(listed) > 5)
+        text += f"\n  objects     {len(listed)}: {names}; the mesh above stands for all of them"
+        return hanging(text, terminal_width())
     scene = with_sampled_grasps(scene_of(options))
     check_object(scene)
     check_poses(scene)
@@ -62,6 +69,9 @@ def check(options: Namespace) -> str:
 
 def plan(options: Namespace) -> str:
     """Say what a run will take."""
+    if options.folder:
+        checked(options.folder)
+        return hanging(objects_text(options.folder, results_folder(options), options.ranks[0]), terminal_width())
     scene = with_sampled_grasps(scene_of(options))
     path = target(options)
     made = make_plan(scene, options.scene, options.overrides)
@@ -76,20 +86,31 @@ def schema(_options: Namespace) -> str:
     return json.dumps(Scene.model_json_schema(), indent=2)
 
 
-def scene_of(options: Namespace) -> Scene:
-    """The scene that the command line names, with what it changes."""
+@contextmanager
+def wrong_scenes_are_bad_usage() -> Iterator[None]:
+    """Around what reads a scene."""
     try:
-        return load_scene(Path(options.scene), [*options.overrides, *petsc_overrides(options.petsc)])
+        yield
     except SceneError as error:
         raise StudyError(USAGE, str(error)) from error
+
+
+def scene_of(options: Namespace) -> Scene:
+    """The scene that the command line names, with what it changes."""
+    with wrong_scenes_are_bad_usage():
+        return load_scene(Path(options.scene), [*options.overrides, *petsc_overrides(options.petsc)])
 
 
 def objects_of(options: Namespace) -> ObjectFolder | None:
     """The objects of a scene that names many; None for a scene of one."""
-    try:
+    with wrong_scenes_are_bad_usage():
         return folder_of(options.scene, [*options.overrides, *petsc_overrides(options.petsc)])
-    except SceneError as error:
-        raise StudyError(USAGE, str(error)) from error
+
+
+def checked(folder: ObjectFolder) -> Scene:
+    """The scene of the first of many objects, which stands for all; its errors are bad usage."""
+    with wrong_scenes_are_bad_usage():
+        return folder.check()
 
 
 def target(options: Namespace, ending: str = "") -> Path:

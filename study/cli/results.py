@@ -3,29 +3,36 @@
 from __future__ import annotations
 
 from argparse import Namespace
+from functools import partial
 from pathlib import Path
 
 from softjaw.study.messages import OTHER_FILE, USAGE, StudyError
+from softjaw.study.result.index import index_path
 from softjaw.study.result.read import open
 from softjaw.study.result.store import open_result, torn_rows
 from softjaw.study.scene import SceneError
+from softjaw.study.show import objects
 from softjaw.study.show.best_grasps import best, best_text
 from softjaw.study.show.compare import compare as compared
 from softjaw.study.show.compare import compare_text
 from softjaw.study.show.watch import file_look
 from softjaw.study.show.watch import watch as watched
-from softjaw.study.table import as_csv, as_json, terminal_width
+from softjaw.study.table import as_csv, as_json, as_text, terminal_width
 
 FORMS = {"json": as_json, "csv": as_csv}
 
 
 def watch(options: Namespace) -> int:
     """Follow a run until it ends."""
-    return watched(file_look(Path(options.file)), options.every)
+    index = index_path(options.file)
+    return watched(partial(objects.look, index) if index else file_look(Path(options.file)), options.every)
 
 
 def show(options: Namespace) -> str:
-    """Print the best grasps."""
+    """Print the best grasps, or the objects with theirs."""
+    if index := index_path(options.file):
+        table = objects.index_table(index, options.top)
+        return FORMS[options.form](table) if options.form else as_text(table, terminal_width())
     ds = open(options.file)
     try:
         if options.form is None:

@@ -8,17 +8,27 @@ from argparse import Namespace
 from mpi4py import MPI
 
 from softjaw.study.case.candidates import with_sampled_grasps
-from softjaw.study.cli.quick import petsc_overrides, target
-from softjaw.study.launch import solve_scene
+from softjaw.study.cli.folder import results_folder
+from softjaw.study.cli.quick import petsc_overrides, target, wrong_scenes_are_bad_usage
+from softjaw.study.launch import solve_objects, solve_scene
 from softjaw.study.messages import DONE, SOME_FAILED, write_file
 from softjaw.study.result.read import open as open_dataset
 from softjaw.study.run.progress import Unbreakable
+from softjaw.study.show import objects
+from softjaw.study.table import terminal_width
 
 
 def run(options: Namespace) -> int:
     """Solve a scene; the same exit code on every rank."""
     # A run in a pipe whose reader leaves must go on solving.
     sys.stdout = Unbreakable(sys.stdout)
+    if options.folder:
+        out = results_folder(options)
+        with wrong_scenes_are_bad_usage():
+            code = solve_objects(options.folder, out, MPI.COMM_WORLD, retry_failed=options.retry_failed)
+        if MPI.COMM_WORLD.rank == 0:
+            print(objects.summary(out / "index.hdf", terminal_width()), flush=True)
+        return code
     given = [*options.overrides, *petsc_overrides(options.petsc)]
     path = target(options)
     return solve_scene(

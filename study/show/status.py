@@ -14,12 +14,14 @@ from numpy.typing import NDArray
 
 from softjaw.study.flags import flag_sentences, flags_in
 from softjaw.study.quantities import DONE, FAILED, MISSING, NO_GRASP, PARTS, STATES, map_row, misses
+from softjaw.study.result.index import index_path
 from softjaw.study.result.lock import holder
 from softjaw.study.result.store import open_result, place_text
 from softjaw.study.run.progress import duration
 from softjaw.study.run.refine import about
 from softjaw.study.scene.sections import COARSE, FINE, FINEST
 from softjaw.study.scene.text import scene_table
+from softjaw.study.show import objects
 from softjaw.study.table import (
     MOST_NOTES,
     PAPER,
@@ -32,6 +34,7 @@ from softjaw.study.table import (
     wrapped,
 )
 
+FORMS = {"json": as_json, "csv": as_csv}
 MOST_PLACES = 2
 NO_ERRORS = "errors of the mesh: not known; accuracy.meshes = 2 in the scene gives them"
 RESUME = "run the same command again to resume"
@@ -54,11 +57,15 @@ class Reason(NamedTuple):
 
 
 def status(options: Namespace) -> str:
-    """Say what a result file holds so far, as text, JSON or CSV."""
+    """Say what a result file or a folder of objects holds so far, as text, JSON or CSV."""
+    if index := index_path(options.file):
+        if options.form is None:
+            return objects.status_text(index, terminal_width())
+        return FORMS[options.form](objects.index_table(index))
     with open_result(options.file) as result:
         if options.form is None:
             return status_text(result, terminal_width())
-        return {"json": as_json, "csv": as_csv}[options.form](status_table(result))
+        return FORMS[options.form](status_table(result))
 
 
 def status_table(result: Any) -> Table:
