@@ -207,6 +207,11 @@ def as_csv(table: Table) -> str:
     return text.getvalue().rstrip("\n")
 
 
+def rendered(table: Table, form: str | None) -> str:
+    """``json`` or ``csv``; for the terminal where neither is asked for."""
+    return {"json": as_json, "csv": as_csv}[form](table) if form else as_text(table, terminal_width())
+
+
 def _csv_cell(value: Any) -> Any:
     """A cell of CSV: None is empty, and a text that a spreadsheet would compute stands behind an apostrophe.
 

@@ -17,9 +17,7 @@ from softjaw.study.show.compare import compare as compared
 from softjaw.study.show.compare import compare_text
 from softjaw.study.show.watch import file_look
 from softjaw.study.show.watch import watch as watched
-from softjaw.study.table import as_csv, as_json, as_text, terminal_width
-
-FORMS = {"json": as_json, "csv": as_csv}
+from softjaw.study.table import rendered, terminal_width
 
 
 def watch(options: Namespace) -> int:
@@ -31,13 +29,12 @@ def watch(options: Namespace) -> int:
 def show(options: Namespace) -> str:
     """Print the best grasps, or the objects with theirs."""
     if index := index_path(options.file):
-        table = objects.index_table(index, options.top)
-        return FORMS[options.form](table) if options.form else as_text(table, terminal_width())
+        return rendered(objects.index_table(index, options.top), options.form)
     ds = open(options.file)
     try:
         if options.form is None:
             return best_text(ds, terminal_width(), options.force, options.top, options.by)
-        return FORMS[options.form](best(ds, options.force, options.top, by=options.by))
+        return rendered(best(ds, options.force, options.top, by=options.by), options.form)
     except ValueError as error:
         raise StudyError(USAGE, f"{options.file}: {error}") from error
 
@@ -46,7 +43,7 @@ def compare(options: Namespace) -> str:
     """Print two maps side by side."""
     first, second = map(open, options.files)
     table = compared(first, second, options.quantity, options.model)
-    return FORMS[options.form](table) if options.form else compare_text(table, options.top, terminal_width())
+    return rendered(table, options.form) if options.form else compare_text(table, options.top, terminal_width())
 
 
 def damage(options: Namespace, error: Exception) -> StudyError | None:

@@ -19,22 +19,15 @@ from softjaw.study.ranking import judged, ranked, score_of, shown_level
 from softjaw.study.result.layout import DONE, FAILED
 from softjaw.study.show.status import Reason
 from softjaw.study.show.status import grouped as kinds_of
-from softjaw.study.table import number
-from softjaw.study.units import shown, shown_unit
+from softjaw.study.table import number, with_unit
+from softjaw.study.units import shown, shown_text, shown_unit
 
 Index = tuple[int, ...]
-TYPESET = {"deg": "°", "mm^2": "mm²"}  # as pages write these units
 WIDE = 5e-3  # relative difference of widths that makes no place wider
 # What a check may be at most (or, for those of `ABOVE`, must exceed).
 LIMITS = {"force_balance": 1e-6, "adhesion": 1e-6, "penetration": 1e-6, "complementarity": 1e-6, "min_det_f": 0.0,
           "ellipticity": 0.0}  # fmt: skip
 ABOVE = ("min_det_f", "ellipticity")
-
-
-def unit_of(units: str) -> tuple[str, float]:
-    """Displayed unit, and the factor from SI to it."""
-    unit = shown_unit(units)
-    return TYPESET.get(unit, unit), shown(1.0, units)
 
 
 def judge(ds: xr.Dataset, chosen: Index | None = None) -> xr.Dataset:
@@ -80,21 +73,20 @@ def at(ds: xr.Dataset, name: str, index: Index, model: str = "ccm") -> float:
 def quantity(ds: xr.Dataset, name: str) -> tuple[str, str, float]:
     """A variable's long name without its unit, the displayed unit, and the factor from SI."""
     found = ds.variables[name].attrs if name in ds.variables else {}
-    return found.get("long_name", name), *unit_of(found.get("units", ""))
+    units = found.get("units", "")
+    return found.get("long_name", name), shown_unit(units), shown(1.0, units)
 
 
 def label_of(ds: xr.Dataset, name: str) -> str:
     """A variable's name and unit for an axis or a column."""
-    text, unit, _ = quantity(ds, name)
-    return f"{text} [{unit}]" if unit else text
+    return with_unit(*quantity(ds, name)[:2])
 
 
 def axis_label(ds: xr.Dataset, axis: str) -> str:
     """An axis of the cases with the displayed unit."""
     if axis == "station" and ds.attrs["poses"]:
         return "candidate"
-    unit = unit_of(ds.variables[axis].attrs["units"])[0]
-    return f"{spoken(axis)} [{unit}]" if unit else spoken(axis)
+    return with_unit(spoken(axis), shown_unit(ds.variables[axis].attrs["units"]))
 
 
 def spoken(name: str) -> str:
@@ -104,7 +96,7 @@ def spoken(name: str) -> str:
 
 def axis_values(ds: xr.Dataset, axis: str) -> np.ndarray:
     """Values of an axis in the displayed unit."""
-    return ds.variables[axis].values * unit_of(ds.variables[axis].attrs["units"])[1]
+    return np.asarray(shown(ds.variables[axis].values, ds.variables[axis].attrs["units"]))
 
 
 def axis_text(ds: xr.Dataset, axis: str, i: int) -> str:
@@ -112,10 +104,8 @@ def axis_text(ds: xr.Dataset, axis: str, i: int) -> str:
     about = ds.variables[axis].attrs
     if options := about.get("options", ()):
         return str(options[i])
-    unit, factor = unit_of(about["units"])
-    text = number(ds.variables[axis].values[i] * factor, 4)
     # A space that does not break keeps number and unit on one line.
-    return text + (unit if unit == "°" else f"\u00a0{unit}" if unit else "")
+    return shown_text(ds.variables[axis].values[i], about["units"]).replace(" ", "\u00a0")
 
 
 def place(ds: xr.Dataset, index: Index, force: bool = False) -> str:

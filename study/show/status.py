@@ -28,13 +28,11 @@ from softjaw.study.table import (
     Column,
     Row,
     Table,
-    as_csv,
-    as_json,
+    rendered,
     terminal_width,
     wrapped,
 )
 
-FORMS = {"json": as_json, "csv": as_csv}
 MOST_PLACES = 2
 NO_ERRORS = "errors of the mesh: not known; accuracy.meshes = 2 in the scene gives them"
 RESUME = "run the same command again to resume"
@@ -61,11 +59,11 @@ def status(options: Namespace) -> str:
     if index := index_path(options.file):
         if options.form is None:
             return objects.status_text(index, terminal_width())
-        return FORMS[options.form](objects.index_table(index))
+        return rendered(objects.index_table(index), options.form)
     with open_result(options.file) as result:
         if options.form is None:
             return status_text(result, terminal_width())
-        return FORMS[options.form](status_table(result))
+        return rendered(status_table(result), options.form)
 
 
 def status_table(result: Any) -> Table:

@@ -25,9 +25,9 @@ from softjaw.study.show.grasps import (
     place,
     quantity,
     spoken,
-    unit_of,
     unravelled,
 )
+from softjaw.study.units import shown_unit
 
 MOST_PANELS, MOST_LABELS, MOST_NOTES = 6, 16, 8000
 MORE = ("quality_fitted", "epsilon", "f_x_max", "f_y_max", "tau_z_max", "safety_factor", "contact_area", "p_max",
@@ -158,7 +158,7 @@ def _button(ds: xr.Dataset, name: str, cuts: Any, x: int, y: int) -> dict[str, A
     arrays = ((field(ds, name, m), at) for m, at in cuts)
     z = [np.full((1, 1), np.nan) if array is None else factor * plane(array, x, y, at) for array, at in arrays]
     axes = [str(ds.status.dims[a]) for a in (x, y)]
-    (xl, xu), (yl, yu) = ((spoken(axis), unit_of(ds[axis].units)[0]) for axis in axes)
+    (xl, xu), (yl, yu) = ((spoken(axis), shown_unit(ds[axis].units)) for axis in axes)
     hover = f"{xl} %{{x}} {xu}, {yl} %{{y}} {yu}<br>{label(title)}: %{{z:.4g}}<br>%{{customdata}}<extra></extra>"
     low, high = plots.span(np.concatenate([a.ravel() for a in z]))
     rows = [None if not np.isfinite(a).any() else plots.with_gaps(a) for a in z]

@@ -29,10 +29,10 @@ from softjaw.study.show.grasps import (
     place,
     quantity,
     spoken,
-    unit_of,
 )
 from softjaw.study.show.status import no_grasps
 from softjaw.study.table import as_text, number
+from softjaw.study.units import shown_unit
 
 CAVEAT = (
     "The paper publishes neither the pad dimensions of its gripper nor the numbers behind its figures. The dimensions "
@@ -49,22 +49,22 @@ and /study/status/code (0 missing, 1 done, 2 failed) and /study/status/message s
 stations and angles, the angle running fastest. /study/scene is the scene with all settings, /study/provenance/sessions
 lists programs and machine. Plots: h5web, silx or NeXpy open at the map of payload; 'softjaw export
 --format vtk' writes the object with its maps and the pads with their pressure for ParaView."""
-ASCII = {"\N{NO-BREAK SPACE}": " ", "\N{DEGREE SIGN}": " deg", "\N{MULTIPLICATION SIGN}": "x", "±": "+-"}
+ASCII = {"\N{NO-BREAK SPACE}": " ", "\N{MULTIPLICATION SIGN}": "x", "±": "+-"}
 
 
 def subtitle(ds: xr.Dataset) -> str:
     """File and axes in one line."""
     parts, axes = [], [str(axis) for axis in ds.status.dims]
     for axis in axes:
-        values, unit = axis_values(ds, axis), unit_of(ds[axis].units)[0]
+        values, unit = axis_values(ds, axis), shown_unit(ds[axis].units)
         n, low = len(values), number(values.min(), 4)
         reach = low if n == 1 else f"{low} to {number(values.max(), 4)}"
-        space, plural = "" if unit in ("", "°") else " ", "s" * (n > 1)
+        plural = "s" * (n > 1)
         name = f"{spoken(axis)}{plural}" if axis in axes[-3:] else f"value{plural} of {spoken(axis)}"
         if axis == "station" and ds.attrs["poses"]:
             parts.append(f"{n} candidate{plural}")
         elif not (axis == "angle" and ds.attrs["poses"]):
-            parts.append(f"{n} {name} ({reach}{space}{unit})")
+            parts.append(f"{n} {name} ({reach} {unit}".rstrip() + ")")
     return f"{Path(ds.attrs['file']).name}: {' × '.join(parts)}"
 
 

@@ -194,7 +194,7 @@ def test_the_verdict_has_the_numbers_of_the_best_grasp_and_of_the_states(ordinar
         assert (first["station"], first["angle"]) == (data.station.values[2], data.angle.values[1])
         sentences, lines = verdict.verdict(data), best_grasps.answer(data, data.attrs["best"])
     found = [lines[name][0].replace("\u00a0", " ") for name in ("where", "opening", "force")]
-    assert found == ["station 20 mm, angle 28.65°", "40 mm", "5 N per finger"]
+    assert found == ["station 20 mm, angle 28.65 deg", "40 mm", "5 N per finger"]
     assert any("10 % more quality" in sentence for sentence in sentences)
     assert [int(n) for n in re.findall(r"\d+", sentences[-1])] == [17, 24, 6, 1]
     assert all(sentence.replace("\u00a0", " ") in page.text for sentence in sentences)
@@ -253,7 +253,7 @@ def test_a_chosen_candidate_stands_beside_the_best_one(tmp_path):
     with open_result(path) as result:
         chosen, failed = judge(dataset(result), (3, 0, 1)), judge(dataset(result), (3, 2, 1))
         said = verdict.chosen(chosen).replace("\u00a0", " ")
-        for words in ("candidate 9: station 30 mm, angle 0°, 5 N", "1.25", "2.5", "place 9 of 11"):
+        for words in ("candidate 9: station 30 mm, angle 0 deg, 5 N", "1.25", "2.5", "place 9 of 11"):
             assert words in said
         assert compared(chosen) == ((3, 0, 1), "the chosen candidate")
         assert "it slipped away" in verdict.chosen(failed)
