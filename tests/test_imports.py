@@ -30,7 +30,6 @@ ALLOWED["study"] |= {f"softjaw.{name}" for name in OWN}
 PICTURES = {
     "fem/objects/triangles.py",
     "study/show/view/solids.py",
-    "study/show/vtk.py",
 }
 DOORS = {
     "petsc4py": {"fem/petsc.py"},

@@ -41,7 +41,7 @@ def export(options: Namespace) -> str:
         raise StudyError(USAGE, f"--format {options.form}: found '{options.file}', expected a folder of objects")
     ds = open(options.file)
     if options.form == "vtk":
-        from softjaw.study.show.vtk import write_vtk  # slow to load
+        from softjaw.study.show.view.solids import write_vtk  # slow to load
 
         return f"written: {write_vtk(ds, Path(options.output), options.force)}"
     few = options.top if options.top is not None else 1 if options.form in SIMULATORS else 0

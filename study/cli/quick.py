@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from argparse import Namespace
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -11,16 +12,19 @@ from typing import Any
 
 from softjaw.study.case.build import build_object, check_object, geometry, mesh_notes, told
 from softjaw.study.case.candidates import check_poses, with_sampled_grasps
-from softjaw.study.cli.folder import objects_text, results_folder
 from softjaw.study.messages import USAGE, StudyError
-from softjaw.study.run.estimate import scaling_text
-from softjaw.study.run.object_folder import ObjectFolder, folder_of
-from softjaw.study.run.plan import make_plan, plan_text
+from softjaw.study.run.estimate import START_S, estimated, scaling_text
+from softjaw.study.run.object_folder import Listed, ObjectFolder, folder_of
+from softjaw.study.run.plan import free_bytes, make_plan, memory, plan_text
+from softjaw.study.run.progress import duration
+from softjaw.study.run.shares import makespan
 from softjaw.study.scene import Scene, SceneError, load_scene, start
 from softjaw.study.scene.objects import Mesh
-from softjaw.study.show.overview import scene_text
+from softjaw.study.show.overview import aligned, scene_text
 from softjaw.study.table import hanging, terminal_width
 from softjaw.study.units import in_si
+
+PLANNED = 5  # objects that are planned, evenly spread, for what all will take
 
 
 def init(options: Namespace) -> str:
@@ -81,6 +85,44 @@ def plan(options: Namespace) -> str:
     return hanging("\n".join(lines), terminal_width())
 
 
+def objects_text(folder: ObjectFolder, out: Path, ranks: int) -> str:
+    """Objects, cases, disk, memory and time on so many ranks."""
+    objects = folder.objects
+    some = objects[:: -(-len(objects) // PLANNED)]
+    planned = [made for listed in some if (made := _planned(folder, listed)) is not None]
+    rows = {"objects": f"{len(objects)}, of which {len(some)} were looked at"}
+    if planned:
+        scale = len(objects) / len(some)
+        cases, space, planning, needs = (list(part) for part in zip(*(made[:4] for made in planned), strict=True))
+        paths = [seconds for made in planned for seconds in made[4]]
+        many = paths * max(1, round(scale))
+        solving = makespan(many, ranks) * scale * len(paths) / len(many)
+        preparing = scale * sum(planning) / ranks
+        free = free_bytes(out / "index.hdf")
+        rows |= {
+            "cases": f"about {scale * sum(cases):.0f}",
+            "disk": f"about {scale * sum(space) / 1e6:.3g} MB in {out}" + f", {free / 1e9:.1f} GB free" * (free >= 0),
+            "memory": f"roughly {max(needs) / 1e9:.1g} GB on each rank, {max(needs) * ranks / 1e9:.2g} GB on {ranks}",
+            "time": f"about {duration(START_S + preparing + solving)} on {ranks} rank{'s' * (ranks > 1)}, "
+            f"{duration(preparing)} of it for sampling grasps; estimated on a bed of springs",
+        }
+    if len(planned) < len(some):
+        rows["no grasp"] = f"{len(some) - len(planned)} of {len(some)}: they are rows of the index, with the reason"
+    return "\n".join(aligned(rows))
+
+
+def _planned(folder: ObjectFolder, listed: Listed) -> tuple[int, int, float, float, list[float]] | None:
+    """Cases, bytes on disk, seconds of planning, bytes of memory and seconds of each load path of an object."""
+    begin = time.perf_counter()
+    try:
+        scene = with_sampled_grasps(folder.scene(listed))
+        made = make_plan(scene, folder.scene_file, folder.overrides_of(listed))
+    except (StudyError, SceneError):
+        return None
+    spent = time.perf_counter() - begin
+    return made.layout.rows, made.layout.nbytes, spent, memory(scene), estimated(made.tried)
+
+
 def schema(_options: Namespace) -> str:
     """Print the JSON schema of a scene."""
     return json.dumps(Scene.model_json_schema(), indent=2)
@@ -123,6 +165,14 @@ def target(options: Namespace, ending: str = "") -> Path:
         text = f"-o: found '{path}', expected a file ending in .hdf, which all viewers open; write -o {better}"
         raise StudyError(USAGE, text)
     return path
+
+
+def results_folder(options: Namespace) -> Path:
+    """The folder of the results; by default the scene's name."""
+    out = Path(options.output or Path("results") / Path(options.scene).stem)
+    if out.suffix == ".hdf" or out.is_file():
+        raise StudyError(USAGE, f"-o: found '{out}', expected a folder, for a scene of many objects")
+    return out
 
 
 def petsc_overrides(words: Sequence[str]) -> list[str]:

@@ -8,8 +8,7 @@ from argparse import Namespace
 from mpi4py import MPI
 
 from softjaw.study.case.candidates import with_sampled_grasps
-from softjaw.study.cli.folder import results_folder
-from softjaw.study.cli.quick import petsc_overrides, target, wrong_scenes_are_bad_usage
+from softjaw.study.cli.quick import petsc_overrides, results_folder, target, wrong_scenes_are_bad_usage
 from softjaw.study.launch import solve_objects, solve_scene
 from softjaw.study.messages import DONE, SOME_FAILED, write_file
 from softjaw.study.result.read import open as open_dataset

@@ -13,9 +13,8 @@ import pytest
 from softjaw.study.cli import main
 from softjaw.study.cli.exporting import DATA_SETS, PLANNERS, SIMULATORS, TABLES
 from softjaw.study.cli.options import FORMATS
-from softjaw.study.export.planners import CLOSING, as_graspgen
+from softjaw.study.export.planners import CLOSING, as_graspgen, yaml_text
 from softjaw.study.export.selection import APPROACHES, GripperFrame, Selection, grasps
-from softjaw.study.export.yaml import yaml_text
 from softjaw.study.flags import Flag
 from softjaw.study.grippers import Hand
 from softjaw.study.messages import CANNOT_WRITE, USAGE
