@@ -144,7 +144,11 @@ def scene_of(options: Namespace) -> Scene:
 
 
 def objects_of(options: Namespace) -> ObjectFolder | None:
-    """The objects of a scene that names many; None for a scene of one."""
+    """The objects of a scene or of ``--objects``, which becomes an override; None for a scene of one."""
+    if options.objects is not None:
+        meshes = Path(options.objects).absolute()
+        pattern = meshes / "*" if meshes.is_dir() else meshes
+        options.overrides.append(f"object.mesh={json.dumps(str(pattern))}")
     with wrong_scenes_are_bad_usage():
         return folder_of(options.scene, [*options.overrides, *petsc_overrides(options.petsc)])
 

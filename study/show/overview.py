@@ -14,11 +14,9 @@ def scene_text(scene: Any, file: str) -> str:
     """What would be run, in a few lines."""
     c, g, o = scene.candidates, scene.gripper, scene.object
     name = f" '{o.name}'" if getattr(o, "name", None) else ""
-    where = (
-        f"{c.total} explicit poses"
-        if c.poses
-        else f"{c.total}: {_list([*c.station_values_mm], 'mm')} along the axis, {_list(c.angles_deg, 'deg')} about it"
-    )
+    where = "explicit poses" if c.poses else "sampled of each object"
+    if not c.poses and not c.sampled:
+        where = f"at {_list([*c.station_values_mm], 'mm')} along the axis, {_list(c.angles_deg, 'deg')} about it"
     size = " x ".join(f"{shown(s, 'm'):g}" for s in g.pad_size)
     mesh = " x ".join(map(str, g.elements))
     levels = [f"{key} {value}" for key, value in scene.effects.model_dump().items()]
@@ -26,7 +24,7 @@ def scene_text(scene: Any, file: str) -> str:
         "object": f"{o.shape}{name}{_extent(o)}",
         "mesh": getattr(o, "mesh", ""),  # the effective path, wherever the scene's leads
         "wall": wall_text(o),
-        "candidates": where,
+        "candidates": f"{c.total} {where}",
         "forces": _list(scene.load.normal_force_n, "N"),
         "friction": f"mu = {scene.friction.mu:g}; CCM, PCM and PCM scaled by F_N",
         "sweep": "; ".join(f"{key}: {_list(values)}" for key, values in scene.sweep.items()),

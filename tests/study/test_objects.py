@@ -82,6 +82,19 @@ def test_a_pattern_without_meshes_is_refused(scene, mesh):
     assert refusal.value.code == USAGE
 
 
+@pytest.mark.parametrize("objects", ["meshes", "meshes/*.stl", "some.csv"])
+def test_the_command_line_names_meshes_from_where_it_is(scene, objects, monkeypatch):
+    """A folder, a pattern or a table; not from the scene's folder, as a key of the scene would be."""
+    (scene.parent / "sub").mkdir(exist_ok=True)
+    (scene.parent / "sub/scene.toml").write_text(SCENE)
+    (scene.parent / "some.csv").write_text("mesh\nmeshes/a.stl\nmeshes/longest.stl\n")
+    monkeypatch.chdir(scene.parent)
+    code, text, _ = command(0, "check", "sub/scene.toml", "--objects", objects)
+    assert code == DONE
+    assert f"{2 if objects.endswith('.csv') else len(NAMES) + 1}: a" in text
+    assert command(0, "check", "sub/scene.toml", "--objects", "nothing/*.stl")[0] == USAGE
+
+
 def test_every_object_is_a_row_and_none_stops_the_others(solved):
     found = rows(solved)
     states = {name: str(row.state.values) for name, row in found.items()}
