@@ -1,7 +1,5 @@
 """Starting the fake study, alone or under mpirun, and comparing what it wrote."""
 
-from __future__ import annotations
-
 import io
 import json
 import subprocess

@@ -1,7 +1,5 @@
 """The same patch written as every kind of file that ``softjaw patch`` reads."""
 
-from __future__ import annotations
-
 import numpy as np
 
 

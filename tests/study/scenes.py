@@ -1,7 +1,5 @@
 """Scenes of tests: an object, a place, coarse pads; and their cases, solved as a study solves them."""
 
-from __future__ import annotations
-
 from softjaw.study import pipeline
 from softjaw.study.case.build import build_object
 from softjaw.study.case.candidates import units

@@ -1,7 +1,5 @@
 """Result files that tests have changed by hand: with the checksums of what they hold now."""
 
-from __future__ import annotations
-
 import h5py
 import numpy as np
 

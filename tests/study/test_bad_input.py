@@ -1,7 +1,5 @@
 """Bad input through the program itself: one clear sentence, the right exit code, nothing started, nothing left."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 import sys

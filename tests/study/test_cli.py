@@ -1,7 +1,5 @@
 """The command line: answers, exit codes, and how little ``--help``, ``check``, ``plan`` and ``status`` load."""
 
-from __future__ import annotations
-
 import argparse
 import csv
 import io
@@ -165,9 +163,6 @@ def test_a_run_outlives_the_reader_of_its_output(tmp_path):
         return done.returncode, done.stderr
 
     assert piped() == (0, "")
-
-
-# --- examples ---------------------------------------------------------------------------------------------------------
 
 
 RUNNABLE = [  # all but those that take minutes and are tested elsewhere

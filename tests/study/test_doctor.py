@@ -1,7 +1,5 @@
 """The doctor names each trouble with its cure, survives what it examines, and is well where the tests run."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
@@ -116,9 +114,6 @@ def test_threads_are_pinned_unless_the_user_chose(monkeypatch):
 def test_the_doctor_loads_no_mpi_itself():
     foreign = {"mpi4py", "petsc4py", "h5py", "pyvista", "numpy"}
     assert ask(f"import sys, softjaw.study.doctor; print({foreign} & set(sys.modules))").stdout == "set()"
-
-
-# --- compiled loops ---------------------------------------------------------------------------------------------------
 
 
 CODE = """

@@ -1,7 +1,5 @@
 """What indicators measure, which reasons are given, and that no indicator lets `auto` skip an effect wrongly."""
 
-from __future__ import annotations
-
 import importlib.util
 import time
 from itertools import pairwise
@@ -258,9 +256,6 @@ def test_choosing_costs_at_most_a_fifth(file, overrides, monkeypatch):
     assert share <= 0.2
 
 
-# --- the backing plate ------------------------------------------------------------------------------------------------
-
-
 STEEL = ("gripper.sheet_thickness_mm=2",)
 PLASTIC = ("gripper.sheet_thickness_mm=1", "gripper.sheet_modulus_gpa=2")
 RIGID = 'effects.sheet="rigid"'
@@ -323,9 +318,6 @@ def test_a_plate_that_tilts_cannot_be_elastic():
     assert scene_of(OVAL, "gripper.tilt_stiffness_nm_per_rad=1")
     with pytest.raises(SceneError, match="tilt_stiffness_nm_per_rad"):
         scene_of(OVAL, "gripper.tilt_stiffness_nm_per_rad=1", 'effects.sheet="elastic"')
-
-
-# --- friction that acts back on the pressure --------------------------------------------------------------------------
 
 
 UNCOUPLED = 'effects.friction_pressure_coupling="none"'

@@ -1,7 +1,5 @@
 """Coarse first, fine where it matters: which cases the finer meshes get, and that no value is lost on the way."""
 
-from __future__ import annotations
-
 import subprocess
 
 import numpy as np
@@ -115,7 +113,6 @@ def test_the_best_of_a_sampled_study_are_solved_well_with_the_same_bits_on_any_r
     unsolved = mesh[:, 1] == 0
     best = np.sort((payload - payload * error)[~unsolved, 1])[-LISTED]
     assert ((payload * (1 + error))[unsolved, 1] <= best + 1e-9).all()
-
     killed = scene.with_name("killed.hdf")
     words = [word for word in command(0, "-m", "softjaw", "run", scene, "-o", killed)]
     process = subprocess.Popen(words, env=launch_environment(), cwd=ROOT, stdout=subprocess.DEVNULL)

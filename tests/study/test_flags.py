@@ -1,7 +1,5 @@
 """Flags and units: every bit has a word and a sentence; exact factors, and one choice for what people read."""
 
-from __future__ import annotations
-
 import ast
 import math
 from pathlib import Path

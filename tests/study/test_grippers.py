@@ -1,7 +1,5 @@
 """Presets of grippers: what a scene gets from them, joint values, and files of one's own."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

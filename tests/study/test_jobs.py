@@ -1,7 +1,5 @@
 """The shipped scenes: each passes ``check``, and each is solved to the end on a coarse mesh."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Kills, hangs and full disks under mpirun: no result is lost, only the case itself fails, and every file goes on."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import random
@@ -123,9 +121,6 @@ def test_no_kill_loses_a_result(tmp_path):
     assert kept > 5 * number
 
 
-# --- what one case or one disk can do --------------------------------------------------------------------------------
-
-
 def states(path):
     with open_result(path) as result:
         return result.status.ravel(), result.messages.ravel()
@@ -205,7 +200,6 @@ def fill(folder):
 def test_a_file_system_that_did_not_reserve_the_space_ends_the_run_and_keeps_what_is_stored(small_disk):
     """The file's space is given back by hand, as a file system that copies on write would have to take it anew."""
     path = small_disk / "holes.hdf"
-
     process = start(2, path, "--delay", 0.15)
     wait_for(lambda: path.exists() and (states(path)[0] == DONE).sum() >= 6)
     process.send_signal(signal.SIGUSR1)
@@ -244,7 +238,6 @@ def test_a_file_system_that_turns_read_only_is_told_once(small_disk):
 def test_ranks_leave_in_order_when_mpirun_is_told_to_stop(tmp_path, name):
     """mpirun answers TERM with 1, whatever its ranks say, and kills them after some two seconds: they are quicker."""
     path = tmp_path / "stopped.hdf"
-
     process = start(2, path, "--hang", 14, "--delay", 0.1)
     wait_for(lambda: path.exists() and states(path)[0][13] == DONE)
     began = time.monotonic()

@@ -1,7 +1,5 @@
 """Forces of a candidate on two meshes, on a rigid object and on a thin wall: each by itself, from the coarse one."""
 
-from __future__ import annotations
-
 import math
 from functools import lru_cache
 
@@ -107,9 +105,6 @@ def test_forces_are_apart_on_two_meshes():
     for overrides in ((), WALL, ("effects.friction_pressure_coupling='tangential'",)):
         assert unit_of(*overrides).apart
         assert not unit_of(*overrides, "accuracy.meshes=1").apart
-
-
-# --- further meshes ---------------------------------------------------------------------------------------------------
 
 
 OWN, FINER, FINEST = (8, 4, 2), (12, 6, 3), (16, 8, 4)

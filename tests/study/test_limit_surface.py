@@ -1,7 +1,5 @@
 """Limit surfaces, general poses and the task in the pipeline, on coarse meshes; judged by what each case stores."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

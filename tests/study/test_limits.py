@@ -1,7 +1,5 @@
 """What one case, one rank or one disk can do to a study: fail its own cases, end the run with a sentence, no more."""
 
-from __future__ import annotations
-
 import contextlib
 import gc
 import os

@@ -1,7 +1,5 @@
 """A folder of objects: which there are, one run over all of them, and what the index says."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

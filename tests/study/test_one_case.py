@@ -1,7 +1,5 @@
 """One case in memory is the case that a run stores; what names no case is refused."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 

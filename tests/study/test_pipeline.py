@@ -1,7 +1,5 @@
 """The pipeline with the real solver on coarse meshes: what symmetry, definitions and limits demand of every number."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """Real runs under mpirun: not a bit of the results depends on the number of ranks, on stops, or on kills."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import signal
@@ -130,7 +128,6 @@ def test_any_number_of_ranks_writes_the_same_bits(tmp_path, scene, alone, ranks)
 )
 def test_a_run_that_is_stopped_or_killed_goes_on_with_other_ranks_to_the_same_bits(tmp_path, scene, alone, how, ranks):
     path = tmp_path / f"{how}.hdf"
-
     process = subprocess.Popen(
         [sys.executable, "-c", SLOWLY, "run", str(scene), "-o", str(path)], env=launch_environment(), cwd=ROOT,
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, stdin=subprocess.DEVNULL,
@@ -144,9 +141,6 @@ def test_a_run_that_is_stopped_or_killed_goes_on_with_other_ranks_to_the_same_bi
     code, _, errors = run(ranks, scene, path)
     assert code == 0, errors
     assert differing(path, contents(alone)) == []
-
-
-# --- two nodes --------------------------------------------------------------------------------------------------------
 
 
 NODES = ROOT / "tests" / "two_nodes.sh"

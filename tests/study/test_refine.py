@@ -1,7 +1,5 @@
 """Refinement of the stations: where the next ones go, what a grown file keeps, and the same bits on any ranks."""
 
-from __future__ import annotations
-
 import subprocess
 from itertools import combinations
 from types import SimpleNamespace
@@ -135,7 +133,6 @@ def filled(path, plan):
     from softjaw.study.case.result import CaseResult
     from softjaw.study.result.skeleton import create
     from softjaw.study.result.write import ResultWriter, record
-
     create(path, plan.layout, plan.header)
     writer = ResultWriter(path, plan.layout, None)
     for row in range(plan.layout.rows):
@@ -170,7 +167,6 @@ def same_bits(scene, expected, own):
 @pytest.mark.ranks
 def test_a_refined_study_has_the_same_bits_on_any_number_of_ranks(tmp_path):
     scene = tmp_path / "vase.toml"
-
     scene.write_text(SCENE)
     alone, _ = refined(scene, "alone.hdf", 0)
     with open_result(alone) as result:
@@ -179,9 +175,6 @@ def test_a_refined_study_has_the_same_bits_on_any_number_of_ranks(tmp_path):
     assert best > 0.6  # 0.19 at the scene's own stations
     same_bits(scene, contents(alone), 20)
     assert "0 of 44 cases to solve" in refined(scene, "alone.hdf", 2)[1]
-
-
-# --- poses ------------------------------------------------------------------------------------------------------------
 
 
 PAD = (0.05, 0.02, 0.015)

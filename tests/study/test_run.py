@@ -1,7 +1,5 @@
 """Runs of a fake study under mpirun: the same bits on any number of ranks, and no kill, full disk or bug loses work."""
 
-from __future__ import annotations
-
 import shutil
 import signal
 import subprocess
@@ -135,7 +133,6 @@ def test_forces_that_are_apart_fail_alone(tmp_path):
 )
 def test_a_signal_stops_in_order_and_the_same_command_goes_on(tmp_path, uninterrupted, name, ranks):
     path = tmp_path / f"{name}.hdf"
-
     process = start(ranks, path, "--delay", 0.15)
     wait_for(lambda: begun(path))
     process.send_signal(getattr(signal, name))
@@ -153,7 +150,6 @@ def test_a_signal_stops_in_order_and_the_same_command_goes_on(tmp_path, uninterr
 
 def test_a_case_that_takes_too_long_is_abandoned_when_there_is_no_time(tmp_path):
     path = tmp_path / "hangs.hdf"
-
     process = start(0, path, "--hang", 14)
     wait_for(lambda: begun(path) and states(path)[13] == DONE)
     began = time.monotonic()
@@ -179,7 +175,6 @@ def test_another_scene_is_refused(tmp_path, whole, uninterrupted):
 @pytest.mark.parametrize("ranks", [0, pytest.param(2, marks=pytest.mark.long)])
 def test_a_second_run_at_the_same_time_is_refused_and_status_can_be_asked(tmp_path, ranks):
     path = tmp_path / "busy.hdf"
-
     process = start(ranks, path, "--delay", 1.0)
     wait_for(lambda: begun(path))
     told = subprocess.run(
@@ -218,9 +213,7 @@ def test_too_little_space_is_noticed_before_anything_is_solved(tmp_path):
 @pytest.mark.parametrize("ranks", [0, pytest.param(2, marks=pytest.mark.long)])
 def test_a_torn_row_is_solved_again(tmp_path, whole, uninterrupted, ranks):
     import h5py
-
     path = tmp_path / "torn.hdf"
-
     shutil.copy(whole, path)
     with h5py.File(path, "r+") as file:
         file["study/fingers/f_x_max"][2, 1, 0, 1, 2] += 1e-12

@@ -1,7 +1,5 @@
 """Who solves what: every unit once, the expensive ones first, nothing new after a stop; and the seconds of a plan."""
 
-from __future__ import annotations
-
 import io
 import subprocess
 import sys
@@ -203,9 +201,6 @@ def test_a_case_that_an_earlier_run_left_out_is_missing_once_it_is_asked_for():
     units = [SimpleNamespace(rows=(rows,), state=state, apart=False, reason="") for rows, state in wanted.items()]
     assert settle(writer, units, [], False).tolist() == [DONE, MISSING, SLIPS, WIDE]
     assert writer.forgotten == [1]
-
-
-# --- progress ---------------------------------------------------------------------------------------------------------
 
 
 class Run:

@@ -1,7 +1,5 @@
 """The batch scripts under a stand-in for Slurm: an mpirun that a signal stops, and a scontrol that notes its words."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

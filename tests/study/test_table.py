@@ -1,7 +1,5 @@
 """One table, four renderings: the same cells in text, page, CSV and JSON, none lost, none made up."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json

@@ -1,7 +1,5 @@
 """Uncertain inputs: samples, the study that is solved with them, intervals, and whether grasps differ beyond them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import xarray as xr
@@ -37,9 +35,6 @@ def file(tmp_path_factory):
     path = tmp_path_factory.mktemp("ball") / "ball.hdf"
     assert softjaw.run(scene(), path) == 0
     return path
-
-
-# --- samples ----------------------------------------------------------------------------------------------------------
 
 
 def test_every_input_takes_the_middles_of_intervals_of_equal_probability_once():
@@ -90,9 +85,6 @@ def test_a_sample_out_of_range_is_refused_before_any_work(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-# --- the gripper's place ----------------------------------------------------------------------------------------------
-
-
 def test_moved_pads_still_face_each_other():
     before = axis_poses(0.03, 0.4, 0.2)
     one, two = moved(before, 0.002, 0.1)
@@ -112,9 +104,6 @@ def test_a_shift_along_the_axis_is_another_station_and_poses_are_turned_too():
     turned = candidates(scene("candidates.roll_deg=30", where=pose_of(approach=(-1, 0, 0))))
     rolled = candidates(scene("candidates.roll_deg=30"))
     assert turned[0].poses[0].rotation == pytest.approx(rolled[0].poses[0].rotation, abs=1e-12)
-
-
-# --- intervals --------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("count", [20, 60, 200])

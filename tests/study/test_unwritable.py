@@ -1,7 +1,5 @@
 """Places that cannot be written: every command that writes says so in one sentence and ends with the same code."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

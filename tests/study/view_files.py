@@ -1,7 +1,5 @@
 """Result files of known geometry for the tests of the three-dimensional views."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What accuracy costs: the sweep that tells it, errors and times that its file gives, and the command."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -30,9 +28,6 @@ def file(tmp_path_factory):
     words = [word for change in SHORT for word in ("--set", change)]
     assert main(["cost", str(folder / "ball.toml"), "-o", str(folder / "c.hdf"), *words]) == DONE
     return folder / "c.hdf"
-
-
-# --- the sweep --------------------------------------------------------------------------------------------------------
 
 
 def test_a_few_cases_are_solved_on_coarser_and_finer_meshes_of_both_kinds():
@@ -85,9 +80,6 @@ def test_meshes_are_swept_only_where_no_faces_are_stored():
         parse_scene(SCENE, "x.toml", both)
     scene = parse_scene(SCENE, "x.toml", [*both, 'run.patches="none"'])
     assert axes(scene)[0].options == ("4 x 2 x 2", "8 x 4 x 2")
-
-
-# --- what its file says -----------------------------------------------------------------------------------------------
 
 
 def test_errors_are_distances_from_the_last_point(file):

@@ -1,7 +1,5 @@
 """All values of a case from two patches and settings, without a solver: closed forms of cylinders face to face."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from types import SimpleNamespace

@@ -1,7 +1,5 @@
 """Whether a gripper fits: extremes of triangles by closed forms, states of candidates of every kind, the undecided."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import trimesh

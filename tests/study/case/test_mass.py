@@ -1,7 +1,5 @@
 """The mass that a density gives: closed forms, and what has no volume."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

@@ -77,9 +77,6 @@ def test_the_file_states_the_frame_in_which_stations_count(files, tmp_path):
     np.testing.assert_allclose(attributes["object_origin"], 1e-3 * SHIFT, atol=1e-6)
 
 
-# --- facets -----------------------------------------------------------------------------------------------------------
-
-
 PAD = ("gripper.pad_length_mm=30", "gripper.pad_width_mm=20", "gripper.pad_thickness_mm=12")
 
 

@@ -1,7 +1,5 @@
 """Sampled grasps: height fields by closed forms, grasps of bodies whose best place is known, states, determinism."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import trimesh

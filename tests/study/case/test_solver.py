@@ -1,7 +1,5 @@
 """One solver of a candidate: every state and every failure is solved once, whoever asks for it."""
 
-from __future__ import annotations
-
 from collections import Counter
 
 import pytest

@@ -1,7 +1,5 @@
 """What would fail every case is refused before anything is solved, and what is seldom meant gets a warning."""
 
-from __future__ import annotations
-
 import contextlib
 
 import pytest

@@ -1,7 +1,5 @@
 """``softjaw init``: what it writes passes ``check`` and runs, replaces nothing, and knows its mesh."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import tomllib
