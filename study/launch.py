@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +20,7 @@ from softjaw.study.run.objects import run_objects
 from softjaw.study.run.pattern import next_round
 from softjaw.study.run.plan import make_plan
 from softjaw.study.run.refine import Rounds, added_cases, refined
-from softjaw.study.run.session import Growth, Work, on_rank0, run_study
+from softjaw.study.run.session import Work, on_rank0, run_study
 from softjaw.study.scene import Scene
 from softjaw.study.show.best_grasps import summary
 from softjaw.study.show.report.verdict import plain_report
@@ -61,8 +60,7 @@ def solve_scene(
     """
     scene = on_rank0(comm, with_sampled_grasps, scene)
     plan = on_rank0(comm, prepare, scene, scene_file, overrides)
-    growth = _growth(scene, plan, comm)
-    return run_study(plan, work(scene), path, comm, retry_failed=retry_failed, growth=growth)
+    return run_study(plan, work(scene, plan, comm), path, comm, retry_failed=retry_failed)
 
 
 def solve_objects(folder: ObjectFolder, out: Path, comm: Any, *, retry_failed: bool = False) -> int:
@@ -79,26 +77,15 @@ def solve_objects(folder: ObjectFolder, out: Path, comm: Any, *, retry_failed: b
         On every rank: what is wrong for all objects alike, or ``out`` cannot be used.
     """
 
-    def study(scene: Scene, overrides: tuple[str, ...]) -> tuple[Any, Work, Growth]:
+    def study(scene: Scene, overrides: tuple[str, ...]) -> tuple[Any, Work]:
         scene = with_sampled_grasps(scene)
         plan = make_plan(scene, folder.scene_file, overrides)
-        return plan, work(scene), _growth(scene, plan, MPI.COMM_SELF)
+        return plan, work(scene, plan, MPI.COMM_SELF)
 
     common = on_rank0(comm, folder.check)
     on_rank0(comm, check_petsc, dict(common.petsc))
-    each = replace(work(common), finalise=None, summary=None)
+    each = Work(pipeline.solve_unit, pipeline.image, time_limit=common.run.time_limit_s, memory=common.run.memory_gb)
     return run_objects(folder, out, study, each, comm, retry_failed=retry_failed)
-
-
-def _growth(scene: Scene, plan: Any, comm: Any) -> Growth:
-    """How the grasps of a scene are refined, and their meshes; also a file that has been refined already needs it."""
-    each, about = added_cases(plan.units, plan.layout), (plan.header.scene_file, plan.header.overrides)
-
-    def study(rounds: Rounds) -> tuple[Any, Work]:
-        made = on_rank0(comm, make_plan, scene, *about, rounds)
-        return made, work(refined(scene, rounds))
-
-    return Growth(study, lambda result: next_round(result, scene, each) or next_cases(result, scene))
 
 
 def prepare(scene: Scene, scene_file: str, overrides: Sequence[str]) -> Any:
@@ -111,18 +98,26 @@ def prepare(scene: Scene, scene_file: str, overrides: Sequence[str]) -> Any:
     return plan
 
 
-def work(scene: Scene) -> Work:
-    """How the cases of a scene are solved."""
+def work(scene: Scene, plan: Any, comm: Any) -> Work:
+    """How the cases of a scene are solved, and in rounds its grasps and their meshes refined."""
+    each, about = added_cases(plan.units, plan.layout), (plan.header.scene_file, plan.header.overrides)
 
-    def finalise(writer: Any) -> None:
-        derived.finalise(writer, scene)
-        writer.write_report(plain_report(dataset(writer.result())))
+    def with_rounds(rounds: Rounds) -> Work:
+        grown_scene = refined(scene, rounds)
 
-    return Work(
-        solve_unit=pipeline.solve_unit,
-        image=pipeline.image,
-        finalise=finalise,
-        summary=summary,
-        time_limit=scene.run.time_limit_s,
-        memory=scene.run.memory_gb,
-    )
+        def finalise(writer: Any) -> None:
+            derived.finalise(writer, grown_scene)
+            writer.write_report(plain_report(dataset(writer.result())))
+
+        return Work(
+            solve_unit=pipeline.solve_unit,
+            image=pipeline.image,
+            finalise=finalise,
+            summary=summary,
+            time_limit=scene.run.time_limit_s,
+            memory=scene.run.memory_gb,
+            more=lambda result: next_round(result, scene, each) or next_cases(result, scene),
+            grown=lambda rounds: (on_rank0(comm, make_plan, scene, *about, rounds), with_rounds(rounds)),
+        )
+
+    return with_rounds(())

@@ -35,7 +35,7 @@ from softjaw.study.run.load_path import sentence
 from softjaw.study.run.object_folder import ObjectFolder, key_of
 from softjaw.study.run.plan import Plan
 from softjaw.study.run.schedule import Claims
-from softjaw.study.run.session import Growth, Work, file_of, finish_alone, locked, on_rank0, rounds_in
+from softjaw.study.run.session import Work, file_of, finish_alone, locked, on_rank0, rounds_in
 from softjaw.study.scene import Scene, SceneError
 from softjaw.study.table import Row
 from softjaw.study.units import in_si
@@ -44,7 +44,7 @@ BATCH_PER_RANK, MOST_OPEN_FILES = 4, 128  # objects of a batch: for each rank, a
 REASON_LETTERS = 400
 FATAL = (messages.CANNOT_WRITE, messages.IN_USE)  # codes of errors that the objects after it would meet, too
 T = TypeVar("T")
-Study = Callable[[Scene, tuple[str, ...]], tuple[Plan, Work, Growth]]
+Study = Callable[[Scene, tuple[str, ...]], tuple[Plan, Work]]
 
 
 def run_objects(
@@ -78,7 +78,7 @@ class _ObjectsRun:
         self._folder, self._out, self._study, self._work, self._comm = folder, out, study, work, comm
         self._retry = retry_failed
         self._rows = on_rank0(comm, _rows_of, folder, out, retry_failed)
-        self._mine: dict[int, tuple[Plan, Work, Growth]] = {}
+        self._mine: dict[int, tuple[Plan, Work]] = {}
         self._failed: list[tuple[int, Row]] = []
         self._tried: set[int] = set()
 
@@ -149,11 +149,11 @@ class _ObjectsRun:
     def _prepared(self, n: int) -> Part:
         begin, listed = time.perf_counter(), self._folder.objects[n]
         overrides, path = self._folder.overrides_of(listed), self._out / f"{listed.name}.hdf"
-        plan, work, growth = self._study(self._folder.scene(listed), overrides)
-        if rounds := rounds_in(path, plan):
-            plan, work = growth.study(rounds)
+        plan, work = self._study(self._folder.scene(listed), overrides)
+        if work.grown and (rounds := rounds_in(path, plan)):
+            plan, work = work.grown(rounds)
         _, torn = file_of(path, plan)
-        self._mine[n] = plan, work, growth
+        self._mine[n] = plan, work
         return Part(n, path, plan, tuple(torn), time.perf_counter() - begin)
 
     # --- solving ------------------------------------------------------------------------------------------------------
@@ -166,7 +166,7 @@ class _ObjectsRun:
         code = session.solve()
         for part, number in zip(parts, files.session, strict=True):
             if part.number in self._mine:
-                _, work, _ = self._mine[part.number]
+                _, work = self._mine[part.number]
                 end = work, part.path, part.plan, number, session.signal
                 self._alone(part.number, finish_alone, *end)
         # Nobody reads a file that is being finished.
@@ -192,19 +192,19 @@ class _ObjectsRun:
 
     def _grown(self, part: Part) -> Part | None:
         """The object with its next round of further grasps in its file; None where it has enough."""
-        plan, _, growth = self._mine[part.number]
+        plan, work = self._mine[part.number]
         with open_result(part.path) as result:
-            added = growth.more(result)
-        if not added:
+            added = work.more(result)
+        if not added or not work.grown:
             return None
-        plan, work = growth.study((*plan.layout.rounds, added))
+        plan, work = work.grown((*plan.layout.rounds, added))
         rewrite(part.path, plan.layout, plan.header)
-        self._mine[part.number] = plan, work, growth
+        self._mine[part.number] = plan, work
         return replace(part, plan=plan, torn=())
 
     def _ending(self, n: int, seconds: float, stopped: bool) -> tuple[int, Row]:
         """The row of an object as its file stands, which is packed if nothing is missing there."""
-        path, (plan, _, _) = self._out / f"{self._folder.objects[n].name}.hdf", self._mine[n]
+        path, (plan, _) = self._out / f"{self._folder.objects[n].name}.hdf", self._mine[n]
         with open_result(path) as result:
             row = self._rows[n] | row_of(result) | {"preparing": seconds}
         if stopped:  # also where no case is missing, a further round may be

@@ -57,6 +57,11 @@ class Work:
         Of a single case [s].
     memory : float, "auto" or "none"
         As for `study.run.limits.limited_memory`.
+    more : callable, optional
+        ``more(result)`` gives the stations, poses or cases of the next round, from what is stored alone; none at the
+        end.
+    grown : callable, optional
+        ``grown(rounds)`` gives plan and work with what these rounds added; collective.
     """
 
     solve_unit: Callable[[Any, Sequence[int]], Iterable[tuple[int, Any]]]
@@ -65,6 +70,8 @@ class Work:
     summary: Callable[[Any], str] | None = None
     time_limit: float = math.inf
     memory: float | str = "none"
+    more: Callable[[Result], tuple[Any, ...]] = lambda _: ()
+    grown: Callable[[Rounds], tuple[Plan, Work]] | None = None
 
 
 def on_rank0(comm: Any, function: Callable[..., T], *arguments: Any) -> T:
@@ -84,29 +91,10 @@ def on_rank0(comm: Any, function: Callable[..., T], *arguments: Any) -> T:
     return value
 
 
-@dataclass(frozen=True)
-class Growth:
-    """How a study gets more grasps, and finer meshes, while it runs.
-
-    Parameters
-    ----------
-    study : callable
-        ``study(rounds)`` gives plan and work with what these rounds added; collective.
-    more : callable
-        ``more(result)`` gives the stations, poses or cases of the next round, from what is stored alone; none at the
-        end.
-    """
-
-    study: Callable[[Rounds], tuple[Plan, Work]]
-    more: Callable[[Result], tuple[Any, ...]]
-
-
-def run_study(
-    plan: Plan, work: Work, path: Path, comm: Any, *, retry_failed: bool = False, growth: Growth | None = None
-) -> int:
+def run_study(plan: Plan, work: Work, path: Path, comm: Any, *, retry_failed: bool = False) -> int:
     """Solve all missing cases of ``plan`` into ``path`` and return the exit code; collective over ``comm``.
 
-    With ``growth`` rounds of further grasps and finer meshes follow, each in a file that takes the place of the last.
+    Rounds of further grasps and finer meshes follow, each in a file that takes the place of the last.
 
     Raises
     ------
@@ -114,13 +102,12 @@ def run_study(
         On every rank: the file is in use, belongs to another scene or cannot be written.
     """
     with locked(path, comm):
-        rounds = on_rank0(comm, rounds_in, path, plan) if growth else ()
-        if growth and rounds:
-            plan, work = growth.study(rounds)
+        if work.grown and (rounds := on_rank0(comm, rounds_in, path, plan)):
+            plan, work = work.grown(rounds)
         finished = on_rank0(comm, _finished, path, plan, retry_failed, comm.size)
         code = _solve(plan, work, path, comm, retry_failed) if finished is None else finished
-        while growth and code != STOPPED and (added := on_rank0(comm, _next_round, path, growth)):
-            plan, work = growth.study((*plan.layout.rounds, added))
+        while work.grown and code != STOPPED and (added := on_rank0(comm, _next_round, path, work)):
+            plan, work = work.grown((*plan.layout.rounds, added))
             finished = None
             on_rank0(comm, rewrite, path, plan.layout, plan.header)
             code = _solve(plan, work, path, comm, retry_failed=False)
@@ -194,9 +181,9 @@ def rounds_in(path: Path, plan: Plan) -> Rounds:
     return ()
 
 
-def _next_round(path: Path, growth: Growth) -> tuple[Any, ...]:
+def _next_round(path: Path, work: Work) -> tuple[Any, ...]:
     with open_result(path) as result:
-        added, number = growth.more(result), len(result.layout.rounds) + 1
+        added, number = work.more(result), len(result.layout.rounds) + 1
     if added:
         print(f"round {number}: {round_text(added)}", flush=True)
     return added

@@ -46,16 +46,16 @@ def plan_of(name, rounds=()):
 
 
 def study(scene, _overrides):
-    """Plan, work and growth of an object."""
+    """Plan and work of an object."""
     from softjaw.study.messages import USAGE, NoGraspError
-    from softjaw.study.run.session import Growth, Work
+    from softjaw.study.run.session import Work
     name = scene.object.name
     if name == "none":
         raise NoGraspError(USAGE, "nothing fits")
     work = Work(lambda *_: (), finalise=(lambda _: 1 / 0) if name == "late" else fake_run.finalise)
-    grown = fake_run.fake_growth(name, 2 + len(name), work) if name == "grows" else None
-    growth = Growth(lambda rounds: (plan_of(name, rounds), work), grown.more if grown else lambda _: ())
-    return plan_of(name if name != "bug" else 1 / 0), work, growth
+    more = fake_run.fake_growth(name, 2 + len(name), work).more if name == "grows" else lambda _: ()
+    work = replace(work, more=more, grown=lambda rounds: (plan_of(name, rounds), work))
+    return plan_of(name if name != "bug" else 1 / 0), work
 
 
 def main(arguments=None):

@@ -11,6 +11,7 @@ import signal
 import sys
 import time
 import traceback
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -56,16 +57,17 @@ def fake_plan(digest="scene", stations=6, derived=True, wide=-1, rounds=(), apar
 
 
 def fake_growth(digest, stations, work):
-    """Rounds of further stations until a budget is spent, by the rule of a real study."""
+    """The work with rounds of further stations until a budget is spent, by the rule of a real study."""
     from softjaw.study.run.refine import next_stations
-    from softjaw.study.run.session import Growth
     given = (1e3 * np.linspace(0, 0.1, stations)).tolist()
     asked = SimpleNamespace(refine=36, station_values_mm=given)
     scene = SimpleNamespace(candidates=asked, accuracy=SimpleNamespace(refined_within=0.01))
-    return Growth(
-        lambda rounds: (fake_plan(digest, stations, rounds=rounds), work),
-        lambda result: next_stations(result, scene, 2 * FORCES),
+    work = replace(
+        work,
+        more=lambda result: next_stations(result, scene, 2 * FORCES),
+        grown=lambda rounds: (fake_plan(digest, stations, rounds=rounds), work),
     )
+    return work
 
 
 def fake_result(row):
@@ -144,10 +146,10 @@ def main(arguments=None):
             return 1 / (unit.index - options.bug) and result
 
     work = Work(fake_path(options), image, finalise, summary, options.limit, options.memory)
-    growth = fake_growth(options.digest, options.stations, work) if options.grow else None
+    work = fake_growth(options.digest, options.stations, work) if options.grow else work
     try:
         plan = fake_plan(options.digest, options.stations, wide=options.wide, apart=options.apart)
-        return run_study(plan, work, options.file, comm, retry_failed=options.retry_failed, growth=growth)
+        return run_study(plan, work, options.file, comm, retry_failed=options.retry_failed)
     except StudyError as error:
         return complain(error)
     except BaseException:
