@@ -22,12 +22,12 @@ from softjaw.study import pipeline
 from softjaw.study.case.build import check_object, with_mass
 from softjaw.study.case.candidates import check_poses, decided, units, with_sampled_grasps
 from softjaw.study.case.contact import Contact
+from softjaw.study.case.limit_surface import finger_surface
 from softjaw.study.case.model import check_petsc
 from softjaw.study.case.result import CaseFailure, CaseResult
 from softjaw.study.flags import Flag, flags_in
 from softjaw.study.messages import SOME_FAILED, StudyError
 from softjaw.study.quantities import BY_KEY, MAIN, MODELS, STATES, TABLE, checked_model
-from softjaw.study.result.surfaces import finger_surface
 from softjaw.study.scene import Scene
 from softjaw.study.units import converted, shown_text
 

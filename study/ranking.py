@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from softjaw.study.case.result import TIE
 from softjaw.study.flags import BORNE, LOST, Flag, flags_in
 from softjaw.study.quantities import DONE, LEAST_FORCE, REALISATION
-from softjaw.study.result.between import at_force, half_width
-from softjaw.study.result.read import mesh_error, values_of
+from softjaw.study.result.read import at_force, half_width, mesh_error, values_of
 from softjaw.study.scene.text import scene_table
 
 FloatArray = NDArray[np.float64]

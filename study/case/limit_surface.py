@@ -6,7 +6,7 @@ for mu = 1: a contact without friction has a limit surface too, of size 0.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -23,6 +23,7 @@ from softjaw.lsfit.ellipsoid import (
     full_ellipsoid,
     three_motion_ellipsoid,
 )
+from softjaw.lsfit.form import exponents
 from softjaw.lsfit.quartic import Quartic
 from softjaw.lsfit.quartic_fit import convex_quartic
 from softjaw.lsfit.samples import FitErrors, fit_error, normalised_samples, overclaim, six_samples, sphere_motions
@@ -232,3 +233,30 @@ def _six_samples(patch: ContactPatch, rho: float, S: float, model: str, count: i
     """Normalised wrenches and unit motions ``(count, 6)`` of evenly spread motions of a patch."""
     twist = sphere_motions(count, 6) / np.repeat([1.0, rho], 3)
     return six_samples(friction_wrench(patch, twist, 1.0, model), twist, S, rho)
+
+
+# --- from the numbers of a result file --------------------------------------------------------------------------------
+
+
+def fitted_surface(coefficients: FloatArray, matrix: FloatArray) -> LimitSurface | None:
+    """The quartic ``(15,)`` or the ellipsoid ``(3, 3)`` in ``(f_x, f_y, tau_z / rho) / (mu S)``; None for NaN."""
+    if np.isfinite(coefficients).all():
+        return Quartic(coefficients, exponents(3, 4))
+    return TiltedEllipsoid(matrix) if np.isfinite(matrix).all() else None
+
+
+def finger_surface(fingers: Callable[..., FloatArray], finger: int, model: str, fitted: bool) -> LimitSurface:
+    """Limit surface of finger 1 or 2 in ``(f_x, f_y, tau_z)`` [N, N, N m]; else than ``fitted`` from three motions.
+
+    ``fingers`` gives a quantity of both ``(2, ...)`` by its name and a friction model.
+    """
+    if finger not in (1, 2):
+        raise ValueError(f"finger is {finger!r}: expected 1 or 2")
+    i = finger - 1
+    if not fitted:
+        return Ellipsoid(fingers("limit_surface/semi_axes", model)[i] * fingers("S")[i])
+    P, A = (fingers(f"limit_surface/{name}", model)[i] for name in ("coefficients", "matrix"))
+    if (surface := fitted_surface(P, A)) is None:
+        raise ValueError("no surface was fitted, or the cases around have no fitted one of one kind: take fitted=False")
+    # The largest force of the planar model is mu S.
+    return surface.scaled(fingers("f_x_max", "pcm")[i] * np.array([1.0, 1.0, fingers("limit_surface/rho")[i]]))

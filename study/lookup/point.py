@@ -166,7 +166,7 @@ class GraspPoint:
             No value here, several points, or no fitted surface in all of the cases around.
         """
         # compiled loops, which a look-up does without until a surface is asked for
-        from softjaw.study.result.surfaces import finger_surface
+        from softjaw.study.case.limit_surface import finger_surface
 
         if self.shape or self.reason:
             raise ValueError("limit surfaces are made one at a time: ask for one point" if self.shape else self.reason)

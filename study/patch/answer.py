@@ -19,7 +19,7 @@ from softjaw.study.case.limit_surface import STANDS_IN, fit_surfaces
 from softjaw.study.case.result import UNDECIDED
 from softjaw.study.flags import Flag, flags_in, raised
 from softjaw.study.messages import OTHER_FILE, USAGE, Problem, StudyError
-from softjaw.study.patch.faces import ReadPatch, checked, refuse
+from softjaw.study.patch.faces import ReadPatch, refuse
 from softjaw.study.patch.patch_reader import ENDINGS, Reading, checked_file, read_table
 from softjaw.study.quantities import MODELS
 
@@ -72,12 +72,12 @@ def read_patch(file: str, reading: Reading) -> ReadPatch:
     path = checked_file(file, ENDINGS)
     ending = path.suffix.lower()
     if ending == ".csv":
-        return checked(read_table(path, reading), reading.flip_normals)
+        return read_table(path, reading)
     from softjaw.study.patch.vtk_faces import read_vtk, trouble  # VTK, which tables do not need
 
     if why := trouble(lambda: read_vtk(path, reading)):  # VTK may not survive the file
         raise StudyError(OTHER_FILE, f"{path}: damaged ({why}); write it again")
-    return checked(read_vtk(path, reading), reading.flip_normals)
+    return read_vtk(path, reading)
 
 
 def contact_of(patch: ContactPatch, mu: float, x_axis: ArrayLike | None = None) -> Contact:

@@ -31,34 +31,6 @@ class ReadPatch:
     notes: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, eq=False)
-class Faces:
-    """Faces of a file in SI units, not yet checked.
-
-    Parameters
-    ----------
-    file : str
-    place : callable
-        Words for the place of face ``i`` in the file.
-    centroid, normal : (n, 3) array
-        Centres [m] and normals of any length [-].
-    area, pressure : (n,) array
-        Areas [m^2] and pressures [Pa].
-    corners : (n, k, 3) array or None
-        Corners in order around each face [m].
-    notes : tuple of str
-    """
-
-    file: str
-    place: Callable[[int], str]
-    centroid: FloatArray
-    area: FloatArray
-    normal: FloatArray
-    pressure: FloatArray
-    corners: FloatArray | None = None
-    notes: tuple[str, ...] = ()
-
-
 def refuse(problems: Sequence[Problem]) -> None:
     """Raise if there are problems, naming the first of them."""
     if problems:
@@ -69,24 +41,12 @@ def refuse(problems: Sequence[Problem]) -> None:
 
 
 def corner_geometry(corners: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Centres, areas and normals of plane faces from their corners.
+    """Centres (mean corners) ``(n, 3)``, areas ``(n,)`` and normals ``(n, 3)`` of plane faces ``(n, k, 3)`` [m].
 
-    Parameters
-    ----------
-    corners : (n, k, 3) array
-        Three or four corners around each face; a triangle among quadrilaterals repeats its last corner [m].
-
-    Returns
-    -------
-    centroid : (n, 3) array
-        Mean of the corners [m].
-    area : (n,) array
-        Half the product of the diagonals [m^2].
-    normal : (n, 3) array
-        By the right-hand rule; zero for a face without area.
+    Corners go round a face by the right-hand rule; a triangle among quadrilaterals repeats its last one. The normal of
+    a face without area is 0.
     """
-    q = corners
-    last = q.shape[1] - 1
+    q, last = corners, corners.shape[1] - 1
     with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused later, with its place
         vector = 0.5 * np.cross(q[:, 2] - q[:, 0], q[:, last] - q[:, 1])
         area = np.linalg.norm(vector, axis=1)
@@ -95,28 +55,25 @@ def corner_geometry(corners: FloatArray) -> tuple[FloatArray, FloatArray, FloatA
         return centroid, area, vector / np.where(area > 0, area, 1.0)[:, None]
 
 
-def checked(faces: Faces, flip: bool = False) -> ReadPatch:
-    """The loaded faces as a contact patch; all that is wrong with them at once, by their places in the file."""
+def checked(
+    file: str, place: Callable[[int], str], centroid: FloatArray, area: FloatArray, normal: FloatArray,
+    pressure: FloatArray, corners: FloatArray | None = None, notes: tuple[str, ...] = (), flip: bool = False,
+) -> ReadPatch:  # fmt: skip
+    """The loaded faces [m, m^2, Pa] as a contact patch; all that is wrong with them at once, by their places."""
     problems: list[Problem] = []
 
     def wrong(bad: NDArray[np.bool_], key: str, found: Callable[[int], str], expected: str, remedy: str) -> None:
-        where = ((i, f"{faces.file}, {faces.place(i)}") for i in np.flatnonzero(bad).tolist())
-        problems.extend(Problem(place, None, key, found(i), expected, remedy) for i, place in where)
+        for i in np.flatnonzero(bad).tolist():
+            problems.append(Problem(f"{file}, {place(i)}", None, key, found(i), expected, remedy))
 
-    for key in ("centroid", "area", "normal", "pressure", "corners"):
-        if (value := getattr(faces, key)) is not None:
-            rows = value.reshape(len(value), -1)
-            first = [f"{v:g}" for v in rows[np.arange(len(rows)), (~np.isfinite(rows)).argmax(axis=1)].tolist()]
-            wrong(~np.isfinite(rows).all(axis=1), key, first.__getitem__, "finite numbers",
-                  "repair the export or leave the face out")  # fmt: skip
-    _check_range(faces, wrong)
+    given = {"centroid": centroid, "area": area, "normal": normal, "pressure": pressure, "corners": corners}
+    _check_range({key: value for key, value in given.items() if value is not None}, wrong)
     refuse(problems)
-    pressure, normal = faces.pressure, faces.normal
     # corners on one line give an area of rounding, which is none either
-    flat = faces.area == 0 if faces.corners is None else (faces.area == 0) | slivers(faces.corners)
+    flat = area == 0 if corners is None else (area == 0) | slivers(corners)
     loaded = (pressure > 0) & ~flat
-    if not loaded.any() or (pressure * faces.area).sum() <= LEAST_LOAD:
-        problems.append(Problem(faces.file, None, "pressure", f"{len(loaded)} faces and no load on any",
+    if not loaded.any() or (pressure * area).sum() <= LEAST_LOAD:
+        problems.append(Problem(file, None, "pressure", f"{len(loaded)} faces and no load on any",
                                 "a face with an area and a pressure above 0",
                                 "zero normal force: export a loaded state"))  # fmt: skip
     wrong(flat & (pressure > 0), "area", lambda i: f"0 under {pressure[i]:g} Pa",
@@ -124,25 +81,30 @@ def checked(faces: Faces, flip: bool = False) -> ReadPatch:
     wrong(loaded & ~normal.any(axis=1), "normal", lambda i: "0, 0, 0", "a direction",
           "recompute the normals or give corners instead of them")  # fmt: skip
     refuse(problems)
-    corners = None if faces.corners is None else faces.corners[loaded]
-    side = -1.0 if flip else 1.0
-    patch = ContactPatch(faces.centroid[loaded], faces.area[loaded], side * normal[loaded], pressure[loaded], corners)
+    patch = ContactPatch(
+        centroid[loaded], area[loaded], (-1.0 if flip else 1.0) * normal[loaded], pressure[loaded],
+        None if corners is None else corners[loaded],
+    )  # fmt: skip
     kept = np.flatnonzero(loaded).tolist()
-    return ReadPatch(faces.file, patch, len(loaded), lambda i: faces.place(kept[i]), faces.notes)
+    return ReadPatch(file, patch, len(loaded), lambda i: place(kept[i]), notes)
 
 
-def _check_range(faces: Faces, wrong: Callable[..., None]) -> None:
-    """Negative pressures and areas, and numbers of no contact on earth, which would overflow further on."""
-    pressure, area, length = faces.pressure, faces.area, np.abs(faces.normal).max(axis=1)
+def _check_range(given: dict[str, FloatArray], wrong: Callable[..., None]) -> None:
+    """What is not finite, negative pressures and areas, and numbers of no contact on earth."""
+    for key, value in given.items():
+        rows = value.reshape(len(value), -1)
+        lost = ~np.isfinite(rows).all(axis=1)
+        first = {i: f"{rows[i][~np.isfinite(rows[i])][0]:g}" for i in np.flatnonzero(lost).tolist()}
+        wrong(lost, key, first.__getitem__, "finite numbers", "repair the export or leave the face out")
+        if key in CREDIBLE:
+            (most, unit), size = CREDIBLE[key], np.abs(rows).max(axis=1)
+            beyond = {i: f"{size[i]:g} {unit}" for i in np.flatnonzero(size > most).tolist()}
+            wrong(size > most, key, beyond.__getitem__, f"at most {most:g} {unit}", "check the unit")
+    area, pressure, length = given["area"], given["pressure"], np.abs(given["normal"]).max(axis=1)
     tensile = (pressure <= 0).all() and (pressure < 0).any()
-    remedy = "change the sign of the column" if tensile else "set faces that do not press to 0"
     wrong(pressure < 0, "pressure", lambda i: f"{pressure[i]:g} Pa", "a pressure of 0 or more, positive in compression",
-          remedy)  # fmt: skip
+          "change the sign of the column" if tensile else "set faces that do not press to 0")  # fmt: skip
     wrong(area < 0, "area", lambda i: f"{area[i]:g} m^2", "an area of 0 or more",
           "the normal alone gives the direction of a face")  # fmt: skip
-    for key, (most, unit) in CREDIBLE.items():
-        size = np.abs(getattr(faces, key)).reshape(len(area), -1).max(axis=1)
-        wrong(size > most, key, lambda i, size=size, unit=unit: f"{size[i]:g} {unit}", f"at most {most:g} {unit}",
-              "check the unit")  # fmt: skip
     astray = (length > LONGEST_NORMAL) | ((length > 0) & (length < 1 / LONGEST_NORMAL))
     wrong(astray, "normal", lambda i: f"a length of about {length[i]:g}", "a length of 1", "normalise it")

@@ -13,7 +13,7 @@ import numpy as np
 
 from softjaw.friction.patch import FloatArray
 from softjaw.study.messages import OTHER_FILE, USAGE, Problem, StudyError, shortened, shown
-from softjaw.study.patch.faces import Faces, corner_geometry, refuse
+from softjaw.study.patch.faces import ReadPatch, checked, corner_geometry, refuse
 
 ENDINGS = (".csv", ".vtu", ".vtp")
 LARGEST_FIELD = 100 * 2**20  # bytes
@@ -130,8 +130,8 @@ def split_header(header: str, pressure_name: str | None = None) -> tuple[str, st
 # --- table ------------------------------------------------------------------------------------------------------------
 
 
-def read_table(path: Path, reading: Reading) -> Faces:
-    """Faces of a CSV file with one face per line: centre, area and normal of each, or its corners."""
+def read_table(path: Path, reading: Reading) -> ReadPatch:
+    """Loaded faces of a CSV file with one face per line: centre, area and normal of each, or its corners."""
     numbers, (headers, *cells) = table_rows(path)
     headers = [header.strip() for header in headers]
     pairs = [split_header(header, reading.pressure_name) for header in headers]
@@ -155,7 +155,10 @@ def read_table(path: Path, reading: Reading) -> Faces:
             corners[:, 3] = np.where(np.isnan(corners[:, 3]).all(axis=1)[:, None], corners[:, 2], corners[:, 3])
         centroid, area, normal = corner_geometry(corners)
         geometry = centroid, area, stacked.get(NORMAL, normal)
-    return Faces(str(path), lambda i: f"line {numbers[i + 1]}", *geometry, values["pressure"], corners, notes)
+    return checked(
+        str(path), lambda i: f"line {numbers[i + 1]}", *geometry, values["pressure"], corners, notes,
+        reading.flip_normals,
+    )  # fmt: skip
 
 
 def table_rows(path: Path) -> tuple[list[int], list[list[str]]]:

@@ -20,7 +20,7 @@ from vtkmodules.vtkCommonCore import vtkLogger, vtkOutputWindow, vtkStringOutput
 
 from softjaw.friction.patch import FloatArray
 from softjaw.study.messages import OTHER_FILE, StudyError, closest
-from softjaw.study.patch.faces import Faces, corner_geometry
+from softjaw.study.patch.faces import ReadPatch, checked, corner_geometry
 from softjaw.study.patch.patch_reader import FACTORS, Reading, check_count, refused, split_header
 
 TRIANGLE, POLYGON, PIXEL, QUAD = 5, 7, 8, 9  # VTK's cell types
@@ -29,8 +29,8 @@ TRIAL_BYTES = 2**30  # beyond what this process has already
 NO_MEMORY = 3  # exit code of a trial
 
 
-def read_vtk(path: Path, reading: Reading) -> Faces:
-    """Faces of a VTU or VTP file of triangles and quadrilaterals.
+def read_vtk(path: Path, reading: Reading) -> ReadPatch:
+    """Loaded faces of a VTU or VTP file of triangles and quadrilaterals.
 
     The pressure is a scalar array of the cells, or one of the points, whose mean over its corners a face takes.
     Normals are the cells' array ``Normals`` if there is one, and follow from the order of the corners otherwise.
@@ -60,7 +60,8 @@ def read_vtk(path: Path, reading: Reading) -> Faces:
     centroid, area, normal = corner_geometry(corners)
     given = (np.asarray(array) for key, array in grid.cell_data.items() if key.lower() in ("normals", "normal"))
     normal = next((array.astype(float) for array in given if array.shape == normal.shape), normal)
-    return Faces(str(path), lambda i: f"cell {i}", centroid, area, normal, pressure, corners, notes)
+    place = "cell {}".format
+    return checked(str(path), place, centroid, area, normal, pressure, corners, notes, reading.flip_normals)
 
 
 def _grid(path: Path) -> Any:

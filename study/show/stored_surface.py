@@ -13,10 +13,10 @@ from softjaw.friction.patch import ContactPatch
 from softjaw.friction.wrench import friction_wrench
 from softjaw.lsfit.ellipsoid import Ellipsoid
 from softjaw.lsfit.surface import LimitSurface
+from softjaw.study.case.limit_surface import fitted_surface
 from softjaw.study.quantities import MODELS
 from softjaw.study.ranking import largest
 from softjaw.study.result.layout import DONE
-from softjaw.study.result.surfaces import fitted_surface
 from softjaw.study.show.grasps import Index, field
 
 AXES = (0, 1, 5)  # of the six components, those of a limit surface

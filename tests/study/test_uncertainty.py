@@ -9,7 +9,7 @@ import softjaw
 from softjaw.study.case.candidates import axes, candidates
 from softjaw.study.case.poses import axis_poses, moved
 from softjaw.study.ranking import Sure
-from softjaw.study.result.between import half_width
+from softjaw.study.result.read import half_width
 from softjaw.study.run.plan import make_plan
 from softjaw.study.scene import parse_scene
 from softjaw.study.scene.errors import SceneError
