@@ -100,10 +100,7 @@ def launch_environment() -> dict[str, str]:
 def mpirun(ranks: int) -> list[str]:
     """First words of the command line that starts so many ranks, more than there are cores if need be.
 
-    Raises
-    ------
-    FileNotFoundError
-        There is no ``mpirun`` on the search path.
+    Raises `FileNotFoundError`: there is no ``mpirun`` on the search path.
     """
     command = ["mpirun", "-n", str(ranks)]
     trial = subprocess.run(

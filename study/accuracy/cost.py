@@ -76,18 +76,10 @@ def _even(count: float) -> int:
 class Setting:
     """One point of the sweep.
 
-    Attributes
-    ----------
-    values : dict of str
-        Value of each swept key, in words.
-    seconds : float
-        Time of a case on one core, mean over those that are solved [s].
-    worst, median : dict of float
-        For each of `JUDGED` the largest and the median relative distance from the reference; NaN where none is known.
-    failed : int
-        Cases without a result.
-    given, reference : bool
-        Whether it is what the scene has without the sweep, and whether it is the most accurate point.
+    ``values``: value of each swept key, in words. ``seconds``: time of a case on one core, mean over those that are
+    solved [s]. ``worst, median``: for each of `JUDGED` the largest and the median relative distance from the reference;
+    NaN where none is known. ``failed``: cases without a result. ``given, reference``: whether it is what the scene has
+    without the sweep, and whether it is the most accurate point.
     """
 
     values: dict[str, str]

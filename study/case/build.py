@@ -32,10 +32,7 @@ def geometry() -> Any:
 def build_object(shape: Any) -> GapObject:
     """Object of a scene's section ``[object]``.
 
-    Raises
-    ------
-    ValueError
-        For geometry that cannot be, a mesh that is open or crosses itself among others.
+    Raises `ValueError` for geometry that cannot be, a mesh that is open or crosses itself among others.
     """
     match shape.shape:
         case "mesh":
@@ -76,10 +73,7 @@ def centre_of_volume(obj: Any) -> NDArray[np.float64]:
 def volume(shape: Any) -> float:
     """Volume of the body that an object's surface encloses [m^3], to 0.3 % where there is no closed form.
 
-    Raises
-    ------
-    ValueError
-        The surface does not enclose one.
+    Raises `ValueError`: the surface does not enclose one.
     """
     match shape.shape:
         case "sphere":
@@ -102,10 +96,7 @@ def volume(shape: Any) -> float:
 def with_mass(scene: Scene) -> Scene:
     """The scene with the mass that its object's density gives, to 0.01 g, in place of the density.
 
-    Raises
-    ------
-    StudyError
-        The object has no volume, or several in a sweep.
+    Raises `StudyError`: the object has no volume, or several in a sweep.
     """
     density = scene.object.density
     if density is None:
@@ -135,10 +126,7 @@ def _revolution(shape: Any) -> objects.Revolution:
 def outer_surface(shape: Any) -> tuple[OuterSurface, bool]:
     """Outer surface of an object that can have a wall, and whether it is a body of revolution.
 
-    Raises
-    ------
-    ValueError
-        For geometry that cannot be.
+    Raises `ValueError` for geometry that cannot be.
     """
     if shape.shape == "revolution":
         return of_revolution(_revolution(shape)), True
@@ -167,10 +155,7 @@ def check_object(scene: Scene) -> None:
     Outlines and meshes are built to be judged, at the price of importing numpy, scipy and numba; of the other shapes
     the scene itself has checked every number, and whatever passes there can be built.
 
-    Raises
-    ------
-    StudyError, SceneError
-        With the key and what is wrong with it.
+    Raises `StudyError, SceneError` with the key and what is wrong with it.
     """
     for inputs in scene.realisations[1:]:
         scene.with_values(inputs)  # a sample that cannot be, such as a friction coefficient below 0
@@ -195,10 +180,7 @@ def check_object(scene: Scene) -> None:
 def middle_of(scene: Scene) -> Any:
     """The `CentreLine` that the scene's stations follow; None where they follow the axis z.
 
-    Raises
-    ------
-    StudyError
-        A mesh without sections across its axis.
+    Raises `StudyError` for a mesh without sections across its axis.
     """
     shape = scene.object
     if shape.shape != "mesh" or not scene.candidates.station_values_mm:

@@ -78,10 +78,7 @@ def candidates(scene: Scene) -> list[Candidate]:
 def check_poses(scene: Scene) -> None:
     """Refuse explicit poses whose pads pass the object.
 
-    Raises
-    ------
-    StudyError
-        With the numbers and labels of the poses.
+    Raises `StudyError` with the numbers and labels of the poses.
     """
     if not scene.candidates.poses or scene.object.shape == "plane":  # which has no end
         return
@@ -104,16 +101,8 @@ def check_poses(scene: Scene) -> None:
 def turn_between(first: Candidate, second: Candidate, axis_symmetry: int) -> float | None:
     """Angle about z that turns both pads of one candidate into those of another, if the object looks the same then.
 
-    Parameters
-    ----------
-    first, second : Candidate
-    axis_symmetry : int
-        Order of the object's rotational symmetry about z; 0 is every angle.
-
-    Returns
-    -------
-    float or None
-        Angle in [0, 2 pi) [rad].
+    ``axis_symmetry``: order of the object's rotational symmetry about z; 0 is every angle. Returns angle in [0, 2 pi)
+    [rad].
     """
     angle, other = (turn_of_pose(*pair, axis_symmetry) for pair in zip(first.poses, second.poses, strict=True))
     if angle is None or other is None or abs(math.remainder(angle - other, 2 * math.pi)) > NEGLIGIBLE:
@@ -147,10 +136,7 @@ def _invariants(place: Candidate) -> tuple[float, ...]:
 def with_sampled_grasps(scene: Scene) -> Scene:
     """The scene `with_mass`, and with explicit poses where it asks for a sampler; see `study.case.sampler`.
 
-    Raises
-    ------
-    StudyError
-        For geometry that cannot be, or that leaves no grasp between the pads.
+    Raises `StudyError` for geometry that cannot be, or that leaves no grasp between the pads.
     """
     scene = with_mass(scene)
     if scene.candidates.sampled is None:
@@ -247,12 +233,8 @@ def _sweep_axes(sweep: Mapping[str, Sequence[Any]]) -> list[Axis]:
 def units(scene: Scene, axis_symmetry: Callable[[Scene], int]) -> list[Unit]:
     """All units of work of a scene, in the order of their first rows.
 
-    Parameters
-    ----------
-    scene : Scene
-    axis_symmetry : callable
-        Order of the rotational symmetry about z of the object of a scene (0: every angle, 1: none). It is called for
-        every point of the sweep, because a sweep can change the shape.
+    ``axis_symmetry``: order of the rotational symmetry about z of the object of a scene (0: every angle, 1: none). It
+    is called for every point of the sweep, because a sweep can change the shape.
     """
     made: list[Unit] = []
     forces, count = len(scene.load.normal_force_n), scene.candidates.total
@@ -297,7 +279,7 @@ def decided(units: Sequence[Unit]) -> list[Unit]:
         if math.isfinite(jaws.max_opening) or jaws.finger is not None:
             points, triangles = surface_triangles(scene.object)
             pose = unit.candidate.poses[0]
-            fit = fit_of((points - pose.origin) @ pose.rotation, triangles, jaws, doubt(points))
-            unit = replace(unit, state=fit.state, reason=fit.message)
+            state, reason = fit_of((points - pose.origin) @ pose.rotation, triangles, jaws, doubt(points))
+            unit = replace(unit, state=state, reason=reason)
         states.append(unit)
     return states

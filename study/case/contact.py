@@ -175,21 +175,11 @@ def pose_flags(contacts: Sequence[Contact]) -> Flag:
 def topology(pressure: ArrayLike, faces: tuple[int, int]) -> dict[str, int]:
     """Pieces, holes and loaded rims of a patch.
 
-    Parameters
-    ----------
-    pressure : (n,) array
-        Of all faces of the pad, those across its width running fastest; without pressure a face is not loaded.
-    faces : (int, int)
-        Faces along the pad's length and across its width.
+    ``pressure`` (n,) array: of all faces of the pad, those across its width running fastest; without pressure a face is
+    not loaded. ``faces`` (int, int): faces along the pad's length and across its width. Returns ``pieces`` (faces that
+    touch at a corner belong together), ``holes`` (not loaded, with load all round) and ``rims``, a sum of
+    `study.quantities.RIMS`.
 
-    Returns
-    -------
-    dict
-        ``pieces`` (faces that touch at a corner belong together), ``holes`` (not loaded, with load all round) and
-        ``rims``, a sum of `study.quantities.RIMS`.
-
-    Examples
-    --------
     >>> topology([1, 1, 1, 1, 0, 1, 1, 1, 1, 0, 0, 0], (4, 3))
     {'pieces': 1, 'holes': 1, 'rims': 13}
     """

@@ -68,17 +68,9 @@ MODEL_SIZES = ("full", "half", "quarter")  # by the number of planes of symmetry
 class Level(NamedTuple):
     """Level of an effect in one case, and why.
 
-    Attributes
-    ----------
-    level : str
-        Of those that `study.quantities.EFFECTS` lists.
-    indicator : float
-        NaN where it is not known.
-    reason : int
-        Index of `study.quantities.REASONS`.
-    change, payload_change, quality_change : float
-        Relative change of e_n, payload and quality by the dearer of the two levels that were compared last, on the
-        coarse mesh; NaN where nothing was measured.
+    ``level``: of those that `study.quantities.EFFECTS` lists. ``indicator``: NaN where it is not known. ``reason``:
+    index of `study.quantities.REASONS`. ``change, payload_change, quality_change``: relative change of e_n, payload and
+    quality by the dearer of the two levels that were compared last, on the coarse mesh; NaN where nothing was measured.
     """
 
     level: str
@@ -93,15 +85,9 @@ class Level(NamedTuple):
 class Step:
     """From one level to the next dearer one.
 
-    Parameters
-    ----------
-    low, high : str
-        Levels by their names in a scene.
-    indicator : callable
-        Of a choice at the ``k``-th force; NaN where it is not known.
-    skip, take : float
-        Indicator up to which the effect is surely skipped for a target of 1 % in e_n (the bound grows with the target),
-        and beyond which it is surely taken; 0 takes it wherever it is not skipped.
+    ``low, high``: levels by their names in a scene. ``indicator``: of a choice at the ``k``-th force; NaN where it is
+    not known. ``skip, take``: indicator up to which the effect is surely skipped for a target of 1 % in e_n (the bound
+    grows with the target), and beyond which it is surely taken; 0 takes it wherever it is not skipped.
     """
 
     low: str
@@ -199,16 +185,7 @@ def level_named(effect: str, name: str) -> str:
 class EffectChoice:
     """Levels of the effects of one candidate, chosen where its scene leaves them open; solves its cases at them.
 
-    Parameters
-    ----------
-    solver : CandidateSolver
-
-    Attributes
-    ----------
-    levels : Levels
-        Those that all forces have.
-    chosen : dict
-        For each effect with steps its `Level` at every force.
+    ``levels``: those that all forces have. ``chosen``: for each effect with steps its `Level` at every force.
     """
 
     def __init__(self, solver: CandidateSolver) -> None:
@@ -315,10 +292,7 @@ class EffectChoice:
     def case(self, k: int) -> Solved:
         """A case, with friction that acts back where it was chosen and can be solved.
 
-        Raises
-        ------
-        ConvergenceError, CheckError
-            If there is no acceptable state.
+        Raises `ConvergenceError, CheckError` if there is no acceptable state.
         """
         solved = self._solved(k)
         if solved.coarse is None:

@@ -46,18 +46,11 @@ Fits = Mapping[str, SurfaceFit]  # by friction model
 class EvaluationSettings:
     """What is computed from two contacts.
 
-    Parameters
-    ----------
-    arms : (3,) array or float
-        Lengths by which the arms of forces are divided along x, y and z of the object's frame, or one for all [m].
-    torques : float
-        Length by which torques about the normals are divided [m].
-    surface : LimitSurface
-        Section ``[limit_surface]`` of a scene.
-    task : Task, optional
-        What is to be held; with it the payload is computed.
-    epsilon_everywhere, six, sampled : bool
-        Whether to find epsilon in any pose, 6-D ellipsoids, and to keep the sampled wrenches.
+    ``arms`` (3,) array or float: lengths by which the arms of forces are divided along x, y and z of the object's
+    frame, or one for all [m]. ``torques``: length by which torques about the normals are divided [m]. ``surface``:
+    section ``[limit_surface]`` of a scene. ``task``: what is to be held; with it the payload is computed.
+    ``epsilon_everywhere, six, sampled``: whether to find epsilon in any pose, 6-D ellipsoids, and to keep the sampled
+    wrenches.
     """
 
     arms: ArrayLike
@@ -101,19 +94,9 @@ def evaluate(
 ) -> tuple[dict[str, Any], list[dict[str, SurfaceFit]]]:
     """Friction limits, limit surfaces and scores of a grasp by two contacts.
 
-    Parameters
-    ----------
-    contacts : two Contact
-        With poses in the object's frame.
-    settings : EvaluationSettings
-
-    Returns
-    -------
-    values : dict
-        Keyed ``group/name`` as in ``study.quantities``, in SI units; ``maps/flags`` has the flags that follow
-        from patches alone.
-    fits : list of dict
-        For each contact its limit surface in every friction model.
+    ``contacts``: with poses in the object's frame. Returns the values, keyed ``group/name`` as in
+    ``study.quantities``, in SI units (``maps/flags`` has the flags that follow from patches alone), and the fits: for
+    each contact its limit surface in every friction model.
     """
     # friction limits come with the contacts, so fitting is the first step that takes time
     fits = _per_patch(contacts, lambda c: {m: fit_surface(c, m, settings.surface) for m in MODELS})
@@ -287,11 +270,8 @@ def volume_in_pose(pair: Sequence[SoftContact], arms: ArrayLike, torques: float)
 def exact_score(pair: Sequence[SoftContact], arms: float, torques: float) -> dict[str, Any]:
     """Score of one grasp with any bodies in any pose, which may take seconds.
 
-    Returns
-    -------
-    dict
-        ``quality`` and ``quality_l1``, the volumes of the grasp wrench space, and lower and upper bound of ``epsilon``
-        for a centre of mass halfway between the contacts.
+    Returns ``quality`` and ``quality_l1``, the volumes of the grasp wrench space, and lower and upper bound of
+    ``epsilon`` for a centre of mass halfway between the contacts.
     """
     lengths = arms, torques, (pair[0].position + pair[1].position) / 2
     volume, ball = grasp_score(pair, *lengths, with_epsilon=False), epsilon(pair, *lengths)

@@ -35,27 +35,11 @@ class Jaws:
     finger: tuple[float, float] | None = None  # length and width of what carries the pad; None: as the pad
 
 
-@dataclass(frozen=True)
-class Fit:
-    """How a gripper fits: the opening it needs at first touch [m], and why it does not fit.
-
-    ``state`` is `WIDE` or `COLLIDES` with a ``message``, or `MISSING`, not computed, where it fits or that is open.
-    """
-
-    opening: float
-    state: int = MISSING
-    message: str = ""
-
-
 def extremes(points: FloatArray, triangles: IntArray, sides: tuple[float, float]) -> tuple[float, float]:
     """Lowest and highest z of triangles over a rectangle about the origin; infinite where there are none.
 
-    Parameters
-    ----------
-    points, triangles : (k, 3) array, (m, 3) int array
-        [m]
-    sides : tuple of float
-        Length and width of the rectangle, along x and y [m].
+    ``points, triangles`` (k, 3) array, (m, 3) int array: [m]. ``sides``: length and width of the rectangle, along x and
+    y [m].
     """
     half = 0.5 * np.array(sides)
     # side by side of the rectangle: most triangles are off one of them, and need not be gathered
@@ -102,34 +86,31 @@ def _on_corners(corners: FloatArray, half: FloatArray) -> FloatArray:
     return np.concatenate(depths)
 
 
-def fit_of(points: FloatArray, triangles: IntArray, jaws: Jaws, doubt: float = 0.0) -> Fit:
-    """How a gripper fits round triangles given in its own frame: z along finger 1's approach, x along the long side.
+def fit_of(points: FloatArray, triangles: IntArray, jaws: Jaws, doubt: float = 0.0) -> tuple[int, str]:
+    """Whether a gripper fits round triangles in its own frame: z along finger 1's approach, x along the long side.
 
-    Parameters
-    ----------
-    points, triangles : arrays
-        As for `extremes`.
-    jaws : Jaws
-    doubt : float
-        What is nearer to a limit is undecided [m], and counts as a fit.
+    `WIDE` or `COLLIDES` and why; `MISSING`, not computed, where it fits or that is open.
+
+    ``points, triangles`` (arrays): as for `extremes`. ``doubt``: what is nearer to a limit is undecided [m], and counts
+    as a fit.
     """
     low, high = extremes(points, triangles, jaws.pad[:2])
     opening = high - low
     if opening > jaws.max_opening + doubt:
         needed, allowed = (shown_text(v, "m", DIGITS) for v in (opening, jaws.max_opening))
-        return Fit(opening, WIDE, f"needs an opening of {needed}, the gripper opens to {allowed}")
+        return WIDE, f"needs an opening of {needed}, the gripper opens to {allowed}"
     if jaws.finger is None or not math.isfinite(opening):
-        return Fit(opening)
+        return MISSING, ""
     front, back = extremes(points, triangles, jaws.finger)
     # how far the object reaches back beside each pad, from the pad's face
     reach = {"finger 1": low - front, "finger 2": back - high}
     hit = {name: far for name, far in reach.items() if far > jaws.pad[2] + doubt}
     if not hit:
-        return Fit(opening)
+        return MISSING, ""
     far = " and ".join(f"{shown_text(v, 'm', DIGITS)} beside that of {name}" for name, v in hit.items())
     thick, size = shown_text(jaws.pad[2], "m", DIGITS), " x ".join(shown_text(v, "m", DIGITS) for v in jaws.finger)
     text = f"the object reaches past the pad's face, {far}; the finger, {size}, begins {thick} behind it"
-    return Fit(opening, COLLIDES, text)
+    return COLLIDES, text
 
 
 def stiffness(gripper: Gripper) -> float:

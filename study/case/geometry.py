@@ -76,10 +76,7 @@ def material_of(shape: Walled) -> WallMaterial:
 def check_wall(shape: Any, surface: OuterSurface) -> None:
     """Refuse a wall that is too thick for the curvature of its outline, by meshing it coarsely.
 
-    Raises
-    ------
-    StudyError
-        With the key and what is wrong with it.
+    Raises `StudyError` with the key and what is wrong with it.
     """
     lowest = float(surface.curve.derivative(np.linspace(*surface.wall, 65))[:, 0].min())
     size = MeshSize(heights=(lowest, lowest), around=0.01, along=0.005, coarse=0.02)

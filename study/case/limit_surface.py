@@ -73,17 +73,9 @@ def fit_surfaces(
 ) -> dict[str, SurfaceFit]:
     """Fit limit surfaces to the wrenches of a contact in one friction model.
 
-    Parameters
-    ----------
-    contact : Contact
-    model : str
-        Friction model.
-    kinds : sequence of str
-        As a scene names them in ``limit_surface.model``.
-    objective : str
-        ``least_squares`` or ``zhou``.
-    samples : int
-        Motions that are fitted to; others, as many as `INDEPENDENT`, judge the fits.
+    ``model``: friction model. ``kinds``: as a scene names them in ``limit_surface.model``. ``objective``:
+    ``least_squares`` or ``zhou``. ``samples``: motions that are fitted to; others, as many as `INDEPENDENT`, judge the
+    fits.
     """
     rho, limits = contact.rho, contact.unit_limits[model]
     twist, wrench = sampled_wrenches(contact, model, samples)

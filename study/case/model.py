@@ -72,14 +72,8 @@ def pad(gripper: Gripper, symmetry: tuple[bool, bool], contact: str, coarser: bo
 class Finger:
     """A pad at first touch with the object.
 
-    Parameters
-    ----------
-    pose : Pose
-        The pad's frame at first touch.
-    surface : GapFunction
-        The object round the contact, in the object's frame.
-    hole_share : float
-        Share of the pad's face before a hole of the object's mesh.
+    ``pose``: the pad's frame at first touch. ``surface``: the object round the contact, in the object's frame.
+    ``hole_share``: share of the pad's face before a hole of the object's mesh.
     """
 
     pose: Pose
@@ -94,13 +88,7 @@ class Finger:
 
 
 def approach(obj: GapObject, pose: Pose, gripper: Gripper) -> Finger:
-    """Move a pad from afar along its approach to first touch.
-
-    Raises
-    ------
-    NoContactError
-        If the pad passes the object.
-    """
+    """Move a pad from afar along its approach to first touch; raises `NoContactError` if the pad passes the object."""
     size = gripper.pad_size
     touch = touching(obj, pose, size)
     box = np.array([0.6 * size[0], 0.6 * size[1], KNOWN_DEPTH * size[2]])
@@ -173,10 +161,7 @@ def mirror_planes(finger: Finger, size: tuple[float, float, float]) -> tuple[boo
 def usable_symmetry(scene: Scene, finger: Finger, elements: tuple[int, int, int]) -> tuple[bool, bool]:
     """Planes of symmetry used with this mesh: those that exist, halve it evenly and are allowed by the effects.
 
-    Raises
-    ------
-    ValueError
-        If the scene forces a symmetry that this candidate does not have.
+    Raises `ValueError` if the scene forces a symmetry that this candidate does not have.
     """
     wanted = scene.effects.model_size
     if wanted == "full":

@@ -67,17 +67,9 @@ def pad_axes(approach: FloatArray, long_side: FloatArray) -> FloatArray:
 def opposed_poses(point: FloatArray, approach: FloatArray, long_side: FloatArray) -> tuple[Pose, Pose]:
     """Two pads that face each other across a point, with the same long side in the object's frame.
 
-    Parameters
-    ----------
-    point : (3,) array
-        Any point on the common line of approach [m].
-    approach, long_side : (3,) arrays
-        Orthogonal unit vectors: finger 1's approach, and the long side of both pads.
-
-    Returns
-    -------
-    (Pose, Pose)
-        Finger 1 and finger 2, each `STANDOFF` away from the point.
+    ``point`` (3,) array: any point on the common line of approach [m]. ``approach, long_side`` (3,) arrays: orthogonal
+    unit vectors: finger 1's approach, and the long side of both pads. Returns finger 1 and finger 2, each `STANDOFF`
+    away from the point.
     """
     return (_pose(point, approach, long_side), _pose(point, -approach, long_side))
 

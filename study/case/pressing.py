@@ -171,12 +171,8 @@ def state_flags(contacts: Sequence[PressedContact]) -> int:
 class OnRigid:
     """Fingers on a rigid object, which do not feel each other.
 
-    Attributes
-    ----------
-    parts : list
-        Load paths of what is pressed by itself: of two fingers that are images of each other the first alone.
-    fingers_solved, planes : int
-        Fingers that are solved, and planes of symmetry of each.
+    ``parts``: load paths of what is pressed by itself: of two fingers that are images of each other the first alone.
+    ``fingers_solved, planes``: fingers that are solved, and planes of symmetry of each.
     """
 
     def __init__(

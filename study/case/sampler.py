@@ -47,18 +47,10 @@ EDGE_COST = 0.05  # of a payload, for which a place off the edges of the object 
 class SampledGrasp:
     """A grasp as the spring foundation sees it.
 
-    Parameters
-    ----------
-    point : (3,) array
-        Middle between both contacts [m].
-    approach, long_side : (3,) arrays
-        Finger 1's approach and the pads' long side.
-    opening : float
-        Distance of the pads' faces at first touch [m].
-    payload : float
-        What it holds on a bed of springs, less where foam is crushed or bears on an edge, for ranking [kg].
-    state : int
-        Why it is not worth a solve, `WIDE`, `COLLIDES` or `SLIPS`; else `MISSING`, not computed.
+    ``point`` (3,) array: middle between both contacts [m]. ``approach, long_side`` (3,) arrays: finger 1's approach and
+    the pads' long side. ``opening``: distance of the pads' faces at first touch [m]. ``payload``: what it holds on a
+    bed of springs, less where foam is crushed or bears on an edge, for ranking [kg]. ``state``: why it is not worth a
+    solve, `WIDE`, `COLLIDES` or `SLIPS`; else `MISSING`, not computed.
     """
 
     point: FloatArray
@@ -81,10 +73,7 @@ def straightened(
 ) -> JawsOnSurface:
     """Turn and shift a gripper until both pads meet the object squarely and in their middles, or a few rounds are over.
 
-    Raises
-    ------
-    NoContactError
-        Where the pads pass the object.
+    Raises `NoContactError` where the pads pass the object.
     """
     grip = JawsOnSurface(surface, point, axes, jaws)
     for _ in range(TURNS):
@@ -147,21 +136,10 @@ def antipodal_grasps(
 ) -> list[SampledGrasp]:
     """At most ``count`` distinct grasps of a surface, the best first; then those that are not worth a solve.
 
-    Parameters
-    ----------
-    surface : (k, 3) array, (m, 3) int array
-        Points [m] and triangles.
-    jaws : Jaws
-    task : Task
-        What they have to hold.
-    count : int
-        Grasps that can be solved.
-    seed : int
-        Of the points where grasps are looked for; the same seed gives the same grasps on every machine.
-    samples : int
-        Number of those points.
-    lids : (n, 3, 3) array, optional
-        Corners of the triangles that close holes [m]: no pad is put there if there are other places.
+    ``surface`` (k, 3) array, (m, 3) int array: points [m] and triangles. ``task``: what they have to hold. ``count``:
+    grasps that can be solved. ``seed``: of the points where grasps are looked for; the same seed gives the same grasps
+    on every machine. ``samples``: number of those points. ``lids`` (n, 3, 3) array, optional: corners of the triangles
+    that close holes [m]: no pad is put there if there are other places.
     """
     points, triangles = np.ascontiguousarray(surface[0]), np.ascontiguousarray(surface[1])
     corners = points[triangles]
@@ -244,7 +222,7 @@ def longest_axis(corners: FloatArray, area: FloatArray) -> FloatArray:
 def judged(grip: JawsOnSurface, task: Task) -> SampledGrasp:
     """State of a grasp on a bed of springs, with its payload there."""
     _, line = grip.misalignment
-    state = fit_of(grip.local, grip.triangles, grip.jaws).state
+    state, _ = fit_of(grip.local, grip.triangles, grip.jaws)
     if not state and slips(line, grip.jaws.mu):
         state = SLIPS
     inward = 1.0 - min(grip.on_edges, EDGE_COST)
@@ -299,10 +277,7 @@ def with_sampled_grasps(scene: Scene) -> Scene:
 
     Poses are rounded to 1 um and 1e-6, so that they are the same on every machine.
 
-    Raises
-    ------
-    NoGraspError
-        Where no grasp fits between the pads.
+    Raises `NoGraspError` where no grasp fits between the pads.
     """
     given, surface, obj = scene.candidates, surface_triangles(scene.object), build_object(scene.object)
     task = task_of(scene, obj)

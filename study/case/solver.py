@@ -51,16 +51,8 @@ class Levels(NamedTuple):
 class Solution:
     """Both fingers in equilibrium at one force on one mesh.
 
-    Parameters
-    ----------
-    mesh : int
-        `COARSE`, `FINE`, or finer.
-    fingers : OnRigid or OnWall
-        What was pressed.
-    states : sequence
-        Of its parts.
-    contacts : sequence of PressedContact
-        Of both fingers.
+    ``mesh``: `COARSE`, `FINE`, or finer. ``fingers``: what was pressed. ``states``: of its parts. ``contacts``: of both
+    fingers.
     """
 
     mesh: int
@@ -137,14 +129,9 @@ def followed(
 class CandidateSolver:
     """Solutions of one candidate.
 
-    Parameters
-    ----------
-    scene : Scene
-        Its levels of effects do not count: they are asked for.
-    poses : two Pose
-        Of the pads before they touch; ``fingers`` are they at first touch.
-    finest : sequence of int
-        Finest mesh of each force that ``accuracy.target`` may ask for; `FINEST` where it is empty.
+    ``scene``: its levels of effects do not count: they are asked for. ``poses``: of the pads before they touch;
+    ``fingers`` are they at first touch. ``finest``: finest mesh of each force that ``accuracy.target`` may ask for;
+    `FINEST` where it is empty.
     """
 
     def __init__(self, scene: Scene, poses: Sequence[Pose], finest: Sequence[int] = ()) -> None:
@@ -180,10 +167,7 @@ class CandidateSolver:
     def solve(self, k: int, mesh: int, levels: Levels) -> Solution:
         """Both fingers at the ``k``-th force.
 
-        Raises
-        ------
-        ConvergenceError, CheckError
-            If there is no acceptable state; the same each time.
+        Raises `ConvergenceError, CheckError` if there is no acceptable state; the same each time.
         """
         if (k, mesh, levels) not in self._solutions:
             fingers = self.pressing(mesh, levels)
@@ -202,10 +186,7 @@ class CandidateSolver:
     def case(self, k: int, levels: Levels) -> Solved:
         """Solutions of a case on the scene's meshes, and on finer ones where ``accuracy.target`` asks for them.
 
-        Raises
-        ------
-        ConvergenceError, CheckError
-            If there is no acceptable state on the scene's mesh.
+        Raises `ConvergenceError, CheckError` if there is no acceptable state on the scene's mesh.
         """
         fine = self.solve(k, FINE, levels)
         if not forces_apart(self.scene):

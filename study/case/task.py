@@ -26,16 +26,9 @@ FloatArray = NDArray[np.float64]
 class Task:
     """What a grasp has to hold.
 
-    Parameters
-    ----------
-    centre_of_mass : (3,) array
-        In the object's frame [m].
-    direction : (3,) array, optional
-        In which the weight pulls; None for every direction.
-    kind : str
-        What happens to the normal forces under load, of `scoring.payload.KINDS`.
-    mass : float, optional
-        Of the object [kg].
+    ``centre_of_mass`` (3,) array: in the object's frame [m]. ``direction`` (3,) array, optional: in which the weight
+    pulls; None for every direction. ``kind``: what happens to the normal forces under load, of `scoring.payload.KINDS`.
+    ``mass``: of the object [kg].
     """
 
     centre_of_mass: ArrayLike

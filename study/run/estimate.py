@@ -147,16 +147,9 @@ def measured_seconds(layout: Layout, path: Path) -> Any:
 def scaled(seconds: ArrayLike, served: ArrayLike, ranks: int, write: float, service: float) -> tuple[float, str]:
     """Seconds until the last case is stored, and what keeps that from being shorter.
 
-    Parameters
-    ----------
-    seconds, served : (n,) arrays
-        Of load paths, or of forces that ranks may divide: time of solving [s], and rows that are stored.
-    ranks : int
-    write, service : float
-        Time that the writes of a row take from its rank, and from the file system [s].
+    ``seconds, served`` (n,) arrays: of load paths, or of forces that ranks may divide: time of solving [s], and rows
+    that are stored. ``write, service``: time that the writes of a row take from its rank, and from the file system [s].
 
-    Examples
-    --------
     >>> scaled([4.0] * 64, [4] * 64, 64, 0.0, 0.0), scaled([4.0] * 64, [4] * 64, 64, 0.1, 0.1)
     ((4.0, '-'), (25.6, 'file system'))
     """
@@ -193,10 +186,7 @@ def _parts(plan: Any, seconds: NDArray[np.float64]) -> list[tuple[float, int]]:
 def scaling_text(plan: Any, path: Path, ranks: Sequence[int], repeat: int) -> str:
     """Time and efficiency of a finished study, or of one with ``repeat`` times its candidates, on so many ranks.
 
-    Raises
-    ------
-    StudyError
-        If the file at ``path`` holds no times of this plan.
+    Raises `StudyError` if the file at ``path`` holds no times of this plan.
     """
     known = measured_seconds(plan.layout, path)
     parts = [] if known is None else _parts(plan, known) * repeat

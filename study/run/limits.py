@@ -39,16 +39,10 @@ class AbandonedError(BaseException):
 class Stopper:
     """Listens to signals between ``with stopper:``; ``name`` is the signal that came, or empty; ``limit`` as below.
 
-    Parameters
-    ----------
-    on_stop : callable
-        Called once, by the first signal.
-    limit : float
-        Time of a single case [s]. It is looked at whenever the solver comes back to Python, which PETSc does for every
-        residual and every tangent.
-    last_resort : float, optional
-        Time after which this process ends itself because a case never came back to Python [s]; for a process that has
-        nobody beside it to notice.
+    ``on_stop``: called once, by the first signal. ``limit``: time of a single case [s]. It is looked at whenever the
+    solver comes back to Python, which PETSc does for every residual and every tangent. ``last_resort``: time after
+    which this process ends itself because a case never came back to Python [s]; for a process that has nobody beside it
+    to notice.
     """
 
     def __init__(self, on_stop: Callable[[], None], limit: float = math.inf, last_resort: float | None = None) -> None:
@@ -160,10 +154,7 @@ def limited_memory(setting: float | str, ranks: int) -> Iterator[None]:
 def require_room() -> None:
     """Refuse a limit of addresses that leaves no room for the program itself.
 
-    Raises
-    ------
-    StudyError
-        With the limit, what is needed, and what to do.
+    Raises `StudyError` with the limit, what is needed, and what to do.
     """
     limit = resource.getrlimit(resource.RLIMIT_AS)[0]
     # With less than this some libraries hang instead of failing, so the run is refused before.

@@ -43,10 +43,7 @@ def settle(writer: Any, units: Iterable[Any], torn: Iterable[int], retry_failed:
 
     A case that an earlier run left out and this one tries is missing again.
 
-    Returns
-    -------
-    (rows,) array
-        State of every case as the run begins.
+    Returns (rows,) array: state of every case as the run begins.
     """
     units, codes, attempts = list(units), writer.codes(), writer.attempts()
     for row in rows_again(units, codes, torn, retry_failed):
@@ -96,10 +93,7 @@ class PathSolver:
     def solve(self, share: Share, position: int, codes: np.ndarray, stopper: Stopper, look: Callable[[], Any]) -> None:
         """Solve a share, which others know by its position, and store the rows that ``codes`` calls missing.
 
-        Raises
-        ------
-        StudyError
-            The file cannot be written any more.
+        Raises `StudyError`: the file cannot be written any more.
         """
         unit, pending = share.unit, _pending(share, codes)
         cases = self._cases(unit, pending)

@@ -48,22 +48,13 @@ class ObjectFolder:
         return (*self.overrides, *listed.overrides)
 
     def scene(self, listed: Listed) -> Scene:
-        """The scene of one object.
-
-        Raises
-        ------
-        SceneError
-            With everything that is wrong with it.
-        """
+        """The scene of one object; raises `SceneError` with everything that is wrong with it."""
         return load_scene(self.scene_file, self.overrides_of(listed))
 
     def check(self) -> Scene:
         """The scene of the first object, whether its mesh is there or not; what is wrong with it is so for all.
 
-        Raises
-        ------
-        SceneError
-            With everything that is wrong.
+        Raises `SceneError` with everything that is wrong.
         """
         path = Path(self.scene_file)
         return parse_scene(read_text(path), path, self.overrides_of(self.objects[0]), check_files=False)
@@ -72,10 +63,7 @@ class ObjectFolder:
 def folder_of(scene_file: str, overrides: Sequence[str]) -> ObjectFolder | None:
     """The objects of a scene that names many; None for a scene of one.
 
-    Raises
-    ------
-    StudyError, SceneError
-        No mesh matches, the CSV file cannot be used, or the scene is no TOML.
+    Raises `StudyError, SceneError`: no mesh matches, the CSV file cannot be used, or the scene is no TOML.
     """
     path = Path(scene_file)
     data = parse_toml(read_text(path), scene_file)

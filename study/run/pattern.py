@@ -57,15 +57,8 @@ def next_round(result: Any, scene: Scene, each: int) -> tuple[Any, ...]:
 def next_poses(result: Any, values: FloatArray, scene: Scene, each: int) -> tuple[Place, ...]:
     """Poses of the next round; none where a finer step gained too little, at the finest, or with the budget spent.
 
-    Parameters
-    ----------
-    result : Result
-    values : (poses, columns) array
-        Score of every pose at every force and point of the sweep, NaN where a grasp cannot be used.
-    scene : Scene
-        As it was before any round.
-    each : int
-        Cases of a pose.
+    ``values`` (poses, columns) array: score of every pose at every force and point of the sweep, NaN where a grasp
+    cannot be used. ``scene``: as it was before any round. ``each``: cases of a pose.
     """
     where, rounds = scene.candidates, result.layout.added
     if where.refine is None:

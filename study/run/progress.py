@@ -37,19 +37,9 @@ class Progress:
 
     The clock for that starts when the first cases are done: until then a cold start has compiled, not solved.
 
-    Parameters
-    ----------
-    weights : (rows,) array
-        Expected cost of each case, in any unit.
-    codes : (rows,) array
-        State of each case at the start.
-    stream : text stream
-        Where to write.
-    live : bool
-        Rewrite one line (a terminal) instead of adding lines. Under mpirun every output looks like a terminal, so the
-        caller has to know.
-    clock : callable
-        Seconds that only grow.
+    ``weights`` (rows,) array: expected cost of each case, in any unit. ``codes`` (rows,) array: state of each case at
+    the start. ``stream``: where to write. ``live``: rewrite one line (a terminal) instead of adding lines. Under mpirun
+    every output looks like a terminal, so the caller has to know. ``clock``: seconds that only grow.
     """
 
     def __init__(

@@ -68,21 +68,10 @@ def _renumbered(
 def chances(stations: FloatArray, score: FloatArray, sound: NDArray[np.bool_], finest: float) -> FloatArray:
     """By which share each interval between stations may beat the best grasp, at the force where that is most.
 
-    Parameters
-    ----------
-    stations : (s,) array
-        Rising.
-    score : (p, s, a, f) array
-        Of every case: points of a sweep, stations, angles, forces; NaN where there is none.
-    sound : (p, s, a, f) array
-        Whether the grasp can be used.
-    finest : float
-        Intervals that are not twice as wide are not divided, and have no chance.
-
-    Returns
-    -------
-    (s - 1,) array
-        0 where nothing is expected to be better.
+    ``stations`` (s,) array: rising. ``score`` (p, s, a, f) array: of every case: points of a sweep, stations, angles,
+    forces; NaN where there is none. ``sound`` (p, s, a, f) array: whether the grasp can be used. ``finest``: intervals
+    that are not twice as wide are not divided, and have no chance. Returns (s - 1,) array: 0 where nothing is expected
+    to be better.
     """
     h = np.diff(stations)
     slope = np.abs(np.diff(score, axis=1)) / h[None, :, None, None]

@@ -29,14 +29,8 @@ class Claims:
     computing. Between nodes the positions are dealt out in turn: a counter on another node would wait until the rank
     that holds it leaves its solver.
 
-    Parameters
-    ----------
-    comm : communicator
-        All ranks of the run.
-    count : int
-        Number of positions.
-    node : communicator, optional
-        The ranks that share this rank's memory; found from ``comm`` where it is not given.
+    ``comm``: all ranks of the run. ``count``: number of positions. ``node``: the ranks that share this rank's memory;
+    found from ``comm`` where it is not given.
     """
 
     def __init__(self, comm: Any, count: int, node: Any = None) -> None:
@@ -104,12 +98,7 @@ class ObjectClaims(Claims):
     It takes an object that nobody on its node has begun, then helps with the one that has most positions left. Between
     nodes the objects are dealt out in turn.
 
-    Parameters
-    ----------
-    comm : communicator
-        All ranks of the run.
-    sizes : sequence of int
-        Number of positions of every object.
+    ``comm``: all ranks of the run. ``sizes``: number of positions of every object.
     """
 
     def __init__(self, comm: Any, sizes: Sequence[int]) -> None:
@@ -151,12 +140,7 @@ class LostRanks:
     A case that hangs inside a library cannot be ended from within: the process that holds it hears no signal in Python.
     Another process of the node can see that, mark the case as failed, and end the run when everything else is done.
 
-    Parameters
-    ----------
-    node : communicator
-        Ranks that share memory.
-    limit : float
-        Time limit of a case [s].
+    ``node``: ranks that share memory. ``limit``: time limit of a case [s].
     """
 
     def __init__(self, node: Any, limit: float) -> None:

@@ -42,26 +42,13 @@ T = TypeVar("T")
 class Work:
     """How it is done.
 
-    Parameters
-    ----------
-    solve_unit : callable
-        ``solve_unit(unit, wanted)`` yields ``(k, CaseResult | CaseFailure)`` for forces of a unit, upward: for those
-        that are wanted, and for others that it has to solve on the way.
-    image : callable, optional
-        ``image(result, unit, c)`` turns a result into that of the ``c``-th candidate which the unit serves.
-    finalise : callable, optional
-        ``finalise(writer)`` runs on rank 0 when no case is missing, to fill derived datasets.
-    summary : callable, optional
-        ``summary(result)`` gives the text that is printed at the end.
-    time_limit : float
-        Of a single case [s].
-    memory : float, "auto" or "none"
-        As for `study.run.limits.limited_memory`.
-    more : callable, optional
-        ``more(result)`` gives the stations, poses or cases of the next round, from what is stored alone; none at the
-        end.
-    grown : callable, optional
-        ``grown(rounds)`` gives plan and work with what these rounds added; collective.
+    ``solve_unit``: ``solve_unit(unit, wanted)`` yields ``(k, CaseResult | CaseFailure)`` for forces of a unit, upward:
+    for those that are wanted, and for others that it has to solve on the way. ``image``: ``image(result, unit, c)``
+    turns a result into that of the ``c``-th candidate which the unit serves. ``finalise``: ``finalise(writer)`` runs on
+    rank 0 when no case is missing, to fill derived datasets. ``summary``: ``summary(result)`` gives the text that is
+    printed at the end. ``time_limit``: of a single case [s]. ``memory``: as for `study.run.limits.limited_memory`.
+    ``more``: ``more(result)`` gives the stations, poses or cases of the next round, from what is stored alone; none at
+    the end. ``grown``: ``grown(rounds)`` gives plan and work with what these rounds added; collective.
     """
 
     solve_unit: Callable[[Any, Sequence[int]], Iterable[tuple[int, Any]]]
@@ -96,10 +83,7 @@ def run_study(plan: Plan, work: Work, path: Path, comm: Any, *, retry_failed: bo
 
     Rounds of further grasps and finer meshes follow, each in a file that takes the place of the last.
 
-    Raises
-    ------
-    StudyError
-        On every rank: the file is in use, belongs to another scene or cannot be written.
+    Raises `StudyError` on every rank: the file is in use, belongs to another scene or cannot be written.
     """
     with locked(path, comm):
         if work.grown and (rounds := on_rank0(comm, rounds_in, path, plan)):
@@ -122,10 +106,7 @@ def run_study(plan: Plan, work: Work, path: Path, comm: Any, *, retry_failed: bo
 def locked(path: Path, comm: Any) -> Iterator[None]:
     """Have a file for the ranks of ``comm`` alone; collective.
 
-    Raises
-    ------
-    StudyError
-        On every rank: the file is in use, or its folder cannot be written.
+    Raises `StudyError` on every rank: the file is in use, or its folder cannot be written.
     """
     # Host and process: two runs on one file system must not have the same name.
     owner = f"host {os.uname().nodename}, process {os.getpid()}, {comm.size} rank{'s' * (comm.size > 1)}"
@@ -246,10 +227,8 @@ class Session:
     def solve(self) -> int:
         """Solve, wait for all ranks, close the file; the exit code.
 
-        Raises
-        ------
-        StudyError
-            The file cannot be written any more; with several ranks all of them are ended at once instead.
+        Raises `StudyError`: the file cannot be written any more; with several ranks all of them are ended at once
+        instead.
         """
         claims = self._claims()
         lost = LostRanks(claims.node, self._work.time_limit)

@@ -71,12 +71,7 @@ def sensible_ranks(costs: Sequence[float]) -> int:
 def shares(units: Iterable[Any], codes: np.ndarray, ranks: int) -> list[Share]:
     """What is missing of some units, in the order of work, cut so that so many ranks are busy to the end.
 
-    Parameters
-    ----------
-    units : iterable
-    codes : (rows,) array
-        State of every case.
-    ranks : int
+    ``codes`` (rows,) array: state of every case.
     """
     waiting = _in_order([Share(unit, forces) for unit in units if (forces := _missing(unit, codes))])
     left, divided = sum(share.cost for share in waiting), list[Share]()

@@ -339,10 +339,7 @@ def put(data: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
 def plain_tables(tables: Mapping[str, Any]) -> dict[str, Any]:
     """A copy of tables, or of values by dotted key, with lists and numbers instead of numpy's.
 
-    Raises
-    ------
-    TypeError
-        For what is no mapping by text.
+    Raises `TypeError` for what is no mapping by text.
     """
     if not isinstance(tables, Mapping) or not all(isinstance(key, str) for key in tables):
         raise TypeError(f"tables of a scene: found {shown(tables)}, expected a mapping of sections, {{'object': ...}}")

@@ -17,14 +17,8 @@ def latin_hypercube(
 
     Each input takes the middles of ``count`` intervals of equal probability, each once.
 
-    Parameters
-    ----------
-    means, half_widths : mappings
-        Of every input; half-widths of its 95 % interval.
-    count : int
+    ``means, half_widths``: of every input; half-widths of its 95 % interval.
 
-    Examples
-    --------
     >>> [round(sample["mu"], 3) for sample in sorted(latin_hypercube({"mu": 0.8}, {"mu": 0.1}, 4), key=str)]
     [0.741, 0.784, 0.816, 0.859]
     """

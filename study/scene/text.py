@@ -125,10 +125,7 @@ def differences(theirs: str, ours: str) -> str:
 def changes(theirs: str, ours: str) -> list[tuple[str, Any, Any]]:
     """Keys that change results and differ between two effective scenes, with both values; None is a key not set.
 
-    Raises
-    ------
-    ValueError
-        One of them is not TOML.
+    Raises `ValueError`: one of them is not TOML.
     """
     before, after = (_values(text) for text in (theirs, ours))
     # In the order of our scene, which is the one that the reader knows.
