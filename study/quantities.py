@@ -188,7 +188,7 @@ class Quantity:
 
 SINGULAR = {"fingers": "finger", "checks": "check", "effects": "effect"}
 F, M, FM = ("finger",), ("model",), ("finger", "model")
-MESHES = "Error estimate, from the differences of the mesh to one with half as many elements per direction"
+MESHES = "Stated error, all that is numerical: mesh, steps of the load path, effects left out, edge of the contact"
 AS_MAP = "As the map, for each finger."
 ROWS = (
     # maps of every case, with what is said beside them

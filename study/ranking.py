@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from softjaw.study.case.result import TIE
 from softjaw.study.flags import BORNE, LOST, Flag, flags_in
 from softjaw.study.quantities import DONE, LEAST_FORCE, REALISATION
-from softjaw.study.result.read import at_force, half_width, mesh_error, values_of
+from softjaw.study.result.read import at_force, half_width, stated_error, values_of
 from softjaw.study.scene.text import scene_table
 
 FloatArray = NDArray[np.float64]
@@ -115,7 +115,7 @@ class Sure:
     Attributes
     ----------
     value, error : (n,) arrays
-        ``error`` is that of the mesh; NaN where it is not known.
+        ``error`` is the stated one; NaN where it is not known.
     samples : (n, m) array
         Values with samples of the uncertain inputs, the same for all grasps; none where no input is uncertain.
     """
@@ -150,7 +150,7 @@ def sure(ds: xr.Dataset, name: str, k: int) -> Sure | None:
     """A map (CCM) of all candidates at a force level; None where a file knows no error of it."""
     if name not in ds:
         return None
-    values, error, samples = values_of(ds, name)[..., k].ravel(), mesh_error(ds, name), ds.get(f"{name}_samples")
+    values, error, samples = values_of(ds, name)[..., k].ravel(), stated_error(ds, name), ds.get(f"{name}_samples")
     if error is None and samples is None:
         return None
     of_mesh = np.zeros(values.shape) if error is None else error[..., k].ravel()

@@ -78,14 +78,15 @@ class Setting:
 
     ``values``: value of each swept key, in words. ``seconds``: time of a case on one core, mean over those that are
     solved [s]. ``worst, median``: for each of `JUDGED` the largest and the median relative distance from the reference;
-    NaN where none is known. ``failed``: cases without a result. ``given, reference``: whether it is what the scene has
-    without the sweep, and whether it is the most accurate point.
+    ``stated``: the largest error that the results state; NaN where none is known. ``failed``: cases without a result.
+    ``given, reference``: whether it is what the scene has without the sweep, and whether it is the most accurate point.
     """
 
     values: dict[str, str]
     seconds: float
     worst: dict[str, float]
     median: dict[str, float]
+    stated: dict[str, float]
     failed: int
     given: bool
     reference: bool
@@ -97,6 +98,7 @@ def settings_in(ds: xr.Dataset) -> list[Setting]:
     shape = ds.status.shape[: len(swept)]
     seconds = _by_point(values_of(ds, BY_KEY["work/seconds_total"].variable), shape)
     maps = {name: _by_point(values_of(ds, name), shape) for name in JUDGED if name in ds}
+    claims = {name: _by_point(values_of(ds, f"{name}_error"), shape) for name in maps if f"{name}_error" in ds}
     best = tuple(0 if axis.long_name in SMALLEST else length - 1 for axis, length in zip(swept, shape, strict=True))
     last = int(np.ravel_multi_index(best, shape))
     errors = {name: np.abs(values - values[last]) / np.abs(values[last]) for name, values in maps.items()}
@@ -107,10 +109,11 @@ def settings_in(ds: xr.Dataset) -> list[Setting]:
         given = all(_same(tables[key.partition(".")[0]].get(key.partition(".")[2]), v) for key, v in values.items())
         known = {name: error[i][np.isfinite(error[i])] for name, error in errors.items()}
         worst, median = ({n: float(f(e)) if e.size else np.nan for n, e in known.items()} for f in (np.max, np.median))
+        stated = {n: float(np.fmax.reduce(claims[n][i])) if n in claims else np.nan for n in maps}
         solved = np.isfinite(seconds[i])
         mean = float(seconds[i][solved].mean()) if solved.any() else np.nan
         words = {key: _words(value) for key, value in values.items()}
-        settings.append(Setting(words, mean, worst, median, int((~solved).sum()), given, i == last))
+        settings.append(Setting(words, mean, worst, median, stated, int((~solved).sum()), given, i == last))
     return settings
 
 
@@ -144,9 +147,11 @@ def cost_text(ds: xr.Dataset) -> str:
     """The settings, the cheapest first, with time and errors; one line for each."""
     settings = settings_in(ds)
     names, reference = list(settings[0].worst), next(s for s in settings if s.reference)
-    head = (*settings[0].values, "time per case", *(f"error of {name}" for name in names), "")
+    errors = (*(f"error of {n}" for n in names), *(f"{n} states" for n in names))
+    head = (*settings[0].values, "time per case", *errors, "")
     rows = [
         (*s.values.values(), f"{s.seconds:.2g} s", *(f"{percent(s.worst[n])} ({percent(s.median[n])})" for n in names),
+         *(percent(s.stated[n]) for n in names),
          ", ".join([*["as in the scene"] * s.given, *[f"{s.failed} failed"] * bool(s.failed)]))
         for s in sorted(settings, key=lambda s: s.seconds)
         if not s.reference
@@ -159,19 +164,25 @@ def cost_text(ds: xr.Dataset) -> str:
 
 
 def cost_picture(ds: xr.Dataset) -> bytes:
-    """Largest errors over the time of a case, a line for each value of the last axis; the scene's own is ringed."""
+    """Largest errors over the time of a case, a line for each value of the last axis; the scene's own is ringed.
+
+    Thin dashes are the largest errors that the results state themselves.
+    """
     settings = [s for s in settings_in(ds) if not s.reference]
     names, last = list(settings[0].worst), list(settings[0].values)[-1]
     with pictures.style():
         drawn, axes = pictures.figure(3.4 * len(names), 3.2, 1, len(names))
         for plot, name in zip(axes[0], names, strict=True):
             for k, value in enumerate(dict.fromkeys(s.values[last] for s in settings)):
-                line = [(s.seconds, s.worst[name]) for s in settings if s.values[last] == value and s.worst[name] > 0]
-                colour, marker = LOOKS[k % len(LOOKS)]
+                along, (colour, marker) = [s for s in settings if s.values[last] == value], LOOKS[k % len(LOOKS)]
+                line = [(s.seconds, s.worst[name]) for s in along if s.worst[name] > 0]
                 plot.plot(*np.transpose(line or [(np.nan, np.nan)]), color=colour, marker=marker, label=value)
+                claimed = [(s.seconds, s.stated[name]) for s in along]
+                plot.plot(*np.transpose(claimed), "--", lw=1, marker=marker, ms=3, color=colour)
             given = [(s.seconds, s.worst[name]) for s in settings if s.given and s.worst[name] > 0]
             if given:
                 plot.plot(*np.transpose(given), "o", ms=11, mfc="none", color="black", label="as in the scene")
-            plot.set(xscale="log", yscale="log", xlabel="time per case [s]", title=f"largest error of {name}")
+            title = f"largest error of {name} (dashed: stated)"
+            plot.set(xscale="log", yscale="log", xlabel="time per case [s]", title=title)
         axes[0][-1].legend(title=last)
         return pictures.as_png(drawn)

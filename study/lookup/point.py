@@ -68,17 +68,15 @@ class GraspPoint:
         return self._shaped(np.where(self.states == INSIDE, values, np.nan))
 
     def error(self, name: str, model: str = "ccm") -> Any:
-        """Estimated error of `value` by the interpolation, in the quantity's unit; see `study.lookup.GraspMap`."""
-        errors = self.map.errors(name, model, self.corners)
-        valid = (self.states == INSIDE) & np.isfinite(self.map.interpolated(name, model, self.corners))
-        return self._shaped(np.where(valid, errors, np.nan))
+        """Stated error of `value`, of the cases around and of the interpolation, in the quantity's unit.
 
-    def mesh_error(self, name: str) -> Any:
-        """Estimated error of `value` (CCM) by the mesh, in the quantity's unit; NaN where the file has none."""
+        See `study.lookup.GraspMap`.
+        """
+        errors, values = (of(name, model, self.corners) for of in (self.map.errors, self.map.interpolated))
         q = BY_KEY.get(f"maps/{name}")
-        if q is None or not q.error or not self.map.source.has(q.of_error.name):
-            return self._shaped(np.full(len(self.states), np.nan))
-        return q.error_in_unit(self.value(q.of_error.name), self.value(name))
+        if q is not None and q.error and self.map.source.has(q.of_error.name):
+            errors = errors + q.error_in_unit(self.map.interpolated(q.of_error.name, "ccm", self.corners), values)
+        return self._shaped(np.where((self.states == INSIDE) & np.isfinite(values), errors, np.nan))
 
     def fingers(self, name: str, model: str = "ccm") -> FloatArray:
         """A quantity of both fingers ``(..., 2, ...)``: ``f_x_max`` or ``fingers/S``, ``limit_surface/rho``."""
@@ -183,10 +181,8 @@ class GraspPoint:
         if self.reason:
             return f"{lines[0]}: {self.reason}"
         for name in (n for n in (*MAIN, *FORCE_RANGE) if self.map.source.has(n)):
-            units, error, mesh = self.map.quantities[name][0], self.error(name), self.mesh_error(name)
-            by_mesh = f", by the mesh +- {shown_text(mesh, units, 2)}" if np.isfinite(mesh) else ""
-            value = shown_text(self.value(name), units, 5)
-            lines.append(f"  {name:<14} {value}  +- {shown_text(error, units, 2)}{by_mesh}")
+            units, value, error = self.map.quantities[name][0], self.value(name), self.error(name)
+            lines.append(f"  {name:<14} {shown_text(value, units, 5)}  +- {shown_text(error, units, 2)}")
         lines += [f"  {flag.sentence}" for flag in flags_in(self.flags)]
         return "\n".join(lines)
 

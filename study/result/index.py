@@ -42,7 +42,7 @@ COLUMNS = tuple(
     for column in (
         ("state", str, "", "one of: " + ", ".join(STATES)),
         ("payload", float, "kg", "mass that the best grasp holds in the worst direction, curved contact model"),
-        ("payload_error", float, "1", "relative error of that payload by the mesh"),
+        ("payload_error", float, "1", "relative error of that payload: numerical, without uncertain inputs"),
         ("opening", float, "m", "distance of the pads' faces at first touch, best grasp"),
         ("force", float, "N", "normal force per finger of the best grasp"),
         ("e_n", float, "m", "eccentricity parameter of the best grasp, curved contact model"),

@@ -172,8 +172,8 @@ def values_of(ds: xr.Dataset, name: str, model: str = "ccm") -> np.ndarray:
     return variable.values
 
 
-def mesh_error(ds: xr.Dataset, name: str) -> np.ndarray | None:
-    """Error of a map (CCM) over the cases from two meshes, in its unit; None where the file has none."""
+def stated_error(ds: xr.Dataset, name: str) -> np.ndarray | None:
+    """Stated error of a map (CCM) over the cases, in its unit; None where the file has none."""
     q = BY_KEY.get(f"maps/{name}")
     if q is None or not q.error or q.of_error.name not in ds:
         return None

@@ -323,7 +323,7 @@ def _held(ds: xr.Dataset, index: Index) -> tuple[str, str]:
     known = "payload_interval" in ds, np.isfinite(at(ds, "payload_error", index))
     covers = "error not known: accuracy.meshes = 2 gives it"
     if any(known):
-        covers = "±: uncertain inputs" if known[0] else "±: mesh, not mu or stiffness"
+        covers = "±: uncertain inputs" if known[0] else "±: numerical, not mu or stiffness"
     return value_text(ds, "payload", index, 3, unit=True), f"{every} ({covers})"
 
 

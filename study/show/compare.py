@@ -14,7 +14,7 @@ from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.quantities import TABLE, map_row
 from softjaw.study.ranking import falling
 from softjaw.study.result.layout import DONE
-from softjaw.study.result.read import axes_of, mesh_error, values_of
+from softjaw.study.result.read import axes_of, stated_error, values_of
 from softjaw.study.scene.text import changes, value_text
 from softjaw.study.table import PAPER, Column, Row, Table, as_text, with_unit, wrapped
 from softjaw.study.units import shown, shown_unit
@@ -176,7 +176,7 @@ def _error(ds: xr.Dataset, name: str, model: str) -> FloatArray | None:
     """Error of a map in its unit; None where the file has none, as for models other than CCM."""
     if map_row(name).by_model and model != "ccm":
         return None
-    return values_of(ds, f"{name}_interval") if f"{name}_interval" in ds else mesh_error(ds, name)
+    return values_of(ds, f"{name}_interval") if f"{name}_interval" in ds else stated_error(ds, name)
 
 
 def _summary(name: str, values: dict[str, NDArray[Any]]) -> Row:

@@ -34,7 +34,7 @@ from softjaw.study.table import (
 )
 
 MOST_PLACES = 2
-NO_ERRORS = "errors of the mesh: not known; accuracy.meshes = 2 in the scene gives them"
+NO_ERRORS = "errors: not known; accuracy.meshes = 2 in the scene gives them"
 RESUME = "run the same command again to resume"
 Index = tuple[int, ...]
 
@@ -78,7 +78,7 @@ def status_table(result: Any) -> Table:
         rows.append(where | ({"label": str(result.labels[index[-3:-1]])} if poses else {}))
     counts = {name.replace(" ", "_"): int(np.sum(result.status == code)) for code, name in enumerate(STATES)}
     facts: Row = {"file": str(result.path), "running": holder(result.path) or None, **counts}
-    facts |= {"largest_error": largest_mesh_error(result), "waiting": waits(result), **_added(result)}
+    facts |= {"largest_error": largest_stated_error(result), "waiting": waits(result), **_added(result)}
     facts["sessions"] = list(result.sessions)
     notes = [reason.text(lambda index: place(result, index)) for reason in reasons_in(result)]
     return Table(result.title, columns, rows, notes, facts, "cases")
@@ -89,12 +89,12 @@ def status_text(result: Any, width: int = PAPER) -> str:
     runner = holder(result.path)
     state = f"running now: {runner}" if runner else RESUME if unfinished(result) else ""
     waiting = f"{n} cases wait for a finer mesh" if (n := waits(result)) else ""
-    known = [wrapped(text, width, "  ", "  ") for text in (largest_mesh_error(result), waiting) if text]
+    known = [wrapped(text, width, "  ", "  ") for text in (largest_stated_error(result), waiting) if text]
     lines = [counts(result), *known, *[wrapped(state, width)] * bool(state), *reasons(result, width)]
     return "\n".join([*lines, *sessions(result, bool(runner), width)])
 
 
-# --- errors of the mesh ----------------------------------------------------------------------------------------------
+# --- stated errors ---------------------------------------------------------------------------------------------------
 
 
 def meshes(result: Any) -> NDArray[np.float64] | None:
@@ -118,7 +118,7 @@ def unfinished(result: Any) -> bool:
     return bool(np.any(result.status == MISSING)) or waits(result) > 0
 
 
-def largest_mesh_error(result: Any) -> str:
+def largest_stated_error(result: Any) -> str:
     """The largest stated error so far of what the scene's target is for."""
     row = map_row(aim(result)[0]).of_error
     errors = result.read(f"{row.name}/{row.name}") if row in result.layout.quantities else None
@@ -157,7 +157,7 @@ def largest_error(
     known = np.where(done, errors, np.nan)
     count = int(np.count_nonzero(np.isfinite(known)))
     if not count:
-        return f"errors of the mesh: none of {solved} solved cases has one"
+        return f"errors: none of {solved} solved cases has one"
     worst = tuple(map(int, np.unravel_index(int(np.nanargmax(known)), status.shape)))
     name, target = aim(cases)
     parts = [f"largest stated error of {name}: {100 * known[worst]:.2g} % ({place_text(axes, labels, worst)})"]

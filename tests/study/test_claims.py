@@ -41,8 +41,8 @@ def test_both_definitions_of_e_n_and_the_projected_one():
 def test_claims_of_the_lookup_hold(tmp_path):
     """Between the stations and forces of the bottle's map, on cases that it does not hold.
 
-    Where friction acts back in one of the cases around and not in another, f_x_max and p_max step by what it moves
-    them, which no curvature shows: claims hold where all are alike.
+    Where friction acts back in one of the cases around and not in another, numbers step by what it moves them: no
+    curvature shows it, the error of the case that leaves it out does.
     """
     import softjaw
     from softjaw.study.doctor import launch_environment
@@ -51,8 +51,8 @@ def test_claims_of_the_lookup_hold(tmp_path):
     own = np.linspace(25, 175, 35)
     between = ((own[1:] + own[:-1]) / 2).round(6).tolist()
     text = re.sub(r"\n(stations_mm|refine|normal_force_n) .*", "", pathlib.Path(BOTTLE).read_text())
-    more = [1, 1.5, 2, 3, 4, 5.5, 7, 8.5, 10, 11.5, 13]
-    for name, stations, forces in (("map", own.tolist(), more[::2]), ("held", between[::2], more)):
+    text = text.replace("elements = [20, 10, 6]", "elements = [12, 6, 4]")
+    for name, stations, forces in (("map", own.tolist(), [1, 2, 4, 7, 10, 13]), ("held", between[::2], [1.5, 3, 8.5])):
         scene = re.sub(r"stations = 35.*", f"stations_mm = {stations}", text)
         (tmp_path / f"{name}.toml").write_text(scene.replace("[load]", f"[load]\nnormal_force_n = {forces}"))
         words = [sys.executable, "-m", "softjaw", "run", tmp_path / f"{name}.toml", "-o", tmp_path / f"{name}.hdf"]
@@ -64,23 +64,14 @@ def test_claims_of_the_lookup_hold(tmp_path):
     point = table.at(station, 0.0, force)
     print(f"{point.ok.size} cases, {1 - point.ok.mean():.0%} of them across a change of the contact")
     assert point.ok.mean() > 0.8
-    taken, solved = (ds["effect_friction_pressure_coupling_level"].values for ds in (whole.isel(angle=0), held))
-    i, j = (np.clip(np.searchsorted(x, at - 1e-9) - 1, 0, len(x) - 2)
-            for x, at in ((whole.station.values, station), (whole.normal_force.values, force)))  # fmt: skip
-    alike = np.all([taken[i + a, j + b] == solved for a in (0, 1) for b in (0, 1)], axis=0)[point.ok]
-    assert 0.2 < alike.mean() < 0.8
+    levels = whole["effect_friction_pressure_coupling_level"].values
+    assert 0.2 < levels.mean() < 0.8  # both are in the map
     for name in (name for name in MAIN if name in held):
         true = (held[name].sel(model="ccm") if "model" in held[name].dims else held[name]).values[point.ok]
         error, claim = np.abs(point.value(name)[point.ok] / true - 1), (point.error(name)[point.ok] / np.abs(true))
         middle, most, worst = np.quantile(error, [0.5, 0.9, 1.0])
-        # the mesh is wrong by another amount at each node, which three nodes cannot see
-        mesh = np.nan_to_num(point.mesh_error(name)[point.ok] / np.abs(true))
-        times = (error / np.maximum(claim + mesh, 1e-12)).max()
-        print(f"{name}: median {middle:.2%}, 90 % {most:.2%}, worst {worst:.1%} ({times:.1f} times claim and mesh"
-              f" error), claims {np.median(claim):.1%}; {(error <= claim).mean():.1%} within,"
-              f" {(error <= claim)[alike].mean():.1%} of those among cases alike")  # fmt: skip
-        # its error by the mesh, which differs from case to case, is larger than what interpolation costs
-        noisy = name == "contact_area"
-        assert (error <= claim)[alike].mean() >= (0.85 if noisy else 0.95), name
-        assert (error <= claim).mean() >= 0.85, name
-        assert times <= (5 if noisy else 3.5), name
+        times = (error / np.maximum(claim, 1e-12)).max()
+        print(f"{name}: median {middle:.2%}, 90 % {most:.2%}, worst {worst:.1%} ({times:.1f} times the claim), "
+              f"claims {np.median(claim):.1%}; {(error <= claim).mean():.1%} within")  # fmt: skip
+        assert (error <= claim).mean() >= 0.95, name
+        assert times <= 3.5, name

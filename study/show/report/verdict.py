@@ -39,7 +39,7 @@ CAVEAT = (
     "used here are in the scene below. Absolute numbers of its figures can therefore not be reproduced, only "
     "trends: in the paper, differences between the models grow with curvature, and torque and e_n grow with force."
 )
-NOT_ESTIMATED = "The error of the mesh was not estimated; accuracy.meshes = 2 in the scene does that."
+NOT_ESTIMATED = "Errors were not estimated; accuracy.meshes = 2 in the scene does that."
 TOP, MOST_REASONS, WIDTH = 5, 10, 120  # of the plain text in the file: grasps, messages, characters
 READING = """How to read the file
 All values are SI. Every dataset has its unit, its label and its definition as attributes; /study/definitions has all

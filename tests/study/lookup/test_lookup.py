@@ -48,15 +48,13 @@ def test_what_is_linear_between_the_cases_is_met_and_says_so(straight):
     assert found.value("e_n", "pcm") == pytest.approx(1.1 * found.e_n, rel=1e-12)
 
 
-def test_a_point_has_the_errors_of_the_mesh_in_the_unit_of_the_value(tmp_path, straight):
+def test_the_error_of_a_point_holds_that_of_the_cases_in_the_unit_of_the_value(tmp_path, straight):
     errors = {"e_n_error__e_n_error": 0.02, "opening_loaded_error__opening_loaded_error": 1e-4}
     path = make(tmp_path / "two.hdf", meshes=2, opening_loaded__opening_loaded=0.03, **errors)
     point = GraspMap(path).at(0.02, 0.0, 3.0)
-    assert point.mesh_error("e_n") == pytest.approx(0.02 * point.e_n, rel=1e-12)
-    assert point.mesh_error("opening_loaded") == pytest.approx(1e-4, rel=1e-12)
-    assert np.isnan(point.mesh_error("opening"))
+    assert point.error("e_n") == pytest.approx(0.02 * point.e_n, rel=1e-12)
+    assert point.error("opening_loaded") == pytest.approx(1e-4, rel=1e-12)
     assert "0.1 mm" in str(point)
-    assert np.isnan(straight.at(0.02, 0.0, 3.0).mesh_error("e_n"))
 
 
 @pytest.mark.parametrize("along", [0, 1, 2, None])
