@@ -14,12 +14,11 @@ from softjaw.study.case.candidates import with_sampled_grasps
 from softjaw.study.case.model import check_petsc
 from softjaw.study.result import derived
 from softjaw.study.result.read import dataset
-from softjaw.study.run.finer import next_cases
 from softjaw.study.run.object_folder import ObjectFolder
 from softjaw.study.run.objects import run_objects
-from softjaw.study.run.pattern import next_round
 from softjaw.study.run.plan import make_plan
 from softjaw.study.run.refine import Rounds, added_cases, refined
+from softjaw.study.run.rounds import next_round
 from softjaw.study.run.session import Work, on_rank0, run_study
 from softjaw.study.scene import Scene
 from softjaw.study.show.best_grasps import summary
@@ -109,7 +108,7 @@ def work(scene: Scene, plan: Any, comm: Any) -> Work:
             summary=summary,
             time_limit=scene.run.time_limit_s,
             memory=scene.run.memory_gb,
-            more=lambda result: next_round(result, scene, each) or next_cases(result, scene),
+            more=lambda result: next_round(result, scene, each),
             grown=lambda rounds: (on_rank0(comm, make_plan, scene, *about, rounds), with_rounds(rounds)),
         )
 

@@ -68,7 +68,7 @@ class Layout:
 
     ``has`` names what of `NEEDS` the scene asks for besides two meshes; the wrenches of ``samples`` motions are stored
     for the candidates ``sampled``, counted over stations and angles. ``rounds`` is what each round of a run added:
-    stations [mm], poses as `study.run.pattern.Place`, or cases that are solved on a finer mesh, by the numbers of their
+    stations [mm], poses as `study.run.refine.Place`, or cases that are solved on a finer mesh, by the numbers of their
     point of a sweep, candidate and force. ``stored`` are the paths of the columns in an existing file, which
     may be others than those of this version; empty for a new one. ``derived`` are quantities over some of the axes that
     are filled once, after all rows.

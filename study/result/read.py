@@ -18,7 +18,7 @@ from softjaw.study.quantities import BOTH_ENDS, BY_KEY, FINGERS, MISSING, MODELS
 from softjaw.study.result.index import index_path, open_index
 from softjaw.study.result.layout import DONE, VERSION
 from softjaw.study.result.store import Result, open_result
-from softjaw.study.scene.samples import UPPER
+from softjaw.study.scene.sections import UPPER
 
 XYZ = ("x", "y", "z")
 FIELDS = ("wrenches/wrench", "wall/place")  # too large to be read with the rest

@@ -2,7 +2,7 @@
 
 Between two stations a score is taken to rise no faster than `STEEPER_SLOPE` times the steepest slope of the interval
 and of the two beside it. Where that lets it pass the best one by more than the scene tolerates, the middle of the
-interval is solved. Poses have no order: around the best of them `study.run.pattern` searches. Angles are not refined,
+interval is solved. Poses have no order: around the best of them `study.run.rounds` searches. Angles are not refined,
 every station has all.
 """
 

@@ -9,9 +9,8 @@ from typing import Annotated, Any, ClassVar
 from pydantic import AfterValidator, BeforeValidator, Field
 
 from softjaw.study.messages import closest, shown
-from softjaw.study.scene.errors import Errors, wrong
 from softjaw.study.scene.objects import LARGEST_MM, Plate, Shape, Span, SphereShape
-from softjaw.study.scene.section import Direction, SceneSection, Text, Vector, once_and_rising
+from softjaw.study.scene.section import Direction, Errors, SceneSection, Text, Vector, once_and_rising, wrong
 from softjaw.study.scene.sections import Gripper
 from softjaw.study.units import converted, si
 

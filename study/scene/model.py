@@ -17,10 +17,19 @@ from pydantic import ConfigDict, Field, ValidationError, ValidationInfo, field_v
 
 from softjaw.study.grippers import filled_in
 from softjaw.study.messages import Problem, closest, shortened, shown
-from softjaw.study.scene.errors import Errors, KeyPath, Place, SceneError, lines_of, problems_of, refuse, wrong
 from softjaw.study.scene.grasps import OF_EVERY_KIND, Candidates, GraspPose
 from softjaw.study.scene.objects import SHAPES, Mesh, Object, SectionTable
-from softjaw.study.scene.section import SceneSection
+from softjaw.study.scene.section import (
+    Errors,
+    KeyPath,
+    Place,
+    SceneError,
+    SceneSection,
+    lines_of,
+    problems_of,
+    refuse,
+    wrong,
+)
 from softjaw.study.scene.sections import (
     UNCERTAIN,
     Accuracy,
@@ -206,11 +215,9 @@ class Scene(SceneSection):
         """Values of the uncertain inputs by dotted key: the scene's own, which are none, then those of the samples."""
         if not self.uncertainty.spread:
             return [{}]
-        from softjaw.study.scene.samples import latin_hypercube  # scipy, which most scenes are read without
-
-        tables = {key: getattr(getattr(self, key.partition(".")[0]), key.partition(".")[2])
-                  for key in self.uncertainty.spread}  # fmt: skip
-        return [{}, *latin_hypercube(tables, self.uncertainty.spread, self.uncertainty.samples)]
+        keys = {key: key.partition(".") for key in self.uncertainty.spread}
+        means = {key: getattr(getattr(self, section), name) for key, (section, _, name) in keys.items()}
+        return [{}, *self.uncertainty.inputs(means)]
 
     def effective(self) -> dict[str, Any]:
         """Every value in effect, defaults filled in, as the tables of a scene file."""

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, get_args
 from pydantic import Field, ValidationInfo, field_validator
 
 from softjaw.fem.objects.mesh_file import ENDINGS, LARGEST_FILE
-from softjaw.study.scene.errors import Errors, refusal, wrong
-from softjaw.study.scene.section import Interval, Point, SceneSection, Text, numbers_text
+from softjaw.study.scene.section import Errors, Interval, Point, SceneSection, Text, numbers_text, refusal, wrong
 from softjaw.study.units import UNITS, in_si, si
 
 SMALLEST_MM, LARGEST_MM = 1.0, 2000.0

@@ -1,16 +1,99 @@
-"""What all sections of a scene share: their base, and kinds of values."""
+"""What all sections of a scene share: their base, kinds of values, and how all that is wrong is said.
+
+Errors are pydantic's, by file, line and key, with the value found and what was expected.
+"""
 
 from __future__ import annotations
 
 import math
+import re
 from collections import Counter
-from collections.abc import Sequence
-from typing import Annotated, Self
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Annotated, Any, Self
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic.fields import FieldInfo
+from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 
-from softjaw.study.messages import printable
-from softjaw.study.scene.errors import Errors, refusal, refuse
+from softjaw.study.messages import Problem, closest, printable, shown
+from softjaw.study.units import UNITS, split_unit
+
+KeyPath = tuple[str | int, ...]
+Errors = Iterator[InitErrorDetails]  # what a rule yields
+Place = tuple[str, int | None]  # a file and a line of it, or an override
+Tables = Mapping[str, Mapping[str, FieldInfo]]  # keys of every section, by its name
+MOST_LISTED = 50  # problems in one message
+MOVED = {  # keys of the last version, and what stands for them
+    "accuracy.e_n": "write `accuracy.target`, with `accuracy.target_of = \"e_n\"`",
+    "effects.fingers": "leave it out: symmetry decides it, and effects.model_size = \"full\" solves both",
+    "effects.friction": "leave it out: every friction model is computed",
+    "effects.limit_surface": "write `limit_surface.model`",
+    "friction.model": "leave it out: every friction model is shown",
+    "friction.cor_grid": "leave it out: `softjaw.read_patch` gives the patch, `softjaw.friction_wrench` its wrenches",
+    "gripper.grading_x": "write `gripper.grading = [x, y, z]`",
+    "gripper.grading_y": "write `gripper.grading = [x, y, z]`",
+    "gripper.grading_z": "write `gripper.grading = [x, y, z]`",
+    "gripper.sheet_poisson": "leave it out: it is 0.3",
+    "gripper.alpha": "write `gripper.terms_kpa = [[exponent, modulus], ...]`",
+    "gripper.shear_moduli_kpa": "write `gripper.terms_kpa = [[exponent, modulus], ...]`",
+    "score.torque_scale": "write `score.contact_length_mm = \"pad\"` or `\"object\"`",
+    "score.length_scale": "write `score.object_length_mm = \"per_axis\"` or `\"longest\"`",
+    "score.graspit": "leave it out: jobs/graspit.py compares with it",
+    "object.wall_profile_mm": "write `object.wall_mm = [[z, thickness], ...]`",
+    "object.open_top": "write `object.open_ends`: \"top\", \"both\" or \"none\"",
+    "object.base": "write `object.open_ends = \"both\"` for a tube",
+    "object.springs_n_per_mm": "leave it out: it is 1 N/mm",
+    "candidates.station_range_mm": "write `candidates.stations_mm`, with the number of stations in `stations`",
+    "candidates.skip_hopeless": "leave it out",
+    "candidates.solve_best": "write `candidates.sampled`: finer meshes go to the grasps that may be among the best",
+    "candidates.refine_within": "leave it out: it is `accuracy.target`, or 2 %",
+    "candidates.sampler": "write `candidates.sampled`, the number of grasps",
+    "candidates.count": "write `candidates.sampled`, the number of grasps",
+    "candidates.seed": "leave it out",
+    "accuracy.wall_around_mm": "write `accuracy.wall_element_mm`",
+    "accuracy.wall_along_mm": "write `accuracy.wall_element_mm`: along the axis it is 5/3 of it",
+    "accuracy.wall_coarse_mm": "write `accuracy.wall_element_mm`: elsewhere it is 4 times as large",
+    "output": "write `patches` in [run], and name the file with -o",
+    "accuracy.residual_tolerance": "leave it out: it is 1e-10",
+    "accuracy.min_step_fraction": "leave it out: it is 1/8",
+    "accuracy.cost_file": "write `accuracy.target`: no file of costs is needed",
+    "uncertainty.probes": "remove it: all candidates are solved with every sample",
+    "uncertainty.mesh": "write `accuracy.meshes = 2`",
+    "uncertainty.mu": "write it as `\"friction.mu\"` in `uncertainty.spread`",
+    "uncertainty.shear_modulus_percent": "write kPa as `\"gripper.shear_modulus_kpa\"` in `uncertainty.spread`",
+    "uncertainty.wall_thickness_percent": "write mm as `\"object.wall_mm\"` in `uncertainty.spread`",
+    "uncertainty.pose_mm": "write it as `\"candidates.shift_mm\"` in `uncertainty.spread`",
+    "uncertainty.pose_deg": "write it as `\"candidates.roll_deg\"` in `uncertainty.spread`",
+}
+HEADER = re.compile(r"\s*(\[\[?)([\w.\"' -]+)\]\]?\s*(?:#.*)?$")
+KEY = re.compile(r"""\s*([\w.\"' -]+?)\s*=""")
+NAME = re.compile(r""""[^"]*"|'[^']*'|[^.\s]+""")
+
+
+class SceneError(ValueError):
+    """A scene that cannot be used, with every problem found in it."""
+
+    def __init__(self, problems: Sequence[Problem]) -> None:
+        self.problems = list(problems)
+        # A file that is no scene at all must not fill the terminal.
+        lines, more = [str(p) for p in self.problems[:MOST_LISTED]], len(self.problems) - MOST_LISTED
+        super().__init__("\n".join([*lines, *([f"{problems[0].file}: and {more} more problems"] if more > 0 else [])]))
+
+
+def refusal(expected: str) -> PydanticCustomError:
+    """The error that a validator raises; ``expected`` goes on a sentence that names the value."""
+    return PydanticCustomError("scene", "{expected}", {"expected": expected})
+
+
+def wrong(value: Any, expected: str, *path: str | int) -> InitErrorDetails:
+    """An error of a rule, for `refuse`: the value found at ``path`` within the section, and what was expected."""
+    return {"type": refusal(expected), "loc": path, "input": value}
+
+
+def refuse(errors: Iterable[InitErrorDetails]) -> None:
+    """Raise all errors of a rule at once, if there are any."""
+    if listed := list(errors):
+        raise ValidationError.from_exception_data("scene", listed)
 
 
 class SceneSection(BaseModel):
@@ -64,3 +147,124 @@ Point = Annotated[tuple[float, float], Field(strict=False)]
 Vector = Annotated[tuple[float, float, float], Field(strict=False)]
 Direction = Annotated[Vector, AfterValidator(_direction)]
 Interval = Annotated[Point, AfterValidator(_lower_first)]
+
+
+# --- what is wrong with a scene ---------------------------------------------------------------------------------------
+
+
+def key_text(path: KeyPath) -> str:
+    """A path as it is written in messages: ``candidates.poses[1].approach``."""
+    parts = [f"[{p}]" if isinstance(p, int) else f".{p if p.isidentifier() else shown(p)}" for p in path]
+    return "".join(parts).removeprefix(".")
+
+
+def problems_of(error: ValidationError, data: Any, tables: Tables, place: Callable[[KeyPath], Place]) -> list[Problem]:
+    """The errors of a scene, one for each key; ``place`` gives the file and line of a key."""
+    expected: dict[KeyPath, list[str]] = {}
+    entries: dict[KeyPath, tuple[str, Any]] = {}
+    for entry in error.errors(include_url=False):
+        path, value = _place_in(data, entry, tables)
+        if entry["type"] == "too_short" and isinstance(value, list) and len(value) >= entry["ctx"]["min_length"]:
+            continue  # a list whose members were refused is not also too short
+        entries.setdefault(path, (entry["type"], value))
+        expected.setdefault(path, []).append(_expectation(entry, path))  # more than one where a key has alternatives
+    problems = []
+    for path, (kind, value) in entries.items():
+        found = "an unknown key" if kind == "extra_forbidden" else "nothing" if value is None else shown(value)
+        texts = " or ".join(dict.fromkeys(expected[path]))
+        unknown = kind == "extra_forbidden"
+        remedy = _right_key(path, tables) if unknown else _right_value(path, kind, value, texts, tables)
+        problems.append(Problem(*place(path), key_text(path), found, texts, remedy))
+    return problems
+
+
+def _place_in(data: Any, entry: ErrorDetails, tables: Tables) -> tuple[KeyPath, Any]:
+    """The path of an error without pydantic's names of alternatives, and the value there."""
+    loc, kind, value = entry["loc"], entry["type"], data
+    known = {*tables, *(key for keys in tables.values() for key in keys)}
+    if loc[:1] == ("object",):  # the shape's name comes next
+        loc = ("object", "shape") if kind.startswith("union_tag") else ("object", *loc[2:])
+    path: list[str | int] = []
+    for part in loc:
+        inside = (
+            part in value if isinstance(value, Mapping)
+            else isinstance(part, int) and isinstance(value, list | tuple) and part < len(value)
+        )  # fmt: skip
+        if inside or part in known or part == "shape":
+            path.append(part)
+            value = value[part] if inside else None
+    return tuple(path), entry["input"] if kind == "scene" else value
+
+
+def _expectation(entry: ErrorDetails, path: KeyPath) -> str:
+    """What pydantic expected, as the end of a sentence."""
+    kind, text = entry["type"], entry["msg"]
+    if kind == "extra_forbidden":
+        return f"a key of [{key_text(path[:-1])}]" if len(path) > 1 else "a section of a scene"
+    if kind == "missing":
+        return "more members" if isinstance(entry["loc"][-1], int) else "a value"
+    if kind in ("model_type", "model_attributes_type", "dict_type"):
+        return "a table"
+    if kind.startswith("union_tag"):
+        return f"one of {entry['ctx']['expected_tags']}" if kind == "union_tag_invalid" else "the object's shape"
+    text = text.removeprefix("Input should be ").removeprefix("Tuple should have ").replace(" after validation", "")
+    return f"{'a number ' * text.startswith(('greater', 'less'))}{text.replace('tuple', 'list')}"
+
+
+def _right_key(path: KeyPath, tables: Tables) -> str:
+    """What to write instead of an unknown key or section."""
+    key, (stem, _) = str(path[-1]), split_unit(str(path[-1]))
+    if moved := MOVED.get(key_text(path)):
+        return moved
+    if len(path) == 1 and (near := closest(key, list(tables))):
+        return f"did you mean [{near}]?"
+    keys = list(dict.fromkeys(k for name, table in tables.items() if name == path[0] for k in table))
+    same = [k for k in keys if split_unit(k)[0] == stem]
+    if near := same[0] if same else closest(key, keys):
+        return f"did you mean `{near}`?"
+    homes = [f"[{name}]" for name, table in tables.items() if key in table]
+    return f"it belongs to {homes[0]}" if homes else f"remove it, or write one of {', '.join(keys or tables)}"
+
+
+def _right_value(path: KeyPath, kind: str, value: Any, expected: str, tables: Tables) -> str:
+    """What to write instead of a wrong value: the choice that was meant, or what the key is, with an example."""
+    if kind == "scene":
+        return ""  # it says so itself
+    if len(path) == 1:
+        return f"write [{path[0]}] with its keys below it, as in jobs/smoke.toml"
+    choices = re.findall(r"'([^']*)'", expected)
+    if isinstance(value, str) and (near := closest(value, choices)):
+        return f'did you mean "{near}"?'
+    key = next(part for part in reversed(path) if isinstance(part, str))
+    field = tables.get(str(path[0]), {}).get(key)
+    if field is None:
+        return ""
+    unit = split_unit(key)[1]
+    example = next(iter(field.examples or ()), None) or (None if field.is_required() else field.default)
+    written = f", as in `{key} = {shown(example)}`" if example not in (None, (), "") else ""
+    return f"{key}: {field.description}{f' [{UNITS[unit].text}]' if unit else ''}{written}"
+
+
+def lines_of(text: str) -> dict[KeyPath, int]:
+    """First line of every section and key of a TOML text that stands on a line of its own; a plain search."""
+    lines: dict[KeyPath, int] = {}
+    table: KeyPath = ()
+    counts: dict[KeyPath, int] = {}
+    for number, line in enumerate(text.split("\n"), 1):
+        if header := HEADER.match(line):
+            table = _names(header[2])
+            if header[1] == "[[":
+                counts[table] = counts.get(table, -1) + 1
+                table = (*table, counts[table])
+            path = table
+        elif key := KEY.match(line):
+            path = (*table, *_names(key[1]))
+        else:
+            continue
+        for n in range(1, len(path) + 1):
+            lines.setdefault(path[:n], number)
+    return lines
+
+
+def _names(text: str) -> KeyPath:
+    return tuple(name.strip("\"'") for name in NAME.findall(text))

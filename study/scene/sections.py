@@ -13,9 +13,8 @@ from pydantic import AfterValidator, ConfigDict, Field, model_validator
 from softjaw.fem.pad.halving import halved
 from softjaw.study.grippers import PRESETS
 from softjaw.study.messages import shown
-from softjaw.study.scene.errors import Errors, wrong
 from softjaw.study.scene.objects import Shape, Walled
-from softjaw.study.scene.section import Direction, Point, SceneSection, Vector, once_and_rising
+from softjaw.study.scene.section import Direction, Errors, Point, SceneSection, Vector, once_and_rising, wrong
 from softjaw.study.scene.text import flat
 from softjaw.study.units import in_si, si
 
@@ -36,6 +35,8 @@ COARSE, FINE = 0, 1  # meshes of a case: half as many elements in every directio
 MOST_MESHES = 4  # of a case, each further one 1.4 times as fine in every direction, which costs 3 times as much
 FINEST = MOST_MESHES - 1
 CONVEX_FITS = ("full", "quartic")  # models that a convex program can fit, too
+SAMPLES_SEED = 20240229  # any number; the samples of a scene are always the same
+UPPER = 0.975  # where a 95 % interval ends
 OPTION_CHARACTERS = {*string.ascii_lowercase, *string.digits, "_"}
 VALUE_CHARACTERS = {*string.ascii_letters, *string.digits, *"_,.+-"}
 OTHERS = "other options go into the environment variable PETSC_OPTIONS"
@@ -349,6 +350,21 @@ class Uncertainty(SceneSection):
         if isinstance(data, dict) and isinstance(data.get("spread"), dict):
             return data | {"spread": flat(data["spread"])}
         return data
+
+    def inputs(self, means: Mapping[str, float]) -> list[dict[str, float]]:
+        """Samples of independent normal inputs about their means, by key.
+
+        Each input takes the middles of as many intervals of equal probability as there are samples, each once.
+        """
+        import numpy as np  # scenes without uncertain inputs are read without it and scipy
+        from scipy.special import ndtri
+        from scipy.stats import qmc
+
+        cube = qmc.LatinHypercube(len(self.spread), scramble=False, optimization="random-cd", seed=SAMPLES_SEED)
+        normal = ndtri(cube.random(self.samples)) / ndtri(UPPER)
+        values = np.array([means[key] for key in self.spread]) + normal * np.array([*self.spread.values()])
+        # digits of a sample, so that no rounding error of a machine makes another one
+        return [dict(zip(self.spread, (float(f"{v:.9g}") for v in row), strict=True)) for row in values]
 
     def spread_rules(self, *sections: SceneSection) -> Errors:
         """Only single numbers of the sections in `UNCERTAIN` can be uncertain."""

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from softjaw.study.messages import Problem, closest, shown
-from softjaw.study.scene.errors import SceneError
+from softjaw.study.scene.section import SceneError
 
 LARGEST = 1_000_000  # bytes; a scene is a few kB
 REMEDY = "write each `key = value` once and on a line of its own, text in quotes, decimals with a point, lists in [ ]"

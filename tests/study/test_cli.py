@@ -5,12 +5,10 @@ import csv
 import io
 import json
 import re
-import resource
 import shlex
 import shutil
 import subprocess
 import sys
-from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -116,32 +114,12 @@ def loaded(*words):
     return {line.partition(".")[0] for line in lines}, told.returncode
 
 
-@cache
-def processor_seconds(*command):
-    """The lesser of two runs; it says little of how busy the machine is, and a ratio nothing of how fast."""
-    spent = []
-    for _ in range(2):
-        before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        subprocess.run(command, capture_output=True, cwd=ROOT)
-        after = resource.getrusage(resource.RUSAGE_CHILDREN)
-        spent.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
-    return min(spent)
-
-
 @pytest.mark.parametrize("command", QUICK)
 def test_quick_answers_load_neither_mpi_nor_petsc(command, scene, finished):
     modules, code = loaded(*QUICK[command](scene, finished))
     assert code == 0
     assert modules.isdisjoint(HEAVY) or (command == "patch" and not modules & {"mpi4py", "petsc4py", "h5py", "pyvista"})
     assert ("numpy" in modules) == (command not in ("help", "init"))
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("command", QUICK)
-def test_quick_answers_take_hardly_longer_than_loading_their_libraries(command, scene, finished):
-    words = ["-m", "softjaw", *map(str, QUICK[command](scene, finished))]
-    libraries = ["-c", f"import h5py, numpy, softjaw.study.scene{', xarray' if command == 'show' else ''}"]
-    assert processor_seconds(sys.executable, *words) < 2.5 * processor_seconds(sys.executable, *libraries)
 
 
 def test_bad_usage_is_told_by_the_first_rank_only(monkeypatch, capsys):

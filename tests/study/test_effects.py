@@ -1,7 +1,6 @@
 """What indicators measure, which reasons are given, and that no indicator lets `auto` skip an effect wrongly."""
 
 import importlib.util
-import time
 from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
@@ -10,16 +9,14 @@ import numpy as np
 import pytest
 
 from softjaw.fem.errors import ConvergenceError
-from softjaw.study import pipeline
 from softjaw.study.case import effects, model
 from softjaw.study.case.effects import FORCED, LITTLE, MUCH, STEPS, UNDECIDED, EffectChoice, neglected_traction
 from softjaw.study.case.effects import STIFF_PLATE as STIFF
-from softjaw.study.case.result import CaseFailure
 from softjaw.study.case.solver import COARSE, Solved
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import EFFECTS, REASONS
-from softjaw.study.scene import SceneError, load_scene
-from tests.study.scenes import CONE, OVAL, scene_of, units_of
+from softjaw.study.scene import SceneError
+from tests.study.scenes import CONE, OVAL, scene_of
 from tests.study.test_pipeline import PLATE, cases, e_n, solved
 from tests.study.test_walls import CUP
 from tests.study.test_walls import solved as on_wall
@@ -218,42 +215,6 @@ def test_no_shell_is_skipped_wrongly(job, monkeypatch):
         taken, error = judged(job, rows, effect)
         assert error[taken].max() > job.TARGET
         assert not taken.all()
-
-
-def cpu_times(file, overrides, monkeypatch):
-    """CPU time [s] of all candidates, of choosing their levels, and of all candidates with the same levels known."""
-    chosen, choose = [], EffectChoice.__init__
-    scene, times = load_scene(ROOT / file, overrides), np.zeros(3)
-
-    def measured(choice, solver):
-        start = time.process_time()
-        choose(choice, solver)
-        times[1] += time.process_time() - start
-        chosen.append(vars(choice) | {"chosen": {name: list(levels) for name, levels in choice.chosen.items()}})
-
-    def known(choice, solver):
-        vars(choice).update(chosen.pop() | {"solver": solver})
-
-    for unit in units_of(scene):
-        for k, way in ((0, measured), (2, known)):
-            monkeypatch.setattr(EffectChoice, "__init__", way)
-            start = time.process_time()
-            assert not [r for _, r in pipeline.solve_unit(unit) if isinstance(r, CaseFailure)]
-            times[k] += time.process_time() - start
-    return times
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(("file", "overrides"), [
-    ("jobs/bottle-rigid.toml", ("candidates.stations_mm=[30, 60, 90, 120, 150]", "candidates.angles_deg=[0]")),
-    ("jobs/bottle.toml", ("candidates.stations_mm=[60, 112]",)),
-])  # fmt: skip
-def test_choosing_costs_at_most_a_fifth(file, overrides, monkeypatch):
-    """Beyond what the levels that are taken need anyway, as the coarse load path; the shares are printed with -s."""
-    total, spent, known = cpu_times(file, overrides, monkeypatch)
-    share = 1.0 - known / total
-    print(f"\n{file} {overrides[0]}: {share:.1%} of {total:.1f} s for choosing, {spent / total:.1%} with shared work")
-    assert share <= 0.2
 
 
 STEEL = ("gripper.sheet_thickness_mm=2",)

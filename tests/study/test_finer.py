@@ -14,8 +14,8 @@ from softjaw.study.ranking import Place
 from softjaw.study.result.skeleton import create
 from softjaw.study.result.store import open_result, torn_rows
 from softjaw.study.result.write import ResultWriter, record
-from softjaw.study.run.finer import rivals
 from softjaw.study.run.plan import make_plan
+from softjaw.study.run.rounds import rivals
 from softjaw.study.scene import load_scene
 from tests.study.launching import ROOT, command, contents, differing, launch, wait_for
 

@@ -31,10 +31,6 @@ def loaded(tmp_path, name, force=60, more=""):
     return load_scene(tmp_path / "scene.toml").gripper
 
 
-def test_there_are_four_presets():
-    assert set(PRESETS) == {"franka_hand", "robotiq_2f85", "schunk_egp50", "wsg50"}
-
-
 @pytest.mark.parametrize("name", PRESETS)
 def test_a_preset_sets_pad_and_opening_and_is_gone(tmp_path, name):
     keys, hand = gripper_file(name)

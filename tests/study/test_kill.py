@@ -218,22 +218,6 @@ def test_a_file_system_that_did_not_reserve_the_space_ends_the_run_and_keeps_wha
     assert study(2, path)[0] == 0
 
 
-def test_a_file_system_that_turns_read_only_is_told_once(small_disk):
-    path = small_disk / "readonly.hdf"
-
-    def run():
-        assert study(0, path)[0] == 0
-        subprocess.run(["mount", "-o", "remount,ro", small_disk], check=True)
-        answers = study(2, path), study(2, small_disk / "new.hdf")
-        subprocess.run(["mount", "-o", "remount,rw", small_disk], check=True)
-        return answers
-
-    for code, _, errors in run():
-        assert code == CANNOT_WRITE, errors
-        assert errors.count("error: ") == 1
-        assert "Read-only file system" in errors
-
-
 @pytest.mark.parametrize("name", ["SIGTERM", "SIGUSR1"])
 def test_ranks_leave_in_order_when_mpirun_is_told_to_stop(tmp_path, name):
     """mpirun answers TERM with 1, whatever its ranks say, and kills them after some two seconds: they are quicker."""

@@ -15,9 +15,9 @@ from softjaw.study.result.layout import layout_from_options
 from softjaw.study.result.skeleton import rewrite
 from softjaw.study.result.store import open_result, torn_rows
 from softjaw.study.run.estimate import measured_seconds
-from softjaw.study.run.pattern import FINEST_STEP_SHARE, SAME_POSE_STEPS, apart, next_poses
 from softjaw.study.run.plan import make_plan
 from softjaw.study.run.refine import FINEST_SPACING_SHARE, chances, gained, next_stations, with_places
+from softjaw.study.run.rounds import FINEST_STEP_SHARE, SAME_POSE_STEPS, apart, next_poses
 from softjaw.study.scene import load_scene, parse_scene
 from tests.study.launching import ROOT, command, contents, differing, launch, wait_for
 from tests.study.scenes import pose_of

@@ -40,17 +40,6 @@ def uninterrupted(whole):
     return contents(whole)
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("ranks", [1, 2, 3])
-def test_the_file_does_not_depend_on_the_number_of_ranks(tmp_path, uninterrupted, ranks):
-    path = tmp_path / "ranks.hdf"
-    code, _, errors = study(ranks, path)
-    assert code == 0, errors
-    assert differing(path, uninterrupted) == []
-    assert not list(tmp_path.glob("*.lock"))
-    assert not list(tmp_path.glob("*.part"))
-
-
 def test_a_rank_that_is_killed_loses_nothing_and_another_number_of_ranks_goes_on(tmp_path, uninterrupted):
     path = tmp_path / "killed.hdf"
     code, _, _ = study(2, path, "--kill", 20)

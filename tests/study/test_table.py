@@ -21,17 +21,10 @@ COLUMNS = (
     Column("range", programs=False, wrap=8),
 )
 ROWS = (
-    {
-        "grasp": 1,
-        "e_n": 0.0171,
-        "e_n_error": 0.01,
-        "opening": 0.06,
-        "opening_error": 2e-4,
-        "force": 2.0,
-        "range": "a, b",
-    },
+    {"grasp": 1, "e_n": 0.0171, "e_n_error": 0.01, "opening": 0.06, "opening_error": 2e-4, "force": 2.0,
+     "range": "a, b"},
     {"grasp": 2, "e_n": math.nan, "opening": 0.06, "opening_error": 2e-4, "force": math.inf, "range": "-"},
-)
+)  # fmt: skip
 TABLE = Table("two grasps", COLUMNS, ROWS, [f"note {k}" for k in range(5)], {"best": np.float64(1.5)}, "grasps")
 
 

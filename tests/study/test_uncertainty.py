@@ -11,9 +11,8 @@ from softjaw.study.case.poses import axis_poses, moved
 from softjaw.study.ranking import Sure
 from softjaw.study.result.read import half_width
 from softjaw.study.run.plan import make_plan
-from softjaw.study.scene import parse_scene
-from softjaw.study.scene.errors import SceneError
-from softjaw.study.scene.samples import latin_hypercube
+from softjaw.study.scene import SceneError, parse_scene
+from softjaw.study.scene.sections import Uncertainty
 from tests.study.scenes import BALL, QUICK, pose_of, scene_of
 
 RIGID = "effects.sheet='rigid'"
@@ -38,13 +37,14 @@ def file(tmp_path_factory):
 
 
 def test_every_input_takes_the_middles_of_intervals_of_equal_probability_once():
-    samples = latin_hypercube({"a": 1.0, "b": -5.0}, {"a": 0.2, "b": 3.0}, 16)
+    uncertain, means = Uncertainty(samples=16, spread={"a": 0.2, "b": 3.0}), {"a": 1.0, "b": -5.0}
+    samples = uncertain.inputs(means)
     expected = norm.ppf((np.arange(16) + 0.5) / 16) / norm.ppf(0.975)
     for key, mean, width in (("a", 1.0, 0.2), ("b", -5.0, 3.0)):
         assert np.sort([sample[key] for sample in samples]) == pytest.approx(mean + width * expected, rel=1e-8)
     # the inputs are independent
     assert abs(np.corrcoef([[s["a"], s["b"]] for s in samples], rowvar=False)[0, 1]) < 0.3
-    assert latin_hypercube({"a": 1.0, "b": -5.0}, {"a": 0.2, "b": 3.0}, 16) == samples
+    assert uncertain.inputs(means) == samples
 
 
 def test_a_scene_is_solved_as_given_and_with_every_sample():
@@ -108,7 +108,7 @@ def test_a_shift_along_the_axis_is_another_station_and_poses_are_turned_too():
 
 @pytest.mark.parametrize("count", [20, 60, 200])
 def test_the_interval_of_an_input_is_its_spread(count):
-    values = [sample["a"] for sample in latin_hypercube({"a": 7.0}, {"a": 0.5}, count)]
+    values = [sample["a"] for sample in Uncertainty(samples=count, spread={"a": 0.5}).inputs({"a": 7.0})]
     # between samples the range is taken along straight lines
     assert float(half_width(xr.DataArray(values, dims="realisation"))) == pytest.approx(0.5, rel=0.02)
     assert np.isnan(half_width(xr.DataArray([*values[1:], np.nan], dims="realisation")))

@@ -10,8 +10,7 @@ from softjaw.study.accuracy.cost import cost_scene, mesh_sweep, settings_in
 from softjaw.study.case.candidates import axes
 from softjaw.study.cli import main
 from softjaw.study.messages import DONE
-from softjaw.study.scene import Scene, parse_scene
-from softjaw.study.scene.errors import SceneError
+from softjaw.study.scene import Scene, SceneError, parse_scene
 from tests.study.scenes import BALL, text_of, units_of
 
 JOBS = Path(__file__).parents[3] / "jobs"

@@ -62,17 +62,8 @@ def test_each_point_of_a_sweep_decides_for_itself():
 
 def test_a_finger_that_is_larger_than_the_pad_runs_into_a_step():
     """A pad on the waist of a dumb-bell whose heads stand 20 mm above it."""
-    corners = [
-        (0, 40),
-        (10, 40),
-        (20, 40),
-        (25, 30),
-        *((z, 20) for z in range(30, 80, 10)),
-        (75, 30),
-        (80, 40),
-        (90, 40),
-    ]
-    outline = [list(corner) for corner in (*corners, (100, 40))]
+    waist = [[z, 20] for z in range(30, 80, 10)]
+    outline = [[0, 40], [10, 40], [20, 40], [25, 30], *waist, [75, 30], [80, 40], [90, 40], [100, 40]]
     text = text_of(f'shape = "revolution"\nprofile_mm = {outline}', stations="[50]", forces="[1]")
     finger = "gripper.finger_size_mm=[70, 22]"
 

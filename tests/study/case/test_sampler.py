@@ -93,8 +93,8 @@ def test_fingers_that_are_larger_than_the_pads_meet_a_step():
     body = surface(trimesh.util.concatenate([plate, rim]))
     pose = axes_of(np.array([0.0, 0.0, -1.0]), np.array([1.0, 0.0, 0.0]))
     points = body[0] @ pose
-    assert fit_of(points, body[1], JAWS).state == MISSING
-    assert fit_of(points, body[1], Jaws(**vars(JAWS) | {"finger": (0.08, 0.03)})).state == COLLIDES
+    assert fit_of(points, body[1], JAWS)[0] == MISSING
+    assert fit_of(points, body[1], Jaws(**vars(JAWS) | {"finger": (0.08, 0.03)}))[0] == COLLIDES
 
 
 def test_the_same_seed_gives_the_same_grasps_and_they_are_distinct():
