@@ -10,7 +10,7 @@ from softjaw.study.case import wall
 from softjaw.study.case.effects import ABOVE, BELOW, SMALL_INDENTATION
 from softjaw.study.case.result import CaseFailure
 from softjaw.study.flags import Flag
-from tests.study.scenes import QUICK, scene_of, units_of
+from tests.study.scenes import QUICK, pose_of, scene_of, units_of
 from tests.study.test_pipeline import differing
 
 CUP = """shape = "revolution"
@@ -80,14 +80,10 @@ def test_across_an_oval_there_is_no_symmetry_and_to_force_one_is_refused():
         solved(OVAL, "effects.model_size='quarter'", where=where)
 
 
-def pose(approach, long_side):
-    return f"[[candidates.poses]]\npoint_mm = [0, 0, 50]\napproach = {approach}\nlong_side = {long_side}\n"
-
-
 @pytest.mark.parametrize("long_side", [[0, 0, -1], *(pytest.param(v, marks=LONG) for v in ([0, 0, 1], [0, 1, 0]))])
 def test_symmetric_and_whole_models_give_both_fingers_the_same_patches(long_side):
     """On a cone the patch is not its own image turned by half a turn."""
-    where = pose([-1, 0, 0], long_side)
+    where = pose_of((0, 0, 50), [-1, 0, 0], long_side)
     small, whole = (solved(CUP, *size, where=where, forces="[1]")[-1] for size in ((), ("effects.model_size='full'",)))
     assert small.effects["fingers"][0] == "one"
     assert whole.effects["fingers"][0] == "two"
@@ -98,11 +94,11 @@ def test_symmetric_and_whole_models_give_both_fingers_the_same_patches(long_side
 
 @LONG
 def test_a_tilted_approach_keeps_one_plane_and_one_along_the_axis_is_refused():
-    tilted = solved(CUP, where=pose([-1, 0, 0.2], [0, 0, 1]))[-1]
+    tilted = solved(CUP, where=pose_of((0, 0, 50), [-1, 0, 0.2], [0, 0, 1]))[-1]
     assert tilted.effects["model_size"][0] == "half"
     assert np.isfinite(tilted.values["maps/e_n"]).all()
     with pytest.raises(Exception, match="90 degrees"):
-        solved(CUP, where=pose([0, 0, 1], [1, 0, 0]))
+        solved(CUP, where=pose_of((0, 0, 50), [0, 0, 1], [1, 0, 0]))
 
 
 def test_images_of_a_grasp_are_what_their_own_solution_would_be():

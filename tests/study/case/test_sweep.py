@@ -10,30 +10,16 @@ from softjaw.study.case import candidates, poses
 from softjaw.study.case.build import build_object
 from softjaw.study.scene import parse_scene
 from tests.fem.test_centre_line import bent
-from tests.study.formula_results import OBJECT
+from tests.study.scenes import OVAL, mesh_of, pose_of, scene_of, text_of
 
 Z = np.array([0.0, 0.0, 1.0])
-CYLINDER = (
-    OBJECT
-    + """[candidates]
-stations_mm = [-10, 0, 30]
-angles_deg = [0, 30, 90, 180, 210, 360]
-[load]
-normal_force_n = [1, 2, 5]
-"""
-)
-POSES = (
-    OBJECT
-    + """[load]
-normal_force_n = [1]
-"""
-)
+CYLINDER = text_of(OVAL, stations="[-10, 0, 30]", angles="[0, 30, 90, 180, 210, 360]", forces="[1, 2, 5]",
+                   elements="[20, 10, 6]")  # fmt: skip
 
 
 def posed(*given):
     """A scene with explicit poses (point, approach, long side)."""
-    table = "\n[[candidates.poses]]\npoint_mm = {}\napproach = {}\nlong_side = {}"
-    return parse_scene(POSES + "".join(table.format(*np.asarray(pose, float).tolist()) for pose in given))
+    return scene_of(OVAL, where="".join(pose_of(*pose) for pose in given))
 
 
 def about_z(angle):
@@ -78,29 +64,10 @@ def test_an_explicit_pose_equals_the_station_that_it_describes():
     assert (place.station, place.angle, place.label) == (0.0, 0.0, "pose 0")
 
 
-MESH = """
-[object]
-shape = "mesh"
-mesh = "{}"
-unit = "m"
-[gripper]
-pad_length_mm = 40
-pad_width_mm = 20
-pad_thickness_mm = 15
-shear_modulus_kpa = 40
-[friction]
-mu = 0.8
-[candidates]
-stations_mm = {}
-angles_deg = [0, 90]
-[load]
-normal_force_n = [5]
-"""
-
-
 def mesh_scene(mesh, tmp_path, stations):
     mesh.export(tmp_path / "body.stl")
-    return parse_scene(MESH.format(tmp_path / "body.stl", stations))
+    pad = ("gripper.pad_length_mm=40", "gripper.pad_width_mm=20")
+    return scene_of(mesh_of(tmp_path / "body.stl", "m"), *pad, stations=stations, angles="[0, 90]", forces="[5]")
 
 
 def test_stations_of_a_bent_mesh_follow_its_centre_line(tmp_path):

@@ -10,32 +10,26 @@ from softjaw.study.cli import main
 from softjaw.study.cli.quick import petsc_overrides
 from softjaw.study.launch import prepare
 from softjaw.study.messages import StudyError
-from softjaw.study.scene import load_scene, parse_scene
+from softjaw.study.scene import load_scene
 from softjaw.study.scene.objects import SphereShape
 from tests.study.launching import ROOT, launch
+from tests.study.scenes import BALL, mesh_of, pose_of, scene_of, text_of
 
-LOAD = "\n[load]\nnormal_force_n = [1]\n"
-BOTTLE = '[object]\nshape = "revolution"\nprofile_mm = [[0, 30], [50, 30], [100, 29], [200, 20]]\n'
-CYLINDER = '[object]\nshape = "elliptic_cylinder"\nsemi_axis_a_mm = 20\nsemi_axis_b_mm = 30\nlength_mm = 200\n'
-BOX = '[object]\nshape = "box"\nsize_mm = [60, 40, 120]\nedge_radius_mm = 6\n'
-FLASK = f'[object]\nshape = "mesh"\nmesh = "{ROOT}/jobs/objects/flask.stl"\nunit = "mm"\n'
-BALL = '[object]\nshape = "sphere"\nradius_mm = 30\n'
+BOTTLE = 'shape = "revolution"\nprofile_mm = [[0, 30], [50, 30], [100, 29], [200, 20]]'
+CYLINDER = 'shape = "elliptic_cylinder"\nsemi_axis_a_mm = 20\nsemi_axis_b_mm = 30\nlength_mm = 200'
+BOX = 'shape = "box"\nsize_mm = [60, 40, 120]\nedge_radius_mm = 6'
+FLASK = mesh_of(ROOT / "jobs" / "objects" / "flask.stl")
 
 
 def at(stations, body=BOTTLE, *overrides):
-    return parse_scene(f"{body}[candidates]\nstations_mm = {stations}\n{LOAD}", overrides=overrides)
-
-
-def pose(point, label="", approach="[1, 0, 0]"):
-    named = f'label = "{label}"\n' if label else ""
-    return f"[[candidates.poses]]\n{named}point_mm = {point}\napproach = {approach}\nlong_side = [0, 0, 1]\n"
+    return scene_of(body, *overrides, where=f"stations_mm = {stations}\n", forces="[1]")
 
 
 @pytest.mark.parametrize("command", ["check", "plan"])
 def test_an_outline_that_makes_no_body_is_refused(tmp_path, capsys, command):
     scene = tmp_path / "scene.toml"
     text = BOTTLE.replace("[[0, 30], [50, 30], [100, 29], [200, 20]]", "[[0, 30], [50, 30], [50, 10], [100, 10]]")
-    scene.write_text(f"{text}[candidates]\nstations_mm = [50]\n{LOAD}")
+    scene.write_text(text_of(text, stations="[50]"))
     assert main([command, str(scene)]) == 2
     assert capsys.readouterr().err.startswith("error: object.profile_mm: ")
 
@@ -56,7 +50,7 @@ def test_a_shape_that_nothing_builds_is_refused():
 @pytest.mark.parametrize("body", [BALL, CYLINDER, BOX])
 def test_a_pad_that_passes_the_object_is_named_by_its_number(body):
     """The second stands at the corner of the box round the ball."""
-    scene = parse_scene(body + pose([0, 0, 0]) + pose([0, 48, 46] if body == BALL else [0, 90, 0]) + LOAD)
+    scene = scene_of(body, where=pose_of() + pose_of((0, 48, 46) if body == BALL else (0, 90, 0)))
     with pytest.raises(StudyError, match=r"^candidates.poses\[1\]"):
         check_poses(scene)
 
@@ -64,14 +58,14 @@ def test_a_pad_that_passes_the_object_is_named_by_its_number(body):
 @pytest.mark.parametrize(("off", "meets"), [(30.9, True), (31.1, False)])
 def test_a_pad_that_just_meets_the_object_is_not_refused(off, meets):
     """A pad 22 mm wide reaches a face at 20 mm from 31 mm off the middle."""
-    scene = parse_scene(BOX + pose([0.3, off, 0]) + LOAD)
+    scene = scene_of(BOX, where=pose_of((0.3, off, 0)))
     with contextlib.nullcontext() if meets else pytest.raises(StudyError):
         check_poses(scene)
 
 
 @pytest.mark.ranks
 def test_a_run_refuses_poses_off_the_object_by_their_labels(tmp_path):
-    text = BALL + pose([0, 0, 0], "near") + pose([0, 38, 50], "far") + LOAD
+    text = text_of(BALL, pose_of(label="near") + pose_of((0, 38, 50), label="far"))
     (tmp_path / "scene.toml").write_text(text)
     code, output, errors = launch(2, "-m", "softjaw", "run", tmp_path / "scene.toml", "-o", tmp_path / "out.hdf")
     assert (code, output) == (2, "")
