@@ -32,13 +32,7 @@ def report(options: Namespace) -> str:
 
 
 def view(options: Namespace) -> str:
-    """Write a result in three dimensions: a page, a picture, or both; by default a page beside the file.
-
-    Raises
-    ------
-    StudyError
-        If a file cannot be written, or there is no such case or map.
-    """
+    """Write a result in three dimensions: a page, a picture, or both; by default a page beside the file."""
     if options.html is None and options.screenshot is None:
         options.html = str(Path(options.file).with_suffix("")) + "-3d.html"
     paths = {name: _target(options, name) for name in ENDINGS if getattr(options, name) is not None}

@@ -14,7 +14,6 @@ from softjaw.study.messages import MEANING, closest, first_rank
 from softjaw.study.quantities import RANKED_BY
 
 MILLION = 10**6
-NO_DRAKE = "Drake has no parameter for it: no torsional friction, or a pressure field of its own; expected"
 KINDS = {
     "bottle": "a bottle of revolution, heights x angles x forces; rigid; uncomment wall_mm for a thin wall",
     "cup": "a thin-walled cup: dents, and the range of forces that hold it without spilling",
@@ -81,13 +80,6 @@ def several(
     return parts
 
 
-def named(text: str) -> str:
-    """A name that is not empty."""
-    if not text.strip():
-        raise ArgumentTypeError("found no name")
-    return text.strip()
-
-
 def bound(text: str) -> tuple[str, float]:
     """A name and a number with an equals sign between them."""
     key, _, value = text.partition("=")
@@ -100,13 +92,6 @@ def direction(text: str) -> tuple[float, ...]:
     if not any(vector):
         raise ArgumentTypeError(f"found {text}, expected a direction, such as 1,0,0")
     return vector
-
-
-def format_of(text: str) -> str:
-    """A format of `export`; another one than those is refused by argparse, Drake with the reason."""
-    if text == "drake":
-        raise ArgumentTypeError(f"{NO_DRAKE} another format")
-    return text
 
 
 def _option(*names: str, **settings: Any) -> tuple[tuple[str, ...], dict[str, Any]]:
@@ -135,7 +120,7 @@ OPTIONS = {
                      help="seconds between updates (default 2)"),
     "json": _option("--json", action="store_const", const="json", dest="form", help="as JSON, SI units"),
     "csv": _option("--csv", action="store_const", const="csv", dest="form", help="as CSV, SI units"),
-    "format": _option("--format", type=format_of, choices=tuple(FORMATS), dest="form", metavar="FORMAT",
+    "format": _option("--format", choices=tuple(FORMATS), dest="form", metavar="FORMAT",
                       help="one of those below"),
     "force": _option("--force", type=POSITIVE, metavar="N", help=NORMAL_FORCE),
     "level": _option("--force", type=number(), metavar="N", help="force level nearest to N [N]"),
@@ -164,7 +149,7 @@ OPTIONS = {
                        " the same form: frame, joints, stroke, forces, palm and fingers"),
     "wider": _option("--wider", type=number("a number, 0 or above", 0.0), default=20.0, metavar="MM",
                      help="how far the gripper opens beyond first touch (default 20)"),
-    "frame": _option("--frame", type=named, default="object", metavar="NAME",
+    "frame": _option("--frame", default="object", metavar="NAME",
                      help="name of the object's frame (default object)"),
     "kind": _option("kind", choices=tuple(KINDS), help="what to start from"),
     "name": _option("-o", metavar="NAME", dest="name",

@@ -52,14 +52,10 @@ def as_usd(grasp: RankedGrasp, body: RigidBody) -> str:
         return frame, made.contacts[f - 1].rotation.T @ frame
 
     down = made.rotation @ body.down / np.linalg.norm(body.down)
-    parts = {"tuple": _tuple, "turn": _turn, "slide": slide, "torsional_radius": torsional_radius}
+    parts = {
+        "tuple": lambda *values: f"({numbers(*values).replace(' ', ', ')})",
+        "turn": lambda rotation: np.roll(quaternion(rotation), 1),  # USD writes the real part first
+        "slide": slide,
+        "torsional_radius": torsional_radius,
+    }
     return rendered("grasp.usda", grasp, body, down=down, gravity=GRAVITY, stiffness=STIFFNESS, **parts)
-
-
-def _tuple(*values: float) -> str:
-    return f"({numbers(*values).replace(' ', ', ')})"
-
-
-def _turn(rotation: FloatArray) -> FloatArray:
-    """A quaternion as USD writes it, the real part first."""
-    return np.roll(quaternion(rotation), 1)

@@ -85,13 +85,7 @@ class Cell:
 
 
 def cell(grasp: RankedGrasp, down: FloatArray = DOWN) -> Cell:
-    """The scene of a grasp.
-
-    Raises
-    ------
-    StudyError
-        A finger of the grasp carries no load, so that its friction has no ratio to it.
-    """
+    """The scene of a grasp; `StudyError` if a finger carries no load, so that its friction has no ratio to it."""
     pads = grasp.case["fingers"]
     across, along = pads[0]["pose_rotation"][:, 2], pads[0]["pose_rotation"][:, 0]
     W = _upright(np.column_stack([across, along, np.cross(across, along)]), np.asarray(down, float))

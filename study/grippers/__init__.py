@@ -95,13 +95,7 @@ class Hand(BaseModel):
 
 @lru_cache
 def gripper_file(name: str) -> tuple[dict[str, Any], Hand]:
-    """Keys of a scene's ``[gripper]`` and the hand, of a preset or of a file.
-
-    Raises
-    ------
-    StudyError
-        No such preset or file, or one with wrong keys.
-    """
+    """Keys of a scene's ``[gripper]`` and the hand, of a preset or of a file."""
     path = FOLDER / f"{name}.toml" if name in PRESETS else Path(name)
     try:
         tables = tomllib.loads(path.read_text(encoding="utf-8"))

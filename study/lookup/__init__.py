@@ -121,7 +121,8 @@ class GraspMap:
         if candidate is not None:
             raise ValueError("the candidates of this map are stations and angles: give at(station, angle, force)")
         along = _one(station, station_mm, "mm", "station")
-        turn = _one(angle, angle_deg, "deg", "angle", self.source.axes[1].values[0] if self._one_angle else None)
+        angles = self.source.axes[1].values
+        turn = _one(angle, angle_deg, "deg", "angle", angles[0] if len(angles) == 1 or self.axes[1].free else None)
         return self.point(along, turn, force)
 
     def best(self, n: int = 1, by: str | None = None, force: float | None = None) -> list[GraspPoint]:
@@ -209,10 +210,6 @@ class GraspMap:
         flat = np.stack([part.ravel() for part in parts], axis=-1)
         at = corners(self.axes, flat)
         return GraspPoint(self, parts[0].shape, flat, at, self.states(at))
-
-    @property
-    def _one_angle(self) -> bool:
-        return len(self.source.axes[1].values) == 1 or self.axes[1].free
 
     def _grid(self, values: np.ndarray) -> np.ndarray:
         for axis, nodes in enumerate(self.axes):

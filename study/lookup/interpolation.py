@@ -137,9 +137,8 @@ def blend(table: FloatArray, at: Corners) -> FloatArray:
 def bends(table: FloatArray, axes: Sequence[Nodes], side: NDArray[np.bool_]) -> FloatArray:
     """``|f'' / 2| h^2`` of every cell along each axis, at the cell's lower node, ``(3, k_1, k_2, k_3)``.
 
-    Differences do not reach over values that are not there, nor from one ``side (k_1, k_2, k_3)`` of a jump to the
-    other. Where no three nodes are left, the difference of the cell's two values stands in: a guess; across a jump,
-    where there is no value, it is 0.
+    Differences reach neither over missing values nor from one ``side (k_1, k_2, k_3)`` of a jump to the other. Where no
+    three nodes are left, the difference of the cell's two values stands in: a guess; across a jump it is 0.
     """
     bent = np.zeros((3, *table.shape))
     for a, nodes in enumerate(axes):

@@ -206,14 +206,11 @@ class GraspPoint:
             before, after = (next(c for c, n in cases if self.map.snapped.ravel()[n] == side) for side in (False, True))
             return f"no value: the wall snaps in between {source.case(before)} and {source.case(after)}; ask at a case"
         if state == JUMP:
-            first, other = (f"{source.case(c)} ({self._contact(n)})" for c, n in self._unlike(cases))
+            kind = self.map.kind.ravel()
+            unlike = [cases[0], next(case for case in cases if kind[case[1]] != kind[cases[0][1]])]
+            first, other = (f"{source.case(c)} ({self._contact(n)})" for c, n in unlike)
             return f"no smooth value: the contact changes between {first} and {other}; take `nearest`, a solved case"
         return ""
-
-    def _unlike(self, cases: list[tuple[tuple[int, ...], int]]) -> list[tuple[tuple[int, ...], int]]:
-        """Two of the cases whose contacts differ in kind."""
-        kind = self.map.kind.ravel()
-        return [cases[0], next(case for case in cases if kind[case[1]] != kind[cases[0][1]])]
 
     def _contact(self, node: int) -> str:
         """The kind of contact of both fingers at a node, in words."""

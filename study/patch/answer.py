@@ -33,8 +33,7 @@ SURFACES = {  # as a scene names them, and in the text
 }
 FITTED_ON = 500  # motions; a fit is judged on others
 SPACE = 3  # dimension of the loads (f_x, f_y, tau_z)
-LIMITS = {"f_x_max": "f_x", "f_y_max": "f_y", "tau_z_max": "tau_z", **{name: name for name in ECCENTRICITIES}}
-FRICTION = ("f_x_max", "f_y_max", "tau_z_max", "tau_pure", *ECCENTRICITIES)
+FRICTION = {"f_x_max": "f_x", "f_y_max": "f_y", "tau_z_max": "tau_z", "tau_pure": "", **{n: n for n in ECCENTRICITIES}}
 UNITS = {
     "area": "m^2", "pressure": "Pa", "S": "N", "F_N": "N", "rho": "m", "origin": "m", "centre_of_pressure": "m",
     "f_x_max": "N", "f_y_max": "N", "tau_z_max": "N m", "tau_pure": "N m", **dict.fromkeys(ECCENTRICITIES, "m"),
@@ -62,13 +61,7 @@ OF_FRAME = Flag.CYCLE | Flag.HOLE | Flag.NO_CORNERS | Flag.OVERHANG
 
 
 def read_patch(file: str, reading: Reading) -> ReadPatch:
-    """The patch in a file, in the file's coordinates.
-
-    Raises
-    ------
-    StudyError
-        With code 3 if the file cannot be read as what its ending says, 2 if what it holds is no patch.
-    """
+    """The patch in a file, in the file's coordinates; `StudyError` for what cannot be read (3) or is no patch (2)."""
     path = checked_file(file, ENDINGS)
     ending = path.suffix.lower()
     if ending == ".csv":
@@ -137,24 +130,10 @@ def exact_surface(contact: Contact, model: str) -> ExactSurface:
 
 
 class EvaluatedPatch:
-    """A patch from a file and all that friction can carry there.
+    """A patch from a file and all that friction can carry there; x is along ``long_side`` or its longer direction.
 
     ``contact`` has its contact frame and friction limits, ``fits`` for each friction model the fitted surfaces by kind,
     ``exact`` for each the limit surface itself, per unit of S.
-
-    Parameters
-    ----------
-    read : ReadPatch
-        Loaded faces in the file's coordinates.
-    mu : float
-        Coulomb friction coefficient [-].
-    long_side : (3,) array, optional
-        Direction that becomes x after projection on the contact plane; by default the longer direction of the patch.
-
-    Raises
-    ------
-    StudyError
-        If the normals point to opposite sides, or ``long_side`` along them.
     """
 
     def __init__(self, read: ReadPatch, mu: float, long_side: ArrayLike | None = None) -> None:
@@ -199,20 +178,9 @@ def grasp_record(
     object_length: float | None = None,
     contact_length: float | None = None,
 ) -> dict[str, Any]:
-    """Score of a grasp by two patches, for unit normal forces (S = 1), in SI units.
+    """Score of a grasp by two patches, for unit normal forces (S = 1), lengths in m; ``kind`` is one of `SURFACES`.
 
-    Parameters
-    ----------
-    first, second : EvaluatedPatch
-        The contacts, in the coordinates of one object; without ``second`` it is like the first, half a turn
-        about x away from it.
-    kind : str
-        Limit surface, one of `SURFACES`.
-    distance : float, optional
-        Between the contacts, where ``second`` is not given [m].
-    object_length, contact_length : float, optional
-        Lengths by which torques of forces and torques about normals are divided; by default the distance, and the
-        longer side of the larger contact [m].
+    Without ``second`` the other contact is like the first, half a turn about x and ``distance`` away from it.
     """
     both = first, second or first
     contacts = first.contact, second.contact if second else opposite(first.contact, float(distance or 0.0))
@@ -248,9 +216,8 @@ def _patch_record(evaluated: EvaluatedPatch) -> dict[str, Any]:
     names = ("origin", "axes", "centre_of_pressure", "flag", "overhang_count", "overhang_share")
     friction = {}
     for model, limits in contact.limits.items():
-        values = {key: getattr(limits, name) for key, name in LIMITS.items()}
-        values["tau_pure"] = pure_torque(contact.local, contact.mu, model)
-        friction[model] = {name: values[name] for name in FRICTION}
+        values = {key: getattr(limits, name) for key, name in FRICTION.items() if name}
+        friction[model] = FRICTION | values | {"tau_pure": pure_torque(contact.local, contact.mu, model)}
     return {
         "file": evaluated.read.file, "faces": evaluated.read.faces, "loaded_faces": len(patch.area),
         "area": patch.area.sum(), "pressure": patch.pressure.max(), "S": contact.limits["ccm"].S,

@@ -117,19 +117,15 @@ def _patch_block(patch: dict[str, Any], mu: float) -> list[str]:
         ("origin", f"{_vector(1e3 * frame['origin'])} mm"),
         *((f"axis {name}", _vector(axis)) for name, axis in zip("xyN", frame["axes"], strict=True)),
     ]  # fmt: skip
-    faces = f"{patch['faces']} face{'s' * (patch['faces'] > 1)}"
-    head = f"{patch['file']}: {faces}, {patch['loaded_faces']} under pressure, mu = {mu:g}"
-    return [head, *(f"  {name:<8} {text}" for name, text in rows), "", as_text(_friction_table(patch), LINE), "",
-            as_text(_surface_table(patch["limit_surface"]["ccm"]), LINE)]  # fmt: skip
-
-
-def _friction_table(patch: dict[str, Any]) -> Table:
-    columns = [Column("friction", wrap=40), *map(Column, MODELS)]
-    rows = []
+    friction: list[Row] = []
     for name in FRICTION:
         values = {model: float(shown(patch["friction"][model][name], UNITS[name])) for model in MODELS}
-        rows.append({"friction": with_unit(name, shown_unit(UNITS[name])), **values})
-    return Table("", columns, rows)
+        friction.append({"friction": with_unit(name, shown_unit(UNITS[name])), **values})
+    table = Table("", [Column("friction", wrap=40), *map(Column, MODELS)], friction)
+    faces = f"{patch['faces']} face{'s' * (patch['faces'] > 1)}"
+    head = f"{patch['file']}: {faces}, {patch['loaded_faces']} under pressure, mu = {mu:g}"
+    return [head, *(f"  {name:<8} {text}" for name, text in rows), "", as_text(table, LINE), "",
+            as_text(_surface_table(patch["limit_surface"]["ccm"]), LINE)]  # fmt: skip
 
 
 def _surface_table(surfaces: dict[str, Any]) -> Table:
@@ -167,13 +163,7 @@ def _between(lower: float, upper: float) -> str:
 
 
 def write_picture(patches: Sequence[EvaluatedPatch], kind: str, path: Path) -> None:
-    """Sections of all patches' limit surfaces, exact and fitted, one row each; the ending chooses the format.
-
-    Raises
-    ------
-    StudyError
-        With code 5 if the file cannot be written.
-    """
+    """Sections of all patches' limit surfaces, exact and fitted, one row each; the ending chooses the format."""
     from softjaw.study import pictures  # loads matplotlib, which the text does not need
 
     with pictures.style():
@@ -194,19 +184,9 @@ def write_picture(patches: Sequence[EvaluatedPatch], kind: str, path: Path) -> N
 
 
 def section(patch: EvaluatedPatch, kind: str, plane: tuple[int, int]) -> FloatArray:
-    """Curve in which a plane of two of ``(f_x, f_y, tau_z)`` meets a limit surface of the CCM, per unit of S.
+    """Curve ``(361, 2)`` in which a plane of two of ``(f_x, f_y, tau_z)`` meets a surface of the CCM, per unit of S.
 
-    Parameters
-    ----------
-    patch : EvaluatedPatch
-    kind : str
-        ``exact`` or a fitted surface.
-    plane : (int, int)
-
-    Returns
-    -------
-    (361, 2) array
-        Loads in the plane [-, m].
+    ``kind`` is ``exact`` or a fitted surface.
     """
     phi = np.linspace(0, 2 * np.pi, 361)
     u = np.zeros((len(phi), 3))

@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 
 from softjaw.fem.contact.extract import extract
-from softjaw.fem.contact.measured import Measured, MeasuredPress
+from softjaw.fem.contact.measured import MeasuredPress
 from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.fem.objects.gap import NoContactError
-from softjaw.fem.objects.measured_face import MeasuredFace, cell_of, measured_face
+from softjaw.fem.objects.measured_face import cell_of, measured_face
 from softjaw.friction.patch import NEGLIGIBLE, ContactPatch, FloatArray
 from softjaw.study.case.model import contact_rules, pad_of
 from softjaw.study.messages import SOME_FAILED, USAGE, Problem, StudyError
@@ -28,21 +28,10 @@ COLUMNS = "x_mm, y_mm, z_mm, or y_mm, z_mm of a contour along the pad's width"
 
 
 def solve_deformed(file: str, unit: str | None, scene: Scene) -> ReadPatch:
-    """Contact patch of the pad of a scene with the deformed face in a file, in the file's coordinates.
+    """Contact patch of the pad of a scene with the deformed face in a table, in the file's coordinates.
 
-    Parameters
-    ----------
-    file : str
-        Table (.csv) of points.
-    unit : str or None
-        Unit of columns that name none.
-    scene : Scene
-        Whose ``[gripper]``, ``[accuracy]`` and ``[petsc]`` say how the pad is solved.
-
-    Raises
-    ------
-    StudyError
-        With code 3 if the file cannot be read, 2 if it holds no deformed face, 6 if the pad has no such state.
+    ``unit`` is that of columns that name none. `StudyError` has the code 3 if the file cannot be read, 2 if it holds no
+    deformed face, 6 if the pad has no such state.
     """
     points, notes = _points(checked_file(file, (".csv",)), unit, scene)
     try:
@@ -66,17 +55,12 @@ def solve_deformed(file: str, unit: str | None, scene: Scene) -> ReadPatch:
         patch.centroid[loaded] - back, patch.area[loaded], patch.normal[loaded], patch.pressure[loaded],
         None if patch.corners is None else patch.corners[loaded] - back,
     )  # fmt: skip
-    notes = (*notes, *_notes(face, measured))
-    return ReadPatch(file, in_file, len(loaded), lambda i: f"face {kept[i]} of the pad", notes)
-
-
-def _notes(face: MeasuredFace, measured: Measured) -> tuple[str, ...]:
-    """What a reader should know of the solve."""
     state = measured.state
     smooth = f"the points scatter by {1e3 * face.noise:.2g} mm round the smoothed face, whose error is"
     text = f"{smooth} {1e3 * face.doubt:.2g} mm; closed by {1e3 * state.closing:.3g} mm, {state.force:.3g} N"
     weak = "the face is pressed in by hardly more than its error: contact may be noise"
-    return (text, *[weak] * (not measured.judged), *state.notes)
+    notes = (*notes, text, *[weak] * (not measured.judged), *state.notes)
+    return ReadPatch(file, in_file, len(loaded), lambda i: f"face {kept[i]} of the pad", notes)
 
 
 def _points(path: Path, unit: str | None, scene: Scene) -> tuple[FloatArray, tuple[str, ...]]:

@@ -39,16 +39,8 @@ MINIMAL = "x_mm, y_mm, z_mm, area_mm2, nx, ny, nz, pressure_kpa, or corners x1_m
 class Reading:
     """What the user says about a file that the file does not say itself.
 
-    Parameters
-    ----------
-    unit : str or None
-        Unit of lengths and, squared, of areas that carry none: ``m``, ``cm`` or ``mm``.
-    pressure_unit : str or None
-        Unit of a pressure that carries none: ``pa``, ``kpa`` or ``mpa``.
-    pressure_name : str or None
-        Name of the column or data array that holds the pressure; by default ``pressure``.
-    flip_normals : bool
-        Whether all normals are turned to the other side.
+    ``unit`` is that of bare lengths and, squared, of bare areas, ``pressure_unit`` that of a bare pressure;
+    ``pressure_name`` is the column or data array of the pressure, ``flip_normals`` turns all normals.
     """
 
     unit: str | None = None
@@ -56,20 +48,9 @@ class Reading:
     pressure_name: str | None = None
     flip_normals: bool = False
 
-    def unit_of(self, kind: str) -> str | None:
-        """Unit of a bare ``length``, ``area``, ``pressure`` or ``number``."""
-        area = f"{self.unit}2" if self.unit else None
-        return {"length": self.unit, "area": area, "pressure": self.pressure_unit, "number": "-"}[kind]
-
 
 def checked_file(file: str, endings: Sequence[str]) -> Path:
-    """The path of a file with one of these endings, which can be read and is not too large.
-
-    Raises
-    ------
-    StudyError
-        With code 3 if it cannot be read, 2 if it has another ending or is too large.
-    """
+    """The path of a file with one of these endings, which can be read and is not too large."""
     path = Path(file)
     if path.suffix.lower() not in endings:
         found = f"the ending {path.suffix}" if path.suffix else "no ending"
@@ -214,7 +195,9 @@ def si_columns(
 ) -> dict[str, FloatArray]:  # fmt: skip
     """Values of the columns at some positions in SI units; a fourth corner may be empty (NaN)."""
     pairs = {name: split_header(headers[k], reading.pressure_name) for name, k in position.items()}
-    units = {name: (pair and pair[1]) or reading.unit_of(KINDS[name]) or "" for name, pair in pairs.items()}
+    area = f"{reading.unit}2" if reading.unit else None
+    bare_units = {"length": reading.unit, "area": area, "pressure": reading.pressure_unit, "number": "-"}
+    units = {name: (pair and pair[1]) or bare_units[KINDS[name]] or "" for name, pair in pairs.items()}
     problems = []
     for kind in dict.fromkeys(KINDS[name] for name in position if not units[name]):
         bare = [headers[k] for name, k in position.items() if KINDS[name] == kind and not units[name]]

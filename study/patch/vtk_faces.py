@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonCore import vtkLogger, vtkOutputWindow, vtkStringOutputWindow
 
-from softjaw.friction.patch import FloatArray
 from softjaw.study.messages import OTHER_FILE, StudyError, closest
 from softjaw.study.patch.faces import ReadPatch, checked, corner_geometry
 from softjaw.study.patch.patch_reader import FACTORS, Reading, check_count, refused, split_header
@@ -55,7 +54,8 @@ def read_vtk(path: Path, reading: Reading) -> ReadPatch:
         pressure = FACTORS["pressure"][unit] * values.astype(float)
     notes: tuple[str, ...] = ()
     if at_points:
-        pressure = _mean_over_corners(pressure[ids], ids)
+        pressure, triangle = pressure[ids], ids[:, -1] == ids[:, 2]  # whose repeated last corner counts once
+        pressure = np.where(triangle, pressure[:, :3].mean(axis=1), pressure.mean(axis=1))
         notes = (f"{path}: '{name}' belongs to the points; every face takes the mean of its corners",)
     centroid, area, normal = corner_geometry(corners)
     given = (np.asarray(array) for key, array in grid.cell_data.items() if key.lower() in ("normals", "normal"))
@@ -123,12 +123,6 @@ def _pressure_array(path: Path, grid: Any, reading: Reading) -> tuple[str, NDArr
     remedy = f"give its name with --pressure-name {closest(wanted, names) or (names[0] if names else 'NAME')}"
     found = f"the arrays {', '.join(names)}" if names else "no array of scalars"
     raise refused(path, None, wanted, found, "the pressure", remedy)
-
-
-def _mean_over_corners(values: FloatArray, ids: NDArray[np.int64]) -> FloatArray:
-    """Mean over the corners of each face, ``(n, k) -> (n,)``; a repeated last corner counts once."""
-    triangle = ids[:, -1] == ids[:, 2]
-    return np.where(triangle, values[:, :3].mean(axis=1), values.mean(axis=1))
 
 
 # --- trial -----------------------------------------------------------------------------------------------------------

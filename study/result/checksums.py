@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.study.quantities import MISSING, STATES
-from softjaw.study.result.datasets import CLOSING_SUMS, SUMS, Column
+from softjaw.study.result.datasets import SUMS, Column
 from softjaw.study.result.hdf5 import StoredFile
 from softjaw.study.result.layout import ROOT, Layout
 
@@ -114,9 +114,3 @@ def of_header(file: StoredFile, layout: Layout) -> int:
     for name in arrays:
         crc = zlib.crc32(np.asarray(file.values(file.plain(f"{ROOT}/{name}"))).tobytes(), crc)
     return crc
-
-
-def closing_sum(file: StoredFile, layout: Layout, name: str) -> int:
-    """The stored checksum of something that is filled after all rows, by its name in ``layout.closing``."""
-    dataset = file.checked(CLOSING_SUMS, (len(layout.closing),), np.dtype("<u4"))
-    return int(file.values(dataset)[layout.closing.index(name)])

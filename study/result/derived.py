@@ -24,46 +24,19 @@ SWEPT = {"object.semi_axis_a_mm", "object.semi_axis_b_mm"}  # give the axes that
 
 
 def derived(scene: Scene) -> list[Quantity]:
-    """Everything that is derived for a scene."""
-    return [*_of_sweep(scene), *_of_force_range(scene)]
-
-
-def finalise(writer: Any, scene: Scene) -> None:
-    """Fill it, by one rank, after all cases."""
-    _fill_sweep(writer, scene)
-    _fill_force_range(writer, scene)
-
-
-def _of_sweep(scene: Scene) -> list[Quantity]:
-    """What a sweep over an elliptic cylinder's semi-axes adds: the axes that curvature studies are drawn over."""
-    if scene.object.shape != "elliptic_cylinder" or not SWEPT & set(scene.sweep):
-        return []
+    """Everything that is derived for a scene: axes of curvature studies, force to use, largest force of the wall."""
     # Curvature belongs to the object alone: station, angle and normal force are left out.
-    over = tuple(axis.name for axis in axes(scene)[:-3])
-    return [
-        Quantity("b_over_a", over, "", "b / a", "Semi-axis across the contact over that along its normal.", "derived"),
-        Quantity("apex_curvature", over, "1/m", "apex curvature a / b^2",
-                 "Curvature of the section where pads at angle 0 touch.", "derived"),
-    ]  # fmt: skip
-
-
-def _fill_sweep(writer: Any, scene: Scene) -> None:
-    """Fill the axes of curvature studies."""
-    if not _of_sweep(scene):
-        return
-    points = [scene.with_values(values).object for values in scene.points]
-    shape = writer.layout.shape[:-3]
-    a, b = (np.reshape([getattr(p, name) for p in points], shape) for name in ("semi_axis_a", "semi_axis_b"))
-    writer.write_derived("b_over_a", b / a)
-    writer.write_derived("apex_curvature", a / b**2)
-
-
-def _of_force_range(scene: Scene) -> list[Quantity]:
-    """Force to use and bounds of the safe force range, as far as the scene asks for them."""
-    over = tuple(axis.name for axis in axes(scene)[:-1])
-    bounds = []
+    names = tuple(axis.name for axis in axes(scene))
+    over, listed = names[:-1], []
+    if scene.object.shape == "elliptic_cylinder" and SWEPT & set(scene.sweep):
+        listed += [
+            Quantity("b_over_a", names[:-3], "", "b / a",
+                     "Semi-axis across the contact over that along its normal.", "derived"),
+            Quantity("apex_curvature", names[:-3], "1/m", "apex curvature a / b^2",
+                     "Curvature of the section where pads at angle 0 touch.", "derived"),
+        ]  # fmt: skip
     if scene.object.mass is not None:
-        bounds += [
+        listed += [
             Quantity(LOW, over, "N", "force to use",
                      "Smallest normal force per finger that holds the object: at which safety_factor (CCM) passes "
                      "task.safety, between the solved forces by straight lines, and from 0 at 0 N. NaN: none of them"
@@ -73,20 +46,24 @@ def _of_force_range(scene: Scene) -> list[Quantity]:
                      "move it; NaN where fewer than two of them are solved up to it.", "derived"),
         ]  # fmt: skip
     if getattr(scene.object, "wall", None) is not None:
-        bounds.append(Quantity(
+        listed.append(Quantity(
             HIGH, over, "N", "largest force that the wall bears",
             "Normal force per finger at which the indentation passes object.allowed_dent_mm or the stress the yield "
             "strength, between the solved forces by straight lines, and from 0 at 0 N; where neither does, the largest"
             " solved force: the wall bears at least that. NaN where the wall was taken as rigid.", "derived",
         ))  # fmt: skip
-    return bounds
+    return listed
 
 
-def _fill_force_range(writer: Any, scene: Scene) -> None:
-    """Fill the bounds, by one rank, after all cases."""
-    wanted = [d.name for d in _of_force_range(scene)]
-    if not wanted:
-        return
+def finalise(writer: Any, scene: Scene) -> None:
+    """Fill it, by one rank, after all cases."""
+    wanted = [q.name for q in derived(scene)]
+    if "b_over_a" in wanted:
+        points = [scene.with_values(values).object for values in scene.points]
+        shape = writer.layout.shape[:-3]
+        a, b = (np.reshape([getattr(p, name) for p in points], shape) for name in ("semi_axis_a", "semi_axis_b"))
+        writer.write_derived("b_over_a", b / a)
+        writer.write_derived("apex_curvature", a / b**2)
     forces = np.asarray(scene.load.normal_force)
     done = writer.codes().reshape(writer.layout.shape) == DONE
     if LOW in wanted:
@@ -114,14 +91,9 @@ def _largest(writer: Any, scene: Scene, forces: FloatArray, done: NDArray[np.boo
 def crossing_error(forces: ArrayLike, values: ArrayLike, limit: float, stated: ArrayLike = 0.0) -> FloatArray:
     """Error of `first_crossing` [N]: that of a straight line in a curve that bends as much as the values beside it do.
 
-    The errors of the values move the crossing, too: by their share of the limit over the slope.
-
-    Parameters
-    ----------
-    forces, values, limit
-        As for `first_crossing`; NaN where no three values, the one at no force counted, lie about the crossing.
-    stated : (..., k) array, optional
-        Relative errors of the values; the larger of those beside the crossing counts, NaN where neither is known.
+    The errors of the values, ``stated (..., k)`` as shares, move the crossing, too: by their share of the limit over
+    the slope; the larger of those beside the crossing counts. NaN where no three values lie about the crossing, the one
+    at no force counted.
 
     Examples
     --------
@@ -151,17 +123,9 @@ def crossing_error(forces: ArrayLike, values: ArrayLike, limit: float, stated: A
 
 
 def first_crossing(forces: ArrayLike, values: ArrayLike, limit: float) -> FloatArray:
-    """Force at which values first pass a limit, by straight lines from 0 at no force; NaN where they never do.
+    """Force at which values ``(..., k)`` first pass a limit, by straight lines from 0 at no force; NaN for never.
 
-    A solved value within `UNDECIDED` of the limit has passed it.
-
-    Parameters
-    ----------
-    forces : (k,) array
-        Ascending [N].
-    values : (..., k) array
-        NaN where there is none; what comes after is not used.
-    limit : float
+    A solved value within `UNDECIDED` of the limit has passed it; what comes after a NaN is not used.
 
     Examples
     --------

@@ -94,10 +94,7 @@ class StoredFile:
 def opened(path: Path, kind: str, make: Callable[[StoredFile], Any]) -> Any:
     """What ``make`` makes of a file, which stays open.
 
-    Raises
-    ------
-    StudyError
-        The file cannot be read as a file of this ``kind``, or another program holds it.
+    `StudyError` if the file cannot be read as a file of this ``kind``, or another program holds it.
     """
     # Opening a pipe or a device could block for ever.
     if path.exists() and not path.is_file():

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import h5py
 import numpy as np
@@ -28,39 +28,27 @@ SOLVED = (DONE, SOME_FAILED)
 INDEX, INDEX_VERSION = "index", 1  # name of its file, which no object's has
 
 
-class IndexColumn(NamedTuple):
-    """A column of the index: its type, its SI unit and what it is."""
-
-    name: str
-    kind: type
-    unit: str
-    definition: str
-
-
-COLUMNS = tuple(
-    IndexColumn(*column)
-    for column in (
-        ("state", str, "", "one of: " + ", ".join(STATES)),
-        ("payload", float, "kg", "mass that the best grasp holds in the worst direction, curved contact model"),
-        ("payload_error", float, "1", "relative error of that payload: numerical, without uncertain inputs"),
-        ("opening", float, "m", "distance of the pads' faces at first touch, best grasp"),
-        ("force", float, "N", "normal force per finger of the best grasp"),
-        ("e_n", float, "m", "eccentricity parameter of the best grasp, curved contact model"),
-        ("quality", float, "1", "quality of the best grasp, curved contact model"),
-        ("best", int, "", "number of the best grasp's candidate in the object's file, from 0; -1 where there is none"),
-        ("grasps", int, "", "solved candidates that hold and do no harm at that force"),
-        ("cases", int, "", "cases of the object: candidates x forces x points of a sweep"),
-        ("done", int, "", "cases that are solved"),
-        ("failed", int, "", "cases that failed"),
-        ("mass", float, "kg", "mass of the object that its scene gives"),
-        ("seconds", float, "s", "time in the object's cases, on all ranks"),
-        ("preparing", float, "s", "time until its grasps were sampled and planned, on one rank"),
-        ("reason", str, "", "why there is no grasp, or why cases failed"),
-        ("file", str, "", "result file, relative to the index"),
-        ("mesh", str, "", "mesh of the object"),
-        ("key", str, "", "SHA-256 of the object's scene and mesh"),
-    )
-)
+COLUMNS: dict[str, tuple[type, str, str]] = {  # type, SI unit and what it is
+    "state": (str, "", "one of: " + ", ".join(STATES)),
+    "payload": (float, "kg", "mass that the best grasp holds in the worst direction, curved contact model"),
+    "payload_error": (float, "1", "relative error of that payload: numerical, without uncertain inputs"),
+    "opening": (float, "m", "distance of the pads' faces at first touch, best grasp"),
+    "force": (float, "N", "normal force per finger of the best grasp"),
+    "e_n": (float, "m", "eccentricity parameter of the best grasp, curved contact model"),
+    "quality": (float, "1", "quality of the best grasp, curved contact model"),
+    "best": (int, "", "number of the best grasp's candidate in the object's file, from 0; -1 where there is none"),
+    "grasps": (int, "", "solved candidates that hold and do no harm at that force"),
+    "cases": (int, "", "cases of the object: candidates x forces x points of a sweep"),
+    "done": (int, "", "cases that are solved"),
+    "failed": (int, "", "cases that failed"),
+    "mass": (float, "kg", "mass of the object that its scene gives"),
+    "seconds": (float, "s", "time in the object's cases, on all ranks"),
+    "preparing": (float, "s", "time until its grasps were sampled and planned, on one rank"),
+    "reason": (str, "", "why there is no grasp, or why cases failed"),
+    "file": (str, "", "result file, relative to the index"),
+    "mesh": (str, "", "mesh of the object"),
+    "key": (str, "", "SHA-256 of the object's scene and mesh"),
+}
 BLANK: dict[type, Any] = {str: "", float: math.nan, int: -1}
 
 
@@ -74,7 +62,7 @@ def index_path(file: str | Path) -> Path | None:
 
 def blank_row(name: str, **values: Any) -> Row:
     """A row with nothing but what is given."""
-    return {"object": name, **{c.name: BLANK[c.kind] for c in COLUMNS}, "state": MISSING, **values}
+    return {"object": name, **{name: BLANK[kind] for name, (kind, *_) in COLUMNS.items()}, "state": MISSING, **values}
 
 
 def code_of(rows: Sequence[Row]) -> int:
@@ -86,36 +74,28 @@ def code_of(rows: Sequence[Row]) -> int:
 
 
 def write_index(path: Path, rows: Sequence[Row], attributes: Mapping[str, Any]) -> None:
-    """Write the whole table; by one process.
-
-    Raises
-    ------
-    StudyError
-        It cannot be written.
-    """
+    """Write the whole table; by one process."""
     with beside(path) as part, h5py.File(part, "w") as file:
         file.attrs.update({"program": PROGRAM, "index_version": INDEX_VERSION, **attributes})
         names = file.create_dataset("object", data=_texts([row["object"] for row in rows]))
         names.make_scale("object")
-        for column in COLUMNS:
-            values = [row[column.name] for row in rows]
-            data = _texts(values) if column.kind is str else np.array(values, "f8" if column.kind is float else "i8")
-            made = file.create_dataset(column.name, data=data)
-            made.attrs.update({"units": column.unit, "long_name": column.name, "definition": column.definition})
+        for name, (kind, *_) in COLUMNS.items():
+            values = [row[name] for row in rows]
+            data = _texts(values) if kind is str else np.array(values, "f8" if kind is float else "i8")
+            made = file.create_dataset(name, data=data)
+            made.attrs.update(_about(name))
             made.dims[0].attach_scale(names)
 
 
 def write_arrays(path: Path, arrays: Mapping[str, Any]) -> None:
-    """Write an HDF5 file of arrays, numbers and texts by path; an existing one is replaced.
-
-    Raises
-    ------
-    StudyError
-        It cannot be written.
-    """
+    """Write an HDF5 file of arrays, numbers and texts by path; an existing one is replaced."""
     with beside(path, folders=True) as part, h5py.File(part, "w") as file:
         for name, values in arrays.items():
             file[name] = values
+
+
+def _about(name: str) -> dict[str, str]:
+    return {"units": COLUMNS[name][1], "long_name": name, "definition": COLUMNS[name][2]}
 
 
 def _texts(values: Sequence[str]) -> Any:
@@ -123,18 +103,12 @@ def _texts(values: Sequence[str]) -> Any:
 
 
 def read_index(path: Path) -> tuple[list[Row], dict[str, Any]]:
-    """Rows and attributes of an index.
-
-    Raises
-    ------
-    StudyError
-        It cannot be read.
-    """
+    """Rows and attributes of an index."""
     file: StoredFile = opened(path, "index of objects", _checked)
     try:
         values: dict[str, list[Any]] = {"object": file.texts("object")}
-        for c in COLUMNS:
-            values[c.name] = file.texts(c.name) if c.kind is str else file.values(file.plain(c.name)).tolist()
+        for name, (kind, *_) in COLUMNS.items():
+            values[name] = file.texts(name) if kind is str else file.values(file.plain(name)).tolist()
         if len({len(column) for column in values.values()}) != 1:
             raise StudyError(OTHER_FILE, f"{path}: damaged (columns of different lengths); run the scene again")
         return [dict(zip(values, row, strict=True)) for row in zip(*values.values(), strict=True)], file.attributes()
@@ -153,7 +127,6 @@ def open_index(path: Path) -> Any:
     import xarray as xr
 
     rows, attributes = read_index(path)
-    about = {c.name: {"units": c.unit, "long_name": c.name, "definition": c.definition} for c in COLUMNS}
-    variables = {c.name: ("object", [row[c.name] for row in rows], about[c.name]) for c in COLUMNS}
+    variables = {name: ("object", [row[name] for row in rows], _about(name)) for name in COLUMNS}
     attributes["file"] = str(path)
     return xr.Dataset(variables, {"object": [row["object"] for row in rows]}, attributes)

@@ -48,8 +48,7 @@ SESSION = np.dtype(
 class Header:
     """What a file says about the scene it was made from; ``labels`` name the candidates in row order.
 
-    ``placed`` is where the frame in which stations and angles count lies in that of the poses, the object's own file,
-    as rotation and origin.
+    ``placed`` is rotation and origin of the frame of stations and angles in that of the poses, the object's own file.
     """
 
     digest: str
@@ -165,14 +164,6 @@ class Layout:
     def datasets(self) -> tuple[Dataset, ...]:
         """All datasets of the study but axes, texts and sessions."""
         return tuple(datasets_of(self))
-
-    def dataset(self, path: str) -> Dataset:
-        """The dataset at a path of `datasets`."""
-        return self._by_path[path]
-
-    @cached_property
-    def _by_path(self) -> dict[str, Dataset]:
-        return {d.path: d for d in self.datasets}
 
     @property
     def nbytes(self) -> int:

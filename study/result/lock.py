@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import fcntl
 import os
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 from softjaw.study.messages import CANNOT_WRITE, IN_USE, StudyError
@@ -35,8 +35,10 @@ class Lock:
         for attempt in range(6):  # 'status' takes the lock for an instant to see whether a run is alive
             self._fd = self._opened()
             # A run that ends unlinks the file: a lock on a file without a name would keep nobody out.
-            if self._flock(fcntl.LOCK_EX | fcntl.LOCK_NB) and self._still_named():
-                break
+            if self._flock(fcntl.LOCK_EX | fcntl.LOCK_NB):
+                with contextlib.suppress(FileNotFoundError):
+                    if os.fstat(self._fd).st_ino == self.path.stat().st_ino:
+                        break
             # The name of the holder lets the message say whom to wait for.
             holder = os.read(self._fd, 200).decode(errors="replace").strip()
             self.release()
@@ -79,12 +81,6 @@ class Lock:
             os.close(self._fd)
             # The number is soon given to another file, which a second release must not close.
             self._fd = -1
-
-    def _still_named(self) -> bool:
-        try:
-            return os.fstat(self._fd).st_ino == self.path.stat().st_ino
-        except FileNotFoundError:
-            return False
 
     def _flock(self, operation: int) -> bool:
         try:
@@ -137,7 +133,7 @@ class OpenedFile:
             remedy = "put it back, or begin again with the same command"
             raise StudyError(CANNOT_WRITE, f"{self.path}: {what} while the run was writing it; {remedy}")
 
-    @contextmanager
+    @contextlib.contextmanager
     def writing(self) -> Iterator[None]:
         """Around a write: a failed one becomes a `StudyError`."""
         try:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from softjaw.study.flags import OF_FILE, Flag
 from softjaw.study.quantities import BOTH_ENDS, BY_KEY, FINGERS, MISSING, MODELS, REALISATION, TABLE, Axis, Quantity
 from softjaw.study.result.index import index_path, open_index
-from softjaw.study.result.layout import DONE, VERSION
+from softjaw.study.result.layout import DONE, ROOT, VERSION
 from softjaw.study.result.store import Result, open_result
 from softjaw.study.scene.sections import UPPER
 
@@ -225,7 +225,7 @@ def _coordinates(result: Result, variables: dict[str, Any]) -> dict[str, Any]:
 
 
 def _attributes(result: Result) -> dict[str, Any]:
-    layout, scene = result.layout, result.scene_attributes
+    layout, scene = result.layout, result.file.attributes(f"{ROOT}/scene")
     return {
         "title": result.title, "file": str(result.path), "layout_version": VERSION, "digest": result.digest,
         "scene": result.scene, "scene_file": scene.get("file", ""),
@@ -251,15 +251,10 @@ def contact_kinds(name: str, values: np.ndarray) -> NDArray[np.int64]:
 
 
 def at_force(ds: xr.Dataset, force: float) -> xr.Dataset:
-    """The dataset at one force [N] between two solved ones, by straight lines; flags of both.
+    """The dataset at one force [N] between two solved ones, by straight lines; flags of both. `ValueError` beyond them.
 
     A case beside one that is not solved has that one's state. Across a snap-in of the wall, and between contacts that
     differ in kind, nothing is known: the state is "not computed".
-
-    Raises
-    ------
-    ValueError
-        For a force outside of the solved ones, with what they are.
     """
     forces = ds["normal_force"].values
     if not forces[0] <= force <= forces[-1] or len(forces) < 2:

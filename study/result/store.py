@@ -110,10 +110,6 @@ class Result:
         """A dataset that was filled after all rows."""
         return self._believable(f"derived/{name}", self._closing(f"derived/{name}"))
 
-    def row(self, *index: int) -> int:
-        """Flat row of a case from its index along each axis."""
-        return int(np.ravel_multi_index(index, self.layout.shape))
-
     @cached_property
     def status(self) -> np.ndarray:
         """State of every case when it was read first, as `study.quantities.STATES` numbers them."""
@@ -140,11 +136,6 @@ class Result:
     def scene(self) -> str:
         """The effective scene as TOML text."""
         return self._string("scene")
-
-    @property
-    def scene_attributes(self) -> dict[str, Any]:
-        """Digest, file name, overrides and PETSc options of the scene."""
-        return self.file.attributes(f"{ROOT}/scene")
 
     @property
     def definitions(self) -> str:
@@ -206,7 +197,8 @@ class Result:
         for patience in (0.02, 0.2, 0.0):  # a run may be writing it just now
             dataset = self._checked(name) if f"{ROOT}/{name}" in self._known else self._text(name)
             values = np.asarray(self.file.values(dataset))
-            if self._unchecked or checksums.of_array(values) == checksums.closing_sum(self.file, self.layout, name):
+            stored = self.file.values(self._checked("checksums/closing"))[self.layout.closing.index(name)]
+            if self._unchecked or checksums.of_array(values) == stored:
                 return values
             time.sleep(patience)
         raise self._damaged(f"{name} does not match its checksum")

@@ -200,10 +200,7 @@ def blank(layout: Layout, message: str = "", seconds: float = math.nan) -> list[
 def record(layout: Layout, result: CaseResult) -> list[np.ndarray]:
     """The row of a solved case, aligned with ``layout.columns``; what the result does not give stays empty.
 
-    Raises
-    ------
-    ValueError
-        A key or a shape that is not in ``study.quantities``: a bug of the caller, not a failed case.
+    `ValueError` for a key or a shape that is not in ``study.quantities``: a bug of the caller, not a failed case.
     """
     given = _flattened(layout, result)
     row = blank(layout, result.message)

@@ -1,6 +1,7 @@
 """The same patch written as every kind of file that ``softjaw patch`` reads."""
 
 import numpy as np
+import pyvista as pv
 
 
 def cylinder_mesh(R=0.03, alpha=np.pi / 3, L=0.04, n=15, m=9, triangles=False):
@@ -33,32 +34,15 @@ def corners(path, points, cells, pressure):
     return table(path, [*headers, "pressure_pa"], [points[cells].reshape(len(cells), -1), pressure])
 
 
-def _array(name, values, kind="Float64"):
-    values = np.asarray(values)
-    parts = values.shape[1] if values.ndim == 2 else 1
-    text = " ".join(map(repr, values.ravel().tolist()))
-    return f'<DataArray type="{kind}" Name="{name}" NumberOfComponents="{parts}" format="ascii">{text}</DataArray>'
-
-
 def vtk(path, points, cells, on_cells=(), on_points=(), kinds=None):
-    """An ASCII VTU or VTP file, by the path's ending; data are pairs of name and values."""
-    sizes = np.array([len(c) for c in cells])
-    flat = np.concatenate([np.asarray(c) for c in cells])
-    topology = _array("connectivity", flat, "Int64") + _array("offsets", np.cumsum(sizes), "Int64")
-    data = "".join(
-        f"<{where}>{''.join(_array(*pair) for pair in pairs)}</{where}>"
-        for where, pairs in (("PointData", on_points), ("CellData", on_cells))
-    )
-    place = f"<Points>{_array('Points', points)}</Points>"
+    """A VTU or VTP file, by the path's ending; data are pairs of name and values."""
+    points, faces = np.asarray(points, float), np.concatenate([[len(c), *c] for c in cells])
     if path.suffix == ".vtu":
-        types = _array("types", [{3: 5, 4: 9}[s] for s in sizes] if kinds is None else kinds, "UInt8")
-        kind, head = "UnstructuredGrid", f'NumberOfPoints="{len(points)}" NumberOfCells="{len(cells)}"'
-        inner = f"{place}<Cells>{topology}{types}</Cells>"
+        grid = pv.UnstructuredGrid(faces, kinds or [{3: 5, 4: 9}[len(c)] for c in cells], points)
     else:
-        kind, head = "PolyData", f'NumberOfPoints="{len(points)}" NumberOfPolys="{len(cells)}"'
-        inner = f"{place}<Polys>{topology}</Polys>"
-    path.write_text(
-        f'<?xml version="1.0"?>\n<VTKFile type="{kind}" version="1.0" byte_order="LittleEndian" '
-        f'header_type="UInt64"><{kind}><Piece {head}>{data}{inner}</Piece></{kind}></VTKFile>\n'
-    )
+        grid = pv.PolyData(points, faces)
+    for data, pairs in ((grid.cell_data, on_cells), (grid.point_data, on_points)):
+        for name, values in pairs:
+            data[name] = np.asarray(values)
+    grid.save(path)
     return path

@@ -9,6 +9,7 @@ import re
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from softjaw.study.cli import main
 from softjaw.study.cli.exporting import DATA_SETS, PLANNERS, SIMULATORS, TABLES
@@ -93,17 +94,6 @@ def read_yaml(text):
     return yaml.safe_load(text)
 
 
-def turned(x, y, z, w):
-    """The rotation of a quaternion, by its own formula."""
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
-
-
 def fits(value, schema):
     """Whether a value has exactly the fields of a schema, each with its type."""
     if isinstance(schema, dict):
@@ -136,7 +126,7 @@ def test_the_gripper_stands_over_its_pads(path, closing):
         axis = R[0][:, 0 if approach.endswith("x") else 1]
         assert grasp.rotation[:, 2] == pytest.approx(-axis if approach.startswith("minus") else axis)
         assert np.linalg.det(grasp.rotation) == pytest.approx(1)
-        assert turned(*grasp.quaternion) == pytest.approx(grasp.rotation, abs=1e-12)
+        assert Rotation.from_quat(grasp.quaternion).as_matrix() == pytest.approx(grasp.rotation, abs=1e-12)
         assert grasp.name.endswith(approach.replace("-", "_"))
 
 
@@ -151,7 +141,7 @@ def test_isaac_grasp_has_the_fields_of_its_documentation(said, gripper):
         assert 0 <= grasp["confidence"] <= 1
         assert fits(grasp["position"], [float])
         assert fits(grasp["orientation"], {"w": float, "xyz": [float]})
-        rotation = turned(*grasp["orientation"]["xyz"], grasp["orientation"]["w"])
+        rotation = Rotation.from_quat([*grasp["orientation"]["xyz"], grasp["orientation"]["w"]]).as_matrix()
         ahead = np.array(grasp["position"]) + 0.1034 * rotation[:, 2]
         R, o, _ = geometry(station_of(ahead))
         assert rotation[:, 1] == pytest.approx(R[0][:, 2], abs=1e-12)  # closes along y
@@ -176,7 +166,7 @@ def test_moveit_grasps_have_the_fields_of_their_messages(said, gripper):
         assert grasp["max_contact_force"] == 16.0
         assert grasp["grasp_posture"]["points"][0]["effort"] == [16.0, 16.0]
         pose = grasp["grasp_pose"]["pose"]
-        rotation = turned(*(pose["orientation"][k] for k in "xyzw"))
+        rotation = Rotation.from_quat([pose["orientation"][k] for k in "xyzw"]).as_matrix()
         ahead = np.array([pose["position"][k] for k in "xyz"]) + 0.1034 * rotation[:, 2]
         i = station_of(ahead)
         assert ahead == pytest.approx(geometry(i)[1].mean(axis=0))
@@ -251,7 +241,6 @@ def test_simulators_get_a_file_for_each_grasp(path, said, tmp_path):
 @pytest.mark.parametrize(
     ("words", "code"),
     [
-        (("--format", "drake"), USAGE),
         (("--format", "urdf"), USAGE),
         (("--format", "moveit", "--force", "99"), USAGE),
         (("--csv", "--min", "beauty=3"), USAGE),

@@ -9,6 +9,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 import trimesh
+from scipy.spatial.transform import Rotation
 
 from softjaw.study.export.mjcf import as_mjcf, friction, tangents
 from softjaw.study.export.physx import as_usd
@@ -77,7 +78,6 @@ def test_gazebo_slips_at_the_torque_of_the_file_by_its_own_formula(path):
         assert numbers(solid.findtext("inertial/pose"))[:3] == pytest.approx(body(path).centre, abs=1e-9)
         inertia = {child.tag: float(child.text) for child in solid.find("inertial/inertia")}
         assert inertia["izz"] == pytest.approx(carried(grasp, body(path)).inertia[2, 2])
-        *place, roll, pitch, yaw = numbers(root.findtext("model/pose"))
         for f, link in enumerate(fingers, start=1):
             surface = link.find("collision/surface/friction")
             a, c = (float(surface.findtext(f"torsional/{name}")) for name in ("patch_radius", "coefficient"))
@@ -89,15 +89,11 @@ def test_gazebo_slips_at_the_torque_of_the_file_by_its_own_formula(path):
             assert numbers(surface.findtext("ode/fdir1")) == [1, 0, 0]
             assert link.get("name") == f"finger{f}"
             *place, roll, pitch, yaw = numbers(link.findtext("pose"))
+            turn = Rotation.from_euler("xyz", [roll, pitch, yaw]).as_matrix()  # about fixed axes, as SDFormat has them
             assert place == pytest.approx(cell(grasp).contacts[f - 1].origin.tolist())
-            assert rpy(roll, pitch, yaw) == pytest.approx(cell(grasp).contacts[f - 1].rotation, abs=1e-9)
-            rail = rpy(roll, pitch, yaw) @ numbers(root.findall("model/joint")[f - 1].findtext("axis/xyz"))
+            assert turn == pytest.approx(cell(grasp).contacts[f - 1].rotation, abs=1e-9)
+            rail = turn @ numbers(root.findall("model/joint")[f - 1].findtext("axis/xyz"))
             assert rail == pytest.approx(cell(grasp).closing * (1 if f == 1 else -1), abs=1e-9)
-
-
-def turned(x, y, z, w):
-    """The rotation of a quaternion, by its own formula."""
-    return np.eye(3) + 2 * w * (K := np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])) + 2 * K @ K
 
 
 def test_the_surface_beside_a_model_of_gazebo_is_the_object(path, tmp_path):
@@ -105,19 +101,6 @@ def test_the_surface_beside_a_model_of_gazebo_is_the_object(path, tmp_path):
     mesh = trimesh.load(tmp_path / "object.stl")
     assert mesh.volume * 1000 == pytest.approx(body(path).mass, rel=1e-4)
     assert mesh.bounds == pytest.approx(np.stack([body(path).points.min(axis=0), body(path).points.max(axis=0)]))
-
-
-def rpy(roll, pitch, yaw):
-    """Turns about the fixed axes x, y, z one after the other, as SDFormat has them."""
-
-    def about(k, angle):
-        i, j = (k + 1) % 3, (k + 2) % 3
-        turn = np.eye(3)
-        turn[i, i] = turn[j, j] = math.cos(angle)
-        turn[i, j], turn[j, i] = -math.sin(angle), math.sin(angle)
-        return turn
-
-    return about(2, yaw) @ about(1, pitch) @ about(0, roll)
 
 
 def test_physx_slips_at_the_torque_of_the_file_by_its_own_formula(path):
@@ -151,6 +134,11 @@ def test_physx_carries_what_the_file_says_and_both_at_once(path, force):
             assert found[name] == pytest.approx(shares, abs=0.005)
 
 
+def turned(q):
+    """The rotation of a quaternion of USD."""
+    return Rotation.from_quat([*q.GetImaginary(), q.GetReal()]).as_matrix()
+
+
 def test_usd_reads_the_stage(path):
     Usd = pytest.importorskip("pxr.Usd", reason="USD is not installed: pip install usd-core")
     from pxr import Gf, UsdGeom, UsdPhysics
@@ -163,7 +151,7 @@ def test_usd_reads_the_stage(path):
     assert mass.GetMassAttr().Get() == pytest.approx(held.mass)
     assert list(mass.GetCenterOfMassAttr().Get()) == pytest.approx(held.centre.tolist(), abs=1e-7)
     turn = mass.GetPrincipalAxesAttr().Get()
-    axes = turned(*turn.GetImaginary(), turn.GetReal())
+    axes = turned(turn)
     moments = np.array(list(mass.GetDiagonalInertiaAttr().Get()))
     assert axes * moments @ axes.T == pytest.approx(held.inertia, rel=1e-5, abs=1e-9)
     down = UsdPhysics.Scene(stage.GetPrimAtPath("/grasp/scene")).GetGravityDirectionAttr().Get()
@@ -174,7 +162,7 @@ def test_usd_reads_the_stage(path):
         joint = UsdPhysics.PrismaticJoint(stage.GetPrimAtPath(f"/grasp/close{f}"))
         for rotation, here in ((np.eye(3), joint.GetLocalRot0Attr()), (contact.rotation, joint.GetLocalRot1Attr())):
             q = here.Get()
-            rail = rotation @ turned(*q.GetImaginary(), q.GetReal())[:, 0]
+            rail = rotation @ turned(q)[:, 0]
             assert rail == pytest.approx(cell(grasp).closing * (1 if f == 1 else -1), abs=1e-6)
         pad = stage.GetPrimAtPath(f"/grasp/finger{f}/pad{f}")
         assert UsdPhysics.CollisionAPI(pad)
