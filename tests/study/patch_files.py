@@ -44,5 +44,5 @@ def vtk(path, points, cells, on_cells=(), on_points=(), kinds=None):
     for data, pairs in ((grid.cell_data, on_cells), (grid.point_data, on_points)):
         for name, values in pairs:
             data[name] = np.asarray(values)
-    grid.save(path)
+    grid.save(path, binary=False)
     return path
