@@ -78,10 +78,11 @@ def _on_segment(x, a, b, foot):
 
 
 @njit(cache=True)
-def _on_triangle(x, p, foot, other):
+def _on_triangle(x, p, most, foot, other):
     """Put the closest point of the triangle ``p (3, 3)`` into ``foot``; squared distance and feature.
 
-    Features: 0 the face, 1 to 3 the edges from corner 0, 1, 2 to the next one, 4 to 6 the corners.
+    Features: 0 the face, 1 to 3 the edges from corner 0, 1, 2 to the next one, 4 to 6 the corners. Infinite where the
+    triangle's plane is farther away than ``most``, squared.
     """
     ux, uy, uz = p[1, 0] - p[0, 0], p[1, 1] - p[0, 1], p[1, 2] - p[0, 2]
     vx, vy, vz = p[2, 0] - p[0, 0], p[2, 1] - p[0, 1], p[2, 2] - p[0, 2]
@@ -91,10 +92,13 @@ def _on_triangle(x, p, foot, other):
     size2 = max(ux * ux + uy * uy + uz * uz, vx * vx + vy * vy + vz * vz)
     # squared area over the fourth power of the size, below which a triangle is taken as its three edges
     if area2 > 1e-20 * size2 * size2:
+        h = (wx * nx + wy * ny + wz * nz) / area2
+        # by more than rounding, which decides between triangles that are as near as each other
+        if h * h * area2 > 1.000001 * most:
+            return np.inf, 0
         c = ((uy * wz - uz * wy) * nx + (uz * wx - ux * wz) * ny + (ux * wy - uy * wx) * nz) / area2
         b = ((wy * vz - wz * vy) * nx + (wz * vx - wx * vz) * ny + (wx * vy - wy * vx) * nz) / area2
         if b > 0.0 and c > 0.0 and b + c < 1.0:
-            h = (wx * nx + wy * ny + wz * nz) / area2
             foot[0], foot[1], foot[2] = x[0] - h * nx, x[1] - h * ny, x[2] - h * nz
             return h * h * area2, 0
     best, feature = np.inf, 0
@@ -116,7 +120,7 @@ def closest(x, corners, order, low, high, start, count):
     for i in range(n):
         best = np.inf
         if i > 0:  # points come in runs: the triangle of the one before is a good first guess
-            best, feature[i] = _on_triangle(x[i], corners[triangle[i - 1]], foot, other)
+            best, feature[i] = _on_triangle(x[i], corners[triangle[i - 1]], np.inf, foot, other)
             triangle[i] = triangle[i - 1]
             feet[i] = foot
         top, stack[0], bound[0] = 1, 0, 0.0
@@ -128,7 +132,7 @@ def closest(x, corners, order, low, high, start, count):
                 continue
             if count[node]:
                 for k in order[start[node] : start[node] + count[node]]:
-                    d2, kind = _on_triangle(x[i], corners[k], foot, other)
+                    d2, kind = _on_triangle(x[i], corners[k], best, foot, other)
                     if d2 < best:
                         best, triangle[i], feature[i] = d2, k, kind
                         feet[i] = foot
