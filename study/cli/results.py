@@ -1,4 +1,4 @@
-"""Commands that read whole result files, as tables and numbers."""
+"""Commands that read whole result files: as tables and numbers, as pages and pictures."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from argparse import Namespace
 from functools import partial
 from pathlib import Path
 
-from softjaw.study.messages import OTHER_FILE, USAGE, StudyError
+from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, USAGE, StudyError, beside, write_file
 from softjaw.study.result.index import index_path
 from softjaw.study.result.read import open
 from softjaw.study.result.store import open_result, torn_rows
@@ -15,9 +15,13 @@ from softjaw.study.show import objects
 from softjaw.study.show.best_grasps import best, best_text
 from softjaw.study.show.compare import compare as compared
 from softjaw.study.show.compare import compare_text
+from softjaw.study.show.grasps import judge
 from softjaw.study.show.watch import file_look
 from softjaw.study.show.watch import watch as watched
 from softjaw.study.table import rendered, terminal_width
+from softjaw.study.units import in_si
+
+ENDINGS = {"screenshot": (".png",), "html": (".html", ".htm")}
 
 
 def watch(options: Namespace) -> int:
@@ -44,6 +48,52 @@ def compare(options: Namespace) -> str:
     first, second = map(open, options.files)
     table = compared(first, second, options.quantity, options.model)
     return rendered(table, options.form) if options.form else compare_text(table, options.top, terminal_width())
+
+
+def choice(options: Namespace) -> tuple[int | None, tuple[float | None, float | None]]:
+    """Candidate, and station [m] and angle [rad], as far as they were given."""
+    station, angle = (*options.at, None, None)[:2]
+    return options.candidate, (in_si("station_mm", station), in_si("angle_deg", angle))
+
+
+def report(options: Namespace) -> str:
+    """Write one page with everything, of a file or of all objects of a folder."""
+    # loads plotly, which tables do not need
+    from softjaw.study.show.report.objects_page import write_objects_page
+    from softjaw.study.show.report.writing import write_report
+
+    if index := index_path(options.file):
+        return f"written: {write_objects_page(index, Path(options.output or index.with_suffix('.html')))}"
+    page = Path(options.output or Path(options.file).with_suffix(".html"))
+    return f"written: {write_report(Path(options.file), page, *choice(options))}"
+
+
+def view(options: Namespace) -> str:
+    """Write a result in three dimensions: a page, a picture, or both; by default a page beside the file."""
+    from softjaw.study.show.view import model, object3d, solids  # pyvista
+
+    if options.html is None and options.screenshot is None:
+        options.html = str(Path(options.file).with_suffix("")) + "-3d.html"
+    paths = {name: _target(options, name) for name in ENDINGS if getattr(options, name) is not None}
+    shown, index = model.view_of(judge(open(options.file)), *choice(options), options.force)
+    quantity = model.quantity_of(shown.ds, options.quantity)
+    if "screenshot" in paths:
+        with beside(paths["screenshot"]) as part:
+            solids.save_picture(shown, index, part, quantity, options.motion)
+    if "html" in paths:
+        write_file(paths["html"], object3d.view_page(shown, index, quantity, options.motion))
+    return "\n".join(f"written: {path}" for path in paths.values())
+
+
+def _target(options: Namespace, name: str) -> Path:
+    path, endings = Path(getattr(options, name)), ENDINGS[name]
+    if path.suffix.lower() not in endings:
+        raise StudyError(USAGE, f"--{name}: found '{path}', expected a file ending in {' or '.join(endings)}")
+    if path.resolve() == Path(options.file).resolve():
+        raise StudyError(USAGE, f"--{name}: {path} is the result file itself; choose another name")
+    if not path.parent.is_dir():
+        raise StudyError(CANNOT_WRITE, f"{path}: no folder {path.parent}; create it first")
+    return path
 
 
 def damage(options: Namespace, error: Exception) -> StudyError | None:
