@@ -1,7 +1,5 @@
 """What all tests share. Those marked ``ranks`` start mpirun themselves; none has to run under it."""
 
-from __future__ import annotations
-
 import os
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # before numpy: bits must not depend on the machine's cores

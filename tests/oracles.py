@@ -1,7 +1,5 @@
 """What tests of fits share: samples, volumes from hulls, quartics of plain least squares, the smallest curvature."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from softjaw.friction.motion import fibonacci_twists

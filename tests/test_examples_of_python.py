@@ -1,7 +1,5 @@
 """The scripts in jobs/examples: each runs from any folder, draws its picture, and finds what it says."""
 
-from __future__ import annotations
-
 import re
 import runpy
 import subprocess

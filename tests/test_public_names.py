@@ -1,7 +1,5 @@
 """``import softjaw``: its names, what it needs, and the example of each."""
 
-from __future__ import annotations
-
 import ast
 import doctest
 import importlib

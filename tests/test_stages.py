@@ -1,7 +1,5 @@
 """The tools of the tests: stages that never count as passed what fails, hangs or lacks a tool; mutations; kernels."""
 
-from __future__ import annotations
-
 import os
 import re
 import sys

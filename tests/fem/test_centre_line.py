@@ -1,7 +1,5 @@
 """Centre lines by closed forms: a bent tube, a mug with its handle, a straight bottle, a hole in the side."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import trimesh

@@ -3,8 +3,6 @@
 Each decision is put where it is hardest, on its limit, then turned, scaled and moved by a few ulp: the same each time.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 from types import SimpleNamespace
 
@@ -104,8 +102,6 @@ def volume(points, triangles):
     return np.einsum("ij,ij->", a, np.cross(b, c)) / 6
 
 
-# --- meshes -----------------------------------------------------------------------------------------------------------
-
 TWO_TURNED = CUBE[0], np.concatenate([CUBE[1][:2, ::-1], CUBE[1][2:]])
 MESHES = {  # and their volumes, 0 for what is no closed surface
     "closed": (CUBE, 1.0),
@@ -177,9 +173,6 @@ def test_a_box_of_whole_steps_has_as_many_cells(seed):
     assert region.coefficients.shape == tuple(4 * -(-(many + 6) // 4) + 1 + 2 * PADDING)
 
 
-# --- cuts through meshes ----------------------------------------------------------------------------------------------
-
-
 @tries
 @given(seeds)
 def test_a_cut_through_a_tip_is_empty(seed):
@@ -214,9 +207,6 @@ def test_a_fold_is_one_from_the_size_of_a_facet_on(seed):
     inner = moved(np.full((1, 4), 0.03), seed)
     outer = inner + facet * np.array([0.0, 0.99, 1.01, np.nan])
     assert folded(outer, inner, facet).tolist() == [[False, False, True, True]]
-
-
-# --- touch ------------------------------------------------------------------------------------------------------------
 
 
 def travel_past(shape, place, seed, reach=20.0):
@@ -280,9 +270,6 @@ def test_a_frame_is_one_up_to_rounding(seed):
         assert outcome(Pose, moved(R @ bent, seed), np.zeros(3)) is ValueError
 
 
-# --- states of a press ------------------------------------------------------------------------------------------------
-
-
 @tries
 @given(seeds)
 def test_a_node_bears_something_or_nothing(seed):
@@ -330,9 +317,6 @@ def test_a_point_is_closed_where_it_bears_something(seed):
     assert bearing(np.maximum(moved(pressure, seed), 0.0)).tolist() == [True] * 3 + [False] * 3
 
 
-# --- grids ------------------------------------------------------------------------------------------------------------
-
-
 @tries
 @given(seeds)
 def test_nodes_on_the_rim_of_the_support_are_held(seed):
@@ -374,8 +358,6 @@ def test_a_slope_of_the_thickness_at_an_end_adds_no_line(seed):
     marks = moved([*BODY.surface.wall, BODY.surface.wall[0]], seed)
     assert len(along(BODY.surface, COARSE, True, True, marks)) == len(LINES)
 
-
-# --- profiles ---------------------------------------------------------------------------------------------------------
 
 EGG = np.array([[0.0, 0.0], [0.02, 0.02], [0.05, 0.03], [0.08, 0.02], [0.1, 0.0]])
 PIECES = len(Revolution(EGG).curve.coefficients)
@@ -437,9 +419,6 @@ def test_an_end_of_the_wall_has_a_place_on_it(seed):
     assert outcome(BENT.station, high + 1e-8) is ValueError
 
 
-# --- symmetry ---------------------------------------------------------------------------------------------------------
-
-
 @tries
 @given(seeds)
 def test_sections_are_round_up_to_rounding(seed):
@@ -493,9 +472,6 @@ def test_semi_axes_that_are_equal_up_to_rounding_make_a_circle(seed):
     assert Box((a, b, c), 0.0).axis_symmetry == 4
 
 
-# --- walls ------------------------------------------------------------------------------------------------------------
-
-
 def cylinder(ends, seed=None):
     """Splines through points of a cylinder of radius 1, between two heights."""
     theta, s = np.linspace(0.0, 2 * np.pi, 25), np.linspace(*ends, 5)
@@ -534,9 +510,6 @@ def test_a_surface_ends_where_it_began(seed):
     X[-1] = 1e-6
     X[1:-1] = 1.0
     assert outcome(spline_surface, np.arange(5.0), np.arange(5.0), X, True) is ValueError
-
-
-# --- shapes -----------------------------------------------------------------------------------------------------------
 
 
 @tries

@@ -1,7 +1,5 @@
 """Splines of an outline against scipy's, which the program does without because loading them takes longer."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

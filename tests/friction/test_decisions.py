@@ -1,7 +1,5 @@
 """No decision about a patch hangs on rounding: rotations and changes of a few units in the last place change none."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The contact frame on the whole contact face of a pad: continuous over holes, exact on smooth surfaces."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Valid files made wrong: small edits of bytes, lines and numbers, as data that hypothesis can draw and shrink."""
 
-from __future__ import annotations
-
 import re
 
 from hypothesis import strategies as st

@@ -1,7 +1,5 @@
 """Mesh files that ask for more than they hold: huge counts, circles, doublings, bombs and other people's files."""
 
-from __future__ import annotations
-
 import json
 
 from tests.fuzz.readers import glb, gltf, gltf_tree, model_3mf, packed

@@ -1,7 +1,5 @@
 """Result files that lie: sound HDF5 whose contents are not what they seem. Each function spoils an open file."""
 
-from __future__ import annotations
-
 import json
 
 import h5py

@@ -1,7 +1,5 @@
 """What a file from elsewhere must not do: reach other files, give orders to a terminal or page, end the program."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import signal

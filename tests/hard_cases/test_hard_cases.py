@@ -1,7 +1,5 @@
 """Small scenes at the edges of what can be simulated come to what is right for them, and what is wrong is found."""
 
-from __future__ import annotations
-
 import re
 from types import SimpleNamespace
 

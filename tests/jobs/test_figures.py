@@ -1,7 +1,5 @@
 """The paper's figures: their table, what is drawn, and the trends that the README claims, on coarse meshes."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -112,8 +110,6 @@ def test_errors_on_the_paper_s_grid_are_those_of_the_reference():
     # the reference's quartic is fitted to the wrenches alone, ours to the motions, too
     assert 0.7 < found["fit_error"] / 0.0003705396009936843 < 1.0
 
-
-# --- the scenes themselves, on coarse meshes ---------------------------------------------------------------------
 
 PAD = ("gripper.elements=[12, 6, 4]", "accuracy.meshes=1")
 WALL = ("accuracy.wall_element_mm=3",)

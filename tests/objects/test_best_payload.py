@@ -1,7 +1,5 @@
 """The sampler's best grasp against a dense scan of the same object: `tests/tools/dense_scan.py` made the table."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

@@ -1,7 +1,5 @@
 """Stated errors against meshes finer in every direction, on random scenes of two seeds (docs/accuracy.md)."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

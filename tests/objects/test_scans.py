@@ -1,7 +1,5 @@
 """Scans of real objects, whole and spoiled: they load, and grasps are found on them."""
 
-from __future__ import annotations
-
 import pytest
 
 from softjaw.fem.objects.mesh_object import MeshObject

@@ -1,7 +1,5 @@
 """The survey of bad meshes and random scenes: what it makes, how it counts, and the parts of it that take seconds."""
 
-from __future__ import annotations
-
 from argparse import Namespace
 
 import numpy as np

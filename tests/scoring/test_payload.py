@@ -1,7 +1,5 @@
 """Payload of a gripper: closed forms, linear programmes over all points, and directions by brute force."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.optimize import linprog

@@ -76,7 +76,6 @@ def test_epsilon_is_the_least_support_of_the_grasp_wrench_space(epsilon, join, s
     middle, D = rng.uniform(-0.6, 0.6), rng.uniform(0.2, 2.0)
     arms = middle - D / 2, middle + D / 2
     exact = epsilon(*contacts, *arms)
-
     named = [[0, 0, 0, 1, 0, 0], *([0, 0, a, 0, 1, 0] for a in arms), *([0, a, 0, 0, 0, -1] for a in arms)]
     angle = np.linspace(-np.pi / 2, np.pi / 2, 20001)[:, None]
     reached = min(
@@ -84,7 +83,6 @@ def test_epsilon_is_the_least_support_of_the_grasp_wrench_space(epsilon, join, s
         for w in unit(np.array(named, dtype=float))
     )
     assert exact * (1 - 1e-12) <= reached <= exact + 2e-4
-
     found = unit(rng.normal(size=(50000, 6)))
     for spread in 0.5 ** np.arange(1, 30):
         best = found[support(found, contacts, arms, join).argsort()[:20]]

@@ -71,7 +71,6 @@ def main() -> int:
     os.environ["SOFTJAW"] = str(ROOT / ".venv" / "bin" / "softjaw")
     os.environ["MOST_RESTARTS"] = "100"  # on a busy machine a start may end before it has solved much
     file = Path("results") / f"{SCENE.stem}.hdf"
-
     for name in ("whole", "stopped", "killed"):
         shutil.rmtree(top / name, ignore_errors=True)
     whole = submitted(top / "whole", "--time=60")
@@ -86,7 +85,6 @@ def main() -> int:
     again = submitted(top / "killed", "--time=60")
     states.append(ended(again))
     report("again", again)
-
     expected = contents(top / "whole" / file)
     unlike = {name: differing(top / name / file, expected) for name in ("stopped", "killed")}
     for name, found in unlike.items():

@@ -8,8 +8,6 @@ bed of springs; the best of them, and as many others at random, are solved on a 
 these has its payload on the mesh of ``init``: the largest of many on a coarse one is large by chance, too.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import sys

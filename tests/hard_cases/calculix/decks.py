@@ -6,8 +6,6 @@ foam is ``*HYPERFOAM`` with alpha = -2, which is Blatz-Ko's law (as two equal te
 matrix for one), and the whole contact face slides freely on the plane: a displacement alone. Units are mm, N, MPa.
 """
 
-from __future__ import annotations
-
 import json
 import re
 import shutil
