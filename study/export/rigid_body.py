@@ -47,10 +47,7 @@ class RigidBody:
 def scene_of(ds: xr.Dataset, case: dict[str, Any]) -> Scene:
     """The scene of a case (`study.export.cases`), with its values of what is swept.
 
-    Raises
-    ------
-    StudyError
-        The file's scene is none of this version.
+    Raises `StudyError`: the file's scene is none of this version.
     """
     index = [int(np.flatnonzero(axis.values == case["place"][axis.name])[0]) for axis in axes_of(ds)[:-3]]
     try:
@@ -68,10 +65,7 @@ def _scene_at(text: str, index: tuple[int, ...]) -> Scene:
 def body_of(ds: xr.Dataset, case: dict[str, Any]) -> RigidBody:
     """The object of a case (`study.export.cases`).
 
-    Raises
-    ------
-    StudyError
-        The object cannot be built, as when its mesh is not there any more.
+    Raises `StudyError`: the object cannot be built, as when its mesh is not there any more.
     """
     scene = scene_of(ds, case)
     shape = scene.object

@@ -162,10 +162,7 @@ def gripper_frame(case: dict[str, Any], approach: str, closing: str, depth: floa
 def chosen(ds: xr.Dataset, choice: Selection) -> tuple[list[dict[str, Any]], list[str], str]:
     """Cases of the chosen grasps, the best first, the same in words, and the map that they are ranked by.
 
-    Raises
-    ------
-    StudyError
-        A force outside of the solved ones, or a map that the file does not have.
+    Raises `StudyError`: A force outside of the solved ones, or a map that the file does not have.
     """
     try:
         at, k, _ = at_level(ds, choice.force)

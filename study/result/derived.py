@@ -95,8 +95,6 @@ def crossing_error(forces: ArrayLike, values: ArrayLike, limit: float, stated: A
     the slope; the larger of those beside the crossing counts. NaN where no three values lie about the crossing, the one
     at no force counted.
 
-    Examples
-    --------
     >>> crossing_error([1.0, 2.0], [[1.0, 4.0]], 2.5).round(3).tolist()  # x^2, which passes at 1.581 and not at 1.5
     [0.083]
     >>> crossing_error([1.0, 2.0], [[1.0, 4.0]], 2.5, [[0.02, 0.03]]).round(3).tolist()  # 3 % of 2.5 over 3
@@ -127,8 +125,6 @@ def first_crossing(forces: ArrayLike, values: ArrayLike, limit: float) -> FloatA
 
     A solved value within `UNDECIDED` of the limit has passed it; what comes after a NaN is not used.
 
-    Examples
-    --------
     >>> first_crossing([1.0, 2.0], [[0.5, 1.5], [0.5, 0.9]], 1.0).tolist()
     [1.5, nan]
     """

@@ -52,10 +52,7 @@ def best(
     Between two solved forces values lie on straight lines. ``by`` names the map that grasps are ranked by. With
     ``lines`` images of one grasp share a row, and rows are counted.
 
-    Raises
-    ------
-    ValueError
-        For a force outside of the solved ones.
+    Raises `ValueError` for a force outside of the solved ones.
     """
     errors = values_of(ds, name) if (name := f"{aim(ds)[0]}_error") in ds else None
     known = errors is not None or "e_n_interval" not in ds
@@ -105,15 +102,9 @@ def summary(result: Any) -> str:
 def case_table(ds: xr.Dataset, cases: Iterable[Index], rank: bool = False, maps: Collection[str] = MAIN) -> Table:
     """Cases as rows: where they are, their maps with the errors that are known, their flags and notes.
 
-    Parameters
-    ----------
-    ds : xarray.Dataset
-        With flags as `study.ranking.judged` gives them.
-    cases : iterable of indices over the axes of ``status``
-    rank : bool
-        Whether the cases are the best ones in their order, all at one force.
-    maps : collection of str
-        Which maps a table has; the first ones are the last that a narrow text leaves out.
+    ``ds`` (xarray.Dataset): with flags as `study.ranking.judged` gives them. ``rank``: whether the cases are the best
+    ones in their order, all at one force. ``maps``: which maps a table has; the first ones are the last that a narrow
+    text leaves out.
     """
     axes, poses = axes_of(ds), ds.attrs["poses"]
     columns = [Column("rank"), Column("name")] if rank else [Column("name"), Column("state", wrap=NOTES_WIDTH)]
@@ -187,15 +178,8 @@ def certainty(ds: xr.Dataset, order: Sequence[int], score: str, k: int) -> str:
 def verdict(found: Sure | None, order: Sequence[int], place: Sequence[tuple[int, ...]], units: str = "") -> str:
     """One sentence on the best grasp against those that follow; empty where nothing is known of errors.
 
-    Parameters
-    ----------
-    found : Sure or None
-    order : sequence of int
-        The grasps from the best one downward; those that fail in the hand left out.
-    place : sequence of tuples of int
-        Of every grasp, what images by symmetry have in common.
-    units : str
-        Of the values, in SI.
+    ``order``: the grasps from the best one downward; those that fail in the hand left out. ``place``: of every grasp,
+    what images by symmetry have in common. ``units``: of the values, in SI.
     """
     if found is None:
         return ""

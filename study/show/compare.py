@@ -30,19 +30,9 @@ def compare(one: xr.Dataset, other: xr.Dataset, quantity: str = "e_n", model: st
     A difference exceeds the errors if it is larger than the sum of both: half-widths of intervals, or else errors of
     the mesh.
 
-    Parameters
-    ----------
-    one, other : xarray.Dataset
-        As `study.result.read.open` gives them.
-    quantity : str
-        Map to be listed case by case.
-    model : str
-        Friction model of all quantities.
-
-    Raises
-    ------
-    StudyError
-        Different kinds of axes, nothing in common, or an unknown quantity.
+    ``one, other`` (xarray.Dataset): as `study.result.read.open` gives them. ``quantity``: map to be listed case by
+    case. ``model``: friction model of all quantities. Raises `StudyError`: different kinds of axes, nothing in common,
+    or an unknown quantity.
     """
     pair = (one, other)
     axes, blocks = _matched(*pair)

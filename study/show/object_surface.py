@@ -41,10 +41,7 @@ class Foot(NamedTuple):
 def surface_of(scene: Any, axes: Any, feet: Iterable[Foot] = ()) -> Surface:
     """The surface of a scene's object, cut along its candidates' cells; with explicit poses below their ``feet``.
 
-    Raises
-    ------
-    ValueError, OSError
-        The object cannot be built, as when its mesh is not there.
+    Raises `ValueError, OSError`: the object cannot be built, as when its mesh is not there.
     """
     body = build_object(scene.object)
     points, triangles = surface_triangles(scene.object)

@@ -54,18 +54,9 @@ def lines(
 ) -> None:
     """One line for each friction model, with error bars on that of the CCM; lines without a finite value are left out.
 
-    Parameters
-    ----------
-    made : Figure
-        The figure that gets the lines.
-    x : (k,) array
-        Abscissas.
-    by_model : dict of (k,) arrays
-        Values of each model; NaN where there is none.
-    row, column : int
-        Panel, from 1.
-    errors : (k,) array, optional
-        Half lengths of the error bars.
+    ``made``: the figure that gets the lines. ``x`` (k,) array: abscissas. ``by_model`` (dict of (k,) arrays): values of
+    each model; NaN where there is none. ``row, column``: panel, from 1. ``errors`` (k,) array, optional: half lengths
+    of the error bars.
     """
     for model, y in by_model.items():
         if not np.isfinite(y).any():

@@ -138,16 +138,9 @@ def largest_error(
 ) -> str:
     """The largest stated error, how many are above a target that the scene names, and how many solved cases have none.
 
-    Parameters
-    ----------
-    errors : array over the cases
-        Relative errors; None where a file has none.
-    cases : Result or xarray.Dataset
-        Has ``status`` and ``scene``.
-    axes, labels
-        As `result.store.place_text` takes them.
-    mesh : array over the cases, optional
-        As `meshes` gives it; cases on the coarse mesh alone do not count.
+    ``errors`` (array over the cases): relative errors; None where a file has none. ``cases`` (Result or
+    xarray.Dataset): has ``status`` and ``scene``. ``axes, labels``: as `result.store.place_text` takes them. ``mesh``
+    (array over the cases, optional): as `meshes` gives it; cases on the coarse mesh alone do not count.
     """
     status, done = np.asarray(cases.status), np.asarray(cases.status) == DONE
     done = done if mesh is None else done & (np.asarray(mesh) > COARSE)

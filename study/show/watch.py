@@ -36,17 +36,10 @@ Look = Callable[[], tuple[list[str], int | None]]
 def watch(look: Look, every: float, stream: TextIO | None = None, sleep: Callable[[float], None] = time.sleep) -> int:
     """Look at a run until it ends; its exit code.
 
-    Parameters
-    ----------
-    look : callable
-        Gives lines, of which the first has the counts, and the exit code once the run has ended. Files are opened anew
-        for every look, so that a run never waits for its watchers.
-    every : float
-        Seconds between two looks.
-    stream : text stream
-        Where to write. On a terminal the lines are drawn over themselves, elsewhere new counts are a line.
-    sleep : callable
-        Waits for so many seconds.
+    ``look``: gives lines, of which the first has the counts, and the exit code once the run has ended. Files are opened
+    anew for every look, so that a run never waits for its watchers. ``every``: seconds between two looks. ``stream``:
+    where to write. On a terminal the lines are drawn over themselves, elsewhere new counts are a line. ``sleep``: waits
+    for so many seconds.
     """
     # Titles and messages are the user's text: brackets in them are no markup.
     console = Console(file=stream or sys.stdout, markup=False, emoji=False, highlight=False)

@@ -28,10 +28,7 @@ AMBIENT = 0.45  # share of the light that comes from everywhere
 def write_objects_page(index: Path, out: Path) -> Path:
     """Write one page on all objects of a folder; the path that was written.
 
-    Raises
-    ------
-    StudyError
-        The index cannot be read, or the page cannot be written.
+    Raises `StudyError`: the index cannot be read, or the page cannot be written.
     """
     rows, about = read_index(index)
     table = index_table(index)

@@ -35,10 +35,7 @@ def write_report(file: Path, out: Path, candidate: int | None = None, place: Pla
     A candidate, counted over stations and angles, or the one nearest to a ``place`` (station [m], angle [rad]) is shown
     beside the best one.
 
-    Raises
-    ------
-    StudyError
-        If ``file`` is no result file or has no such candidate, or ``out`` cannot be written.
+    Raises `StudyError` if ``file`` is no result file or has no such candidate, or ``out`` cannot be written.
     """
     # A report must never write over the result that it is made from.
     if Path(file).resolve() == Path(out).resolve():

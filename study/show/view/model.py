@@ -227,10 +227,7 @@ def view_of(ds: xr.Dataset, candidate: int | None, where: Place, force: float | 
 
     ``where`` is a station [m] and an angle [rad]; the nearest of the file are taken, as for the force [N].
 
-    Raises
-    ------
-    StudyError
-        For a candidate that the file does not have, or a station far outside of the map.
+    Raises `StudyError` for a candidate that the file does not have, or a station far outside of the map.
     """
     k = ds.attrs["level"] if force is None else nearest(forces(ds), force)
     shape = ds.status.shape
@@ -279,10 +276,7 @@ def maps_of(ds: xr.Dataset) -> list[str]:
 def quantity_of(ds: xr.Dataset, name: str | None) -> str:
     """A map of the study by its name; by default the one that grasps are ranked by.
 
-    Raises
-    ------
-    StudyError
-        If there is no such map with a value.
+    Raises `StudyError` if there is no such map with a value.
     """
     names = maps_of(ds)
     if name is None or name in names:

@@ -184,10 +184,7 @@ def write_vtk(ds: xr.Dataset, path: Path, force: float | None = None) -> Path:
     finger and candidate. Positions are in the frame of the object's own file [m]. Of a sweep the first point is
     written. An object with a thin wall has the displacement of the best case, at ``force`` [N] if it is given.
 
-    Raises
-    ------
-    StudyError
-        The ending is another, the file cannot be written, or the object cannot be drawn.
+    Raises `StudyError`: the ending is another, the file cannot be written, or the object cannot be drawn.
     """
     if path.suffix.lower() not in ENDINGS:
         raise StudyError(USAGE, f"-o: found '{path}', expected a file ending in {' or '.join(ENDINGS)}")
