@@ -126,10 +126,7 @@ def beside(path: Path, folders: bool = False) -> Iterator[Path]:
 
     Devices and pipes are written to as they are.
 
-    Raises
-    ------
-    StudyError
-        If the file cannot be written, with exit code 5.
+    Raises `StudyError` if the file cannot be written, with exit code 5.
     """
     special = path.exists() and not path.is_file() and not path.is_dir()
     part = path if special else path.with_name(f"{path.stem}.{os.getpid()}.part{path.suffix}")

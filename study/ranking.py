@@ -112,12 +112,8 @@ def passed_over(score: np.ndarray, flags: np.ndarray) -> tuple[list[int], str]:
 class Sure:
     """Values of some grasps and how far off they may be.
 
-    Attributes
-    ----------
-    value, error : (n,) arrays
-        ``error`` is the stated one; NaN where it is not known.
-    samples : (n, m) array
-        Values with samples of the uncertain inputs, the same for all grasps; none where no input is uncertain.
+    ``value, error`` (n,) arrays: ``error`` is the stated one; NaN where it is not known. ``samples`` (n, m) array:
+    values with samples of the uncertain inputs, the same for all grasps; none where no input is uncertain.
     """
 
     value: FloatArray
@@ -161,10 +157,7 @@ def sure(ds: xr.Dataset, name: str, k: int) -> Sure | None:
 def score_of(ds: xr.Dataset, by: str | None = None) -> str:
     """What grasps are ranked by: what is named, else payload; quality or e_n where a file has no value of it.
 
-    Raises
-    ------
-    ValueError
-        For the least force where the scene names no mass.
+    Raises `ValueError` for the least force where the scene names no mass.
     """
     if by == LEAST_FORCE:
         if "force_low" not in ds:
@@ -260,10 +253,7 @@ def at_level(ds: Any, force: float | None = None) -> tuple[Any, int, str]:
 
     Between two solved forces values lie on straight lines; without a force it is the one of `shown_level`.
 
-    Raises
-    ------
-    ValueError
-        For a force outside of the solved ones.
+    Raises `ValueError` for a force outside of the solved ones.
     """
     forces = ds["normal_force"].values
     if force is None:
@@ -283,11 +273,7 @@ def shown_level(ds: Any, flags: np.ndarray) -> tuple[int, str]:
     Where the object's mass is known the lowest at which a grasp holds it and does no harm; else the highest that most
     of the solved candidates reached, or that some wall bears.
 
-    Parameters
-    ----------
-    ds : xarray.Dataset
-    flags : array of int
-        As `judged` gives them.
+    ``flags``: as `judged` gives them.
     """
     forces, done = ds["normal_force"].values, ds["status"].values == DONE
     usable = np.flatnonzero(((flags & LOST == 0) & done).reshape(-1, len(forces)).any(axis=0))
