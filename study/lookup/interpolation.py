@@ -22,8 +22,6 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 CLAIM_FACTOR = 2.0  # between estimate and claim: with less, less than 95 % of the errors stay within it
 CLOSING_GAP_RATIO = 1.5  # a gap that closes a circle may be this much wider than the others
-
-
 UPPER = np.array(list(np.ndindex(2, 2, 2)))  # which corners of a cell are its upper ones, along each axis
 
 
@@ -32,8 +30,7 @@ class Nodes:
     """Nodes of one axis: coordinates ``x (k,)``, rising, and where their values stand along the file's axis.
 
     A periodic axis brings coordinates into ``[x_0, x_0 + period)`` first; with ``half_turn`` every odd multiple of the
-    period exchanges the fingers, and ``swapped (k,)`` tells whose values have to be exchanged. Between the nodes of an
-    ``exact`` axis there is nothing.
+    period exchanges the fingers, for nodes as ``swapped (k,)``. Between nodes of an ``exact`` axis there is nothing.
     """
 
     name: str

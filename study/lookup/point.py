@@ -148,20 +148,9 @@ class GraspPoint:
     def limit_surface(self, finger: int, model: str = "ccm", fitted: bool = True) -> LimitSurface:
         """Limit surface of finger 1 or 2 in (f_x, f_y, tau_z) [N, N, N m], with ``support``, ``holds`` and the rest.
 
-        Between the cases the coefficients are interpolated: a mean of convex forms is convex, so the surface is.
-
-        Parameters
-        ----------
-        finger : 1 or 2
-        model : str
-            Friction model.
-        fitted : bool
-            The surface that the scene's ``[limit_surface]`` asks for; else the ellipsoid from three motions.
-
-        Raises
-        ------
-        ValueError
-            No value here, several points, or no fitted surface in all of the cases around.
+        It is the one that the scene's ``[limit_surface]`` asks for, or the ellipsoid from three motions where not
+        ``fitted``. Between the cases the coefficients are interpolated: a mean of convex forms is convex. `ValueError`
+        where there is no value, of several points, and where not all cases around have a fitted surface.
         """
         # compiled loops, which a look-up does without until a surface is asked for
         from softjaw.study.case.limit_surface import finger_surface

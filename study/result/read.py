@@ -101,21 +101,9 @@ def read_patch(file: str | Path, **at: int | slice) -> xr.Dataset:
 
 
 def read_field(file: str | Path, path: str, **at: int | slice) -> xr.DataArray:
-    """One of the large datasets that `open` leaves out: ``wall/place``, ``wrenches/wrench``.
+    """One of the large datasets that `open` leaves out (``wall/place``, ``wrenches/wrench``), at positions.
 
-    Parameters
-    ----------
-    file, at
-        As in `read_patch`.
-    path : str
-        Dataset below ``/study``.
-
-    Raises
-    ------
-    KeyError
-        The file has no such dataset.
-    StudyError
-        The file cannot be read or is damaged.
+    ``at`` is as in `read_patch`; `KeyError` if the file has no such dataset.
     """
     with open_result(file) as result:
         q = next((q for q in result.layout.quantities if q.key == path), None)

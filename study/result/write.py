@@ -29,9 +29,8 @@ NOT_FINER = "on a finer mesh it was not solved: "
 class ResultWriter:
     """A result file open on all ranks of ``comm``; opening and closing are collective, everything else is not.
 
-    With ``comm = None`` this process has it alone and needs no MPI; nor does a single rank. ``wanted (rows,)`` is the
-    finest mesh of every row: one that is stored from a coarser mesh counts as missing, and keeps its values until
-    those of the finer mesh replace them.
+    With ``comm = None`` this process has it alone and needs no MPI; nor does a single rank. A row that is stored from a
+    coarser mesh than ``wanted (rows,)`` counts as missing; it keeps its values until those of the finer one are there.
     """
 
     def __init__(self, path: Path, layout: Layout, comm: Any, wanted: np.ndarray | None = None) -> None:
