@@ -102,8 +102,8 @@ def _result(
     if coarse:
         other = _state_values(coarse)
         values |= mesh_errors(
-            contacts, coarse.contacts, values, other, settings, coarse.views, solved.weight, solved.pairs_of_contacts,
-            solved.floor + choice.skipped_share(k),
+            contacts, coarse.contacts, values, other, settings, coarse.views, solved.pairs_of_contacts,
+            solved.floor, choice.skipped_share(k),
         )  # fmt: skip
         # only where every case has a target: without one the sums at the end say how many cases miss the usual one
         if (target := scene.accuracy.target) is not None and not unit.finest:

@@ -21,7 +21,7 @@ from softjaw.fem.objects.gap import Pose
 from softjaw.fem.petsc import Seconds
 from softjaw.study.case.build import build_object, forces_apart, has_wall, pad_elements
 from softjaw.study.case.contact import Contact
-from softjaw.study.case.errors import OF_FINER_MESHES, OF_MESHES, edge_floor, error_of
+from softjaw.study.case.errors import edge_floor, error_of
 from softjaw.study.case.evaluate import settings_of
 from softjaw.study.case.model import approach
 from softjaw.study.case.pressing import OnRigid, OnWall, PressedContact, pressing, refuse_along_axis
@@ -101,11 +101,6 @@ class Solved:
     def floor(self) -> float:
         """Share of a value that meshes can agree on by luck."""
         return edge_floor(self.fine.contacts, self.fine.contacts[0].state.pad.shape.per_side ** 2)
-
-    @property
-    def weight(self) -> float:
-        """Weight of the difference between these two in the error."""
-        return OF_MESHES if self.fine.mesh == FINE else OF_FINER_MESHES
 
 
 def followed(
@@ -219,7 +214,7 @@ class CandidateSolver:
             return math.nan
         settings = settings_of(self.scene, build_object(self.scene.object))
         pairs, floor = solved.pairs_of_contacts, solved.floor
-        return error_of(name, fine.contacts, coarse.contacts, coarse.views, settings, solved.weight, pairs, floor)
+        return error_of(name, fine.contacts, coarse.contacts, coarse.views, settings, pairs, floor)
 
     def _refined(self, solved: Solved, k: int, levels: Levels) -> Solved:
         """The case as it is where its error is surely below the target, else on further meshes.

@@ -50,7 +50,7 @@ def payload_values(
     """Maps of what the grasp holds, one value for each friction model, and whether it holds itself (curved model).
 
     The friction of a finger is the hull of the sampled wrenches, which lies inside the exact limit surface: what is
-    found errs on the safe side, by about 1 % with 500 samples.
+    found errs on the safe side, with 500 samples by 2 % (median of 40 grasps) to 4 % (one in ten is farther off).
     """
     payloads = [_payload(contacts, [fit[m].wrench for fit in fits], task) for m in MODELS]
     mass = np.array([f.force for f in payloads]) / GRAVITY

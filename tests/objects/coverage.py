@@ -4,7 +4,7 @@
     python -m tests.objects.coverage --table rows.csv
 
 A row is a quantity of a case: family, friction acting back or not, true relative error, stated one. A reference has
-`FINER` times the elements in each direction and its own load path; thin walls also have smaller elements of the wall.
+twice the elements in each direction, those of a thin wall included, and its own load path.
 """
 
 from __future__ import annotations
@@ -20,67 +20,85 @@ import numpy as np
 from softjaw.study import pipeline
 from softjaw.study.case.build import build_object
 from softjaw.study.case.candidates import units
-from softjaw.study.case.result import CaseFailure
-from softjaw.study.quantities import BY_KEY
+from softjaw.study.case.effects import COUPLING
+from softjaw.study.case.result import CaseFailure, CaseResult
 from softjaw.study.scene import Scene
-from tests.objects.random_scenes import number, outline, random_scene
+from tests.objects.random_scenes import (
+    ball,
+    box,
+    cone,
+    ellipse,
+    forces,
+    gripper,
+    number,
+    outline,
+    places,
+    stacked,
+    superellipse,
+)
 
-FINER = 1.6
 QUANTITIES = ("payload", "quality", "e_n", "f_x_max", "tau_z_max", "closing", "contact_area", "p_max")
-FAMILIES = {"outline": "revolution", "cone": "revolution", "ball": "revolution", "ellipse": "cylinder", "box": "box",
-            "superellipse": "cylinder", "stacked": "sections", "mesh": "mesh", "wall": "thin wall"}  # fmt: skip
+SHAPES = {"revolution": (outline, cone, ball), "cylinder": (ellipse, superellipse, stacked), "box": (box,)}
+FAMILIES = (*SHAPES, "mesh", "thin wall")
 ROOT = Path(__file__).resolve().parents[2]
 HEADER = ("scene", "family", "friction", "force", "quantity", "true", "stated")
 
 
 def scene_tables(seed: int, k: int) -> tuple[str, dict]:
-    """Every sixth scene is a mesh from a file, every other sixth a thin wall, the rest are random shapes."""
-    kind, tables = random_scene(seed, k)
-    tables |= {"accuracy": {"meshes": 2}, "limit_surface": {"model": "three_motions"}}
-    rng = np.random.default_rng([seed, k, 1])
-    if k % 6 == 4:
-        place = {"stations_mm": [number(rng.uniform(35, 85))], "angles_deg": [number(rng.uniform(0, 90))]}
-        mesh = {"shape": "mesh", "mesh": str(ROOT / "jobs" / "objects" / "flask.stl"), "unit": "mm", "axis": "z"}
-        return "mesh", tables | {"object": mesh, "candidates": place}
-    if k % 6 == 5:
-        body = outline(rng)
-        height = body["profile_mm"][-1][0]
-        tables["load"] = {"normal_force_n": [number(rng.uniform(1.0, 3.0))]}
-        place = {"stations_mm": [number(height * rng.uniform(0.3, 0.7))], "angles_deg": [0]}
-        return "wall", tables | {"object": body | {"wall_mm": number(rng.uniform(0.4, 1.0))}, "candidates": place}
-    tables["load"]["normal_force_n"] = tables["load"]["normal_force_n"][1:]
-    return kind, tables
+    """Family and tables of the ``k``-th scene of a seed: one grasp at one force on a small mesh."""
+    family, rng = FAMILIES[k % len(FAMILIES)], np.random.default_rng([seed, k, 31])
+    pads = gripper(rng) | {"elements": [int(2 * rng.integers(4, 6)), 6, 3]}
+    tables = {
+        "gripper": pads, "friction": {"mu": number(rng.uniform(0.15, 1.1))}, "accuracy": {"meshes": 2},
+        "limit_surface": {"model": "three_motions"}, "run": {"patches": "none"},
+    }  # fmt: skip
+    force = forces(rng, pads)[int(rng.integers(0, 3))]
+    if family == "mesh":
+        name, low, high = (("flask", 35, 85), ("mug", 30, 80))[rng.integers(0, 2)]
+        mesh = str(ROOT / "jobs" / "objects" / f"{name}.stl")
+        tables["object"] = {"shape": "mesh", "mesh": mesh, "unit": "mm", "axis": "z"}
+        place = {"stations_mm": [number(rng.uniform(low, high))], "angles_deg": [number(rng.uniform(0, 90))]}
+    elif family == "thin wall":
+        body = (outline, cone)[rng.integers(0, 2)](rng)
+        tables["object"] = body | {"wall_mm": number(rng.uniform(0.4, 1.0))}
+        tables["accuracy"]["wall_element_mm"] = 2.0
+        place = {"stations_mm": [number(body["profile_mm"][-1][0] * rng.uniform(0.3, 0.7))], "angles_deg": [0]}
+        force = number(min(force, rng.uniform(0.5, 3)))
+    else:
+        tables["object"] = SHAPES[family][rng.integers(0, len(SHAPES[family]))](rng)
+        place = places(rng, tables["object"], pads)
+    return family, tables | {"candidates": place, "load": {"normal_force_n": [force]}}
 
 
 def finer(tables: dict) -> dict:
-    """The scene with more elements in every direction, even ones along both sides as on the default mesh."""
-    elements = [2 * round(FINER * n / 2) for n in tables["gripper"]["elements"][:2]]
-    elements.append(int(np.ceil(FINER * tables["gripper"]["elements"][2])))
-    accuracy = {"meshes": 1} | ({"wall_element_mm": 1.0} if "wall_mm" in tables["object"] else {})
-    return tables | {"gripper": tables["gripper"] | {"elements": elements}, "accuracy": accuracy}
+    """The scene on one mesh with twice the elements in every direction, those of a wall included."""
+    elements = [2 * n for n in tables["gripper"]["elements"]]
+    wall = {key: value / 2 for key, value in tables["accuracy"].items() if key == "wall_element_mm"}
+    return tables | {"gripper": tables["gripper"] | {"elements": elements}, "accuracy": {"meshes": 1, **wall}}
 
 
-def solved(tables: dict, **effects: str) -> dict:
-    """Results of the scene's one candidate by force."""
-    scene = Scene.of_tables(tables | {"effects": effects})
+def solved(tables: dict, coupling: str) -> CaseResult | CaseFailure:
+    """Result of the scene's one case."""
+    scene = Scene.of_tables(tables | {"effects": {"friction_pressure_coupling": coupling}})
     unit = units(scene, lambda point: build_object(point.object).axis_symmetry)[0]
-    return dict(pipeline.solve_unit(unit))
+    return dict(pipeline.solve_unit(unit))[0]
 
 
 def rows(seed: int, k: int) -> Iterator[tuple]:
-    """Comparisons of one scene; the reference has friction acting back wherever a user could have it."""
-    kind, tables = scene_tables(seed, k)
-    default, reference = solved(tables), solved(finer(tables), friction_pressure_coupling="tangential")
-    for i, force in enumerate(tables["load"]["normal_force_n"]):
-        if isinstance(default[i], CaseFailure) or isinstance(reference[i], CaseFailure):
+    """Comparisons of one scene without friction acting back, and with it as `auto` takes it or leaves it out."""
+    family, tables = scene_tables(seed, k)
+    for wanted, truth in (("none", "none"), ("auto", "tangential")):
+        default, reference = solved(tables, wanted), solved(finer(tables), truth)
+        if isinstance(default, CaseFailure) or isinstance(reference, CaseFailure):
             continue
-        values, truth = default[i].values, reference[i].values
-        level = default[i].effects["friction_pressure_coupling"].level
+        acting = "left out" if default.effects[COUPLING].level == "none" else "acting back"
+        level = "off" if wanted == "none" else acting
         for name in QUANTITIES:
-            error = values.get(f"maps/{name}_error", np.nan)
-            value, true = (float(np.ravel(each[f"maps/{name}"])[0]) for each in (values, truth))
-            assert BY_KEY[f"maps/{name}"].error == "relative"
-            yield f"{seed}/{k}", FAMILIES[kind], level, force, name, abs(true / value - 1.0), error
+            error = default.values.get(f"maps/{name}_error", np.nan)
+            value, true = (float(np.ravel(each.values[f"maps/{name}"])[0]) for each in (default, reference))
+            if value:
+                force = tables["load"]["normal_force_n"][0]
+                yield f"{seed}/{k}", family, level, force, name, abs(true / value - 1.0), error
 
 
 def table(lines: list[dict[str, str]], by: str = "friction") -> str:

@@ -3,13 +3,12 @@
 import numpy as np
 import pytest
 
-from tests.objects.coverage import HEADER, rows, scene_tables, table
+from tests.objects.coverage import FAMILIES, HEADER, rows, scene_tables, table
 
 
 def test_every_family_is_among_the_scenes():
-    kinds = [scene_tables(1, k)[0] for k in range(24)]
-    assert {"mesh", "wall"} < set(kinds)
-    assert len(set(kinds)) > 6
+    kinds = [scene_tables(1, k)[0] for k in range(10)]
+    assert [kinds.count(family) for family in FAMILIES] == [2] * 5
 
 
 def test_a_table_counts_what_is_covered():
@@ -21,8 +20,8 @@ def test_a_table_counts_what_is_covered():
 @pytest.mark.long
 @pytest.mark.parametrize("seed", [1, 2])
 def test_nine_of_ten_errors_are_inside_the_stated_ones_and_these_are_not_far_too_large(seed):
-    """A dozen scenes leave 0.95 uncertain by some hundredths."""
-    found = [row for k in range(12) for row in rows(seed, k)]
+    """Ten scenes leave 0.95 uncertain by some hundredths."""
+    found = [row for k in range(200, 210) for row in rows(seed, k)]
     true, stated = np.array([row[-2:] for row in found], float).T
     known = np.isfinite(stated)
     assert known.mean() > 0.9
