@@ -276,14 +276,15 @@ def _refined(C, V1, V2, kind, rows, points, bases, n, upper, u):
 
     The nearest facet's normal is looked along until the bounds are as close as `BOUND_GAP`.
     """
-    facets, planes = np.zeros((2 * MOST_POINTS, 3), np.int64), np.zeros((2 * MOST_POINTS, 4))
+    # A closed hull has fewer than two facets a point; one more point can leave three times as many where it is not.
+    facets, planes = np.zeros((6 * MOST_POINTS, 3), np.int64), np.zeros((6 * MOST_POINTS, 4))
     count = _tetrahedron(points[:n], facets, planes)
     for i in range(n):
         count = _added(points, i, facets, planes, count)
     while True:
         nearest = np.argmin(planes[:count, 3])
         lower = planes[nearest, 3]
-        if n == MOST_POINTS or upper < ROUNDING_FORCE or lower >= upper * (1.0 - BOUND_GAP):
+        if n == MOST_POINTS or count > 2 * n or upper < ROUNDING_FORCE or lower >= upper * (1.0 - BOUND_GAP):
             return lower, upper, u
         normal, along = planes[nearest, :3].copy(), np.zeros(6)
         along[:3] = normal
