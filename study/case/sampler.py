@@ -148,8 +148,12 @@ def antipodal_grasps(
     seen: list[SampledGrasp] = []
     over_holes: list[SampledGrasp] = []
     starts: list[JawsOnSurface] = []
+    offered: list[SampledGrasp] = []
     for place, normal in sampled(corners, normals, samples, seed):
         try:
+            aimed = JawsOnSurface((points, triangles), place, axes_of(-normal, axis), jaws)
+            if state := state_of(aimed):
+                offered.append(SampledGrasp(aimed.point, aimed.axes[:, 2], aimed.axes[:, 0], aimed.opening, 0.0, state))
             start = straightened((points, triangles), place, axes_of(-normal, axis), jaws)
             if any(same_place(start, other) for other in starts):
                 continue
@@ -165,6 +169,7 @@ def antipodal_grasps(
     seen = seen if any(not grasp.state for grasp in seen) else [*seen, *over_holes]
     best = [grasp for grasp in thinned(seen, count, jaws.pad[0]) if not grasp.state]
     seen += [climbed((points, triangles), grasp, jaws, task, lids) for grasp in best]
+    seen += offered
     return thinned(seen, count, jaws.pad[0])
 
 
@@ -219,12 +224,15 @@ def longest_axis(corners: FloatArray, area: FloatArray) -> FloatArray:
     return axis * (1.0 if axis[np.argmax(np.abs(axis))] > 0 else -1.0)
 
 
+def state_of(grip: JawsOnSurface) -> int:
+    """Why a grasp is not worth a solve, or `MISSING`."""
+    state, _ = fit_of(grip.local, grip.triangles, grip.jaws)
+    return int(state or (SLIPS if slips(grip.misalignment[1], grip.jaws.mu) else MISSING))
+
+
 def judged(grip: JawsOnSurface, task: Task) -> SampledGrasp:
     """State of a grasp on a bed of springs, with its payload there."""
-    _, line = grip.misalignment
-    state, _ = fit_of(grip.local, grip.triangles, grip.jaws)
-    if not state and slips(line, grip.jaws.mu):
-        state = SLIPS
+    state = state_of(grip)
     inward = 1.0 - min(grip.on_edges, EDGE_COST)
     worth = 0.0 if state else grip.peak * inward * held(grip.contacts, task)
     return SampledGrasp(grip.point, grip.axes[:, 2], grip.axes[:, 0], grip.opening, worth, state)
@@ -294,6 +302,8 @@ def with_sampled_grasps(scene: Scene) -> Scene:
     kept = {key: getattr(given, key) for key in OF_EVERY_KIND}
     # how many were asked for stays, which tells that they are screened
     where = Candidates(poses=poses, **kept).model_copy(update={"sampled": given.sampled})
+    bad = ((_as_pose(grasp, placed), grasp.state) for grasp in found if grasp.state)
+    where._rejected = tuple((*pose.point_mm, *pose.approach, *pose.long_side, state) for pose, state in bad)
     parts: dict[str, Any] = {"candidates": where}
     if forces_apart(scene) and scene.accuracy.target is None:
         parts["accuracy"] = scene.accuracy.model_copy(update={"target": LISTED_TARGET})

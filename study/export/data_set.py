@@ -1,7 +1,8 @@
 """A folder of objects as one data set to learn from: every grasp with its label, in three formats.
 
 A grasp is a candidate at one normal force. It is successful where it holds and does no harm (flags); the others, and
-those that are too wide, collide or slip before any solve, are the unsuccessful ones. What did not converge is left out.
+those that are too wide, collide or slip before any solve, are the unsuccessful ones. So are the grasps that a sampler
+offered and rejected, which have no force. ``state`` says which is which. What did not converge is left out.
 All formats hold the same arrays, SI units, in the frame of the object's own file, whose coordinates times ``scale`` are
 metres. An object's name decides its split, so that a data set that grows keeps its splits.
 """
@@ -17,6 +18,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -27,11 +29,12 @@ from softjaw.study.export.cases import MEANING, cases
 from softjaw.study.export.selection import GripperFrame, gripper_frame, holds
 from softjaw.study.flags import LOST
 from softjaw.study.messages import USAGE, StudyError, beside, write_file
-from softjaw.study.quantities import DONE, NO_GRASP
+from softjaw.study.quantities import DONE, NO_GRASP, STATES
 from softjaw.study.ranking import judged, task_keys
 from softjaw.study.result.index import read_index, write_arrays
 from softjaw.study.result.read import maps_in, open
 from softjaw.study.scene import parse_scene
+from softjaw.study.scene.grasps import GraspPose
 from softjaw.study.table import plain
 from softjaw.study.units import UNITS
 
@@ -91,7 +94,7 @@ def write_data_set(index: Path, out: Path, form: str, gripper: GripperFrame) -> 
         write_file(out / "splits" / f"{split}.txt", "".join(f"{file}\n" for file in files), folders=True)
     about = {"format": form, "grasps": whole, "successful": good, "splits": {k: len(v) for k, v in listed.items()},
              "gripper": {"name": gripper.hand.frame, "approach_axis": "z", "closing_axis": gripper.along},
-             "units": _units(), "meaning": MEANING,
+             "units": _units(), "meaning": MEANING, "states": STATES,
              "object_in_gripper": "holds, does no harm, and this gripper can take it"}
     write_file(out / "data-set.json", json.dumps(about, indent=1))
     counts = " and ".join(f"{len(files)} for {split}" for split, files in listed.items())
@@ -193,8 +196,8 @@ def grasp_arrays(ds: xr.Dataset, gripper: GripperFrame) -> Arrays:
     refused = [at for at in refused if at[-3] < len(poses)]
     listed = list(cases(ds, "ccm", [*solved, *refused]))
     for case, at in zip(listed[len(solved) :], refused, strict=True):
-        for finger, pose in zip(case["fingers"], poses[at[-3]], strict=True):
-            finger |= {"pose_origin": pose.origin, "pose_rotation": pose.rotation}
+        _placed(case, poses[at[-3]])
+    listed += [_offered(listed[0], row) for row in ds.attrs["rejected"] if listed]
     transforms, success = np.tile(np.eye(4), (len(listed), 1, 1)), np.zeros(len(listed), bool)
     for i, case in enumerate(listed):
         approach, depth = "minus-x", gripper.hand.depth(gripper.hand.stroke_mm / 1e3)
@@ -205,6 +208,7 @@ def grasp_arrays(ds: xr.Dataset, gripper: GripperFrame) -> Arrays:
         transforms[i, :3, :3], transforms[i, :3, 3] = gripper_frame(case, approach, gripper.along, depth)
     arrays = {"transforms": transforms, "object_in_gripper": success}
     arrays["force"] = np.array([case["place"]["normal_force"] for case in listed], float)
+    arrays["state"] = np.array([STATES.index(case["state"]) for case in listed], np.int64)
     arrays["flags"] = np.array([case["flags"] for case in listed], np.int64)
     known = maps_in(ds)
     for name in (n for q in MAPS for n in (q, f"{q}_error") if n in known):
@@ -212,6 +216,21 @@ def grasp_arrays(ds: xr.Dataset, gripper: GripperFrame) -> Arrays:
     for name in SURFACE:
         arrays[name] = np.array([[finger[name] for finger in case["fingers"]] for case in listed], float)
     return arrays
+
+
+def _placed(case: dict[str, Any], poses: tuple[Pose, Pose]) -> None:
+    for finger, pose in zip(case["fingers"], poses, strict=True):
+        finger |= {"pose_origin": pose.origin, "pose_rotation": pose.rotation}
+
+
+def _offered(like: dict[str, Any], row: np.ndarray) -> dict[str, Any]:
+    """A grasp that the sampler offered and rejected, with the keys of another case and nothing known."""
+    values = row.astype(float)
+    pose = GraspPose(point_mm=tuple(values[:3]), approach=tuple(values[3:6]), long_side=tuple(values[6:9]))
+    fingers = [{name: np.full_like(value, np.nan, dtype=float) for name, value in f.items()} for f in like["fingers"]]
+    case = {"place": {"normal_force": np.nan}, "state": STATES[int(row[9])], "flags": 0, "fingers": fingers}
+    _placed(case, explicit_poses(pose, Pose(np.eye(3), np.zeros(3))))
+    return case | {"maps": dict.fromkeys(like["maps"], np.nan)}
 
 
 def _poses(ds: xr.Dataset) -> list[tuple[Pose, Pose]]:

@@ -25,7 +25,7 @@ OF_STATE = {state: zlib.crc32(bytes([state])) for state in range(len(STATES))}
 # What a byte does to a running CRC-32, by the byte and the last eight bits of the sum.
 STEP = ~np.array([zlib.crc32(bytes([i ^ 0xFF])) for i in range(256)], np.uint32) ^ np.uint32(0x00FFFFFF)
 ABOUT = {"axes": ("units", "long_name", "scene_key"), "scene": ("digest", "file", "overrides", "petsc_options")}
-PLACED = ("object_rotation", "object_origin")
+PLACED = ("object_rotation", "object_origin", "rejected")
 
 
 def of_array(values: Any) -> int:

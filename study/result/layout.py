@@ -49,6 +49,7 @@ class Header:
     """What a file says about the scene it was made from; ``labels`` name the candidates in row order.
 
     ``placed`` is rotation and origin of the frame of stations and angles in that of the poses, the object's own file.
+    ``rejected`` are the grasps that a sampler offered and rejected: point [mm], approach, long side, state.
     """
 
     digest: str
@@ -59,6 +60,7 @@ class Header:
     petsc_options: str = ""
     labels: tuple[str, ...] = ()
     placed: Any = None
+    rejected: tuple[tuple[float, ...], ...] = ()
 
 
 @dataclass(frozen=True)

@@ -224,6 +224,7 @@ def _attributes(result: Result) -> dict[str, Any]:
         "derived": tuple(q.name for q in layout.derived),
         "object_rotation": np.asarray(scene.get("object_rotation", np.eye(3))),
         "object_origin": np.asarray(scene.get("object_origin", np.zeros(3))),
+        "rejected": np.asarray(scene.get("rejected", np.zeros((0, 10)))),
     }  # fmt: skip
 
 

@@ -109,6 +109,7 @@ def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = (), r
         petsc_options=" ".join(f"-{key} {value}" for key, value in scene.petsc.items()),
         labels=tuple(candidate.label for candidate in grasps.candidates(scene)),
         placed=placed,
+        rejected=scene.candidates.rejected,
     )
     layout = Layout(
         axes,

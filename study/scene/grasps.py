@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Annotated, Any, ClassVar
 
-from pydantic import AfterValidator, BeforeValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr
 
 from softjaw.study.messages import closest, shown
 from softjaw.study.scene.objects import LARGEST_MM, Plate, Shape, Span, SphereShape
@@ -65,6 +65,7 @@ def _budget(given: Any) -> Any:
 class Candidates(SceneSection):
     """Where to grasp: stations along the object's axis x angles about it, explicit poses, or sampled grasps."""
 
+    _rejected: tuple[tuple[float, ...], ...] = PrivateAttr(())
     stations: int | None = Field(
         None, ge=2, le=10_000, description="number of stations, spread evenly from the first to the last of stations_mm"
     )
@@ -115,6 +116,11 @@ class Candidates(SceneSection):
         if self.poses:
             return tuple(pose.label or f"pose {i}" for i, pose in enumerate(self.poses))
         return tuple(f"{s:g} mm, {a:g} deg" for s in self.station_values_mm for a in self.angles_deg)
+
+    @property
+    def rejected(self) -> tuple[tuple[float, ...], ...]:
+        """Grasps that the sampler offered and rejected: point [mm], approach, long side and state of each."""
+        return self._rejected
 
     @property
     def total(self) -> int:

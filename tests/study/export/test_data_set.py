@@ -14,6 +14,8 @@ from softjaw.study.cli import main
 from softjaw.study.export.data_set import FORMS, grasp_arrays
 from softjaw.study.export.selection import GripperFrame
 from softjaw.study.flags import Flag
+from softjaw.study.quantities import DONE, WIDE
+from softjaw.study.quantities import SLIPS as SLIPPING
 from softjaw.study.result.index import blank_row, write_index
 from softjaw.study.result.store import open_result
 from softjaw.study.run.objects import row_of
@@ -73,6 +75,20 @@ def test_arrays_are_those_of_the_file(folder):
         assert matrix[:3, 0] == pytest.approx(R[0][:, 2])  # and closes along x, from finger 1
         assert matrix[:3, 3] == pytest.approx(o.mean(axis=0))
     assert arrays["semi_axes"].shape == (COUNT, 2, 3)
+
+
+def test_what_the_sampler_rejected_is_unsuccessful_and_says_why(folder):
+    ds = opened(folder / "cup.hdf")
+    ds.attrs["rejected"] = np.array([[10, 20, 30, 1, 0, 0, 0, 0, 1, SLIPPING], [0, 0, 5, 0, 1, 0, 0, 0, 1, WIDE]], "f4")
+    arrays = grasp_arrays(ds, GripperFrame(closing="x"))
+    assert {len(values) for values in arrays.values()} == {COUNT + 2}
+    assert arrays["state"].tolist() == [*[DONE] * COUNT, SLIPPING, WIDE]
+    assert not arrays["object_in_gripper"][COUNT:].any()
+    assert np.isnan(arrays["payload"][COUNT:]).all()
+    first = arrays["transforms"][COUNT]
+    assert first[:3, 3] == pytest.approx([0.01, 0.02, 0.03])
+    assert first[:3, 0] == pytest.approx([1, 0, 0])  # it closes along finger 1's approach
+    assert first[:3, 2] == pytest.approx([0, 0, -1])
 
 
 def test_graspgen_has_its_fields_and_splits_with_relative_paths(sets):
