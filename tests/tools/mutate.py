@@ -1,12 +1,11 @@
 """How many small random bugs the fast tests notice: ``python -m tests.tools.mutate --count 100 --out mutants.jsonl``.
 
 A mutant is the project with one change: an operator, a constant, a sign, an index or a condition of ``FOLDERS``. The
-seed fixes the sample. First the tests of ``make test`` run without a change, which shows the files of tests that run
-each line, and their times. Then each mutant meets the files that run its line, the fastest first, until a test fails.
-What is compiled, or outside of functions, is not seen so: such mutants meet all files that run anything of their module
-or lie in the folder that mirrors its own. Those that pass meet the tests that start ranks. The working tree is never
-touched: the files that git knows are copied, and the copy is changed. Each mutant adds one line of JSON to the output;
-the same command again resumes. A test that fails without a change is named and left out.
+seed fixes the sample. First the tests of ``make test`` that start no ranks run without a change, which shows the files
+of tests that run each line, and their times. Then each mutant meets the files that run its line, the fastest first,
+until a test fails. What is compiled, or outside of functions, is not seen so: there the lines count that name it. The
+work is done in a copy. Each slice of a mutant's tests adds one line of JSON to the output; the same command again
+resumes. A test that fails without a change is left out.
 """
 
 from __future__ import annotations
@@ -27,19 +26,26 @@ import xml.etree.ElementTree as ElementTree
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
+from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
 import pytest
+from scipy.stats import binomtest
+
+from softjaw.study.doctor import launch_environment
 
 ROOT = Path(__file__).parents[2]
 FOLDERS = ("fem", "friction", "lsfit", "scoring", "study/case", "study/result", "study/run")
 KINDS = ("operator", "constant", "sign", "index", "condition")
 OPERATORS = {ast.Add: "-", ast.Sub: "+", ast.Mult: "/", ast.Div: "*", ast.Pow: "*", ast.FloorDiv: "/", ast.Mod: "//"}
 COMPARISONS = {ast.Lt: ">", ast.LtE: ">=", ast.Gt: "<", ast.GtE: "<=", ast.Eq: "!=", ast.NotEq: "=="}
-COMPILED = re.compile(r"^\s*@(numba\.)?(njit|vectorize|guvectorize)|^\s*@\w*(kernel|compiled)", re.M)
-FAST, RANKS = "not long", "ranks and not long"
-LIMIT_S = 1500  # of a mutant; what takes longer hangs
+PACKAGES = ("fem", "friction", "lsfit", "scoring", "study")
+MARKS = "not long and not ranks"
+REPORT = "report.xml"
+SLICE_S = 60  # of tests by their time without a change; a mutant that passes waits until the others had theirs
+COMPILING_S, HANGING = 120, 5  # what takes longer than the one and so many times its time hangs
+WHOLE_S = 10_000  # of all tests
 
 
 @dataclass(frozen=True)
@@ -131,50 +137,62 @@ def mutated(source: str, mutation: Mutation) -> str:
 
 
 class Copy:
-    """A copy of the project in which one file at a time is changed."""
+    """A copy of the project in which one file at a time is changed, and what its tests run there."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, kept: Path) -> None:
         self.folder = folder
         self.failing: list[str] = []
-        self.durations: dict[str, float] = {}
-        self.covered: dict[str, dict[str, list[str]]] = {}
-        listed = ["git", "ls-files", "--cached", "--others", "--exclude-standard"]
-        for name in subprocess.run(listed, cwd=ROOT, capture_output=True, text=True, check=True).stdout.splitlines():
-            if (ROOT / name).exists():
-                (folder / name).parent.mkdir(parents=True, exist_ok=True)
-                shutil.copy2(ROOT / name, folder / name, follow_symlinks=False)
-        (folder / ".venv").symlink_to(Path(sys.prefix))
-        self._restore_compiled()
+        for package in (*PACKAGES, "softjaw", "tests", "jobs"):
+            shutil.copytree(ROOT / package, folder / package, symlinks=True)
+        for file in (file for file in ROOT.iterdir() if file.is_file()):
+            shutil.copy2(file, folder)
+        shutil.copytree(ROOT / "docs", folder / "docs")
+        (folder / ".venv").symlink_to(sys.prefix)
+        if not kept.exists():
+            self.measure(kept)
+        found = json.loads(kept.read_text())
+        self.failing, self.durations, self.covered = (found[key] for key in ("failing", "durations", "covered"))
+        self.sources = {str(f.relative_to(ROOT)): f.read_text() for p in PACKAGES for f in (ROOT / p).rglob("*.py")}
 
-    def _restore_compiled(self) -> None:
-        """Take over what numba has compiled of the unchanged sources; their times are the same."""
-        for file in [*ROOT.rglob("__pycache__/*.nb[ic]")]:
-            target = self.folder / file.relative_to(ROOT)
-            if ".venv" not in file.parts and "softjaw" not in file.relative_to(ROOT).parts[:1]:
-                target.parent.mkdir(parents=True, exist_ok=True)
-                shutil.copy2(file, target)
-
-    def _drop_compiled(self) -> None:
-        """Numba looks at the time of one file only, while a compiled loop holds those that it calls."""
-        for file in self.folder.rglob("__pycache__/*.nb[ic]"):
-            file.unlink()
+    def measure(self, kept: Path) -> None:
+        """Run all tests without a change."""
+        covered = self.folder / "covered.json"
+        failing = self.failures(WHOLE_S, "-p", "tests.tools.covered", COVERED=str(covered))
+        kept.write_text(json.dumps(measured(failing, self.folder / REPORT, covered)))
 
     def tests_of(self, mutation: Mutation) -> list[str]:
-        """Test files that run a line, or else anything of its file, the fastest first."""
-        of_file = self.covered.get(mutation.file, {})
-        names = set(of_file.get(str(mutation.line), []))
-        if not names:
-            mirrored = (self.folder / "tests" / Path(mutation.file).parent).rglob("test_*.py")
-            names = {str(path.relative_to(self.folder)) for path in mirrored}.union(*of_file.values())
-        return sorted(names, key=lambda name: (self.durations.get(name, 1.0), name))
+        """Test files that run the line; else those that run a line with the name of what it stands in."""
+        place = (mutation.file, mutation.line)
+        seen, places = {place}, [place]
+        files: set[str] = set()
+        while places:
+            file, line = places.pop()
+            statement = enclosing(self.sources[file], line)
+            of_file = self.covered.get(file, {})
+            found = {name for k in range(statement.first, statement.last + 1) for name in of_file.get(str(k), [])}
+            files |= found
+            for name in () if found or statement.seen(of_file) else statement.names:
+                more = set(self._mentions(name, file)) - seen
+                seen |= more
+                places += more
+        return sorted(files, key=lambda name: (self.durations.get(name, 1.0), name))
 
-    def failures(self, *words: str, marks: str = FAST, limit: float = LIMIT_S, **variables: str) -> list[str]:
+    def _mentions(self, name: str, file: str) -> Iterator[tuple[str, int]]:
+        """Lines with a name in its file and in those that know its module."""
+        word, module = re.compile(rf"\b{name}\b"), Path(file).stem
+        for other, source in self.sources.items():
+            if other == file or (module in source and name in source):
+                for number, line in enumerate(source.splitlines(), 1):
+                    if word.search(line) and not line.startswith(("from ", "import ", "def ", "class ")):
+                        yield other, number
+
+    def failures(self, limit: float, *words: str, **variables: str) -> list[str]:
         """The tests that fail, or why there is no answer."""
-        report = self.folder / "report.xml"
+        report = self.folder / REPORT
         report.unlink(missing_ok=True)
         left_out = [word for name in self.failing for word in ("--deselect", name)]
-        words = (sys.executable, "-m", "pytest", "-q", "-m", marks, f"--junitxml={report}", *left_out, *words)
-        environment = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": str(self.folder), **variables}
+        words = (sys.executable, "-m", "pytest", "-q", "-m", MARKS, f"--junitxml={report}", *left_out, *words)
+        environment = {**launch_environment(), "PYTHONPATH": str(self.folder), **variables}
         with subprocess.Popen(
             words, cwd=self.folder, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT, text=True, start_new_session=True,
@@ -188,47 +206,108 @@ class Copy:
                 return [f"no answer within {limit:.0f} s"]
         if process.returncode in (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED):
             return []
-        cases = ElementTree.parse(report).iter("testcase") if report.exists() else ()
-        wrong = [case for case in cases if case.find("failure") is not None or case.find("error") is not None]
-        return [node_id(case) for case in wrong] or [f"exit code {process.returncode}: {output[-200:]}"]
+        return wrong(report) or [f"exit code {process.returncode}: {output[-200:]}"]
 
-    def killer(self, mutation: Mutation) -> str:
-        """The test that notices the mutation; empty for a survivor."""
-        target, original = self.folder / mutation.file, ROOT / mutation.file
-        source = original.read_text()
-        compiled = COMPILED.search(source) is not None
+    def tried(self, mutation: Mutation, after: int) -> tuple[str, int]:
+        """The test that notices a mutation, empty if none, and how many of its files are left for another time."""
+        files = self.tests_of(mutation)[after:]
+        if not files:
+            return "", 0
+        costs = list(accumulate(self.durations.get(name, 1.0) for name in files))
+        count = max(1, sum(cost <= SLICE_S for cost in costs))
+        target = self.folder / mutation.file
+        source = target.read_text()
+        stale = self._compiled_with(mutation.file)
+        kept = {file: file.read_bytes() for file in stale}
+        times = target.stat()
         try:
             target.write_text(mutated(source, mutation))
-            if compiled:
-                self._drop_compiled()
-            files = self.tests_of(mutation)
-            failures = (files and self.failures("-x", *files)) or self.failures("-x", marks=RANKS)
-            return failures[0] if failures else ""
+            for file in stale:
+                file.unlink()
+            failures = self.failures(COMPILING_S + HANGING * costs[count - 1], "-x", *files[:count])
         finally:
-            shutil.copy2(original, target)
-            if compiled:
-                self._restore_compiled()
+            target.write_text(source)
+            os.utime(target, ns=(times.st_atime_ns, times.st_mtime_ns))
+            for file in self._compiled_with(mutation.file):
+                file.unlink()
+            for file, content in kept.items():
+                file.write_bytes(content)
+        return (failures[0], 0) if failures else ("", len(files) - count)
 
-    def measure(self, kept: Path) -> None:
-        """Run all tests without a change, or take what an earlier run has measured."""
-        if not kept.exists():
-            covered = self.folder / "covered.json"
-            limit = 10 * LIMIT_S
-            failing = self.failures("-p", "tests.tools.covered", limit=limit, COVERED=str(covered))
-            seconds: Counter[str] = Counter()
-            for case in ElementTree.parse(self.folder / "report.xml").iter("testcase"):
-                seconds[node_id(case).partition("::")[0]] += float(case.get("time") or 0)
-            lines = json.loads(covered.read_text())
-            kept.write_text(json.dumps({"failing": failing, "durations": seconds, "covered": lines}))
-        measured = json.loads(kept.read_text())
-        self.failing, self.durations, self.covered = (measured[key] for key in ("failing", "durations", "covered"))
-        for name in self.failing:
-            print(f"fails without a change: {name}", flush=True)
+    def _compiled_with(self, name: str) -> list[Path]:
+        """What numba has compiled of a file and of those that import it: it looks at the time of one file only."""
+        names = {name}
+        while more := {n for n, text in self.sources.items() if any(imports(text, m) for m in names)} - names:
+            names |= more
+        return [f for n in names for f in (self.folder / n).parent.glob(f"__pycache__/{Path(n).stem}.*.nb[ic]")]
+
+
+@dataclass(frozen=True)
+class Statement:
+    """Lines of a statement, and the names of the compiled function, or of the top level, in which it stands."""
+
+    first: int
+    last: int
+    names: list[str]
+    body: range
+
+    def seen(self, lines: dict[str, list[str]]) -> bool:
+        """Whether tests run other lines of the same function, so that none runs this one."""
+        return any(lines.get(str(k)) for k in self.body)
+
+
+def enclosing(source: str, line: int) -> Statement:
+    """The statement around a line of a source."""
+    tree = ast.parse(source)
+    around = [n for n in ast.walk(tree) if isinstance(n, ast.stmt) and n.lineno <= line <= (n.end_lineno or 0)]
+    if not around:
+        return Statement(line, line, [], range(0))
+    inner = max(around, key=lambda n: (n.lineno, -(n.end_lineno or 0)))
+    body = getattr(inner, "body", None)
+    last = max(line, body[0].lineno - 1) if isinstance(body, list) else inner.end_lineno
+    first = line if isinstance(inner, ast.FunctionDef | ast.ClassDef) else inner.lineno
+    functions = [n for n in around if isinstance(n, ast.FunctionDef) and n is not inner]
+    if functions:
+        function = functions[-1]
+        return Statement(first, last or line, [function.name], range(function.body[0].lineno, function.end_lineno or 0))
+    outer = around[0]
+    names = [outer.name] if isinstance(outer, ast.FunctionDef | ast.ClassDef) else []
+    if isinstance(outer, ast.Assign | ast.AnnAssign):
+        targets = outer.targets if isinstance(outer, ast.Assign) else [outer.target]
+        names = [n.id for target in targets for n in ast.walk(target) if isinstance(n, ast.Name)]
+    return Statement(first, last or line, names, range(0))
+
+
+def imports(source: str, name: str) -> bool:
+    """Whether a source imports a file of the project."""
+    folder, _, module = name.removesuffix(".py").replace("/", ".").rpartition(".")
+    of_folder = re.search(rf"^from softjaw\.{folder} import (\([^)]*\b{module}\b|.*\b{module}\b)", source, re.M)
+    return bool(of_folder) or f"from softjaw.{folder}.{module} import" in source
 
 
 def node_id(case: ElementTree.Element) -> str:
     """How pytest names a test of its report."""
     return f"{(case.get('classname') or '').replace('.', '/')}.py::{case.get('name')}"
+
+
+def wrong(report: Path) -> list[str]:
+    """The tests that failed, from a report of pytest."""
+    cases = ElementTree.parse(report).iter("testcase") if report.exists() else ()
+    return [node_id(case) for case in cases if case.find("failure") is not None or case.find("error") is not None]
+
+
+def measured(failing: list[str], report: Path, covered: Path) -> dict[str, Any]:
+    """What fails, the seconds of each file of tests, and the files that run each line."""
+    seconds: Counter[str] = Counter()
+    for case in ElementTree.parse(report).iter("testcase"):
+        seconds[node_id(case).partition("::")[0]] += float(case.get("time") or 0)
+    return {"failing": failing, "durations": seconds, "covered": json.loads(covered.read_text())}
+
+
+def interval(hits: int, count: int) -> tuple[float, float]:
+    """The 95 % interval of a share (Clopper and Pearson 1934)."""
+    found = binomtest(hits, count).proportion_ci()
+    return found.low, found.high
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -245,21 +324,26 @@ def main(arguments: list[str] | None = None) -> int:
             print(f"{m.file}:{m.line}: {m.kind}: {' '.join(m.old.split())}  ->  {m.new}")
         return 0
     options.out.parent.mkdir(parents=True, exist_ok=True)
-    tried = [json.loads(line) for line in options.out.read_text().splitlines()] if options.out.exists() else []
+    lines = options.out.read_text().splitlines() if options.out.exists() else []
+    rows = {row["number"]: row for row in map(json.loads, lines)}
     with tempfile.TemporaryDirectory() as folder:
-        copy = Copy(Path(folder))
-        copy.measure(options.out.with_suffix(".tests.json"))
-        for m in mutants[len(tried) :]:
-            begun = time.monotonic()
-            row = asdict(m) | {"killed_by": copy.killer(m), "seconds": round(time.monotonic() - begun)}
-            tried.append(row)
-            with options.out.open("a") as file:
-                file.write(json.dumps(row) + "\n")
-            print(f"{m.file}:{m.line} {m.kind}: {row['killed_by'] or 'SURVIVED'} ({row['seconds']} s)", flush=True)
-    survivors = [row for row in tried if not row["killed_by"]]
+        copy = Copy(Path(folder), options.out.with_suffix(".tests.json"))
+        while waiting := [i for i in range(len(mutants)) if i not in rows or rows[i]["left"]]:
+            for i in waiting:
+                m, begun = mutants[i], time.monotonic()
+                done = len(copy.tests_of(m)) - rows[i]["left"] if i in rows else 0
+                killer, left = copy.tried(m, done)
+                rows[i] = {"number": i, **asdict(m), "killed_by": killer, "left": left}
+                rows[i]["seconds"] = round(time.monotonic() - begun)
+                with options.out.open("a") as file:
+                    file.write(json.dumps(rows[i]) + "\n")
+                state = killer or (f"{left} files left" if left else "SURVIVED")
+                print(f"{i} {m.file}:{m.line} {m.kind}: {state} ({rows[i]['seconds']} s)", flush=True)
+    survivors = [row for row in rows.values() if not row["killed_by"]]
     for row in survivors:
         print(f"survivor {row['file']}:{row['line']}: {row['kind']}: {row['old']}  ->  {row['new']}")
-    print(f"{len(tried) - len(survivors)} of {len(tried)} mutants were noticed")
+    low, high = interval(len(rows) - len(survivors), len(rows))
+    print(f"{len(rows) - len(survivors)} of {len(rows)} mutants were noticed: {low:.0%} to {high:.0%}")
     return 0
 
 
