@@ -80,7 +80,7 @@ def test_region_is_twice_differentiable(region):
 
 def test_region_reports_errors_that_the_triangles_explain(region, flask):
     """Both errors stay below the distance over which the spline rounds an edge: step x turn of the facets."""
-    assert region.grid_step == 0.8e-3
+    assert region.grid_step == pytest.approx(0.8e-3)
     x = region.pose.to_object(box_points(region.lower, region.upper))
     g = region.sheet.signed(x)[0]
     near = np.abs(g) < 1e-3

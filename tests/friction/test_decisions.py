@@ -136,8 +136,7 @@ def test_the_sides_of_faces_are_decided_or_undecided_for_good(seed):
     patch = replace(patch, normal=normal)
     expected = np.ones(len(patch.load))
     expected[[144, 5]], expected[145 + 31] = 0, -1
-    np.testing.assert_array_equal(wound(patch), expected)
-    np.testing.assert_array_equal(wound(shaken(patch, seed)[0]), expected)
+    assert wound(patch).tolist() == wound(shaken(patch, seed)[0]).tolist() == expected.tolist()  # -1, 0 or 1
 
 
 @REPEATABLE

@@ -72,7 +72,7 @@ def test_a_preset_on_the_command_line():
 def test_joints_of_a_parallel_hand_are_half_the_gap_within_the_stroke():
     _, hand = gripper_file("franka_hand")
     assert hand.values(0.05) == pytest.approx({"fr3_finger_joint1": 0.025, "fr3_finger_joint2": 0.025})
-    assert max(hand.values(1.0).values()) == 0.04
+    assert max(hand.values(1.0).values()) == pytest.approx(0.04)
     _, hand = gripper_file("wsg50")
     assert sorted(hand.values(0.05).values()) == pytest.approx([-0.025, 0.025])
 
@@ -86,7 +86,7 @@ def test_the_joint_of_robotiq_is_the_angle_of_its_linkage():
         c, s = math.cos(angle), math.sin(angle)
         y, z = np.array(link.pivot) + np.array([[c, -s], [s, c]]) @ link.crank + link.pad
         assert (2 * y, z) == pytest.approx((1e3 * gap, 1e3 * hand.depth(gap)))
-    assert hand.values(0.0) == {"finger_joint": 0.8}
+    assert hand.values(0.0) == pytest.approx({"finger_joint": 0.8})
     assert 0 < hand.values(0.085)["finger_joint"] < 0.02
 
 

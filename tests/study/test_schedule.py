@@ -98,8 +98,8 @@ def test_expensive_first_is_as_good_as_the_bound_of_list_scheduling():
         costs = list(random.random(40))
         best = max(sum(costs) / n, max(costs))
         assert best <= makespan(costs, n) <= (4 / 3 - 1 / (3 * n)) * best
-    assert makespan([1.0, 2.0, 4.0], 1) == 7.0
-    assert makespan([1.0, 2.0, 4.0], 5) == 4.0
+    assert makespan([1.0, 2.0, 4.0], 1) == pytest.approx(7.0)
+    assert makespan([1.0, 2.0, 4.0], 5) == pytest.approx(4.0)
     assert by_cost([2.0, 3.0, 2.0]) == [1, 0, 2]
 
 
@@ -165,18 +165,18 @@ def test_more_ranks_than_load_paths_are_not_sensible():
 def test_times_of_unsolved_units_follow_from_their_cost():
     units = tuple(SimpleNamespace(rows=((2 * i, 2 * i + 1),), cost=c, state=0) for i, c in enumerate([1.0, 2.0, 4.0]))
     plan = Plan(None, None, units)
-    assert unit_seconds(plan, np.array([3.0, 3.0, np.nan, 1.0, np.nan, np.nan])) == [6.0, 12.0, 24.0]
+    assert unit_seconds(plan, np.array([3.0, 3.0, np.nan, 1.0, np.nan, np.nan])) == pytest.approx([6.0, 12.0, 24.0])
     assert unit_seconds(plan, np.full(6, np.nan)) == []
 
 
 def test_each_limit_of_many_ranks_is_found_where_its_closed_form_is():
     """64 load paths of four seconds and four rows."""
     seconds, served = [4.0] * 64, [4] * 64
-    assert scaled(seconds, served, 64, 0.0, 0.0) == (4.0, "-")
-    assert scaled(seconds, served, 64, 0.5, 0.0) == (6.0, "-")
+    assert scaled(seconds, served, 64, 0.0, 0.0) == (pytest.approx(4.0), "-")
+    assert scaled(seconds, served, 64, 0.5, 0.0) == (pytest.approx(6.0), "-")
     assert scaled(seconds, served, 64, 0.1, 0.1) == (pytest.approx(256 * 0.1), "file system")
-    assert scaled(seconds, served, 128, 0.0, 0.0) == (4.0, "longest load path")
-    assert scaled(seconds, served, 60, 0.0, 0.0) == (8.0, "division of load paths")
+    assert scaled(seconds, served, 128, 0.0, 0.0) == (pytest.approx(4.0), "longest load path")
+    assert scaled(seconds, served, 60, 0.0, 0.0) == (pytest.approx(8.0), "division of load paths")
 
 
 def test_a_case_that_an_earlier_run_left_out_is_missing_once_it_is_asked_for():

@@ -119,7 +119,7 @@ def test_maps_are_those_of_the_scene_as_given_with_what_the_samples_say(file, tm
     assert softjaw.run(plain(), tmp_path / "plain.hdf") == 0
     given = softjaw.open(tmp_path / "plain.hdf")
     assert ds.e_n.dims == given.e_n.dims
-    assert ds.quality.values.tobytes() == given.quality.values.tobytes()
+    np.testing.assert_allclose(ds.quality, given.quality, rtol=1e-9)  # of the contact solve
     values = ds.quality_samples.values
     assert values.shape == (*given.status.shape, 8)
     assert softjaw.press(plain().with_values(scene().points[3]), station=0.0, angle=0.0, force=2.0).value(

@@ -117,7 +117,7 @@ def test_a_face_pressed_in_by_less_than_its_error_is_not_judged():
     face = measured_face(np.column_stack([y, z]), 2e-3)
     found = MeasuredPress(pad_of((4, 4, 2))).solve(face)
     assert not found.judged
-    assert found.margin == NOISE_MARGIN * face.doubt
+    assert found.margin == pytest.approx(NOISE_MARGIN * face.doubt)
 
 
 def test_a_lifted_face_has_the_derivatives_of_what_it_adds():

@@ -179,7 +179,7 @@ def test_pressures_are_never_interpolated_below_zero():
     x = np.zeros(coarse.size)
     x[coarse.closing_dof + 1 :: 5] = 1.0  # quadratic functions swing between 1 and 0
     pressure = interpolated(coarse, x, pad)[pad.closing_dof + 1 :]
-    assert pressure.min() == 0.0
+    assert pressure.min() >= 0.0
     assert pressure.max() >= 1.0 - 1e-12
 
 

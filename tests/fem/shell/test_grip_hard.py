@@ -105,7 +105,7 @@ def test_a_long_side_that_points_down_gives_the_same_patch_turned():
         once = turned(finger.pad, patch, signs)
         again = turned(finger.pad, once, signs)
         for name in ("centroid", "normal", "corners", "pressure"):
-            np.testing.assert_array_equal(getattr(again, name), getattr(patch, name))
+            np.testing.assert_allclose(getattr(again, name), getattr(patch, name), rtol=1e-14)  # signs change
         # the same corner of the grid comes first, and faces are run round in the same sense
         for field in (once, patch):
             sides = field.corners[:, 1] - field.corners[:, 0], field.corners[:, 3] - field.corners[:, 0]
@@ -130,7 +130,7 @@ def test_a_part_of_a_wall_is_not_faced_from_beyond_its_edges(quarter):
     theta = np.array([-0.02, 0.02, 0.5 * np.pi - 0.02, 0.5 * np.pi + 0.02])
     points = np.column_stack([0.036 * np.cos(theta), 0.036 * np.sin(theta), np.full(4, 0.075)])
     found = face(quarter, points, quarter.places(points), *still(quarter))
-    np.testing.assert_array_equal(found.gap == FAR, [True, False, False, True])
+    assert (found.gap == FAR).tolist() == [True, False, False, True]
     np.testing.assert_allclose(found.gap[1:3], 1e-3, atol=1e-7)
 
 
@@ -158,7 +158,7 @@ def test_a_pad_over_the_rim_is_carried_up_to_the_rim():
     finger = next(grip(thin(), z=0.198, elements=(12, 4, 2), mesh=ROUGH, radius=0.013).load_path([0.5])).fingers[0]
     patch = extract(finger.pad, finger)
     height = 0.198 + patch.centroid[:, 0]
-    assert patch.pressure[height > 0.2051].max() == 0.0
+    assert patch.pressure[height > 0.2051].max() <= 1e-12 * patch.pressure.max()
     assert patch.pressure[height > 0.2025].max() > 0.3 * patch.pressure.max()
     assert finger.checks.penetration_depth < 0.15 * finger.closing
 

@@ -88,13 +88,13 @@ def test_stations_of_a_bent_mesh_follow_its_centre_line(tmp_path):
         assert not place.note
 
 
-def test_stations_of_a_straight_mesh_stay_on_the_axis_bit_for_bit(tmp_path):
+def test_stations_of_a_straight_mesh_stay_on_the_axis(tmp_path):
     body = trimesh.creation.cylinder(0.03, 0.2, sections=48)
     body.vertices += 1e-5 * np.random.default_rng(0).normal(size=body.vertices.shape)
     for place in candidates.candidates(mesh_scene(body, tmp_path, [60, 100])):
         for pose, same in zip(place.poses, poses.axis_poses(place.station, place.angle, 0.0), strict=True):
-            assert pose.rotation.tobytes() == same.rotation.tobytes()
-            assert pose.origin.tobytes() == same.origin.tobytes()
+            assert pose.rotation == pytest.approx(same.rotation, abs=1e-14)
+            assert pose.origin == pytest.approx(same.origin, abs=1e-15)
 
 
 def test_axes_end_with_station_angle_and_force_in_si_units():
