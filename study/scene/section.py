@@ -23,48 +23,6 @@ Errors = Iterator[InitErrorDetails]  # what a rule yields
 Place = tuple[str, int | None]  # a file and a line of it, or an override
 Tables = Mapping[str, Mapping[str, FieldInfo]]  # keys of every section, by its name
 MOST_LISTED = 50  # problems in one message
-MOVED = {  # keys of the last version, and what stands for them
-    "accuracy.e_n": "write `accuracy.target`, with `accuracy.target_of = \"e_n\"`",
-    "effects.fingers": "leave it out: symmetry decides it, and effects.model_size = \"full\" solves both",
-    "effects.friction": "leave it out: every friction model is computed",
-    "effects.limit_surface": "write `limit_surface.model`",
-    "friction.model": "leave it out: every friction model is shown",
-    "friction.cor_grid": "leave it out: `softjaw.read_patch` gives the patch, `softjaw.friction_wrench` its wrenches",
-    "gripper.grading_x": "write `gripper.grading = [x, y, z]`",
-    "gripper.grading_y": "write `gripper.grading = [x, y, z]`",
-    "gripper.grading_z": "write `gripper.grading = [x, y, z]`",
-    "gripper.sheet_poisson": "leave it out: it is 0.3",
-    "gripper.alpha": "write `gripper.terms_kpa = [[exponent, modulus], ...]`",
-    "gripper.shear_moduli_kpa": "write `gripper.terms_kpa = [[exponent, modulus], ...]`",
-    "score.torque_scale": "write `score.contact_length_mm = \"pad\"` or `\"object\"`",
-    "score.length_scale": "write `score.object_length_mm = \"per_axis\"` or `\"longest\"`",
-    "score.graspit": "leave it out: jobs/graspit.py compares with it",
-    "object.wall_profile_mm": "write `object.wall_mm = [[z, thickness], ...]`",
-    "object.open_top": "write `object.open_ends`: \"top\", \"both\" or \"none\"",
-    "object.base": "write `object.open_ends = \"both\"` for a tube",
-    "object.springs_n_per_mm": "leave it out: it is 1 N/mm",
-    "candidates.station_range_mm": "write `candidates.stations_mm`, with the number of stations in `stations`",
-    "candidates.skip_hopeless": "leave it out",
-    "candidates.solve_best": "write `candidates.sampled`: finer meshes go to the grasps that may be among the best",
-    "candidates.refine_within": "leave it out: it is `accuracy.target`, or 2 %",
-    "candidates.sampler": "write `candidates.sampled`, the number of grasps",
-    "candidates.count": "write `candidates.sampled`, the number of grasps",
-    "candidates.seed": "leave it out",
-    "accuracy.wall_around_mm": "write `accuracy.wall_element_mm`",
-    "accuracy.wall_along_mm": "write `accuracy.wall_element_mm`: along the axis it is 5/3 of it",
-    "accuracy.wall_coarse_mm": "write `accuracy.wall_element_mm`: elsewhere it is 4 times as large",
-    "output": "write `patches` in [run], and name the file with -o",
-    "accuracy.residual_tolerance": "leave it out: it is 1e-10",
-    "accuracy.min_step_fraction": "leave it out: it is 1/8",
-    "accuracy.cost_file": "write `accuracy.target`: no file of costs is needed",
-    "uncertainty.probes": "remove it: all candidates are solved with every sample",
-    "uncertainty.mesh": "write `accuracy.meshes = 2`",
-    "uncertainty.mu": "write it as `\"friction.mu\"` in `uncertainty.spread`",
-    "uncertainty.shear_modulus_percent": "write kPa as `\"gripper.shear_modulus_kpa\"` in `uncertainty.spread`",
-    "uncertainty.wall_thickness_percent": "write mm as `\"object.wall_mm\"` in `uncertainty.spread`",
-    "uncertainty.pose_mm": "write it as `\"candidates.shift_mm\"` in `uncertainty.spread`",
-    "uncertainty.pose_deg": "write it as `\"candidates.roll_deg\"` in `uncertainty.spread`",
-}
 HEADER = re.compile(r"\s*(\[\[?)([\w.\"' -]+)\]\]?\s*(?:#.*)?$")
 KEY = re.compile(r"""\s*([\w.\"' -]+?)\s*=""")
 NAME = re.compile(r""""[^"]*"|'[^']*'|[^.\s]+""")
@@ -214,8 +172,6 @@ def _expectation(entry: ErrorDetails, path: KeyPath) -> str:
 def _right_key(path: KeyPath, tables: Tables) -> str:
     """What to write instead of an unknown key or section."""
     key, (stem, _) = str(path[-1]), split_unit(str(path[-1]))
-    if moved := MOVED.get(key_text(path)):
-        return moved
     if len(path) == 1 and (near := closest(key, list(tables))):
         return f"did you mean [{near}]?"
     keys = list(dict.fromkeys(k for name, table in tables.items() if name == path[0] for k in table))
