@@ -37,7 +37,7 @@ def volume_share(first: ArrayLike, second: ArrayLike, torques: float) -> float:
     ``torques`` is the length by which torques are divided [m], which decides where GraspIt!'s points lie.
     """
     axes = [np.asarray(a, float) / [1.0, 1.0, torques] for a in (first, second)]
-    exact = [(body.volume, body.shadow_area) for body in map(Ellipsoid, axes)]
+    exact = [(body.volume, body.shadow_area) for body in map(Ellipsoid.of_axes, axes)]
     hulls = [polytope_volume(graspit_vertices(a)) for a in axes]
     return volume_linf(*hulls[0], *hulls[1], 1.0) / volume_linf(*exact[0], *exact[1], 1.0)
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,7 +13,7 @@ from scipy.optimize import nnls
 from softjaw.lsfit.form import exponents, monomials
 from softjaw.lsfit.samples import FLAT_RATIO, checked_wrenches, principal_frame
 from softjaw.lsfit.sos import least_in_cone, quadratic_parts
-from softjaw.lsfit.surface import OUT_OF_SPAN, ZERO_SHARE, FitFlag, LimitSurface, checked_factors, mapped_value, rows
+from softjaw.lsfit.surface import ZERO_SHARE, FitFlag, LimitSurface, checked_factors, mapped_value, rows
 
 FloatArray = NDArray[np.float64]
 
@@ -23,74 +24,117 @@ WEAK = 1e-10  # share of the largest eigenvalue of normal equations, below which
 
 @dataclass(frozen=True, eq=False)
 class Ellipsoid(LimitSurface):
-    """Axis-aligned ellipsoid ``P(w) = sum (w_i / e_i)^2 <= 1``.
+    """Ellipsoid ``{F y : |y| <= 1}`` in any number of dimensions, image of the unit ball.
 
-    A contact that cannot carry a load along an axis has the semi-axis 0 there: the body is a disc, a segment or a
-    point, and `rank` tells which. No semi-axis is ever infinite.
+    A contact that cannot carry some load has a flat one: a disc, a segment or a point, and `rank` tells which.
 
     Parameters
     ----------
-    semi_axes : (3,) array
-        Largest ``(f_x, f_y, tau_z)``, in units of the caller's choice.
+    F : (d, r) array
+        Map with independent columns; flat if ``r < d``.
     flag : FitFlag
         What the reader should know.
 
     Examples
     --------
-    >>> disc = Ellipsoid([1.0, 1.0, 0.0])
+    >>> disc = Ellipsoid.of_axes([1.0, 1.0, 0.0])
     >>> disc.rank, disc.volume, disc.holds([0.5, 0.5, 0.0]), disc.holds([0.0, 0.0, 1e-9])
     (2, 0.0, array([ True]), array([False]))
     """
 
-    semi_axes: FloatArray = field()
+    F: FloatArray
     flag: FitFlag = FitFlag.CLEAN
     degree = 2
-    dimension = 3
 
     def __post_init__(self) -> None:
-        """Refuse what is no length."""
-        axes = np.array(self.semi_axes, dtype=float)
-        if axes.shape != (3,) or not np.isfinite(axes).all() or (axes < 0).any():
-            raise ValueError(f"semi_axes is {axes.tolist()}: expected three finite numbers that are not negative")
-        axes.flags.writeable = False
-        object.__setattr__(self, "semi_axes", axes)
+        """Freeze the map."""
+        F = np.array(self.F, float)
+        F.flags.writeable = False
+        object.__setattr__(self, "F", F)
+
+    @classmethod
+    def of_axes(cls, semi_axes: ArrayLike, flag: FitFlag = FitFlag.CLEAN) -> Ellipsoid:
+        """Ellipsoid with semi-axes ``(d,)`` along the components, flat where one is 0."""
+        axes = np.array(semi_axes, dtype=float)
+        if axes.ndim != 1 or not np.isfinite(axes).all() or (axes < 0).any():
+            raise ValueError(f"semi_axes is {axes.tolist()}: expected finite numbers that are not negative")
+        return cls(np.diag(axes)[:, axes > 0], flag)
+
+    @classmethod
+    def of_matrix(cls, A: ArrayLike) -> Ellipsoid:
+        """Ellipsoid ``w' A w <= 1``; ``A (d, d)`` symmetric, and positive definite to `ZERO_SHARE`."""
+        A = np.array(A, float)
+        if A.ndim != 2 or A.shape[0] != A.shape[1] or not np.isfinite(A).all():
+            raise ValueError(f"A has shape {A.shape}: expected finite numbers in a square matrix")
+        # rounding leaves 1e-16; more than this is another matrix than the caller meant
+        if abs(A - A.T).max() > 1e-9 * abs(A).max():
+            raise ValueError("A is not symmetric: give (A + A') / 2, which has the same quadratic form")
+        diagonal = A.diagonal()
+        if (diagonal <= 0).any():
+            raise ValueError(f"A has the diagonal {diagonal.tolist()}: an ellipsoid needs a positive definite matrix")
+        # axes of very different length keep their digits if they are made equal first
+        size = 1 / np.sqrt(diagonal)
+        even = A * np.outer(size, size)
+        lowest = float(np.linalg.eigvalsh(even)[0])
+        if lowest < ZERO_SHARE:
+            kind = "negative" if lowest < -ZERO_SHARE else "less than rounding can tell from zero"
+            raise ValueError(f"A has the eigenvalue {lowest:.1e} once its diagonal is 1, {kind}: give the semi-axes")
+        return cls(size[:, None] * np.linalg.inv(np.linalg.cholesky(even)).T)
+
+    @cached_property
+    def inverse(self) -> FloatArray:
+        """Map ``(r, d)`` from the body back onto the ball."""
+        F = self.F
+        return np.linalg.inv(F) if F.shape[0] == F.shape[1] else np.linalg.pinv(F)
+
+    @property
+    def A(self) -> FloatArray:
+        """Matrix ``(d, d)`` of ``P(w) = w' A w``; the pseudo-inverse of ``F F'`` for a flat body."""
+        return self.inverse.T @ self.inverse
+
+    @property
+    def dimension(self) -> int:
+        """Number of components of a wrench."""
+        return len(self.F)
 
     @property
     def span(self) -> FloatArray:
-        """Orthonormal directions ``(3, rank)`` in which the body extends."""
-        return np.eye(3)[:, self.semi_axes > 0]
+        """Orthonormal directions ``(d, rank)`` in which the body extends."""
+        return np.linalg.qr(self.F)[0]
 
     @property
     def volume(self) -> float:
-        """Volume ``4/3 pi e_1 e_2 e_3``."""
-        return 4 / 3 * math.pi * float(self.semi_axes.prod())
+        """Volume of the body; 0 if it is flat."""
+        if self.F.shape[1] < self.dimension:
+            return 0.0
+        ball = math.pi ** (self.dimension / 2) / math.gamma(self.dimension / 2 + 1)
+        return ball * abs(float(np.linalg.det(self.F)))
 
     @property
     def shadow_area(self) -> float:
-        """Area ``pi e_1 e_2`` of the shadow on the plane of the forces."""
-        return math.pi * float(self.semi_axes[0] * self.semi_axes[1])
+        """Area of the shadow on the plane of the first two components."""
+        # the shadow of a ball's image is an ellipse, with the singular values of two rows as axes
+        s = np.linalg.svd(self.F[:2], compute_uv=False)
+        return math.pi * float(s[0] * s[1]) if len(s) > 1 else 0.0
 
     def value(self, w: ArrayLike) -> FloatArray:
-        """``P(w)``, ``(m, 3) -> (m,)``; infinite for loads along an axis that carries none."""
-        w = rows(w, 3)
-        # what rounding leaves along an axis without load must not make the value infinite
-        inside = (self.semi_axes == 0) & (np.abs(w) <= OUT_OF_SPAN * np.linalg.norm(w, axis=1, keepdims=True))
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return (np.where(inside, 0.0, w / self.semi_axes) ** 2).sum(axis=1)
+        """``P(w)``, ``(m, d) -> (m,)``; infinite where a flat body does not extend."""
+        W = rows(w, self.dimension)
+        # through the map and not A, as a sum of squares cannot turn negative by rounding
+        Y = W @ self.inverse.T
+        return mapped_value((Y**2).sum(axis=1), Y, self.F, W)
 
     def gradient(self, w: ArrayLike) -> FloatArray:
-        """Gradient ``2 w_i / e_i^2``, the direction of motion, ``(m, 3) -> (m, 3)``; 0 along an axis without load."""
-        with np.errstate(divide="ignore"):
-            inverse = np.where(self.semi_axes > 0, 1 / self.semi_axes, 0.0)
-        return 2 * rows(w, 3) * inverse * inverse
+        """Gradient ``2 A w``, the direction of motion, ``(m, d) -> (m, d)``."""
+        return 2 * rows(w, self.dimension) @ self.inverse.T @ self.inverse
 
     def support(self, t: ArrayLike) -> FloatArray:
-        """Largest ``w . t`` over the body, ``(m, 3) -> (m,)``."""
-        return np.linalg.norm(rows(t, 3) * self.semi_axes, axis=1)
+        """Largest ``w . t`` over the body, ``(m, d) -> (m,)``."""
+        return np.linalg.norm(rows(t, self.dimension) @ self.F, axis=1)
 
     def scaled(self, factors: ArrayLike) -> Ellipsoid:
-        """Image of the body under ``w -> factors * w``, ``(3,)``, factors not zero."""
-        return Ellipsoid(np.abs(checked_factors(factors, 3)) * self.semi_axes, self.flag)
+        """Image of the body under ``w -> factors * w``, ``(d,)``, factors not zero."""
+        return Ellipsoid(checked_factors(factors, self.dimension)[:, None] * self.F, self.flag)
 
 
 def three_motion_ellipsoid(f_x: float, f_y: float, tau_z: float, rho: float) -> Ellipsoid:
@@ -112,7 +156,9 @@ def three_motion_ellipsoid(f_x: float, f_y: float, tau_z: float, rho: float) -> 
     patches.
     """
     least = ZERO_SHARE * max(f_x, f_y)
-    return Ellipsoid(np.array([x if x > least * unit else 0.0 for x, unit in ((f_x, 1), (f_y, 1), (tau_z, rho))]))
+    return Ellipsoid.of_axes(
+        np.array([x if x > least * unit else 0.0 for x, unit in ((f_x, 1), (f_y, 1), (tau_z, rho))])
+    )
 
 
 def axis_aligned_ellipsoid(W: ArrayLike) -> Ellipsoid:
@@ -148,10 +194,10 @@ def axis_aligned_ellipsoid(W: ArrayLike) -> Ellipsoid:
     flag |= FitFlag.BOUNDED if (a <= 1e-9).any() else FitFlag.CLEAN
     axes = np.zeros(3)
     axes[used] = reach[used] / np.sqrt(a + floor)
-    return Ellipsoid(axes, flag)
+    return Ellipsoid.of_axes(axes, flag)
 
 
-def full_ellipsoid(W: ArrayLike) -> TiltedEllipsoid:
+def full_ellipsoid(W: ArrayLike) -> Ellipsoid:
     """Ellipsoid ``w' A w`` with the least mean square of ``P(w) - 1``, in any number of dimensions.
 
     Parameters
@@ -161,7 +207,7 @@ def full_ellipsoid(W: ArrayLike) -> TiltedEllipsoid:
 
     Returns
     -------
-    TiltedEllipsoid
+    Ellipsoid
         Flat, and flagged, if the wrenches lie in a subspace. Where they do not determine ``A``, the ellipsoid nearest
         to their principal axes; where they would make it endless, the best one that reaches at most
         `MAX_REACH_RATIO` times as far as they do.
@@ -175,7 +221,7 @@ def full_ellipsoid(W: ArrayLike) -> TiltedEllipsoid:
     B, Y, flag = principal_frame(W)
     A, more = _quadratic_form(Y)
     # A = L L' makes the body |L' y| <= 1, the image of the ball under the inverse of L'
-    return TiltedEllipsoid.of_ball(B @ np.linalg.inv(np.linalg.cholesky(A)).T, flag | more)
+    return Ellipsoid(B @ np.linalg.inv(np.linalg.cholesky(A)).T, flag | more)
 
 
 def _quadratic_form(Y: FloatArray) -> tuple[FloatArray, FitFlag]:
@@ -213,118 +259,3 @@ def nearest_solution(N: FloatArray, b: FloatArray, start: FloatArray) -> tuple[F
     # only the difference from the start is solved for, so what data leave open stays there
     x = start + V @ ((V.T @ (b - N @ start)) / values[held])
     return x, FitFlag.CLEAN if values[0] > WEAK * values[-1] else FitFlag.UNDERDETERMINED
-
-
-@dataclass(frozen=True, eq=False)
-class TiltedEllipsoid(LimitSurface):
-    """Ellipsoid ``P(w) = w' A w <= 1`` in any number of dimensions.
-
-    Parameters
-    ----------
-    A : (d, d) array
-        Symmetric and positive definite to `ZERO_SHARE`; for a flat ellipsoid the pseudo-inverse of ``F F'``.
-    F : (d, r) array, optional
-        Image of the unit ball: the body is ``{F y : |y| <= 1}``. Needed only for a flat ellipsoid, ``r < d``.
-    flag : FitFlag
-        What the reader should know.
-
-    Examples
-    --------
-    >>> TiltedEllipsoid([[1.0, 0.0], [0.0, 4.0]]).semi_axes
-    array([1. , 0.5])
-    """
-
-    A: FloatArray
-    F: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
-    flag: FitFlag = FitFlag.CLEAN
-    inverse: FloatArray = field(init=False, repr=False)
-    degree = 2
-
-    def __post_init__(self) -> None:
-        """Refuse what is no ellipsoid."""
-        A = np.array(self.A, float)
-        if A.ndim != 2 or A.shape[0] != A.shape[1] or not np.isfinite(A).all():
-            raise ValueError(f"A has shape {A.shape}: expected finite numbers in a square matrix")
-        # rounding leaves 1e-16; more than this is another matrix than the caller meant
-        if abs(A - A.T).max() > 1e-9 * abs(A).max():
-            raise ValueError("A is not symmetric: give (A + A') / 2, which has the same quadratic form")
-        F = np.array(self.F, float) if np.size(self.F) else _ball_map(A)
-        inverse = _inverse(F)
-        for name, array in (("A", (A + A.T) / 2), ("F", F), ("inverse", inverse)):
-            array.flags.writeable = False
-            object.__setattr__(self, name, array)
-
-    @classmethod
-    def of_ball(cls, F: ArrayLike, flag: FitFlag = FitFlag.CLEAN) -> TiltedEllipsoid:
-        """Image ``{F y : |y| <= 1}`` of the unit ball, ``F (d, r)`` with independent columns; flat if ``r < d``."""
-        inverse = _inverse(np.asarray(F, float))
-        # the map is kept: A holds squares of the axes, in which a short one loses twice as many digits
-        return cls(inverse.T @ inverse, np.asarray(F, float), flag)
-
-    @property
-    def dimension(self) -> int:
-        """Number of components of a wrench."""
-        return len(self.A)
-
-    @property
-    def span(self) -> FloatArray:
-        """Orthonormal directions ``(d, rank)`` in which the body extends."""
-        return np.linalg.qr(self.F)[0]
-
-    @property
-    def volume(self) -> float:
-        """Volume of the body; 0 if it is flat."""
-        if self.F.shape[1] < self.dimension:
-            return 0.0
-        ball = math.pi ** (self.dimension / 2) / math.gamma(self.dimension / 2 + 1)
-        return ball * abs(float(np.linalg.det(self.F)))
-
-    @property
-    def shadow_area(self) -> float:
-        """Area of the shadow on the plane of the first two components."""
-        # the shadow of a ball's image is an ellipse, with the singular values of two rows as axes
-        s = np.linalg.svd(self.F[:2], compute_uv=False)
-        return math.pi * float(s[0] * s[1]) if len(s) > 1 else 0.0
-
-    def value(self, w: ArrayLike) -> FloatArray:
-        """``P(w)``, ``(m, d) -> (m,)``; infinite where a flat body does not extend."""
-        W = rows(w, self.dimension)
-        # through the map and not A, as a sum of squares cannot turn negative by rounding
-        Y = W @ self.inverse.T
-        return mapped_value((Y**2).sum(axis=1), Y, self.F, W)
-
-    def gradient(self, w: ArrayLike) -> FloatArray:
-        """Gradient ``2 A w``, the direction of motion, ``(m, d) -> (m, d)``."""
-        return 2 * rows(w, self.dimension) @ self.inverse.T @ self.inverse
-
-    def support(self, t: ArrayLike) -> FloatArray:
-        """Largest ``w . t`` over the body, ``(m, d) -> (m,)``."""
-        return np.linalg.norm(rows(t, self.dimension) @ self.F, axis=1)
-
-    def scaled(self, factors: ArrayLike) -> TiltedEllipsoid:
-        """Image of the body under ``w -> factors * w``, ``(d,)``, factors not zero."""
-        return TiltedEllipsoid.of_ball(checked_factors(factors, self.dimension)[:, None] * self.F, self.flag)
-
-
-def _inverse(F: FloatArray) -> FloatArray:
-    return np.linalg.inv(F) if F.shape[0] == F.shape[1] else np.linalg.pinv(F)
-
-
-def _ball_map(A: FloatArray) -> FloatArray:
-    # Axes of very different length keep their digits if they are made equal first.
-    diagonal = A.diagonal()
-    if (diagonal <= 0).any():
-        raise ValueError(f"A has the diagonal {diagonal.tolist()}: an ellipsoid needs a positive definite matrix")
-    size = 1 / np.sqrt(diagonal)
-    even = A * np.outer(size, size)
-    lowest = float(np.linalg.eigvalsh(even)[0])
-    if lowest < -ZERO_SHARE:
-        raise ValueError(
-            f"A has the eigenvalues {np.linalg.eigvalsh(A).tolist()}: an ellipsoid needs them all positive"
-        )
-    if lowest < ZERO_SHARE:
-        raise ValueError(
-            f"A has the eigenvalue {lowest:.1e} once its diagonal is 1, less than rounding can tell from zero: whether "
-            "the ellipsoid is closed is undecided; give its semi-axes (TiltedEllipsoid.of_ball)"
-        )
-    return size[:, None] * np.linalg.inv(np.linalg.cholesky(even)).T

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softjaw.lsfit.ellipsoid import TiltedEllipsoid
+from softjaw.lsfit.ellipsoid import Ellipsoid
 from softjaw.lsfit.form import (
     derivative,
     directions,
@@ -108,9 +108,9 @@ class Quartic(LimitSurface):
         return units[:, None] * round_frame(even.value, self.dimension, 4)
 
     @property
-    def ellipsoid(self) -> TiltedEllipsoid:
+    def ellipsoid(self) -> Ellipsoid:
         """An ellipsoid near the body."""
-        return TiltedEllipsoid.of_ball(self.frame, self.flag)
+        return Ellipsoid(self.frame, self.flag)
 
     @cached_property
     def volume(self) -> float:

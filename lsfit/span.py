@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import block_array, csc_array, csr_array, diags_array, eye_array
 
-from softjaw.lsfit.ellipsoid import MAX_REACH_RATIO, TiltedEllipsoid, full_ellipsoid
+from softjaw.lsfit.ellipsoid import MAX_REACH_RATIO, Ellipsoid, full_ellipsoid
 from softjaw.lsfit.form import exponents, monomial_gradients, monomials
 from softjaw.lsfit.lowest import lies_above, smallest_value
 from softjaw.lsfit.quartic import Quartic
@@ -136,9 +136,9 @@ def placed(surface: LimitSurface, samples: SpanSamples) -> LimitSurface:
     """Surface of span coordinates in the coordinates of the wrenches; flagged and flat if the samples are."""
     d, r = samples.B.shape
     flag = surface.flag | samples.flag
-    if isinstance(surface, TiltedEllipsoid):
+    if isinstance(surface, Ellipsoid):
         # maps of the ball compose; the matrix A would be formed and taken apart again
-        return TiltedEllipsoid.of_ball(samples.B @ surface.F, flag)
+        return Ellipsoid(samples.B @ surface.F, flag)
     if isinstance(surface, Image):
         return Image(surface.inner, samples.B @ surface.B, flag)
     # a diagonal map only scales coefficients; any other mixes them, which costs digits
@@ -182,7 +182,7 @@ def zhou_ellipsoid(samples: SpanSamples, weights: tuple[float, float, float] = Z
     values, V = np.linalg.eigh(matrix)
     # an open form makes no ellipsoid, so it is refused before one is made
     refuse_endless(float(values[0]), V[:, 0], samples.Y, 2)
-    surface = TiltedEllipsoid(matrix)
+    surface = Ellipsoid.of_matrix(matrix)
     refuse_runaway(surface, samples.Y)
     return placed(surface, samples)
 
@@ -239,7 +239,7 @@ def _cones(m: int, d: int, k: int, size: int) -> list:
     ]
 
 
-def refuse_runaway(surface: Quartic | TiltedEllipsoid, Y: FloatArray) -> None:
+def refuse_runaway(surface: Quartic | Ellipsoid, Y: FloatArray) -> None:
     """Raise `CollapsedFitError` if ``surface`` lies twice as far out as the samples ``Y``."""
     with np.errstate(divide="ignore"):
         # the median, as single bad samples may lie anywhere

@@ -22,7 +22,8 @@ SUPPORT_STEP = 1e-5  # of differences of a support function of size 1: rounding 
 class Body(Protocol):
     """Limit surface in ``(f_x, f_y, tau_z)`` per unit normal force, with 0 inside or on it.
 
-    A body that has ``vertices (k, 3)`` counts as their hull, one of ``degree`` 2 as an ellipsoid about 0.
+    A body that has ``vertices (k, 3)`` counts as their hull, one that has ``F (3, r)`` as the image of the unit ball
+    under that map, an ellipsoid about 0.
     """
 
     @property
@@ -75,6 +76,10 @@ class PolytopeBody:
         """Largest ``w . t`` over the body, ``(m, 3) -> (m,)``."""
         return (np.atleast_2d(np.asarray(t, float)) @ self.vertices.T).max(axis=1)
 
+    def scaled(self, factors: ArrayLike) -> PolytopeBody:
+        """Image of the hull under ``w -> factors * w``."""
+        return PolytopeBody(self.vertices * np.asarray(factors, float))
+
 
 def vertices_of(body: Body) -> FloatArray | None:
     """Vertices ``(k, 3)`` of a polytope, None of any other body."""
@@ -82,40 +87,18 @@ def vertices_of(body: Body) -> FloatArray | None:
     return None if vertices is None else np.asarray(vertices, float)
 
 
-def quadratic_form(body: Body) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Reach ``(3,)``, lengths ``(3,)`` that scale loads to one, and form ``Q`` of the scaled body's squared support.
-
-    Six supports determine the form of an ellipsoid; of another body it means nothing.
-    """
-    reach = body.support(np.eye(3))
-    # a short axis keeps its digits beside long ones only if all are made one size first
-    scale = np.where(reach > 0, reach, 1.0)
-    e, pairs = np.diag(1 / scale), [(0, 1), (0, 2), (1, 2)]
-    Q = np.diag((reach / scale) ** 2)
-    for (i, j), h in zip(pairs, body.support(np.array([e[i] + e[j] for i, j in pairs])), strict=True):
-        # polarisation: the squared support of a sum holds the mixed term twice
-        product = (h**2 - Q[i, i] - Q[j, j]) / 2
-        Q[i, j] = Q[j, i] = product if abs(product) > 1e-14 else 0.0  # rounding of axes along the components
-    return reach, scale, Q
-
-
-def is_ellipsoid(body: Body) -> bool:
-    """Whether the squared support is a quadratic form, as of an ellipsoid about 0."""
-    _, scale, Q = quadratic_form(body)
-    # six supports always fit some form: others have to confirm it
-    t = fibonacci_vertices(np.ones(3), 60)
-    h2 = body.support(t / scale) ** 2
-    return bool(np.abs(h2 - np.einsum("ka,ab,kb->k", t, Q, t)).max() <= 1e-9 * h2.max())
+def ball_map(body: Body) -> FloatArray | None:
+    """Map ``(3, 3)`` of the unit ball onto an ellipsoid; None of any other body."""
+    F = getattr(body, "F", None)
+    return None if F is None else np.hstack([F, np.zeros((3, 3 - F.shape[1]))])
 
 
 def ellipsoid_matrix(body: Body) -> FloatArray | None:
-    """Symmetric ``A (3, 3)`` such that the body is the image of the unit ball under it; None if its degree is not 2."""
-    if getattr(body, "degree", None) != 2:
+    """Symmetric ``A (3, 3)`` such that the body is the image of the unit ball under it; None if it is no ellipsoid."""
+    if (F := ball_map(body)) is None:
         return None
-    reach, scale, Q = quadratic_form(body)
-    if np.array_equal(Q, np.diag(Q.diagonal())):
-        return np.diag(reach)
-    return _root(Q * np.outer(scale, scale))
+    V, axes, _ = np.linalg.svd(F)
+    return (V * axes) @ V.T
 
 
 def ellipsoid_inside(body: Body) -> FloatArray:
@@ -124,11 +107,8 @@ def ellipsoid_inside(body: Body) -> FloatArray:
     Otherwise it has the proportions of the body's semi-axes. Its size follows from the support on a few thousand
     directions, less what a support function can fall between them, 2 to 4 % of its largest value.
     """
-    # a root from the scaled form keeps the digits of short axes, which a symmetric root would mix up
-    if is_ellipsoid(body):
-        _, scale, Q = quadratic_form(body)
-        size, V = np.linalg.eigh(Q)
-        return np.sqrt(np.maximum(size, 0))[:, None] * V.T * scale
+    if (F := ball_map(body)) is not None:
+        return F.T
     ends = body.support(np.vstack([np.eye(3), -np.eye(3)]))
     axes = (ends[:3] + ends[3:]) / 2
     # a flat body holds no ellipsoid of three axes; a point keeps the bound true
@@ -140,23 +120,16 @@ def ellipsoid_inside(body: Body) -> FloatArray:
     return np.diag(axes * max(h.min() - spacing * h.max() / (1 - spacing), 0))
 
 
-def _root(B: FloatArray) -> FloatArray:
-    """Symmetric root of a symmetric matrix whose eigenvalues are negative by rounding at most."""
-    values, vectors = np.linalg.eigh(B)
-    return (vectors * np.sqrt(np.maximum(values, 0))) @ vectors.T
-
-
 def touching_points(body: Body, t: ArrayLike) -> FloatArray:
     """A point of the body that is farthest in each direction, ``(m, 3) -> (m, 3)``; 0 for no direction."""
     T = np.atleast_2d(np.asarray(t, float))
     vertices = vertices_of(body)
     if vertices is not None:
         return vertices[(T @ vertices.T).argmax(axis=1)]
-    A = ellipsoid_matrix(body)
-    if A is not None:
-        felt = T @ A
+    if (F := ball_map(body)) is not None:
+        felt = T @ F
         length = np.linalg.norm(felt, axis=1, keepdims=True)
-        return felt / np.where(length > 0, length, 1.0) @ A
+        return felt / np.where(length > 0, length, 1.0) @ F.T
     # points by Newton's method are exact to more digits than differences of the support
     if hasattr(body, "support_points"):
         return np.asarray(body.support_points(T))

@@ -42,9 +42,9 @@ from scipy.sparse import block_diag, csc_array, vstack
 from softjaw.scoring.contact import (
     Body,
     SoftContact,
+    ball_map,
     ellipsoid_inside,
     fibonacci_vertices,
-    is_ellipsoid,
     joined,
     joint_support,
     touching_points,
@@ -102,7 +102,7 @@ def epsilon(
         raise ValueError("contacts is empty: a grasp needs at least one contact")
     c, bodies = C[:, :, 0], [contact.body for contact in contacts]
     D = np.array([ellipsoid_inside(body) @ Ci[:, 1:].T for body, Ci in zip(bodies, C, strict=True)])
-    exact = all(is_ellipsoid(body) for body in bodies)
+    exact = all(ball_map(body) is not None for body in bodies)
     if (apart := separating_wrench(c, D)) is None:
         lower, upper, u = _between(c, D, kind, tolerance)
     else:

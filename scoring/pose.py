@@ -24,38 +24,18 @@ over these pairs of sides of ``S_1, S_2`` (integrals of ``(1 - l)^4 l`` and of `
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softjaw.scoring.contact import Body, PolytopeBody, SoftContact, vertices_of
+from softjaw.scoring.contact import Body, SoftContact, ball_map, vertices_of
 from softjaw.scoring.fibre import Fibre, Span, fibre_of
 
 FloatArray = NDArray[np.float64]
 
 
 DELTA_TURN = 1e-9  # [rad] keeps a direction off sides parallel to it, where the share of least force is not unique
-
-
-class _Ellipsoid:
-    """Image of an ellipsoid under ``w -> factors * w``."""
-
-    degree = 2
-
-    def __init__(self, body: Body, factors: FloatArray) -> None:
-        self.body, self.factors = body, factors
-
-    @property
-    def volume(self) -> float:
-        return self.body.volume * float(self.factors.prod())
-
-    @property
-    def shadow_area(self) -> float:
-        return self.body.shadow_area * float(self.factors[:2].prod())
-
-    def support(self, t: ArrayLike) -> FloatArray:
-        return self.body.support(np.asarray(t) * self.factors)
 
 
 class PoseVolume(NamedTuple):
@@ -144,18 +124,16 @@ def _volumes(fibres: tuple[Fibre, Fibre], delta: FloatArray, level: int, with_l1
     return np.array([linf, edges / 15 + joint_pairs(n1, n2, delta) / 20])
 
 
-def _evened(C: FloatArray, body: Body) -> tuple[FloatArray, Body]:
+def _evened(C: FloatArray, body: Any) -> tuple[FloatArray, Body]:
     """Wrench map and body in loads that reach to 1, or are divided by their wrench's size if there are none.
 
     What is thin enough to count as flat must not depend on the unit of length.
     """
-    vertices = vertices_of(body)
-    if vertices is None and getattr(body, "degree", None) != 2:
+    if vertices_of(body) is None and ball_map(body) is None:
         return C, body  # no other body is thickened
     reach = body.support(np.eye(3))
     scale = np.where(reach > 0, reach, 1 / np.linalg.norm(C[:, 1:], axis=0))
-    even = C * np.append(1.0, scale)
-    return even, _Ellipsoid(body, 1 / scale) if vertices is None else PolytopeBody(vertices / scale)
+    return C * np.append(1.0, scale), body.scaled(1 / scale)
 
 
 def _spans(C1: FloatArray, body1: Body, C2: FloatArray, body2: Body) -> tuple[Span, Span] | None:

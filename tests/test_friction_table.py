@@ -184,7 +184,7 @@ def fits_in_six_dimensions(inputs, _):
 
 
 def bodies(inputs):
-    return [Ellipsoid(inputs[f"semi_axes{i}"]) for i in (1, 2)]
+    return [Ellipsoid.of_axes(inputs[f"semi_axes{i}"]) for i in (1, 2)]
 
 
 def measures(bodies, rho):

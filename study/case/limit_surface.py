@@ -16,13 +16,7 @@ from numpy.typing import NDArray
 from softjaw.friction.motion import fibonacci_twists
 from softjaw.friction.patch import ContactPatch
 from softjaw.friction.wrench import friction_wrench
-from softjaw.lsfit.ellipsoid import (
-    Ellipsoid,
-    TiltedEllipsoid,
-    axis_aligned_ellipsoid,
-    full_ellipsoid,
-    three_motion_ellipsoid,
-)
+from softjaw.lsfit.ellipsoid import Ellipsoid, axis_aligned_ellipsoid, full_ellipsoid, three_motion_ellipsoid
 from softjaw.lsfit.form import exponents
 from softjaw.lsfit.quartic import Quartic
 from softjaw.lsfit.quartic_fit import convex_quartic
@@ -138,9 +132,7 @@ def fit_flag(fits: Sequence[Mapping[str, SurfaceFit]]) -> int:
 
 def matrix(surface: LimitSurface) -> FloatArray:
     """Matrix ``A (3, 3)`` of an ellipsoid ``w A w = 1``; NaN for other surfaces, and for flat ones."""
-    if isinstance(surface, Ellipsoid) and surface.rank == 3:
-        return np.diag(surface.semi_axes**-2.0)
-    return surface.A if isinstance(surface, TiltedEllipsoid) else np.full((3, 3), np.nan)
+    return surface.A if isinstance(surface, Ellipsoid) and surface.rank == 3 else np.full((3, 3), np.nan)
 
 
 def coefficients(surface: LimitSurface) -> FloatArray:
@@ -205,7 +197,7 @@ def six_ellipsoid(patch: ContactPatch, rho: float, S: float) -> tuple[FloatArray
         surface, errors = span_ellipsoid(W, T)
     except FitError:
         return np.full((6, 6), np.nan), 0, FitErrors(np.nan, np.nan, np.nan)
-    assert isinstance(surface, TiltedEllipsoid)
+    assert isinstance(surface, Ellipsoid)
     return surface.A, surface.rank, errors._replace(Edir=float(np.radians(errors.Edir)))
 
 
@@ -234,7 +226,7 @@ def fitted_surface(coefficients: FloatArray, matrix: FloatArray) -> LimitSurface
     """The quartic ``(15,)`` or the ellipsoid ``(3, 3)`` in ``(f_x, f_y, tau_z / rho) / (mu S)``; None for NaN."""
     if np.isfinite(coefficients).all():
         return Quartic(coefficients, exponents(3, 4))
-    return TiltedEllipsoid(matrix) if np.isfinite(matrix).all() else None
+    return Ellipsoid.of_matrix(matrix) if np.isfinite(matrix).all() else None
 
 
 def finger_surface(fingers: Callable[..., FloatArray], finger: int, model: str, fitted: bool) -> LimitSurface:
@@ -246,7 +238,7 @@ def finger_surface(fingers: Callable[..., FloatArray], finger: int, model: str, 
         raise ValueError(f"finger is {finger!r}: expected 1 or 2")
     i = finger - 1
     if not fitted:
-        return Ellipsoid(fingers("limit_surface/semi_axes", model)[i] * fingers("S")[i])
+        return Ellipsoid.of_axes(fingers("limit_surface/semi_axes", model)[i] * fingers("S")[i])
     P, A = (fingers(f"limit_surface/{name}", model)[i] for name in ("coefficients", "matrix"))
     if (surface := fitted_surface(P, A)) is None:
         raise ValueError("no surface was fitted, or the cases around have no fitted one of one kind: take fitted=False")

@@ -120,7 +120,7 @@ def stored_surface(
         return None
     # From the file itself: a sweep may change mu from case to case.
     mu = float(planar / S)
-    ellipsoid = Ellipsoid(semi_axes[m] / mu / [1, 1, rho])
+    ellipsoid = Ellipsoid.of_axes(semi_axes[m] / mu / [1, 1, rho])
     unit = planar * np.array([1.0, 1.0, rho]) * SHOWN
     patch = _patch(ds, index, finger, faces or {})
     fits = (field(ds, f"limit_surface_{name}") for name in ("coefficients", "matrix"))

@@ -60,7 +60,7 @@ def limit_surfaces() -> dict[str, tuple[Work, str]]:
 
 
 def scores() -> dict[str, tuple[Work, str]]:
-    body, angle = Ellipsoid((0.8, 0.6, 0.15)), math.radians(10)
+    body, angle = Ellipsoid.of_axes((0.8, 0.6, 0.15)), math.radians(10)
     c, s = math.cos(angle), math.sin(angle)
     pair = [SoftContact([-x / 2, 0, 0], contact_axes([x * c, s, 0], np.eye(3)[2]), body) for x in (1.0, -1.0)]
     one, two = np.array([0.8, 0.7, 0.012]), np.array([0.8, 0.75, 0.011])

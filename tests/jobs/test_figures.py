@@ -104,7 +104,7 @@ def test_errors_on_the_paper_s_grid_are_those_of_the_reference():
     """A curved contact under even pressure, 21 x 21 centres of rotation: case l12 of tests/data/friction_table.json."""
     patch = cylinder_grid(1.0, np.pi / 3, 2.0, 48, 48)
     limits = friction_limits(patch, 1.0)
-    ellipsoid = Ellipsoid(np.array(limits.per_unit_force) / [1.0, 1.0, 2.0])
+    ellipsoid = Ellipsoid.of_axes(np.array(limits.per_unit_force) / [1.0, 1.0, 2.0])
     found = surfaces.errors_on_grid(StoredSurface(np.ones(3), 2.0, ellipsoid, None, patch, "ccm"))
     assert found["fit_error_ellipsoid"] == pytest.approx(0.003113307368265586, rel=1e-6)
     # the reference's quartic is fitted to the wrenches alone, ours to the motions, too

@@ -14,7 +14,6 @@ from softjaw.lsfit.body import hull_volume
 from softjaw.lsfit.ellipsoid import (
     MAX_REACH_RATIO,
     Ellipsoid,
-    TiltedEllipsoid,
     axis_aligned_ellipsoid,
     full_ellipsoid,
     three_motion_ellipsoid,
@@ -102,7 +101,7 @@ def test_whether_a_matrix_is_that_of_an_ellipsoid(least, outcome):
     def decide(rng):
         R = turn(rng)
         A = shaken(rng, R @ np.diag([1, 1, least]) @ R.T)
-        return TiltedEllipsoid((A + A.T) / 2).rank
+        return Ellipsoid.of_matrix((A + A.T) / 2).rank
 
     assert outcomes(decide) == {outcome: TURNS}
 
@@ -208,14 +207,14 @@ def test_loads_in_the_plane_of_a_flat_body_are_in_it():
     def decide(rng):
         R = turn(rng)
         B = R[:, :2] * [1.0, 0.5]
-        bodies = Image(Quartic([1.0, 0, 2, 0, 1], exponents(2, 4)), B), TiltedEllipsoid.of_ball(B)
+        bodies = Image(Quartic([1.0, 0, 2, 0, 1], exponents(2, 4)), B), Ellipsoid(B)
         inside = shaken(rng, w @ B.T)
         return tuple(
             (bool(body.holds(inside).all()), bool(body.holds(inside + 1e-3 * R[:, 2]).any())) for body in bodies
         )
 
     assert outcomes(decide) == {((True, False), (True, False)): TURNS}
-    flat = Ellipsoid([1.0, 0.5, 0.0])
+    flat = Ellipsoid.of_axes([1.0, 0.5, 0.0])
 
     def with_noise(rng):
         return bool(flat.holds(np.column_stack([0.4 * w, 1e-17 * rng.normal(size=20)])).all())
@@ -249,7 +248,7 @@ def test_a_motion_against_a_flat_body_is_at_a_right_angle_to_its_normals():
 
     def decide(rng):
         B = turn(rng)[:, :2]
-        return round(fit_error(TiltedEllipsoid.of_ball(B), [B[:, 0]], [-B[:, 0]]).Edir, 6)
+        return round(fit_error(Ellipsoid(B), [B[:, 0]], [-B[:, 0]]).Edir, 6)
 
     assert outcomes(decide) == {90.0: TURNS}
 

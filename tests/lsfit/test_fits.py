@@ -86,7 +86,7 @@ def test_errors_and_volumes_of_known_patches(name):
     patch, rho, errors, eigenvalue, ratios = PATCHES[name]
     W, T = samples(patch, 500, rho)
     limits = np.array(friction_limits(patch, 1.0).per_unit_force) / [1, 1, rho]
-    models = Ellipsoid(limits), full_ellipsoid(W), least_squares_quartic(W)
+    models = Ellipsoid.of_axes(limits), full_ellipsoid(W), least_squares_quartic(W)
     off = np.array([fit_error(model, W, T) for model in models]) - numbers(errors)
     np.testing.assert_allclose(off, 0, atol=0.06)
     np.testing.assert_allclose(off[:, :2], 0, atol=6e-5)

@@ -5,7 +5,7 @@ import pytest
 
 from softjaw.friction.motion import SLIDE_X, SLIDE_Y
 from softjaw.friction.wrench import friction_wrench
-from softjaw.lsfit.ellipsoid import TiltedEllipsoid
+from softjaw.lsfit.ellipsoid import Ellipsoid
 from softjaw.lsfit.form import exponents
 from softjaw.lsfit.quartic import Quartic
 from softjaw.lsfit.samples import normalised_samples, six_samples, sphere_motions
@@ -29,7 +29,7 @@ def as_they_are(W, T):
 
 def objective(surface, W, T, lam, beta, gamma):
     """The objective as the publication writes it, with the best rate of each sample."""
-    G, quadratic = surface.gradient(W), isinstance(surface, TiltedEllipsoid)
+    G, quadratic = surface.gradient(W), isinstance(surface, Ellipsoid)
     G = G / 2 if quadratic else G
     rates = np.maximum((G * T).sum(axis=1), 0.0)
     size = np.linalg.norm(surface.A if quadratic else surface.coefficients)
@@ -49,7 +49,7 @@ def test_no_neighbour_is_better(fit, weights):
     for seed in range(10):
         F = np.random.default_rng(seed).normal(size=(3, 3))
         if fit is zhou_ellipsoid:
-            beside = TiltedEllipsoid(0.99 * best.A + 0.01 * F @ F.T)
+            beside = Ellipsoid.of_matrix(0.99 * best.A + 0.01 * F @ F.T)
         else:
             E = exponents(3, 4)
             fourth = np.zeros(len(E))
@@ -60,7 +60,7 @@ def test_no_neighbour_is_better(fit, weights):
 
 def test_an_ellipsoid_is_found_again():
     A = np.array([[2.0, 0.3, -0.2], [0.3, 3.0, 0.5], [-0.2, 0.5, 9.0]])
-    true, u = TiltedEllipsoid(A), sphere_motions(80, 3)
+    true, u = Ellipsoid.of_matrix(A), sphere_motions(80, 3)
     W = u * true.radius(u)[:, None]
     np.testing.assert_allclose(zhou_ellipsoid(span_samples(W, unit(W @ A))).A, A, rtol=1e-6, atol=1e-6)
 

@@ -20,7 +20,7 @@ def body_of(shape):
     """Ellipsoid of three semi-axes, hull of an array of points, anything else as it is."""
     if hasattr(shape, "support"):
         return shape
-    return Ellipsoid(shape) if np.ndim(shape) == 1 else PolytopeBody(shape)
+    return Ellipsoid.of_axes(shape) if np.ndim(shape) == 1 else PolytopeBody(shape)
 
 
 def facing(first=A, second=B, d=1.3, tilt=0.0, offset=(0, 0, 0)):

@@ -65,20 +65,6 @@ class Radial(Smooth):
         return 1 / np.linalg.norm(np.asarray(u) / self.inside.semi_axes, axis=1)
 
 
-class Tilted:
-    """Image of the unit ball under any map."""
-
-    degree = 2
-
-    def __init__(self, matrix):
-        self.matrix = matrix
-        self.volume = 4 / 3 * math.pi * abs(np.linalg.det(matrix))
-        self.shadow_area = math.pi * math.sqrt(np.linalg.det(matrix[:2] @ matrix[:2].T))
-
-    def support(self, t):
-        return np.linalg.norm(np.atleast_2d(t) @ self.matrix, axis=1)
-
-
 @pytest.mark.parametrize("pose", POSES)
 def test_polytopes_have_the_volume_of_their_hull_in_six_dimensions(pose):
     vertices = [PolytopeBody(fibonacci_vertices(axes, m)) for axes, m in ((A, 9), (B, 7))]
@@ -91,7 +77,7 @@ def test_polytopes_have_the_volume_of_their_hull_in_six_dimensions(pose):
 @pytest.mark.parametrize("kind", ["ellipsoid", "graspit"])
 @pytest.mark.parametrize("turn", [0.0, 0.7])
 def test_facing_contacts_have_the_closed_form_however_they_are_turned_about_their_line(kind, turn):
-    bodies = [Ellipsoid(a) if kind == "ellipsoid" else PolytopeBody(graspit_vertices(a)) for a in (A, B)]
+    bodies = [Ellipsoid.of_axes(a) if kind == "ellipsoid" else PolytopeBody(graspit_vertices(a)) for a in (A, B)]
     one, two = tilted(0, 0, bodies=bodies)
     x, y, N = two.axes
     c, s = math.cos(turn), math.sin(turn)
@@ -117,7 +103,7 @@ def test_ellipsoids_are_the_limit_of_polytopes_within_them(pose):
 @pytest.mark.parametrize("seed", range(4))
 def test_the_error_is_stated_and_kept(seed):
     rng = np.random.default_rng(seed)
-    contacts = anywhere(rng, *(Ellipsoid(rng.uniform(0.05, 1, 3)) for _ in "12"))
+    contacts = anywhere(rng, *(Ellipsoid.of_axes(rng.uniform(0.05, 1, 3)) for _ in "12"))
     fine = pose_volume(*contacts, 1.0, 1.0, relative_error=1e-9)
     usual = pose_volume(*contacts, 1.0, 1.0)
     assert usual.relative_error <= 1e-5
@@ -127,12 +113,12 @@ def test_the_error_is_stated_and_kept(seed):
 def test_laws_of_scale_and_motion():
     rng = np.random.default_rng(7)
     axes = rng.uniform(0.1, 1, (2, 3))
-    one, two = anywhere(rng, *map(Ellipsoid, axes))
+    one, two = anywhere(rng, *map(Ellipsoid.of_axes, axes))
     exact = pose_volume(one, two, 1.0, 1.0, relative_error=1e-8)
     Q, shift = rotation(rng), rng.normal(size=3)
     moved = [SoftContact(Q @ c.position + shift, c.axes @ Q.T, c.body) for c in (one, two)]
     same = pose_volume(*moved, 1.0, 1.0, relative_error=1e-8), pose_volume(two, one, 1, 1, shift, relative_error=1e-8)
-    longer = [SoftContact(1e3 * c.position, c.axes, Ellipsoid(c.body.semi_axes * [1, 1, 1e3])) for c in moved]
+    longer = [SoftContact(1e3 * c.position, c.axes, Ellipsoid.of_axes(c.body.semi_axes * [1, 1, 1e3])) for c in moved]
     same += (pose_volume(*longer, 1e3, 1e3, relative_error=1e-8),)
     for found in same:
         np.testing.assert_allclose(found[:2], exact[:2], rtol=1e-7)
@@ -143,19 +129,23 @@ def test_laws_of_scale_and_motion():
 def test_bodies_known_by_support_or_radius(hidden):
     for pose in POSES[1:4]:
         exact = pose_volume(*tilted(*pose), 1.0, 0.7)
-        found = pose_volume(*tilted(*pose, bodies=[hidden(Ellipsoid(a)) for a in (A, B)]), 1.0, 0.7, (0, 0, 0), 1e-4)
+        found = pose_volume(
+            *tilted(*pose, bodies=[hidden(Ellipsoid.of_axes(a)) for a in (A, B)]), 1.0, 0.7, (0, 0, 0), 1e-4
+        )
         np.testing.assert_allclose(found[:2], exact[:2], rtol=2e-4)
-        mixed = pose_volume(*tilted(*pose, bodies=[Ellipsoid(A), hidden(Ellipsoid(B))]), 1, 0.7, (0, 0, 0), 1e-4)
+        mixed = pose_volume(
+            *tilted(*pose, bodies=[Ellipsoid.of_axes(A), hidden(Ellipsoid.of_axes(B))]), 1, 0.7, (0, 0, 0), 1e-4
+        )
         np.testing.assert_allclose(mixed[:2], exact[:2], rtol=2e-4)
 
 
 def test_tilted_ellipsoids():
     rng = np.random.default_rng(5)
-    bodies = [Tilted(rng.normal(size=(3, 3)) * [[1], [1], [0.2]]) for _ in "12"]
+    bodies = [Ellipsoid(rng.normal(size=(3, 3)) * [[1], [1], [0.2]]) for _ in "12"]
     found = pose_volume(*tilted(20, -30, (0, 0.2, 0.1), bodies=bodies), 1.0, 1.0)
     volumes = []
     for m in (400, 1600):
-        inside = [PolytopeBody(fibonacci_vertices(np.ones(3), m) @ b.matrix.T) for b in bodies]
+        inside = [PolytopeBody(fibonacci_vertices(np.ones(3), m) @ b.F.T) for b in bodies]
         volumes.append(np.array(pose_volume(*tilted(20, -30, (0, 0.2, 0.1), bodies=inside), 1.0, 1.0)[:2]))
     np.testing.assert_allclose(found[:2], volumes[1] + (volumes[1] - volumes[0]) / 3, rtol=4e-4)
 
@@ -167,22 +157,22 @@ def test_tilted_ellipsoids():
 def test_contacts_that_do_not_carry_every_load(axes1, flat):
     """The limit of thin bodies; a point without friction leaves fewer than 6 dimensions."""
     pose = (30, -20, (0.1, 0.3, 0.2))
-    found = pose_volume(*tilted(*pose, bodies=[Ellipsoid(axes1), Ellipsoid(B)]), 1.0, 1.0)
-    thin = Ellipsoid(np.maximum(axes1, 1e-7))
-    limit = pose_volume(*tilted(*pose, bodies=[thin, Ellipsoid(B)]), 1.0, 1.0)
+    found = pose_volume(*tilted(*pose, bodies=[Ellipsoid.of_axes(axes1), Ellipsoid.of_axes(B)]), 1.0, 1.0)
+    thin = Ellipsoid.of_axes(np.maximum(axes1, 1e-7))
+    limit = pose_volume(*tilted(*pose, bodies=[thin, Ellipsoid.of_axes(B)]), 1.0, 1.0)
     np.testing.assert_allclose(found[:2], limit[:2], rtol=1e-4, atol=1e-8)
     assert (found.linf == 0) == flat
     polytope = PolytopeBody(fibonacci_vertices(axes1, 1500))
-    inside = pose_volume(*tilted(*pose, bodies=[polytope, Ellipsoid(B)]), 1.0, 1.0)
+    inside = pose_volume(*tilted(*pose, bodies=[polytope, Ellipsoid.of_axes(B)]), 1.0, 1.0)
     np.testing.assert_allclose(inside[:2], found[:2], rtol=5e-3)
 
 
 def test_no_volume_in_fewer_than_six_dimensions():
-    points = [Ellipsoid([1, 1, 0])] * 2
+    points = [Ellipsoid.of_axes([1, 1, 0])] * 2
     cases = [
         tilted(0, 0, bodies=points), tilted(20, -30, (0, 0.1, 0.2), bodies=points),  # no torque about their line
         tilted(0, 0, d=0.0), tilted(90, 90), tilted(90, -90),  # one place; normals across the line
-        tilted(10, 10, bodies=[Ellipsoid([0, 0, 0])] * 2),
+        tilted(10, 10, bodies=[Ellipsoid.of_axes([0, 0, 0])] * 2),
         tilted(10, 10, bodies=[PolytopeBody(np.zeros((1, 3)))] * 2),
     ]  # fmt: skip
     for contacts in cases:
@@ -221,8 +211,11 @@ def test_areas_of_hulls_with_the_origin():
 def test_meshes_and_touching_points():
     points, triangles = sphere_mesh(2)
     assert (len(points), len(triangles)) == (162, 320)
-    body = Ellipsoid(A)
-    np.testing.assert_allclose(ellipsoid_matrix(body), np.diag(A))
+    body = Ellipsoid.of_axes(A)
+    turned = Ellipsoid(np.random.default_rng(1).normal(size=(3, 3)))
+    np.testing.assert_allclose(ellipsoid_matrix(body), np.diag(A), atol=1e-15)
+    root = ellipsoid_matrix(turned)
+    np.testing.assert_allclose([root, root @ root], [root.T, turned.F @ turned.F.T], atol=1e-14)
     t = points[:20]
     for kind in (body, Smooth(body), Radial(body)):
         np.testing.assert_allclose(touching_points(kind, t), touching_points(body, t), atol=1e-8)

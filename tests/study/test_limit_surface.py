@@ -115,7 +115,7 @@ def soft_contacts(values, m):
     for f in range(2):
         R = values["fingers/pose_rotation"][f]
         position = R @ values["fingers/frame_origin"][f] + values["fingers/pose_origin"][f]
-        body = Ellipsoid(values["limit_surface/semi_axes"][f][m])
+        body = Ellipsoid.of_axes(values["limit_surface/semi_axes"][f][m])
         yield SoftContact(position, values["fingers/frame_axes"][f] @ R.T, body)
 
 

@@ -9,7 +9,6 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from softjaw.fem.objects.gap import Pose
-from softjaw.lsfit.ellipsoid import Ellipsoid
 from softjaw.scoring.contact import SoftContact
 from softjaw.scoring.pose import pose_volume
 from softjaw.study.case.build import build_object, centre_of_volume
@@ -81,7 +80,7 @@ def test_arms_are_scaled_along_the_axes_of_the_object(angle):
     if angle != 0.4:  # along an axis: in closed form, with its length
         assert found == pytest.approx(quality(pair(), replace(SETTINGS, arms=sizes @ np.abs(along))), rel=1e-9)
     else:
-        bodies = [SoftContact(c.origin / sizes, c.axes, Ellipsoid(c.ellipsoids["ccm"].semi_axes)) for c in contacts]
+        bodies = [SoftContact(c.origin / sizes, c.axes, c.ellipsoids["ccm"]) for c in contacts]
         assert found == pytest.approx(pose_volume(*bodies, 1.0, 0.05).linf, rel=1e-4)
         closed = quality(pair(), SETTINGS) * (0.09 * np.linalg.norm(along / sizes)) ** 2
         assert found < 0.97 * closed
