@@ -14,7 +14,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import spline_filter
 
@@ -28,59 +27,52 @@ class SplineSurface:
     Parameters
     ----------
     theta, s : (m + 1,), (k + 1,) arrays
-        Ascending parameters of the grid lines: angle about the axis [rad] and a length along the outline [m].
+        Ascending parameters of the grid lines: angle once about the axis [rad] and a length along the outline [m].
     coefficients : (m, k, 3, 4, 4) array
         Of the powers of ``theta`` and of ``s``, lowest first [m].
-    closed : bool
-        Whether ``theta`` runs once round; it is then taken modulo the full turn.
     """
 
     theta: FloatArray
     s: FloatArray
     coefficients: FloatArray
-    closed: bool
 
-    def at(self, theta: ArrayLike, s: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Points ``(n, 3)`` [m] and unit normals ``(n, 3)``, the cross product of the theta and s directions.
-
-        A normal is zero where the surface has none: where a line of the grid shrinks to a point on the axis.
-        """
-        theta, s = np.broadcast_arrays(np.asarray(theta, float), np.asarray(s, float))
-        D = np.empty((theta.size, 6, 3))
-        for n, pair in enumerate(zip(theta.ravel(), s.ravel(), strict=True)):
-            evaluate(self.theta, self.s, self.coefficients, self.closed, *pair, D[n])
-        normal = np.cross(D[:, 1], D[:, 2])
-        return D[:, 0], normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    def at(self, theta: FloatArray, s: FloatArray) -> FloatArray:
+        """Points and derivatives ``X, X_t, X_s, X_tt, X_ts, X_ss`` at ``n`` pairs of parameters: ``(n, 6, 3)``."""
+        D = np.empty((len(theta), 6, 3))
+        _evaluate(self.theta, self.s, self.coefficients, theta, s, D)
+        return D
 
 
-def spline_surface(theta: ArrayLike, s: ArrayLike, points: ArrayLike, closed: bool) -> SplineSurface:
+def spline_surface(theta: FloatArray, s: FloatArray, points: FloatArray) -> SplineSurface:
     """Surface through ``points (m + 1, k + 1, 3)`` on the grid ``theta (m + 1,)``, ``s (k + 1,)``.
 
     Raises
     ------
     ValueError
-        If the parameters do not ascend, or a closed surface does not end where it began.
+        If the parameters do not ascend, or the surface does not end where it began.
     """
-    theta, s, X = np.asarray(theta, float), np.asarray(s, float), np.array(points, dtype=float)
-    if X.shape != (len(theta), len(s), 3):
-        raise ValueError(f"points has shape {X.shape}, expected {(len(theta), len(s), 3)} for this grid")
-    if closed:
-        off = np.abs(X[0] - X[-1]).max()
-        if off > 1e-9 * np.abs(X).max():
-            raise ValueError(f"a closed surface must end where it began, found {off:.3g} m between its two ends")
-        # periodic splines want both ends equal
-        X[-1] = X[0]
-    around = CubicSpline(theta, X, axis=0, bc_type="periodic" if closed else "not-a-knot").c[::-1]  # (4, m, k + 1, 3)
+    X = points.copy()
+    off = np.abs(X[0] - X[-1]).max()
+    if off > 1e-9 * np.abs(X).max():
+        raise ValueError(f"a surface must end where it began, found {off:.3g} m between its two ends")
+    # periodic splines want both ends equal
+    X[-1] = X[0]
+    around = CubicSpline(theta, X, axis=0, bc_type="periodic").c[::-1]  # (4, m, k + 1, 3)
     along = CubicSpline(s, around, axis=2).c[::-1]  # (4, k, 4, m, 3)
-    return SplineSurface(theta, s, np.ascontiguousarray(along.transpose(3, 1, 4, 2, 0)), closed)
+    return SplineSurface(theta, s, np.ascontiguousarray(along.transpose(3, 1, 4, 2, 0)))
 
 
 @njit(cache=True)
-def evaluate(theta_lines, s_lines, coefficients, closed, theta, s, D):
+def _evaluate(theta_lines, s_lines, coefficients, theta, s, D):
+    """`evaluate` at many places."""
+    for n in range(theta.size):
+        evaluate(theta_lines, s_lines, coefficients, theta[n], s[n], D[n])
+
+
+@njit(cache=True)
+def evaluate(theta_lines, s_lines, coefficients, theta, s, D):
     """Position and derivatives ``D (6, 3)``: ``X, X_t, X_s, X_tt, X_ts, X_ss``, continued beyond the ends."""
-    if closed:
-        turn = theta_lines[-1] - theta_lines[0]
-        theta = theta_lines[0] + (theta - theta_lines[0]) % turn
+    theta = theta_lines[0] + (theta - theta_lines[0]) % (theta_lines[-1] - theta_lines[0])
     i = min(max(np.searchsorted(theta_lines, theta, side="right") - 1, 0), theta_lines.size - 2)
     j = min(max(np.searchsorted(s_lines, s, side="right") - 1, 0), s_lines.size - 2)
     u, v = theta - theta_lines[i], s - s_lines[j]

@@ -13,7 +13,6 @@ from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.fem.objects.outer_surface import OuterSurface
 from softjaw.fem.objects.splines import SplineSurface, spline_surface
 from softjaw.fem.shell.facing import FAR, Wall, face
-from softjaw.friction.patch import NEGLIGIBLE
 
 AROUND, ALONG = 192, 256  # samples of the surface that splines join
 RIM = 17  # samples of a rounded edge, which is short
@@ -29,12 +28,9 @@ class Stacked:
     @property
     def axis_symmetry(self) -> int:
         """Every angle if all sections are circles about the axis, half a turn without shifts, else none."""
-        if not all(self.outer.symmetric):
-            return 1
-        s = np.linspace(*self.outer.wall, 64)
-        z = self.outer.curve.derivative(s)[:, 0]
-        off = np.abs(np.stack([self.outer.ratio(z) - 1.0, self.outer.exponent(z) - 2.0])).max()
-        return 0 if off <= NEGLIGIBLE else 2
+        if self.outer.round:
+            return 0
+        return 2 if all(self.outer.symmetric) else 1
 
     @property
     def bounds(self) -> FloatArray:
@@ -110,11 +106,8 @@ class _NearWall:
         return self.body._gap(x, np.ones(len(x), dtype=bool))
 
 
-def wall_surface(outer, lower: float | None = None, upper: float | None = None) -> SplineSurface:
-    """Splines through the part of an outer surface between two places ``s`` [m], by default the ends of its wall.
-
-    ``outer`` offers ``wall``, ``curve`` and ``jets`` as ``fem.objects.outer_surface.OuterSurface`` does.
-    """
+def wall_surface(outer: OuterSurface, lower: float | None = None, upper: float | None = None) -> SplineSurface:
+    """Splines through the part of an outer surface between two places ``s`` [m], by default the ends of its wall."""
     ends = outer.wall[0] if lower is None else lower, outer.wall[1] if upper is None else upper
     breaks = outer.curve.breaks
     breaks = breaks[(breaks > ends[0]) & (breaks < ends[1])]
@@ -125,7 +118,7 @@ def wall_surface(outer, lower: float | None = None, upper: float | None = None) 
     s = s[np.concatenate([[True], np.diff(s) > 1e-9])]
     theta = np.linspace(0.0, 2 * np.pi, AROUND + 1)
     T, S = np.meshgrid(theta, s, indexing="ij")
-    return spline_surface(theta, s, outer.jets(T, S)[:, 0].reshape(*T.shape, 3), closed=True)
+    return spline_surface(theta, s, outer.jets(T, S)[:, 0].reshape(*T.shape, 3))
 
 
 def undeformed(surface: SplineSurface) -> Wall:

@@ -10,19 +10,18 @@ round body the traced surface lies inside by about two thirds of their sagitta, 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
-from scipy.interpolate import BSpline, CubicSpline
+from scipy.interpolate import BSpline
 
 from softjaw.fem.errors import MeshError
 from softjaw.fem.objects.gap import FloatArray
 from softjaw.fem.objects.mesh_object import MeshObject
-from softjaw.fem.objects.outer_surface import Jet, OuterSurface
+from softjaw.fem.objects.outer_surface import OuterSurface
 from softjaw.fem.objects.profile import joined, lid
-from softjaw.fem.objects.splines import SplineSurface, evaluate, spline_surface
+from softjaw.fem.objects.splines import SplineSurface, spline_surface
 from softjaw.fem.objects.traced_outline import (
     FEW,
     Wall,
@@ -163,49 +162,13 @@ class TraceReport:
     wavelength: float
 
 
-@dataclass(frozen=True, eq=False)
-class TracedSurface(OuterSurface):
-    """Closed surface ``X(theta, s)`` traced on a mesh; `traced` builds it.
-
-    The attributes of `OuterSurface` mean the same: ``shift_x`` and ``shift_y`` are the centre line, ``ratio`` the
-    sections' width along y over that along x, ``exponent`` is 2 on round bodies and NaN on others.
-
-    Attributes
-    ----------
-    shape : SplineSurface
-        ``q (cos theta, sin theta, 0)``: the sections in units of the mean radius.
-    round : bool
-        Whether every angle is a symmetry.
-    """
-
-    shape: SplineSurface = field(kw_only=True)
-    round: bool = field(kw_only=True)
-
-    def _parts(self, theta: FloatArray, s: FloatArray) -> tuple[list[Jet], Jet, list[Jet], Jet]:
-        """See `OuterSurface`."""
-        none = np.zeros_like(s)
-        d = [self.curve.derivative(s, order) for order in range(3)]
-        z, a = (Jet([d[0][:, i], none, d[1][:, i], none, none, d[2][:, i]]) for i in (0, 1))
-        shift = [z.through(*(f(z.rows[0], order) for order in range(3))) for f in (self.shift_x, self.shift_y)]
-        D = np.empty((len(s), 6, 3))
-        _evaluate(self.shape.theta, self.shape.s, self.shape.coefficients, theta, s, D)
-        return [Jet(D[:, :, 0].T), Jet(D[:, :, 1].T)], a, shift, z
-
-
-@njit(cache=True)
-def _evaluate(theta_lines, s_lines, coefficients, theta, s, D):
-    """Position and derivatives of a closed surface at many places."""
-    for n in range(theta.size):
-        evaluate(theta_lines, s_lines, coefficients, True, theta[n], s[n], D[n])
-
-
 def traced(
     mesh: MeshObject,
     heights: tuple[float, float] | None = None,
     wavelength: float | None = None,
     rim: float = 0.002,
     largest_distance: float | None = None,
-) -> tuple[TracedSurface, TraceReport]:
+) -> tuple[OuterSurface, TraceReport]:
     """Smooth surface near a closed mesh with the axis z, for a thin-walled body of the same outside.
 
     Parameters
@@ -256,9 +219,9 @@ def facet_size(mesh: MeshObject) -> float:
     return float(side[order][np.searchsorted(total, 0.5 * total[-1])])
 
 
-def _surface(wall: Wall, radii: Radii, rim: float) -> TracedSurface:
+def _surface(wall: Wall, radii: Radii, rim: float) -> OuterSurface:
     """Surface through radii, with lids."""
-    s, z, R = radii.s, radii.z, radii.R
+    s, R = radii.s, radii.R
     a = smooth_spline(s, R.mean(axis=1), radii.wavelength, (0.0, s[-1]))
     given = curve_of(radii.height, a)
     below, above = (lid(given, height, rim, first=k == 0) for k, height in enumerate(wall.lids))
@@ -266,26 +229,20 @@ def _surface(wall: Wall, radii: Radii, rim: float) -> TracedSurface:
     first = sum(len(piece.coefficients) for piece in below)
     start, end = float(curve.breaks[first]), float(curve.breaks[-1])
     # carried on over the lids, so that they have the shape of the last section
-    q = continued(s + start, R / a(s)[:, None], radii.wavelength, (0.0, end))
-    n = R.shape[1] // 4
-    ratio = CubicSpline(z, (R[:, n] + R[:, 3 * n]) / (R[:, 0] + R[:, 2 * n]))
-    exponent = 2.0 if radii.round else np.nan
-    return TracedSurface(
+    shape = _shape(continued(s + start, R / a(s)[:, None], radii.wavelength, (0.0, end)), R.shape[1])
+    return OuterSurface(
         curve,
         (start, start + float(s[-1])),
         (float(curve.breaks[1]) if len(below) > 1 else 0.0, float(curve.breaks[-2]) if len(above) > 1 else end),
-        lambda h, order=0: ratio(np.clip(h, *wall.ends), order),
-        lambda h, order=0: np.full(np.shape(h), exponent if order == 0 else 0.0),
-        lambda h, order=0: wall.centre(h, order)[:, 0],
-        lambda h, order=0: wall.centre(h, order)[:, 1],
+        lambda theta, s, z, z_s: shape.at(theta, s)[:, :3, :2].transpose(1, 0, 2),
+        wall.centre,
         radii.symmetric,
-        shape=_shape(q, R.shape[1]),
-        round=radii.round,
+        radii.round,
     )
 
 
 def _shape(q: BSpline, around: int) -> SplineSurface:
-    """Sections ``q(s) (around,)`` as splines round and along."""
+    """Sections ``q (cos theta, sin theta, 0)`` in units of the mean radius, as splines round and along."""
     knots = q.t[3:-3]
     s = np.linspace(knots[0], knots[-1], 2 * (len(knots) - 1) + 1)  # splines of the shape per knot of the outline
     theta = np.linspace(0.0, 2 * np.pi, around + 1)
@@ -293,19 +250,19 @@ def _shape(q: BSpline, around: int) -> SplineSurface:
     values = q(s)
     # a closed surface has to end where it began
     values = np.concatenate([values, values[:, :1]], axis=1).T
-    return spline_surface(theta, s, values[:, :, None] * e[:, None, :], closed=True)
+    return spline_surface(theta, s, values[:, :, None] * e[:, None, :])
 
 
-def _report(surface: TracedSurface, mesh: MeshObject, wall: Wall, facet: float, wavelength: float) -> TraceReport:
+def _report(surface: OuterSurface, mesh: MeshObject, wall: Wall, facet: float, wavelength: float) -> TraceReport:
     """Distances between mesh and surface."""
     middle, normal = mesh.points[mesh.triangles].mean(axis=1), area_vectors(mesh.points, mesh.triangles)
-    away = middle[:, :2] - np.stack([surface.shift_x(middle[:, 2]), surface.shift_y(middle[:, 2])], axis=1)
+    away = middle[:, :2] - wall.centre(middle[:, 2])
     outwards = np.einsum("ni,ni->n", away, normal[:, :2]) > 0  # not the inner wall of a hollow mesh
     x = np.concatenate([mesh.points[np.unique(mesh.triangles[outwards])], middle[outwards]])
     s = np.linspace(*surface.wall, 8 * len(surface.curve.breaks))
     z = surface.curve.derivative(s)[:, 0]
     x = x[(x[:, 2] >= z[0]) & (x[:, 2] <= z[-1])]
-    d = x[:, :2] - np.stack([surface.shift_x(x[:, 2]), surface.shift_y(x[:, 2])], axis=1)
+    d = x[:, :2] - wall.centre(x[:, 2])
     theta, s = np.arctan2(d[:, 1], d[:, 0]), np.interp(x[:, 2], z, s)
     off = np.abs(np.einsum("ni,ni->n", x - surface.jets(theta, s)[:, 0], surface.normals(theta, s)))
     k = int(off.argmax())

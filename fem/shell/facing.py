@@ -74,7 +74,7 @@ class Wall:
         low, high = self.ends
         lines = np.unique(np.clip(self.s, low, high))
         t, s = (grid.ravel() for grid in np.meshgrid(self.theta, lines, indexing="ij"))
-        return np.column_stack([t, s]), cKDTree(self.surface.at(t, s)[0])
+        return np.column_stack([t, s]), cKDTree(self.surface.at(t, s)[:, 0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,7 +145,7 @@ def _search(wall: Wall, points: FloatArray, places: FloatArray, v: FloatArray, w
     )  # fmt: skip
     surface = wall.surface
     _face(
-        np.ascontiguousarray(points), places, surface.theta, surface.s, surface.coefficients, surface.closed,
+        np.ascontiguousarray(points), places, surface.theta, surface.s, surface.coefficients,
         wall.closed, *wall.ends, wall.theta, wall.s, wall.nodes, wall.half, v, w, facing.gap, facing.normal, facing.e,
         facing.nodes, facing.N, facing.H, facing.G, facing.A,
     )  # fmt: skip
@@ -153,7 +153,7 @@ def _search(wall: Wall, points: FloatArray, places: FloatArray, v: FloatArray, w
 
 
 @njit(cache=True)
-def _face(points, places, lines_t, lines_s, coefficients, periodic, closed, low, high, theta, s, table, half, v, w, gap,
+def _face(points, places, lines_t, lines_s, coefficients, closed, low, high, theta, s, table, half, v, w, gap,
           normal, e, nodes, N, H, G, A):  # fmt: skip
     """Loop of `_search`."""
     X, J, inverse = np.empty((6, 3)), np.empty((3, 3)), np.empty((3, 3))
@@ -168,7 +168,7 @@ def _face(points, places, lines_t, lines_s, coefficients, periodic, closed, low,
             t0 = theta[0] + (t0 - theta[0]) % (theta[-1] - theta[0])
         ok, length, size = False, 1.0, 1.0
         for iteration in range(50):
-            evaluate(lines_t, lines_s, coefficients, periodic, t0, s0, X)
+            evaluate(lines_t, lines_s, coefficients, t0, s0, X)
             _element(theta, s, table, t0, s0, at, shape, shape_1, shape_2)
             length = _director(X, half, w, at, shape, shape_1, shape_2, n, n_1, n_2)
             # a director that has vanished faces nowhere, and NaN does not get past either

@@ -15,7 +15,7 @@ from functools import lru_cache
 import numpy as np
 
 from softjaw.fem.objects.gap import Pose
-from softjaw.fem.objects.outer_surface import OuterSurface, Turned
+from softjaw.fem.objects.outer_surface import OuterSurface
 from softjaw.fem.objects.stacked import wall_surface
 from softjaw.fem.shell.element import FloatArray, Shell
 from softjaw.fem.shell.facing import Wall
@@ -96,8 +96,6 @@ class ThinWalled:
     Parameters
     ----------
     surface : OuterSurface
-    round : bool
-        Whether every angle is a symmetry.
     thickness : float or (k, 2) tuple
         Of the wall [m], or pairs (z, thickness).
     material : WallMaterial
@@ -112,7 +110,6 @@ class ThinWalled:
     """
 
     surface: OuterSurface
-    round: bool
     thickness: float | tuple[tuple[float, float], ...]
     material: WallMaterial
     support: str = "free"
@@ -157,7 +154,7 @@ def grasp(body: ThinWalled, poses: tuple[Pose, Pose], allowed: tuple[bool, bool]
     approach = poses[0].rotation[:, 2]
     # an approach along the axis has no angle about it, and any will do
     angle = float(np.arctan2(-approach[1], -approach[0])) if np.hypot(*approach[:2]) > 1e-6 else 0.0
-    turned = Turned(body.surface, angle, body.round)
+    turned = body.surface.turned(angle)
     turned_poses = tuple(_turned(pose, angle) for pose in poses)
     size = max(np.abs(pose.origin).max() for pose in turned_poses)
 
@@ -197,9 +194,8 @@ def object_factors(
 
 
 def _supported(body: ThinWalled, held: Grasp, size: MeshSize) -> tuple[Shell[BodyMesh], FloatArray]:
-    surface = Turned(body.surface, held.angle, body.round)
     mesh = body_mesh(
-        surface, body.thickness, size, held.mirrors,
+        body.surface.turned(held.angle), body.thickness, size, held.mirrors,
         open_top=body.open_top, open_bottom=body.open_bottom, base_thickness=body.base_thickness,
     )  # fmt: skip
     return supported(mesh, body.material, body.support, body.springs)

@@ -11,11 +11,10 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 from skfem import ElementQuad1
 
-from softjaw.fem.objects.outer_surface import OuterSurface, Turned
+from softjaw.fem.objects.outer_surface import OuterSurface
 from softjaw.fem.shell.element import FloatArray, IntArray, ShellMesh, grid_elements
 from softjaw.friction.patch import NEGLIGIBLE
 
-Outer = OuterSurface | Turned
 Thickness = float | Sequence[tuple[float, float]]  # of a wall [m], or pairs (z, thickness)
 LINE_SAMPLES = 4000  # of the wanted element size along a line
 TURN = np.radians(25.0)  # largest turn of the outline within one element
@@ -83,7 +82,9 @@ def divided(start: float, end: float, x: FloatArray, h: FloatArray, multiple: in
     return places
 
 
-def along(surface: Outer, size: MeshSize, open_bottom: bool, open_top: bool, marks: Sequence[float] = ()) -> FloatArray:
+def along(
+    surface: OuterSurface, size: MeshSize, open_bottom: bool, open_top: bool, marks: Sequence[float] = ()
+) -> FloatArray:
     """Grid lines along the outline, with one on the edge of each flat lid and at each of the places ``marks``."""
     begin = surface.wall[0] if open_bottom else 0.0
     end = surface.wall[1] if open_top else surface.end
@@ -99,7 +100,7 @@ def along(surface: Outer, size: MeshSize, open_bottom: bool, open_top: bool, mar
     return np.concatenate([*(run[:-1] for run in runs), runs[-1][-1:]])
 
 
-def around(surface: Outer, size: MeshSize, symmetry: tuple[bool, bool]) -> FloatArray:
+def around(surface: OuterSurface, size: MeshSize, symmetry: tuple[bool, bool]) -> FloatArray:
     """Grid lines round the body; the sizes are true at the middle of the gripped heights."""
     begin, end = {
         (False, False): (size.angles[0], size.angles[0] + 2 * np.pi),
@@ -143,7 +144,7 @@ class BodyMesh(ShellMesh):
         Numbers that these planes fix.
     """
 
-    surface: Outer
+    surface: OuterSurface
     theta: FloatArray
     s: FloatArray
     number: IntArray
@@ -187,7 +188,7 @@ class BodyMesh(ShellMesh):
 
 
 def body_mesh(
-    surface: Outer,
+    surface: OuterSurface,
     thickness: Thickness,
     size: MeshSize,
     symmetry: tuple[bool, bool] = (False, False),
@@ -229,7 +230,7 @@ def body_mesh(
     return BodyMesh(X, D, grid_elements(number), surface, theta, s, number, symmetry, planes)
 
 
-def _steps(surface: Outer, thickness: Thickness) -> list[float]:
+def _steps(surface: OuterSurface, thickness: Thickness) -> list[float]:
     """Places on the wall where a given thickness changes its slope: the mesh needs a line there."""
     if isinstance(thickness, float):
         return []
@@ -238,7 +239,7 @@ def _steps(surface: Outer, thickness: Thickness) -> list[float]:
     return [surface.station(height) for height, _ in thickness if low < height < high]
 
 
-def _numbers(surface: Outer, theta: FloatArray, s: FloatArray, *, whole: bool) -> tuple[IntArray, IntArray]:
+def _numbers(surface: OuterSurface, theta: FloatArray, s: FloatArray, *, whole: bool) -> tuple[IntArray, IntArray]:
     """Node on each crossing, and the (theta, s) line numbers ``(2, k)`` of every node's first crossing."""
     m, n = len(theta), len(s)
     key = np.arange(m * n).reshape(m, n)
@@ -253,7 +254,7 @@ def _numbers(surface: Outer, theta: FloatArray, s: FloatArray, *, whole: bool) -
     return number.reshape(m, n).astype(np.int32), np.stack([first // n, first % n])
 
 
-def _wall(surface: Outer, thickness: Thickness, base: float | None, s: FloatArray) -> FloatArray:
+def _wall(surface: OuterSurface, thickness: Thickness, base: float | None, s: FloatArray) -> FloatArray:
     """Thickness ``(n,)`` at the places s."""
     table = np.array([(0.0, thickness)] if isinstance(thickness, float) else thickness)
     z = surface.curve.derivative(s)[:, 0]

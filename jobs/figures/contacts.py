@@ -113,7 +113,7 @@ def candidate_marks() -> np.ndarray:
 
 def outline(shape: Any, angle: float) -> tuple[np.ndarray, np.ndarray]:
     """Heights and half widths [m] along the approach at ``angle`` [rad] of an object with a wall round its axis."""
-    surface = outer_surface(shape)[0]
+    surface = outer_surface(shape)
     theta, s = np.meshgrid(np.linspace(0, 2 * np.pi, 73), np.linspace(*surface.wall, 161), indexing="ij")
     place = surface.jets(theta, s)[:, 0].reshape(*theta.shape, 3)
     along = place[..., 0] * np.cos(angle) + place[..., 1] * np.sin(angle)

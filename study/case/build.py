@@ -40,7 +40,7 @@ def build_object(shape: Any) -> GapObject:
         case "revolution":
             return _revolution(shape)
         case "sections":
-            return geometry().stacked(outer_surface(shape)[0])
+            return geometry().stacked(outer_surface(shape))
         case "elliptic_cylinder":
             return objects.EllipticCylinder(shape.semi_axis_a, shape.semi_axis_b, shape.length)
         case "sphere":
@@ -123,18 +123,17 @@ def _revolution(shape: Any) -> objects.Revolution:
 
 
 @lru_cache(maxsize=8)
-def outer_surface(shape: Any) -> tuple[OuterSurface, bool]:
-    """Outer surface of an object that can have a wall, and whether it is a body of revolution.
+def outer_surface(shape: Any) -> OuterSurface:
+    """Outer surface of an object that can have a wall.
 
     Raises `ValueError` for geometry that cannot be.
     """
     if shape.shape == "revolution":
-        return of_revolution(_revolution(shape)), True
+        return of_revolution(_revolution(shape))
     if shape.shape == "mesh":
         surface, _ = geometry().traced_surface(shape)
-        return surface, surface.round
-    sections = [Section(s.z, s.a, s.b, s.exponent, s.shift) for s in shape.sections]
-    return of_sections(sections), shape.axis_symmetry == 0
+        return surface
+    return of_sections([Section(s.z, s.a, s.b, s.exponent, s.shift) for s in shape.sections])
 
 
 def has_wall(shape: Any) -> bool:
@@ -172,7 +171,7 @@ def check_object(scene: Scene) -> None:
         except ValueError as error:
             raise StudyError(USAGE, f"{key}: {error}") from error
         if shape.wall is not None:
-            geometry().check_wall(shape, outer_surface(shape)[0])
+            geometry().check_wall(shape, outer_surface(shape))
         if shape.shape == "mesh":
             _check_stations(scene, shape)
 

@@ -19,7 +19,7 @@ from softjaw.fem.objects.gap import GapObject
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.fem.objects.outer_surface import OuterSurface
 from softjaw.fem.objects.stacked import Stacked
-from softjaw.fem.objects.traced_surface import TracedSurface, TraceReport, traced
+from softjaw.fem.objects.traced_surface import TraceReport, traced
 from softjaw.fem.shell.wall_material import WallMaterial, wall_material
 from softjaw.fem.shell.wall_mesh import MeshSize, along, around, body_mesh
 from softjaw.study.messages import USAGE, StudyError
@@ -45,7 +45,7 @@ def stacked(surface: OuterSurface) -> GapObject:
 
 
 @lru_cache(maxsize=8)
-def traced_surface(shape: Mesh) -> tuple[TracedSurface, TraceReport]:
+def traced_surface(shape: Mesh) -> tuple[OuterSurface, TraceReport]:
     """Smooth surface of a mesh's wall, and how far it is from the mesh."""
     mesh = mesh_object(shape)
     if not mesh.closed:

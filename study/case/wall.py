@@ -30,10 +30,8 @@ ESTIMATE = WallMesh(0.004, 0.006, 0.012)  # mesh of the estimate that the level 
 def thin_body(shape: Walled) -> ThinWalled:
     """Wall of an object that has one (``shape.wall`` is not None)."""
     assert shape.wall is not None
-    surface, is_round = outer_surface(shape)
     return ThinWalled(
-        surface,
-        is_round,
+        outer_surface(shape),
         shape.wall,
         material_of(shape),
         shape.support,
@@ -55,7 +53,7 @@ def estimated_indentation(
     """
     length, width, _ = scene.gripper.pad_size
     # A round object is the same at every angle, so all candidates share its factors.
-    linear = object_factors(body, 0.0 if body.round else grasp.angle, grasp.mirrors, ESTIMATE, 0.6 * width)
+    linear = object_factors(body, 0.0 if body.surface.round else grasp.angle, grasp.mirrors, ESTIMATE, 0.6 * width)
     mesh, area = linear.shell.mesh, linear.shell.node_area
     load = np.zeros((linear.shell.nodes, 6))
     pressed = np.zeros(linear.shell.nodes, dtype=bool)

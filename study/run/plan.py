@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from softjaw.fem.objects.outer_surface import Turned
 from softjaw.study.case import candidates as grasps
 from softjaw.study.case.build import (
     check_object,
@@ -256,11 +255,11 @@ def wall_unknowns(scene: Any) -> dict[str, int]:
     pads.
     """
     try:
-        surface, is_round = outer_surface(scene.object)
+        surface = outer_surface(scene.object)
     except (AttributeError, ValueError):
         return {}
     angle = 0.0 if scene.candidates.poses else scene.candidates.angles[0]
-    turned = Turned(surface, angle, is_round)
+    turned = surface.turned(angle)
     mirrors = _mirrors(scene, turned.symmetric)
     low, high, half = _covered(scene, surface)
 

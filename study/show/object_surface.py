@@ -258,7 +258,7 @@ def undeformed(shape: Any, angle: float) -> np.ndarray | None:
     ``angle`` is finger 1's about the axis [rad]. None for shapes without a wall that can be traced.
     """
     try:
-        surface = outer_surface(shape)[0]
+        surface = outer_surface(shape)
     except (AttributeError, OSError, ValueError):
         return None
     end = surface.wall[1] if shape.open_top else surface.end

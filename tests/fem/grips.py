@@ -31,11 +31,9 @@ def can() -> Revolution:
     return Revolution(np.column_stack([z, [0.033, 0.035, 0.035, 0.035, 0.035, 0.013, 0.013, 0.013]]))
 
 
-def thin(
-    thickness: float = 4e-4, law: WallMaterial | None = None, support: str = "standing", around: bool = True
-) -> ThinWalled:
+def thin(thickness: float = 4e-4, law: WallMaterial | None = None, support: str = "standing") -> ThinWalled:
     """The can with a wall of PET."""
-    return ThinWalled(of_revolution(can()), around, thickness, law or wall_material("pet"), support)
+    return ThinWalled(of_revolution(can()), thickness, law or wall_material("pet"), support)
 
 
 def pose(theta: float, z: float, radius: float = 0.035) -> Pose:

@@ -9,7 +9,7 @@ import pytest
 from softjaw.fem.errors import MeshError
 from softjaw.fem.objects.gap import grid_triangles
 from softjaw.fem.objects.mesh_object import MeshObject
-from softjaw.fem.objects.outer_surface import Section, Turned, of_sections
+from softjaw.fem.objects.outer_surface import Section, of_sections
 from softjaw.fem.objects.revolution import Revolution
 from softjaw.fem.objects.stacked import Stacked
 from softjaw.fem.objects.traced_outline import cast, centroids, smooth_rings, smooth_spline
@@ -124,10 +124,7 @@ def test_a_leaning_body_is_followed():
         gap = np.abs(exact.gap(surface.jets(*places(surface, 400))[:, 0])[0])
         assert gap.max() < most
         assert report.largest < 2 * most
-        centre = np.array([float(f(np.array([0.11]))[0]) for f in (surface.shift_x, surface.shift_y)])
-        assert centre == pytest.approx(
-            [float(f(np.array([0.11]))[0]) for f in (LEANING.shift_x, LEANING.shift_y)], abs=5e-4
-        )
+        assert surface.shift(np.array([0.11])) == pytest.approx(LEANING.shift(np.array([0.11])), abs=5e-4)
 
 
 def test_the_noise_of_a_scan_is_smoothed():
@@ -160,15 +157,11 @@ def flask():
 def test_derivatives_and_normals_of_the_surface():
     surface, h = flask()[0], np.array([1e-4, 1e-6])
     theta, s = RNG.uniform(-4, 9, 300), RNG.uniform(1e-3, surface.end - 1e-3, 300)
-    lines = np.concatenate([surface.curve.breaks, surface.shape.s])
-    s = s[np.abs(s[:, None] - lines).min(axis=1) > 1e-5]
-    theta = theta[: len(s)]
     D = surface.jets(theta, s)
-    for axis, pairs in ((0, ((0, 1), (1, 3), (2, 4))), (1, ((0, 2), (1, 4), (2, 5)))):
+    for axis in (0, 1):
         dt, ds = h * (np.arange(2) == axis)
-        found = (surface.jets(theta + dt, s + ds) - surface.jets(theta - dt, s - ds)) / (2 * h[axis])
-        for of, derivative in pairs:
-            assert np.abs(found[:, of] - D[:, derivative]).max() < 1e-4 * np.abs(D[:, derivative]).max()
+        found = (surface.jets(theta + dt, s + ds) - surface.jets(theta - dt, s - ds))[:, 0] / (2 * h[axis])
+        assert np.abs(found - D[:, 1 + axis]).max() < 1e-4 * np.abs(D[:, 1 + axis]).max()
     n = surface.normals(theta, s)
     assert np.abs(np.einsum("nki,ni->nk", D[:, 1:3], n)).max() < 1e-15
     wall = (s > surface.wall[0]) & (s < surface.wall[1])
@@ -187,7 +180,7 @@ def test_the_flask_of_the_examples():
     assert max(report.lids) < 4e-4
     assert report.heights == pytest.approx((0.002, 0.118), abs=1e-3)
     assert Stacked(surface).axis_symmetry == 2
-    turned = Turned(surface, 0.5 * np.pi, surface.round)
+    turned = surface.turned(0.5 * np.pi)
     assert turned.symmetric == (True, True)
     mesh = body_mesh(turned, 4e-4, MeshSize(heights=(0.03, 0.05), around=0.004, along=0.006), (True, True))
     on = np.abs(mesh.theta) < 1e-12
@@ -196,7 +189,7 @@ def test_the_flask_of_the_examples():
 
 def traced_can():
     surface, _ = traced(revolved(can(), 0.0015))
-    return ThinWalled(surface, surface.round, 4e-4, PET, "standing")
+    return ThinWalled(surface, 4e-4, PET, "standing")
 
 
 @pytest.mark.long

@@ -14,7 +14,7 @@ def wall():
     """Cylinder about z, its mesh unrelated to the grid of its splines."""
     theta, s = np.linspace(0, 2 * np.pi, 97), np.linspace(0, LENGTH, 31)
     T, S = np.meshgrid(theta, s, indexing="ij")
-    surface = spline_surface(theta, s, np.stack([R * np.cos(T), R * np.sin(T), S], axis=-1), closed=True)
+    surface = spline_surface(theta, s, np.stack([R * np.cos(T), R * np.sin(T), S], axis=-1))
     number = np.arange(40 * 21, dtype=np.int32).reshape(40, 21)
     lines = np.linspace(0, 2 * np.pi, 41), np.linspace(0, LENGTH, 21)
     return Wall(surface, *lines, np.vstack([number, number[:1]]), np.full(40 * 21, 2e-4))
@@ -31,7 +31,8 @@ def points():
 def nodes(wall):
     """Outer face of the mesh's nodes and the normals there."""
     T, S = np.meshgrid(wall.theta[:-1], wall.s, indexing="ij")
-    return wall.surface.at(T.ravel(), S.ravel())
+    X = wall.surface.at(T.ravel(), S.ravel())[:, 0]
+    return X, X * [1 / R, 1 / R, 0]
 
 
 def still(wall):
