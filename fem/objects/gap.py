@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Protocol, Self
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,7 +94,7 @@ class Analytic(GapFunction):
         """See `first_touch`."""
         return first_touch(self, pose, points, reach)
 
-    def near(self, pose: Pose, lower: FloatArray, upper: FloatArray, element: float | None = None) -> Self:
+    def near(self, pose: Pose, lower: FloatArray, upper: FloatArray, element: float | None = None) -> GapFunction:
         """Return the shape itself: a closed form needs no region."""
         return self
 

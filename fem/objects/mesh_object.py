@@ -67,11 +67,6 @@ class MeshObject:
     placed: Pose = field(default_factory=lambda: Pose(np.eye(3), np.zeros(3)))
     closed: bool = True
 
-    def __post_init__(self) -> None:
-        """Refuse a step that is no length."""
-        if self.grid_step is not None and not (np.isfinite(self.grid_step) and self.grid_step > 0):
-            raise ValueError(f"grid_step must be a positive length in metres, found {self.grid_step}")
-
     @classmethod
     def from_file(
         cls, path: str | Path, unit: str, axis: str = "z", grid_step: float | None = None,
@@ -82,8 +77,6 @@ class MeshObject:
         ``axis`` of the file becomes z, by a cyclic exchange of the coordinates; z starts at 0 and the bounding box is
         centred in x and y. Raises ``MeshError`` with one sentence that says what is wrong and what to do.
         """
-        if axis not in TURNS:
-            raise MeshError(f"the mesh's axis must be one of {', '.join(TURNS)}, found {axis!r}")
         corners, triangles = read_triangles(Path(path))
         try:
             clean = cleaned(corners, triangles, unit)
@@ -143,10 +136,6 @@ class MeshObject:
         g, normal, _ = self._tree.signed(x)
         return g, normal, np.zeros((len(x), 3, 3))
 
-    def distance(self, x: FloatArray) -> FloatArray:
-        """Signed distance ``(n,)`` [m] to the flat triangles, all of them."""
-        return self._tree.signed(x)[0]
-
     def near(self, pose: Pose, lower: FloatArray, upper: FloatArray, element: float | None = None) -> MeshRegion:
         """Smooth signed distance inside the box from ``lower (3,)`` to ``upper (3,)`` of the pad's frame [m].
 
@@ -155,8 +144,6 @@ class MeshObject:
         """
         box = np.array([lower, upper], dtype=float)
         size = box[1] - box[0]
-        if not (size > 0).all():
-            raise ValueError(f"the box from {box[0].tolist()} to {box[1].tolist()} m is empty; swap its corners")
         step = self._step(size, element)
         # whole coarse cells, as `sampled` asks for; rounding of the quotient must not add one
         cells = COARSE * np.ceil((size / step - 1e-9 + 2 * MARGIN_CELLS) / COARSE)

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -149,15 +148,7 @@ def of_revolution(body: Revolution) -> OuterSurface:
 
 
 def of_sections(sections: Sequence[Section], rim: float = 0.002) -> OuterSurface:
-    """Surface through sections given from bottom to top; ``rim`` rounds the edges at flat ends [m].
-
-    Raises
-    ------
-    ValueError
-        For sections that make no body.
-    """
-    if any(p.z >= q.z for p, q in pairwise(sections)):
-        raise ValueError("sections must be given from bottom to top, each higher than the one before")
+    """Surface through sections given from bottom to top; ``rim`` rounds the edges at flat ends [m]."""
     return _surface(Revolution(np.array([[p.z, p.a] for p in sections]), rim), list(sections))
 
 

@@ -55,8 +55,6 @@ class Revolution(Analytic):
     def __post_init__(self) -> None:
         """Draw the curve, and refuse profiles that are no body's."""
         points = _checked_points(self.profile)
-        if not (np.isfinite(self.rim) and self.rim > 0):
-            raise ValueError(f"rim must be a positive length in metres, found {self.rim}")
         given, curve = through(points, self.rim)
         places = _places(curve)
         line = curve.derivative(places)
@@ -110,10 +108,6 @@ class Revolution(Analytic):
 def _checked_points(profile: FloatArray) -> FloatArray:
     """Profile as an array that runs upwards along the outside."""
     points = np.array(profile, dtype=float)
-    if points.ndim != 2 or points.shape[1] != 2 or len(points) < 2:
-        raise ValueError(f"profile must be a list of at least two pairs (z, r), found shape {points.shape}")
-    if not np.isfinite(points).all():
-        raise ValueError(f"profile point {_first(~np.isfinite(points).all(axis=1))} is not a pair of finite numbers")
     ends = points[[0, -1], 1]
     points[[0, -1], 1] = np.where(np.abs(ends) <= NEGLIGIBLE, 0.0, ends)
     bad = points[:, 1] <= 0

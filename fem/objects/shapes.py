@@ -29,22 +29,11 @@ __all__ = ["Box", "EllipticCylinder", "GapFunction", "GapObject", "Plane", "Revo
 SLAB_HALF_EXTENT = 0.1  # how far a slab is drawn along y and z [m]
 
 
-def _positive(**values: float) -> None:
-    """Refuse a dimension that is not a positive number, by name."""
-    for name, value in values.items():
-        if not (np.isfinite(value) and value > 0):
-            raise ValueError(f"{name} must be a positive length in metres, found {value}")
-
-
 @dataclass(frozen=True)
 class Plane(Analytic):
     """Slab ``|x| <= thickness / 2`` without end along y and z."""
 
     thickness: float
-
-    def __post_init__(self) -> None:
-        """Refuse a slab without thickness."""
-        _positive(thickness=self.thickness)
 
     def gap(self, x: FloatArray) -> Gap:
         """Signed distance ``(n,)`` [m], normal ``(n, 3)`` and Hessian ``(n, 3, 3)`` (zero)."""
@@ -74,10 +63,6 @@ class Sphere(Analytic):
     """Sphere about the origin."""
 
     radius: float
-
-    def __post_init__(self) -> None:
-        """Refuse a sphere without extent."""
-        _positive(radius=self.radius)
 
     def gap(self, x: FloatArray) -> Gap:
         """Signed distance ``(n,)`` [m], normal ``(n, 3)`` and Hessian ``(n, 3, 3)`` [1/m]."""
@@ -121,10 +106,6 @@ class EllipticCylinder(Analytic):
     b: float
     length: float
     rim: float = 0.002
-
-    def __post_init__(self) -> None:
-        """Refuse a cylinder without extent."""
-        _positive(a=self.a, b=self.b, length=self.length, rim=self.rim)
 
     @property
     def edge_radius(self) -> float:
@@ -199,19 +180,6 @@ class Box(Analytic):
 
     size: FloatArray
     edge_radius: float
-
-    def __post_init__(self) -> None:
-        """Refuse a box that its rounding would swallow."""
-        size = np.array(self.size, dtype=float)
-        if size.shape != (3,):
-            raise ValueError(f"size must hold three lengths in metres, found {self.size}")
-        _positive(size=float(size.min()))
-        if not 0 <= self.edge_radius <= size.min() / 2:
-            raise ValueError(
-                f"edge_radius must lie between 0 and half the smallest side, {size.min() / 2:g} m, found "
-                f"{self.edge_radius}"
-            )
-        object.__setattr__(self, "size", size)
 
     def gap(self, x: FloatArray) -> Gap:
         """Signed distance ``(n,)`` [m], normal ``(n, 3)`` and Hessian ``(n, 3, 3)`` [1/m]."""

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from softjaw.fem.objects.gap import FloatArray, Gap, GapFunction, Pose, Surface, first_touch, grid_triangles
+from softjaw.fem.objects.gap import Analytic, FloatArray, Gap, GapFunction, Pose, Surface, grid_triangles
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.fem.objects.outer_surface import OuterSurface
 from softjaw.fem.objects.splines import SplineSurface, spline_surface
@@ -20,7 +20,7 @@ DRAWN_AROUND, DRAWN_ALONG = 72, 90
 
 
 @dataclass(frozen=True, eq=False)
-class Stacked:
+class Stacked(Analytic):
     """Closed body inside an outer surface."""
 
     outer: OuterSurface
@@ -37,15 +37,11 @@ class Stacked:
         """Corners ``(2, 3)`` [m]."""
         return self._triangles.bounds
 
-    def first_touch(self, pose: Pose, points: FloatArray, reach: float) -> float:
-        """See `softjaw.fem.objects.gap.first_touch`."""
-        return first_touch(self, pose, points, reach)
-
     def gap(self, x: FloatArray) -> Gap:
         """Signed distance ``(n,)`` [m], normal ``(n, 3)`` and Hessian ``(n, 3, 3)`` [1/m]."""
         x = np.asarray(x, dtype=float)
         # where the exact place on the wall is looked for [m]
-        return self._gap(x, np.abs(self._triangles.distance(x)) < 0.004)
+        return self._gap(x, np.abs(self._triangles.gap(x)[0]) < 0.004)
 
     def near(self, pose: Pose, lower: FloatArray, upper: FloatArray, element: float | None = None) -> GapFunction:
         """Gap function for use close to the wall, which need not ask the triangles first."""

@@ -270,7 +270,7 @@ def _report(surface: OuterSurface, mesh: MeshObject, wall: Wall, facet: float, w
     lids = []
     for ends, height in zip(((0.0, surface.wall[0]), (surface.wall[1], surface.end)), wall.lids, strict=True):
         theta, s = np.meshgrid(np.linspace(0, 2 * np.pi, LID, endpoint=False), np.linspace(*ends, LID))
-        off_lid = np.abs(mesh.distance(surface.jets(theta, s)[:, 0])).max()
+        off_lid = np.abs(mesh.gap(surface.jets(theta, s)[:, 0])[0]).max()
         lids.append(np.nan if height is None else float(off_lid))
     return TraceReport(
         (float(z[0]), float(z[-1])), float(off[k]), float(np.sqrt((off**2).mean())), place,

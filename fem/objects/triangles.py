@@ -97,8 +97,6 @@ def cleaned(points: FloatArray, triangles: IntArray, unit: str = "m") -> Triangl
         No triangles with finite coordinates, or an implausible size.
     """
     points, triangles = np.asarray(points, dtype=float), np.asarray(triangles)
-    if unit not in UNITS:
-        raise MeshError(f"the mesh's unit must be one of {', '.join(UNITS)}, found {unit!r}")
     triangles, notes = _finite(points, triangles)
     points, triangles, merged = _merged(points, triangles)
     # points that no triangle uses are gone by now and do not count for the size
@@ -310,18 +308,4 @@ def _inside(points: FloatArray, piece: IntArray, other: IntArray) -> bool:
     """Whether a piece lies inside another, but for a few places where it may come through."""
     corners = np.unique(piece)
     asked = points[corners[:: 1 + len(corners) // 100]]  # corners of a piece are tested, about 100
-    return float(np.mean([winding_number(x, points, other) > 0.5 for x in asked])) > 0.9
-
-
-def winding_number(x: FloatArray, points: FloatArray, triangles: IntArray) -> float:
-    """How often triangles surround the point ``x (3,)``: 1 inside, 0 outside (solid angle over 4 pi)."""
-    a, b, c = (points[triangles] - x).transpose(1, 0, 2)
-    A, B, C = (np.linalg.norm(v, axis=1) for v in (a, b, c))
-    dot = lambda u, v: np.einsum("ij,ij->i", u, v)  # noqa: E731
-    lower = A * B * C + dot(a, b) * C + dot(b, c) * A + dot(c, a) * B
-    # a triangle on which x lies up to rounding is seen under half a turn or its negative: it counts as neither
-    side, noise = dot(a, np.cross(b, c)), ROUNDED * np.abs(points).max() * (A * B + B * C + C * A)
-    on = (np.abs(side) <= noise) & (lower <= 1e-3 * A * B * C + noise)
-    return float(np.where(on, 0.0, np.arctan2(side, lower)).sum() / (2 * np.pi))
-
-
+    return float(np.mean(TriangleTree(points, other).signed(asked)[0] < -ROUNDED * np.abs(points).max())) > 0.9

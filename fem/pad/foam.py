@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from softjaw.fem import materials
 from softjaw.fem.assembly import gather, pairs
-from softjaw.fem.materials import stress
+from softjaw.fem.materials import inverted, principal, stress
 from softjaw.fem.pad.mesh import Pad
 
 FloatArray = NDArray[np.float64]
@@ -33,20 +33,7 @@ def _gradient(u, dN, nodes, F, B):
             for a in range(nodes):
                 value += u[i, a] * dN[j, a]
             F[i, j] = value
-    B[0, 0] = F[1, 1] * F[2, 2] - F[1, 2] * F[2, 1]
-    B[0, 1] = F[0, 2] * F[2, 1] - F[0, 1] * F[2, 2]
-    B[0, 2] = F[0, 1] * F[1, 2] - F[0, 2] * F[1, 1]
-    B[1, 0] = F[1, 2] * F[2, 0] - F[1, 0] * F[2, 2]
-    B[1, 1] = F[0, 0] * F[2, 2] - F[0, 2] * F[2, 0]
-    B[1, 2] = F[0, 2] * F[1, 0] - F[0, 0] * F[1, 2]
-    B[2, 0] = F[1, 0] * F[2, 1] - F[1, 1] * F[2, 0]
-    B[2, 1] = F[0, 1] * F[2, 0] - F[0, 0] * F[2, 1]
-    B[2, 2] = F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]
-    J = F[0, 0] * B[0, 0] + F[0, 1] * B[1, 0] + F[0, 2] * B[2, 0]
-    for i in range(3):
-        for j in range(3):
-            B[i, j] /= J
-    return J
+    return inverted(F, B)
 
 
 @njit(cache=True)
@@ -58,22 +45,6 @@ def smallest_det(u, dN):
         for q in range(dN.shape[1]):
             smallest = min(smallest, _gradient(u[e], dN[e, q], dN.shape[3], F, B))
     return smallest
-
-
-@njit(cache=True)
-def extreme_eigenvalues(M):
-    """Smallest and largest eigenvalue of a symmetric 3 x 3 matrix, from the trigonometric roots of its cubic."""
-    mean = (M[0, 0] + M[1, 1] + M[2, 2]) / 3.0
-    a, b, c = M[0, 0] - mean, M[1, 1] - mean, M[2, 2] - mean
-    d, e, f = M[0, 1], M[0, 2], M[1, 2]
-    radius = np.sqrt((a * a + b * b + c * c + 2.0 * (d * d + e * e + f * f)) / 6.0)
-    # three equal eigenvalues: the angle below is undefined
-    if radius <= 1e-12 * abs(mean):
-        return mean, mean
-    # rounding can push the cosine of the angle beyond 1
-    half_det = 0.5 * (a * (b * c - f * f) - d * (d * c - f * e) + e * (d * f - b * e)) / radius**3
-    angle = np.arccos(min(1.0, max(-1.0, half_det))) / 3.0
-    return mean + 2.0 * radius * np.cos(angle + 2.0 * np.pi / 3.0), mean + 2.0 * radius * np.cos(angle)
 
 
 @njit(cache=True, inline="always")
@@ -175,9 +146,9 @@ def _bound_to(laws):
                 for i in range(3):
                     for k in range(3):
                         C[i, k] = F[0, i] * F[0, k] + F[1, i] * F[1, k] + F[2, i] * F[2, k]
-                low, high = extreme_eigenvalues(C)
-                # rounding can leave the smallest eigenvalue of a crushed element below zero
-                strain = max(strain, abs(np.sqrt(max(low, 0.0)) - 1.0), abs(np.sqrt(high) - 1.0))
+                for square in principal(C)[0]:
+                    # rounding can leave the smallest eigenvalue of a crushed element below zero
+                    strain = max(strain, abs(np.sqrt(max(square, 0.0)) - 1.0))
                 # one point per element: loss of ellipticity is a warning, and the tensor in 24 directions is dear
                 if q > 0:
                     continue
@@ -189,7 +160,7 @@ def _bound_to(laws):
                             for j in range(3):
                                 value += m[j] * (A[i, j, k, 0] * m[0] + A[i, j, k, 1] * m[1] + A[i, j, k, 2] * m[2])
                             Q[i, k] = value
-                    ellipticity = min(ellipticity, extreme_eigenvalues(Q)[0])
+                    ellipticity = min(ellipticity, principal(Q)[0].min())
         return strain, ellipticity / shear_modulus
 
     return elements, strain_measures

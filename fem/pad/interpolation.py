@@ -45,10 +45,8 @@ def _mirrored(coarse: Pad, points: FloatArray, nodes: FloatArray, values: FloatA
 def _tensor(coarse: Pad, points: FloatArray, nodes: FloatArray, values: FloatArray) -> FloatArray:
     """Values ``(n, c)`` at points ``(n, d)``, d = 2 or 3, from those at the nodes of a grid of mesh lines."""
     lines = [coarse.lines(axis) for axis in range(points.shape[1])]
-    # nodes inside elements are off their line by rounding, so the nearest line is theirs
-    place = tuple(np.abs(nodes[:, axis, None] - line).argmin(axis=1) for axis, line in enumerate(lines))
     grid = np.empty((*map(len, lines), values.shape[1]))
-    grid[place] = values
+    grid[coarse.places(nodes)] = values
     places = [_places(points[:, axis], line, coarse.shape.per_side) for axis, line in enumerate(lines)]
     total = np.zeros((len(points), values.shape[1]))
     for corner in np.ndindex(*(coarse.shape.per_side,) * len(lines)):

@@ -105,8 +105,8 @@ class Pad:
             """Nodes of the facets there."""
             return basis.get_dofs(lambda x: np.abs(x[axis] - place) < tol).flatten()
 
-        self.contact_nodes, self.contact_grid = _as_grid(self.nodes, on_plane(2, 0.0), tol)
-        back_nodes, _ = _as_grid(self.nodes, on_plane(2, -self.shape.size[2]), tol)
+        self.contact_grid = len(self.lines(0)), len(self.lines(1))
+        self.contact_nodes, back_nodes = (self._as_grid(on_plane(2, z)) for z in (0.0, -self.shape.size[2]))
         free = np.ones((count, 3), dtype=bool)
         self.back = self._on_plate(back_nodes)
         # an elastic plate leaves all of the back free that neither the finger nor a plane of symmetry holds
@@ -178,28 +178,22 @@ class Pad:
         # those inside a triquadratic element lie in its middle
         return ends if self.shape.per_side == 2 else np.sort(np.append(ends, 0.5 * (ends[1:] + ends[:-1])))
 
+    def places(self, nodes: FloatArray) -> tuple[IntArray, ...]:
+        """Numbers along each axis of the mesh lines that nodes ``(n, d)`` lie on [m]."""
+        # nodes inside elements are off their line by rounding, so the nearest line is theirs
+        lines = (self.lines(axis) for axis in range(nodes.shape[1]))
+        return tuple(np.abs(x[:, None] - line).argmin(axis=1) for x, line in zip(nodes.T, lines, strict=True))
+
+    def _as_grid(self, chosen: NDArray[np.int64]) -> IntArray:
+        """Nodes of a face as a grid, along x first."""
+        column, row = self.places(self.nodes[chosen, :2])
+        return chosen[np.lexsort((row, column))].astype(np.int32)
+
     def displacement(self, x: FloatArray) -> FloatArray:
         """Nodal displacements ``(k, 3)`` [m] of a vector of unknowns."""
         u = np.zeros(self.dofs.shape)
         u[self.dofs >= 0] = x[self.dofs[self.dofs >= 0]]
         return u
-
-
-def _as_grid(nodes: FloatArray, chosen: NDArray[np.int64], tol: float) -> tuple[IntArray, tuple[int, int]]:
-    """Nodes of a face as a grid, along x first: their numbers and the grid's shape."""
-    column, row = (_lines(nodes[chosen, axis], tol) for axis in (0, 1))
-    # by the lines' numbers: rounding of coordinates would mix up the nodes of one line
-    order = np.lexsort((row, column))
-    return chosen[order].astype(np.int32), (int(column.max()) + 1, int(row.max()) + 1)
-
-
-def _lines(x: FloatArray, tol: float) -> IntArray:
-    """Number ``(n,)`` of the mesh line of every coordinate; nodes inside elements are off it by rounding."""
-    # consecutive coordinates that differ by more than rounding begin another line
-    order = np.argsort(x)
-    number = np.empty(len(x), dtype=np.int32)
-    number[order] = np.concatenate([[0], np.cumsum(np.diff(x[order]) > tol)])
-    return number
 
 
 def face_rule(per_side: int, contact: str) -> tuple[FloatArray, FloatArray]:

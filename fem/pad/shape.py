@@ -34,15 +34,6 @@ class PadShape:
     grading: tuple[float, float, float] = (1.0, 1.0, 1.0)
     element: str = "hex8"
 
-    def __post_init__(self) -> None:
-        """Refuse what cannot be meshed."""
-        if min(self.size) <= 0 or not np.all(np.isfinite(self.size)):
-            raise ValueError(f"pad size must be positive, found {self.size} m")
-        if min(self.elements) < 1:
-            raise ValueError(f"a pad needs at least one element in every direction, found {self.elements}")
-        if self.element not in PER_SIDE:
-            raise ValueError(f"element '{self.element}' is unknown; choose one of {', '.join(PER_SIDE)}")
-
     @property
     def per_side(self) -> int:
         """Nodes along a side of an element, and quadrature points along a side of its face."""
@@ -89,14 +80,6 @@ class BackingPlate:
     poisson_ratio: float
     support: tuple[float, float]
 
-    def __post_init__(self) -> None:
-        """Refuse numbers that are no plate."""
-        if not (self.thickness > 0 and self.young_modulus > 0 and min(self.support) >= 0):
-            raise ValueError(
-                f"a backing plate needs a positive thickness and modulus and a support that is not negative, found "
-                f"{self.thickness} m, {self.young_modulus} Pa, {self.support} m"
-            )
-
 
 @dataclass(frozen=True)
 class TiltingMount:
@@ -112,11 +95,6 @@ class TiltingMount:
 
     stiffness: float
     glue: float
-
-    def __post_init__(self) -> None:
-        """Refuse numbers that are no mount."""
-        if not (self.stiffness > 0 and self.glue > 0):
-            raise ValueError(f"a mount needs positive stiffnesses, found {self.stiffness} N m and {self.glue} Pa/m")
 
 
 def _graded(n: int, ratio: float) -> FloatArray:

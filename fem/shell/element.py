@@ -48,15 +48,6 @@ class ShellMesh:
     D: FloatArray
     elements: IntArray
 
-    def __post_init__(self) -> None:
-        """Refuse arrays that do not fit together."""
-        if self.X.shape != self.D.shape or self.X.ndim != 2 or self.X.shape[1] != 3:
-            raise ValueError(f"X and D must both be (k, 3), found {self.X.shape} and {self.D.shape}")
-        if self.elements.ndim != 2 or self.elements.shape[1] != 4:
-            raise ValueError(f"elements must be (n, 4), found {self.elements.shape}")
-        if self.elements.min() < 0 or self.elements.max() >= len(self.X):
-            raise ValueError(f"elements name node {self.elements.max()}, but there are {len(self.X)} nodes")
-
     @property
     def outer(self) -> FloatArray:
         """Nodes of the outer face ``(k, 3)`` [m]."""

@@ -23,6 +23,7 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from softjaw.fem.materials import inverted
 from softjaw.fem.objects.gap import FloatArray
 from softjaw.fem.objects.splines import SplineSurface, evaluate
 
@@ -188,7 +189,7 @@ def _face(points, places, lines_t, lines_s, coefficients, closed, low, high, the
                     r[c] += shape[a] * v[at[a], c]
                     J[c, 0] += shape_1[a] * v[at[a], c]
                     J[c, 1] += shape_2[a] * v[at[a], c]
-            if not _invert(J, inverse):
+            if inverted(J, inverse) == 0.0:
                 break
             size = abs(r[0]) + abs(r[1]) + abs(r[2])
             # the derivatives below belong to this very place, so it is checked before the step, not after
@@ -276,20 +277,3 @@ def _director(X, half, w, at, N, N_1, N_2, n, n_1, n_2):
         n_1[i] = (n_1[i] - n[i] * p_1) / length
         n_2[i] = (n_2[i] - n[i] * p_2) / length
     return length
-
-
-@njit(cache=True)
-def _invert(J, inverse):
-    """Inverse of a 3 x 3 matrix; whether it has one."""
-    for i in range(3):
-        a, b = (i + 1) % 3, (i + 2) % 3
-        for j in range(3):
-            c, d = (j + 1) % 3, (j + 2) % 3
-            inverse[j, i] = J[a, c] * J[b, d] - J[a, d] * J[b, c]
-    det = J[0, 0] * inverse[0, 0] + J[0, 1] * inverse[1, 0] + J[0, 2] * inverse[2, 0]
-    if det == 0.0:
-        return False
-    for i in range(3):
-        for j in range(3):
-            inverse[i, j] /= det
-    return True

@@ -41,16 +41,7 @@ def supported(
         height; "free".
     stiffness : float
         Of the weak springs that hold what is left of rigid motions, all together and per direction [N/m].
-
-    Raises
-    ------
-    ValueError
-        For an unknown support, or springs that would leave the body adrift.
     """
-    if support not in SUPPORTS:
-        raise ValueError(f"support '{support}' is unknown; choose one of {', '.join(SUPPORTS)}")
-    if not stiffness > 0:
-        raise ValueError(f"the weak springs need a positive stiffness, found {stiffness} N/m")
     shell = Shell(mesh, material.young_modulus, material.poisson_ratio)
     # spread by area, so that they resist rigid motions alike whatever the mesh
     shell.springs.reshape(-1, 6)[:, :3] = (stiffness * mesh.share * shell.node_area / shell.node_area.sum())[:, None]
@@ -74,19 +65,6 @@ def _standing(mesh: BodyMesh, held: FloatArray) -> None:
 SUPPORTS: dict[str, Callable[[BodyMesh, FloatArray], None]] = {
     "clamped": _clamped, "standing": _standing, "free": lambda mesh, held: None,
 }  # fmt: skip
-
-
-@dataclass(frozen=True)
-class WallMesh:
-    """Sizes of the wall's elements [m]: round and along the object where pads touch, and the largest elsewhere."""
-
-    around: float = 0.0015
-    along: float = 0.0025
-    coarse: float = 0.006
-
-    def halved(self) -> WallMesh:
-        """Half as many elements in every direction."""
-        return WallMesh(2 * self.around, 2 * self.along, 2 * self.coarse)
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,12 +149,12 @@ def grasp(body: ThinWalled, poses: tuple[Pose, Pose], allowed: tuple[bool, bool]
     return Grasp(angle, solved[:n], flipped[:n], (between, across))
 
 
-def wall_between(body: ThinWalled, held: Grasp, pad_size: Sequence[float], mesh: WallMesh, *, linear: bool = False):
+def wall_between(body: ThinWalled, held: Grasp, pad_size: Sequence[float], size: MeshSize, *, linear: bool = False):
     """Shell meshed finely where the pads of this grasp touch: the model, and what each finger can touch."""
     low, high, half = _footprint(held, pad_size)
-    size = MeshSize((0.0, np.pi), (low, high), half, mesh.around, mesh.along, mesh.coarse)
     # a pad may reach beyond the wall, where the outline has no station
-    shell, fixed = _supported(body, held, _within(body, size))
+    low, high = (float(end) for end in np.clip([low, high], *_span(body)))
+    shell, fixed = _supported(body, held, replace(size, heights=(low, high), half_width=half))
     meshed = shell.mesh
     wall = Wall(_surface(meshed), meshed.theta, meshed.s, meshed.number, 0.5 * meshed.thickness)
     return (LinearWall if linear else NonlinearWall)(shell, fixed), [wall] * len(held.poses)
@@ -185,12 +163,11 @@ def wall_between(body: ThinWalled, held: Grasp, pad_size: Sequence[float], mesh:
 # the indicator of every candidate asks for the same factors
 @lru_cache(maxsize=4)
 def object_factors(
-    body: ThinWalled, angle: float, mirrors: tuple[bool, bool], mesh: WallMesh, half: float
+    body: ThinWalled, angle: float, mirrors: tuple[bool, bool], size: MeshSize, half: float
 ) -> LinearShell:
     """First stiffness of the object, meshed alike along its whole wall; made once per rank."""
-    z = body.surface.curve.derivative(np.linspace(*body.surface.wall, 257))[:, 0]
-    size = MeshSize((0.0, np.pi), (z.min(), z.max()), half, mesh.around, mesh.along, mesh.coarse)
-    return LinearShell(*_supported(body, Grasp(angle, (), (), mirrors), _within(body, size)))
+    whole = replace(size, heights=_span(body), half_width=half)
+    return LinearShell(*_supported(body, Grasp(angle, (), (), mirrors), whole))
 
 
 def _supported(body: ThinWalled, held: Grasp, size: MeshSize) -> tuple[Shell[BodyMesh], FloatArray]:
@@ -207,11 +184,10 @@ def _surface(mesh: BodyMesh):
     return wall_surface(mesh.surface, max(mesh.s[0], low), min(mesh.s[-1], high))
 
 
-def _within(body: ThinWalled, size: MeshSize) -> MeshSize:
-    """The same with the gripped heights cut to those of the wall."""
+def _span(body: ThinWalled) -> tuple[float, float]:
+    """Lowest and highest place of the wall [m]."""
     z = body.surface.curve.derivative(np.linspace(*body.surface.wall, 257))[:, 0]
-    low, high = np.clip(size.heights, z.min(), z.max())
-    return replace(size, heights=(float(low), float(high)))
+    return float(z.min()), float(z.max())
 
 
 def _footprint(held: Grasp, pad_size: Sequence[float]) -> tuple[float, float, float]:

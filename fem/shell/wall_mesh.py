@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
-from skfem import ElementQuad1
 
 from softjaw.fem.objects.outer_surface import OuterSurface
 from softjaw.fem.shell.element import FloatArray, IntArray, ShellMesh, grid_elements
@@ -17,45 +15,35 @@ from softjaw.friction.patch import NEGLIGIBLE
 
 Thickness = float | Sequence[tuple[float, float]]  # of a wall [m], or pairs (z, thickness)
 LINE_SAMPLES = 4000  # of the wanted element size along a line
+GROWTH = 0.25  # of the element size, per distance from the gripped regions
 TURN = np.radians(25.0)  # largest turn of the outline within one element
-SQUARE = ElementQuad1()
 
 
 @dataclass(frozen=True)
 class MeshSize:
-    """How fine a mesh is.
+    """How fine a wall's mesh is; the gripped regions lie at the angles 0 and pi about the axis.
 
     Parameters
     ----------
-    angles : tuple of float
-        Middles of the gripped regions about the axis [rad].
-    heights : (float, float)
-        Range of z that pads touch [m].
-    half_width : float
-        Half the width of a gripped region round the body [m].
     around, along : float
         Element sizes in the gripped regions [m].
     coarse : float
         Largest element size elsewhere [m].
-    growth : float
-        Increase of the size per distance from the gripped regions [-].
+    heights : (float, float)
+        Range of z that pads touch [m].
+    half_width : float
+        Half the width of a gripped region round the body [m].
     """
 
-    angles: tuple[float, ...] = (0.0, np.pi)
-    heights: tuple[float, float] = (0.0, 0.0)
-    half_width: float = 0.012
     around: float = 0.0015
     along: float = 0.0025
     coarse: float = 0.006
-    growth: float = 0.25
+    heights: tuple[float, float] = (0.0, 0.0)
+    half_width: float = 0.012
 
-    def __post_init__(self) -> None:
-        """Refuse sizes that are no sizes."""
-        for name in ("half_width", "around", "along", "coarse", "growth"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"{name} must be positive, found {getattr(self, name)}")
-        if not self.heights[0] <= self.heights[1]:
-            raise ValueError(f"heights must be (low, high), found {self.heights}")
+    def halved(self) -> MeshSize:
+        """Half as many elements in every direction."""
+        return replace(self, around=2 * self.around, along=2 * self.along, coarse=2 * self.coarse)
 
 
 def limited(x: FloatArray, h: FloatArray, growth: float) -> FloatArray:
@@ -93,8 +81,8 @@ def along(
     off = np.maximum(np.maximum(low - x, x - high), 0.0)
     bend = np.abs(surface.curve.curvature(x))
     # fine where pads touch, and wherever the outline bends: facets must follow a rounded edge
-    h = np.minimum(np.minimum(size.along + size.growth * off, size.coarse), TURN / np.maximum(bend, 1e-9))
-    h = limited(x, h, size.growth)
+    h = np.minimum(np.minimum(size.along + GROWTH * off, size.coarse), TURN / np.maximum(bend, 1e-9))
+    h = limited(x, h, GROWTH)
     edges = sorted({edge for edge in (*surface.flat, *marks) if begin + NEGLIGIBLE < edge < end - NEGLIGIBLE})
     runs = [divided(a, b, x, h) for a, b in pairwise([begin, *edges, end])]
     return np.concatenate([*(run[:-1] for run in runs), runs[-1][-1:]])
@@ -103,7 +91,7 @@ def along(
 def around(surface: OuterSurface, size: MeshSize, symmetry: tuple[bool, bool]) -> FloatArray:
     """Grid lines round the body; the sizes are true at the middle of the gripped heights."""
     begin, end = {
-        (False, False): (size.angles[0], size.angles[0] + 2 * np.pi),
+        (False, False): (0.0, 2 * np.pi),
         (False, True): (0.0, np.pi),
         (True, False): (-0.5 * np.pi, 0.5 * np.pi),
         (True, True): (0.0, 0.5 * np.pi),
@@ -113,13 +101,13 @@ def around(surface: OuterSurface, size: MeshSize, symmetry: tuple[bool, bool]) -
     speed = np.linalg.norm(surface.jets(fine, s)[:, 1], axis=1)
     arc = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(fine))])
     turn = np.interp(0.0, fine, arc) - np.interp(-2 * np.pi, fine, arc)
-    middles = np.interp(np.mod(size.angles, 2 * np.pi), fine, arc)
+    middles = np.interp([0.0, np.pi], fine, arc)
 
     first, last = (float(place) for place in np.interp([begin, end], fine, arc))
     x = np.linspace(first, last, LINE_SAMPLES)
     # the short way round the body
     off = np.abs((x[:, None] - middles + 0.5 * turn) % turn - 0.5 * turn).min(axis=1)
-    h = np.minimum(size.around + size.growth * np.maximum(off - size.half_width, 0.0), size.coarse)
+    h = np.minimum(size.around + GROWTH * np.maximum(off - size.half_width, 0.0), size.coarse)
     theta = np.interp(divided(first, last, x, h, 4 >> sum(symmetry)), arc, fine)
     # exactly, because nodes on planes of symmetry are told by their angle
     theta[[0, -1]] = begin, end
@@ -166,25 +154,16 @@ class BodyMesh(ShellMesh):
         """Nodes that a body standing on a table touches it with: the rim of its flat bottom."""
         return np.unique(self.number[:, np.abs(self.s - self.surface.flat[0]).argmin()])
 
-    def locate(self, theta: ArrayLike, s: ArrayLike) -> tuple[IntArray, FloatArray, FloatArray]:
-        """Nodes ``(n, 4)``, shape functions ``N (n, 4)`` and their derivatives by theta and s ``(n, 2, 4)`` at points.
-
-        A value interpolated with ``N`` is bilinear in theta and s. Points outside the mesh get the nearest element.
-        """
-        t, p = (np.atleast_1d(np.asarray(place, dtype=float)) for place in (theta, s))
+    def locate(self, t: FloatArray, p: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Nodes and bilinear shape functions ``(n, 4)`` at angles and places; outside the mesh those of the nearest."""
         if self.closed:
             t = self.theta[0] + np.mod(t - self.theta[0], 2 * np.pi)
         i = np.clip(np.searchsorted(self.theta, t, side="right") - 1, 0, len(self.theta) - 2)
         j = np.clip(np.searchsorted(self.s, p, side="right") - 1, 0, len(self.s) - 2)
-        h, k = self.theta[i + 1] - self.theta[i], self.s[j + 1] - self.s[j]
-        u, v = (t - self.theta[i]) / h, (p - self.s[j]) / k
-        basis = [SQUARE.lbasis(np.stack([u, v]), corner) for corner in range(4)]
-        N = np.stack([value for value, _ in basis], axis=1)
-        dN = np.stack([slope for _, slope in basis]).transpose(2, 1, 0) / np.stack([h, k], axis=1)[:, :, None]
-        nodes = np.stack(
-            [self.number[i, j], self.number[i + 1, j], self.number[i + 1, j + 1], self.number[i, j + 1]], 1
-        )
-        return nodes, N, dN
+        u = (t - self.theta[i]) / (self.theta[i + 1] - self.theta[i])
+        v = (p - self.s[j]) / (self.s[j + 1] - self.s[j])
+        N = np.stack([(1 - u) * (1 - v), u * (1 - v), u * v, (1 - u) * v], axis=1)
+        return self.number[np.stack([i, i + 1, i + 1, i], 1), np.stack([j, j, j + 1, j + 1], 1)], N
 
 
 def body_mesh(

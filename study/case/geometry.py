@@ -7,6 +7,7 @@ rest of ``check`` takes.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
@@ -70,7 +71,10 @@ def trace_warning(shape: Mesh) -> str:
 def material_of(shape: Walled) -> WallMaterial:
     """Material of a wall, from the table or from the scene's own numbers."""
     name = None if shape.wall_material == "custom" else shape.wall_material
-    return wall_material(name, shape.young_modulus, shape.wall_poisson_ratio, shape.yield_strength)
+    return wall_material(
+        name, young_modulus=shape.young_modulus, poisson_ratio=shape.wall_poisson_ratio,
+        yield_strength=shape.yield_strength,
+    )  # fmt: skip
 
 
 def check_wall(shape: Any, surface: OuterSurface) -> None:
@@ -96,5 +100,5 @@ def wall_lines(
 
     ``scene`` is a `Scene` whose object has a wall, ``turned`` its outer surface as the fingers see it.
     """
-    size = MeshSize((0.0, math.pi), heights, half, *scene.accuracy.wall_sizes)
+    size = replace(MeshSize(*scene.accuracy.wall_sizes), heights=heights, half_width=half)
     return around(turned, size, mirrors), along(turned, size, scene.object.open_bottom, scene.object.open_top)

@@ -13,7 +13,8 @@ from softjaw.fem.contact.extract import extract, turned
 from softjaw.fem.contact.path import Pressed
 from softjaw.fem.errors import CheckError
 from softjaw.fem.shell.grip import Grip
-from softjaw.fem.shell.thin_walled import Grasp, WallMesh, grasp, wall_between
+from softjaw.fem.shell.thin_walled import Grasp, grasp, wall_between
+from softjaw.fem.shell.wall_mesh import MeshSize
 from softjaw.fem.shell.wall_problem import WallProblem
 from softjaw.friction.patch import ContactPatch
 from softjaw.friction.wrench import FrictionLimits
@@ -277,7 +278,7 @@ def grasp_of(scene: Scene, fingers: Sequence[Finger], coarser: bool = False) -> 
 
 def _grip(scene: Scene, fingers: Sequence[Finger], grasp_frame: Grasp, coarser: bool, stride: int) -> Grip:
     """Both fingers on the wall."""
-    size = WallMesh(*scene.accuracy.wall_sizes)
+    size = MeshSize(*scene.accuracy.wall_sizes)
     mesh = size.halved() if coarser else size
     body, linear = thin_body(scene.object), scene.effects.object == "linear_shell"
     coupled = scene.effects.friction_pressure_coupling == "tangential"

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from softjaw.fem.contact.path import Pressed
 from softjaw.fem.errors import CheckError
 from softjaw.fem.shell.element import Shell
-from softjaw.fem.shell.thin_walled import Grasp, ThinWalled, WallMesh, object_factors
+from softjaw.fem.shell.thin_walled import Grasp, ThinWalled, object_factors
+from softjaw.fem.shell.wall_mesh import MeshSize
 from softjaw.fem.shell.wall_model import faces
 from softjaw.study.case.build import outer_surface
 from softjaw.study.case.geometry import material_of
@@ -23,7 +24,7 @@ from softjaw.study.scene.objects import Walled
 
 FloatArray = NDArray[np.float64]
 DENTED_SHARE = 0.2  # of the object's half width between the fingers, beyond which an indentation is told by a flag
-ESTIMATE = WallMesh(0.004, 0.006, 0.012)  # mesh of the estimate that the level is chosen by
+ESTIMATE = MeshSize(0.004, 0.006, 0.012)  # mesh of the estimate that the level is chosen by
 
 
 @lru_cache(maxsize=8)
@@ -123,7 +124,7 @@ def _places(grasp: Grasp, shell: Shell, q: FloatArray) -> FloatArray:
     x, y = np.cos(theta), np.sin(theta)
     side = np.stack([np.where((x < 0) & grasp.mirrors[0], -1.0, 1.0), np.where((y < 0) & grasp.mirrors[1], -1.0, 1.0)])
     angle = np.arctan2(side[1] * y, side[0] * x).ravel()
-    nodes, N, _ = mesh.locate(angle, s.ravel())
+    nodes, N = mesh.locate(angle, s.ravel())
     moved = np.einsum("na,nai->ni", N, (q[:, :3] + q[:, 3:])[nodes])
     place = mesh.surface.jets(angle, s.ravel())[:, 0] + moved
     place[:, :2] *= side.reshape(2, -1).T

@@ -73,7 +73,10 @@ def wall_text(shape: Any) -> str:
     if not has_wall(shape):
         return ""
     name = None if shape.wall_material == "custom" else shape.wall_material
-    found = wall_material(name, shape.young_modulus, shape.wall_poisson_ratio, shape.yield_strength)
+    found = wall_material(
+        name, young_modulus=shape.young_modulus, poisson_ratio=shape.wall_poisson_ratio,
+        yield_strength=shape.yield_strength,
+    )  # fmt: skip
     given = shape.thicknesses_mm
     thickness = f"{min(given):g}" if min(given) == max(given) else f"{min(given):g} to {max(given):g}"
     strength = shown_text(found.yield_strength, "Pa", 6) if found.yield_strength else ""

@@ -12,15 +12,16 @@ from softjaw.fem.objects.revolution import Revolution
 from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.pad.shape import PadShape
 from softjaw.fem.shell.grip import Grip
-from softjaw.fem.shell.thin_walled import ThinWalled, WallMesh, grasp, wall_between
+from softjaw.fem.shell.thin_walled import ThinWalled, grasp, wall_between
 from softjaw.fem.shell.wall_material import WallMaterial, wall_material
+from softjaw.fem.shell.wall_mesh import MeshSize
 from softjaw.fem.shell.wall_problem import WallProblem
 from softjaw.friction.frame import contact_frame, in_frame
 from softjaw.friction.wrench import friction_limits
 from tests.fem.reference import dense
 
 SIZE = (0.03, 0.02, 0.02)
-COARSE = WallMesh(0.003, 0.005, 0.010)
+COARSE = MeshSize(0.003, 0.005, 0.010)
 FOAM = 24e3  # shear modulus of the pads [Pa]
 
 
@@ -50,7 +51,7 @@ def grip(
     elements: tuple[int, int, int] = (6, 4, 3),
     allowed: tuple[bool, bool] = (True, True),
     level: str = "nonlinear",
-    mesh: WallMesh = COARSE,
+    mesh: MeshSize = COARSE,
     theta: float = 0.0,
     radius: float = 0.035,
     mu: float | None = None,

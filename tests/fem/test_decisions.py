@@ -142,7 +142,7 @@ def travel_past(shape, place, seed, reach=20.0):
 def test_a_pad_that_passes_at_the_surface_itself_has_no_contact(seed):
     """Past a sphere it has none; along the side of a box it is known to graze."""
     half = np.random.default_rng(seed).uniform(0.01, 0.05)
-    ball, box = Sphere(half), Box((2 * half,) * 3, 0.1 * half)
+    ball, box = Sphere(half), Box(np.full(3, 2 * half), 0.1 * half)
     for out in (0.0, 1e-8):
         with pytest.raises(NoContactError):
             travel_past(ball, [0.0, -0.1, half + out], seed, 5.0)

@@ -7,7 +7,7 @@ import trimesh
 from softjaw.fem.errors import MeshError
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.fem.objects.smooth_triangles import smooth_triangles
-from softjaw.fem.objects.triangles import cleaned, neighbours, winding_number
+from softjaw.fem.objects.triangles import cleaned, neighbours
 from tests.fem.test_facing_surface import BOX, in_box, side
 from tests.objects.bodies import outline_body, slabs
 
@@ -51,7 +51,7 @@ def test_triangles_are_turned_as_their_neighbours_and_outwards():
     some = np.where(np.arange(len(BALL.faces))[:, None] < 5, BALL.faces[:, ::-1], BALL.faces)
     for faces in (BALL.faces[:, ::-1], some):
         mesh = cleaned(np.array(BALL.vertices), faces)
-        assert winding_number(np.zeros(3), mesh.points, mesh.triangles) == pytest.approx(1)
+        assert trimesh.Trimesh(mesh.points, mesh.triangles, process=False).volume > 0
         assert mesh.closed
         assert len(mesh.notes) == 1
 

@@ -87,8 +87,3 @@ def test_the_tangent_is_that_of_differences():
     d = np.random.default_rng(1).normal(size=pad.size) * 1e-4
     found = (problem.residual(x + 1e-3 * d) - problem.residual(x - 1e-3 * d)) / 2e-3
     np.testing.assert_allclose(K @ d, found, atol=1e-6 * np.abs(found).max())
-
-
-def test_a_mount_needs_positive_stiffnesses():
-    with pytest.raises(ValueError, match="positive"):
-        TiltingMount(0.0, GLUE)

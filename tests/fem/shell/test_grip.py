@@ -10,12 +10,12 @@ from softjaw.fem.contact.load_stepping import Work
 from softjaw.fem.contact.path import OnPath
 from softjaw.fem.contact.press import Press
 from softjaw.fem.contact.problem import Control
-from softjaw.fem.shell.thin_walled import WallMesh
 from softjaw.fem.shell.wall_material import WallMaterial, wall_material
+from softjaw.fem.shell.wall_mesh import MeshSize
 from tests.fem.grips import check_tangent, e_n, gap_at, grip, pose, stirred, thin
 
 FORCES = (0.5, 2.0)
-FINE = WallMesh(0.00085, 0.0025, 0.005)
+FINE = MeshSize(0.00085, 0.0025, 0.005)
 
 
 MU = 0.4

@@ -11,14 +11,14 @@ from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.fem.objects.gap import Pose
 from softjaw.fem.shell.facing import FAR, face
 from softjaw.fem.shell.opening import Opening
-from softjaw.fem.shell.thin_walled import WallMesh, grasp
+from softjaw.fem.shell.thin_walled import grasp
 from softjaw.fem.shell.wall_material import WallMaterial
 from softjaw.fem.shell.wall_mesh import MeshSize, body_mesh
 from tests.fem.falling_force import MM, Curve, crossings
 from tests.fem.grips import e_n, grip, pose, thin
 
-ROUGH = WallMesh(0.004, 0.008, 0.016)
-SIZE = MeshSize((0.0, np.pi), (0.05, 0.10), 0.013, 0.006, 0.012, 0.02)
+ROUGH = MeshSize(0.004, 0.008, 0.016)
+SIZE = MeshSize(0.006, 0.012, 0.02, (0.05, 0.10), 0.013)
 
 
 @cache
@@ -164,7 +164,7 @@ def test_a_pad_over_the_rim_is_carried_up_to_the_rim():
 
 
 def closing_and_e_n(elements, size):
-    sizes = WallMesh(size * 0.002, size * 0.003, size * 0.006)
+    sizes = MeshSize(size * 0.002, size * 0.003, size * 0.006)
     state = next(grip(thin(), elements=elements, mesh=sizes).load_path([3.0])).fingers[0]
     return np.array([state.closing, e_n(state)])
 

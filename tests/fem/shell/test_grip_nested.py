@@ -6,12 +6,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-from softjaw.fem.shell.thin_walled import WallMesh
 from softjaw.fem.shell.wall_mesh import MeshSize, body_mesh, interpolated
 from tests.fem.grips import grip, thin
 
 FORCES = (0.5, 2.0)
-FINE = WallMesh(0.004, 0.008, 0.016)
+FINE = MeshSize(0.004, 0.008, 0.016)
 SYMMETRIES = [(True, True), (True, False), (False, True), (False, False)]
 
 

@@ -119,15 +119,12 @@ def test_sizes_grow_no_faster_than_asked():
 def test_values_between_nodes_are_bilinear_in_the_parameters():
     mesh = body_mesh(SURFACES["square"], 4e-4, COARSE)
     theta, s = RNG.uniform(-9, 9, 100), RNG.uniform(mesh.s[1], mesh.s[-1], 100)
-    nodes, N, dN = mesh.locate(theta, s)
-    grid_s = np.full(len(mesh.X), np.nan)
-    grid_s[mesh.number.ravel()] = np.broadcast_to(mesh.s, mesh.number.shape).ravel()
-    assert np.einsum("ni,ni->n", N, grid_s[nodes]) == pytest.approx(s, rel=1e-12)
-    assert np.einsum("nki,ni->nk", dN, grid_s[nodes]) == pytest.approx(np.tile([0.0, 1.0], (100, 1)), abs=1e-9)
-    h = 1e-7
-    moved = mesh.locate(theta + h, s)
-    same = (moved[0] == nodes).all(axis=1)
-    assert (moved[1] - N)[same] / h == pytest.approx(dN[same, 0], rel=1e-4, abs=1e-4)
+    nodes, N = mesh.locate(theta, s)
+    at = np.full((len(mesh.X), 2), np.nan)
+    at[mesh.number[:-1]] = np.stack(np.meshgrid(np.cos(mesh.theta[:-1]), mesh.s, indexing="ij"), -1)
+    assert np.einsum("ni,nik->nk", N, at[nodes]) == pytest.approx(
+        np.column_stack([np.interp(theta % (2 * np.pi), mesh.theta, np.cos(mesh.theta)), s]), rel=1e-12, abs=1e-12
+    )
 
 
 def pinched(symmetry, support="standing", surface="flask"):
@@ -242,18 +239,7 @@ def test_bodies_that_cannot_be_meshed_are_refused(arguments):
         body_mesh(**({"surface": SURFACES["square"], "thickness": 4e-4, "size": COARSE} | arguments))
 
 
-def test_sections_that_make_no_body_are_refused():
-    with pytest.raises(ValueError, match="bottom to top"):
-        of_sections(SQUARE[::-1])
-
-
 def test_wall_materials():
     assert wall_material("PP").young_modulus == 1.3e9
     assert wall_material("pet", young_modulus=2.8e9) == WallMaterial(2.8e9, 0.38, 57e6)
     assert wall_material(young_modulus=1e9, poisson_ratio=0.4).yield_strength is None
-    with pytest.raises(ValueError, match="glass"):
-        wall_material("glass")
-    with pytest.raises(ValueError, match="poisson_ratio"):
-        wall_material(young_modulus=1e9)
-    with pytest.raises(ValueError, match="hung"):
-        supported(body_mesh(SURFACES["flask"], 4e-4, COARSE, QUARTER), PET, "hung")
