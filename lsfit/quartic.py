@@ -16,7 +16,6 @@ from softjaw.lsfit.form import (
     half_sphere_monomials,
     hessian_tensor,
     monomials,
-    places,
     quartic_shadow,
     quartic_volume,
     round_frame,
@@ -35,9 +34,9 @@ class Quartic(LimitSurface):
     Parameters
     ----------
     coefficients : (k,) array
-        ``c``, one for each monomial.
-    exponents : (k, d) array
-        ``E``, each row with the sum 4.
+        ``c``, one for each monomial, in the order of `lsfit.form.exponents`.
+    dimension : int
+        Number of components of a wrench.
     flag : FitFlag
         What the reader should know.
     ball_map : (d, d) array, optional
@@ -48,37 +47,26 @@ class Quartic(LimitSurface):
     """
 
     coefficients: FloatArray
-    exponents: NDArray[np.int64]
+    dimension: int = 3
     flag: FitFlag = FitFlag.CLEAN
     ball_map: FloatArray | None = field(default=None, repr=False)
     units: FloatArray | None = field(default=None, repr=False)
     degree = 4
 
     def __post_init__(self) -> None:
-        """Bring the monomials into the order of `lsfit.form.exponents`, and refuse what is no quartic."""
-        c, E = np.array(self.coefficients, float), np.asarray(self.exponents, dtype=np.int64)
-        if E.ndim != 2 or len(E) == 0 or (E < 0).any() or (E.sum(axis=1) != 4).any():
-            raise ValueError("exponents: expected rows of whole numbers (k, d), none negative, each with the sum 4")
-        if c.shape != (len(E),) or not np.isfinite(c).all():
+        """Refuse what is no quartic, then freeze the coefficients."""
+        c, count = np.array(self.coefficients, float), len(self.exponents)
+        if c.shape != (count,) or not np.isfinite(c).all():
             raise ValueError(
-                f"coefficients has shape {c.shape}: expected {len(E)} finite numbers, one for each monomial"
+                f"coefficients has shape {c.shape}: expected {count} finite numbers, one for each monomial"
             )
-        order = exponents(E.shape[1], 4)
-        # fits pass the cached array itself, which is in order
-        if E is not order:
-            place = places(E.shape[1], 4)
-            sorted_c = np.zeros(len(order))
-            # a monomial may be listed twice; an assignment would keep its last coefficient only
-            np.add.at(sorted_c, [place[tuple(row)] for row in E.tolist()], c)
-            c = sorted_c
         c.flags.writeable = False
         object.__setattr__(self, "coefficients", c)
-        object.__setattr__(self, "exponents", order)
 
     @property
-    def dimension(self) -> int:
-        """Number of components of a wrench."""
-        return self.exponents.shape[1]
+    def exponents(self) -> NDArray[np.int64]:
+        """Exponents of the monomials ``(k, d)``."""
+        return exponents(self.dimension, 4)
 
     def value(self, w: ArrayLike) -> FloatArray:
         """``P(w)``, ``(m, d) -> (m,)``."""
@@ -103,7 +91,7 @@ class Quartic(LimitSurface):
             refuse_open(substitute(self.coefficients, self.exponents, self.ball_map), self.dimension, self.ball_map)
             return self.ball_map
         units = np.ones(self.dimension) if self.units is None else self.units
-        even = Quartic(self.coefficients * np.prod(units**self.exponents, axis=1), self.exponents)
+        even = Quartic(self.coefficients * np.prod(units**self.exponents, axis=1), self.dimension)
         refuse_open(even.coefficients, self.dimension, np.diag(units))
         return units[:, None] * round_frame(even.value, self.dimension, 4)
 
@@ -176,12 +164,12 @@ class Quartic(LimitSurface):
         ball_map = None if self.ball_map is None else f[:, None] * self.ball_map
         units = np.abs(f) if self.units is None else np.abs(f) * self.units
         return Quartic(
-            self.coefficients / np.prod(f**self.exponents, axis=1), self.exponents, self.flag, ball_map, units
+            self.coefficients / np.prod(f**self.exponents, axis=1), self.dimension, self.flag, ball_map, units
         )
 
     @cached_property
     def _round(self) -> Quartic:
-        return Quartic(substitute(self.coefficients, self.exponents, self.frame), self.exponents)
+        return Quartic(substitute(self.coefficients, self.exponents, self.frame), self.dimension)
 
     @cached_property
     def _tensor(self) -> FloatArray:

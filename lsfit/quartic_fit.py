@@ -138,16 +138,16 @@ def placed(v: FloatArray, samples: RoundSamples, flag: FitFlag) -> Quartic | Ima
     E = exponents(r, 4)
     # coefficients in the components do not exist for a flat body, and lose their digits in a tilted frame
     if r < d:
-        return Image(Quartic(v, E), samples.B, flag)
+        return Image(Quartic(v, r), samples.B, flag)
     reach = np.linalg.norm(samples.B, axis=1)
     # rows of one length: what is left of the condition is tilt, which no choice of units undoes
     turn = samples.B / reach[:, None]
     # condition of a frame's directions; coefficients lose its fourth power times rounding
     if np.linalg.cond(turn) > 50.0:
-        return Image(Quartic(v, E), samples.B, flag)
+        return Image(Quartic(v, r), samples.B, flag)
     # turned first and stretched last, as a division by units costs a coefficient no digits
     coefficients = substitute(v, E, np.linalg.inv(turn)) / np.prod(reach**E, axis=1)
-    return Quartic(coefficients, E, flag, samples.B if flag == FitFlag.CLEAN else None, reach)
+    return Quartic(coefficients, d, flag, samples.B if flag == FitFlag.CLEAN else None, reach)
 
 
 @njit(cache=True)

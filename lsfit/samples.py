@@ -18,16 +18,16 @@ FLAT_RATIO = 1e-9  # of principal lengths: below it samples are flat
 
 
 def normalised_samples(wrench: ArrayLike, twist: ArrayLike, force: float, rho: float) -> tuple[FloatArray, FloatArray]:
-    """Wrenches ``(f_x, f_y, tau / rho) / force`` and unit motions ``(v_x, v_y, rho omega) / |.|``.
+    """Wrenches ``(f, tau / rho) / force`` and unit motions ``(v, rho omega) / |.|``.
 
     With ``rho`` in proportion to the patch, equal patches of any size and unit give equal samples.
 
     Parameters
     ----------
-    wrench : (m, 3) or (m, 6) array
-        ``[f_x, f_y, tau_z]``, or all six components of which these three are taken [N, N m].
-    twist : (m, 3) array
-        ``[v_x, v_y, omega_z]`` [m/s, rad/s].
+    wrench : (m, 6) or (m, d) array
+        ``[f, tau]`` about the origin, or the components of it that the motions have [N, N m].
+    twist : (m, d) array
+        ``[v_x, v_y, omega_z]``, or ``[v, omega]`` of the origin [m/s, rad/s].
     force : float
         ``mu S`` [N].
     rho : float
@@ -35,41 +35,15 @@ def normalised_samples(wrench: ArrayLike, twist: ArrayLike, force: float, rho: f
 
     Returns
     -------
-    W, T : (m, 3) array
+    W, T : (m, d) array
         Wrenches and unit motions [-].
     """
     w, t = np.atleast_2d(np.asarray(wrench, float)), np.atleast_2d(np.asarray(twist, float))
-    return _normalised(w[:, [0, 1, 5]] if w.shape[1] == 6 else w, t, force, rho)
-
-
-def six_samples(wrench: ArrayLike, twist: ArrayLike, force: float, rho: float) -> tuple[FloatArray, FloatArray]:
-    """Wrenches ``(f, tau / rho) / force`` and unit motions ``(v, rho omega) / |.|`` of the origin.
-
-    Parameters
-    ----------
-    wrench, twist : (m, 6) array
-        ``[f, tau]`` about, and ``[v, omega]`` of, the origin [N, N m; m/s, rad/s].
-    force : float
-        ``mu S`` [N].
-    rho : float
-        Length of the contact [m].
-
-    Returns
-    -------
-    W, T : (m, 6) array
-        Wrenches and unit motions [-].
-    """
-    w, t = np.atleast_2d(np.asarray(wrench, float)), np.atleast_2d(np.asarray(twist, float))
-    if w.shape != t.shape or w.shape[1] != 6:
-        raise ValueError(f"wrench has shape {w.shape} and twist {t.shape}: expected (m, 6) for both")
-    return _normalised(w, t, force, rho)
-
-
-def _normalised(w: FloatArray, t: FloatArray, force: float, rho: float) -> tuple[FloatArray, FloatArray]:
-    """Samples free of units, of three components, the last a torque, or of six, the last three torques."""
     if not (force > 0 and rho > 0):
         raise ValueError(f"force is {force} and rho is {rho}: samples are normalised by a positive force and length")
-    size = np.array([1.0, 1.0, rho] if t.shape[1] == 3 else [1.0, 1.0, 1.0, rho, rho, rho])
+    planar = t.shape[1] == 3
+    w = w[:, [0, 1, 5]] if planar and w.shape[1] == 6 else w
+    size = np.array([1.0, 1.0, rho] if planar else [1.0, 1.0, 1.0, rho, rho, rho])
     # a torque is divided by rho and a rotation multiplied by it: powers keep their value
     T = t * size
     length = np.sqrt(np.einsum("md,md->m", T, T))

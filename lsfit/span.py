@@ -147,23 +147,17 @@ def placed(surface: LimitSurface, samples: SpanSamples) -> LimitSurface:
     return Image(surface, samples.B, flag)
 
 
-class CollapsedFitError(FitError):
-    """The fitted surface does not pass near the samples, or nothing holds it in some direction."""
-
-
 def zhou_quartic(samples: SpanSamples, weights: tuple[float, float, float] = ZHOU_WEIGHTS) -> LimitSurface:
     """Sos-convex quartic with the least objective, see the head of this file, in the coordinates of the samples.
 
     Raises
     ------
-    CollapsedFitError
-        If the surface runs away from the samples.
     FitError
-        If the solver fails.
+        If the surface runs away from the samples, or the solver fails.
     """
     r, E = samples.rank, exponents(samples.rank, 4)
     M, G = monomials(samples.Y, E), monomial_gradients(samples.Y, r, 4)
-    surface = Quartic(_solve(samples, M, G, gram_map(r), np.ones(len(E)), weights), E)
+    surface = Quartic(_solve(samples, M, G, gram_map(r), np.ones(len(E)), weights), r)
     refuse_runaway(surface, samples.Y)
     # the bound from samples is cheap and settles most cases; only the others need a search
     if not lies_above(surface.coefficients, r, _least(samples.Y, 4)):
@@ -240,23 +234,23 @@ def _cones(m: int, d: int, k: int, size: int) -> list:
 
 
 def refuse_runaway(surface: Quartic | Ellipsoid, Y: FloatArray) -> None:
-    """Raise `CollapsedFitError` if ``surface`` lies twice as far out as the samples ``Y``."""
+    """Raise `FitError` if ``surface`` lies twice as far out as the samples ``Y``."""
     with np.errstate(divide="ignore"):
         # the median, as single bad samples may lie anywhere
         median = float(np.median(np.maximum(surface.value(Y), 0.0)) ** (-1 / surface.degree))
     if median > 2:
-        raise CollapsedFitError(
+        raise FitError(
             f"the surface lies {median:.3g} times as far out as half of the {len(Y)} samples: give more of them"
         )
 
 
 def refuse_endless(P: float, u: FloatArray, Y: FloatArray, degree: int) -> None:
-    """Raise `CollapsedFitError` if a surface reaches too far beyond the samples, by its least value ``P`` at ``u``."""
+    """Raise `FitError` if a surface reaches too far beyond the samples, by its least value ``P`` at ``u``."""
     least = _least(Y, degree)
     if P < least:
         # a value of zero or less is a reach without end
         reach = MAX_REACH_RATIO * (least / max(P, 1e-300)) ** (1 / degree)
-        raise CollapsedFitError(
+        raise FitError(
             f"the surface reaches {reach:.3g} times as far as the samples along {np.round(u, 3).tolist()} (scaled "
             "coordinates), where no sample holds it: sample more motions"
         )

@@ -21,7 +21,7 @@ from softjaw.lsfit.ellipsoid import Ellipsoid, axis_aligned_ellipsoid, full_elli
 from softjaw.lsfit.form import exponents, monomials
 from softjaw.lsfit.quartic import Quartic
 from softjaw.lsfit.quartic_fit import convex_quartic
-from softjaw.lsfit.samples import fit_error, normalised_samples, sample_rank, six_samples
+from softjaw.lsfit.samples import fit_error, normalised_samples, sample_rank
 from softjaw.lsfit.span import zhou_ellipsoid, zhou_quartic
 from softjaw.lsfit.surface import FitFlag, supported_shadow
 from softjaw.scoring.closed_form import epsilon_l1, epsilon_linf, volume_l1, volume_linf
@@ -169,11 +169,11 @@ def fits_in_six_dimensions(inputs, _):
     point = np.array(inputs["ref_point"], float)
     twist = unit / [1, 1, 1, rho, rho, rho]
     about = moved(patch, np.eye(3), -point)  # motions are those of the reference point
-    W, T = six_samples(friction_wrench(about, twist, mu), twist, mu * friction_limits(patch, mu).S, rho)
+    W, T = normalised_samples(friction_wrench(about, twist, mu), twist, mu * friction_limits(patch, mu).S, rho)
     full = full_ellipsoid(W)
     E = exponents(6, 4)
     M = monomials(W, E)
-    quartic = Quartic(np.linalg.solve(M.T @ M + 1e-6 * np.eye(len(E)), M.sum(axis=0)), E)
+    quartic = Quartic(np.linalg.solve(M.T @ M + 1e-6 * np.eye(len(E)), M.sum(axis=0)), 6)
     return {
         "W_absmax": np.abs(W).max(axis=0), "W_first3": W[:3], "ell_full.A": full.A,
         **errors_of("ell_full", full, W, T), **errors_of("quartic_ls_reg1e-6", quartic, W, T),

@@ -17,10 +17,9 @@ from softjaw.friction.motion import fibonacci_twists
 from softjaw.friction.patch import ContactPatch
 from softjaw.friction.wrench import friction_wrench
 from softjaw.lsfit.ellipsoid import Ellipsoid, axis_aligned_ellipsoid, full_ellipsoid, three_motion_ellipsoid
-from softjaw.lsfit.form import exponents
 from softjaw.lsfit.quartic import Quartic
 from softjaw.lsfit.quartic_fit import convex_quartic
-from softjaw.lsfit.samples import FitErrors, fit_error, normalised_samples, overclaim, six_samples, sphere_motions
+from softjaw.lsfit.samples import FitErrors, fit_error, normalised_samples, overclaim, sphere_motions
 from softjaw.lsfit.span import span_ellipsoid, span_quartic, span_samples, zhou_ellipsoid, zhou_quartic
 from softjaw.lsfit.surface import FitError, LimitSurface
 from softjaw.study.case.contact import Contact
@@ -216,7 +215,7 @@ def six_quartic(contact: Contact, model: str, samples: int) -> tuple[LimitSurfac
 def _six_samples(patch: ContactPatch, rho: float, S: float, model: str, count: int) -> tuple[FloatArray, FloatArray]:
     """Normalised wrenches and unit motions ``(count, 6)`` of evenly spread motions of a patch."""
     twist = sphere_motions(count, 6) / np.repeat([1.0, rho], 3)
-    return six_samples(friction_wrench(patch, twist, 1.0, model), twist, S, rho)
+    return normalised_samples(friction_wrench(patch, twist, 1.0, model), twist, S, rho)
 
 
 # --- from the numbers of a result file --------------------------------------------------------------------------------
@@ -225,7 +224,7 @@ def _six_samples(patch: ContactPatch, rho: float, S: float, model: str, count: i
 def fitted_surface(coefficients: FloatArray, matrix: FloatArray) -> LimitSurface | None:
     """The quartic ``(15,)`` or the ellipsoid ``(3, 3)`` in ``(f_x, f_y, tau_z / rho) / (mu S)``; None for NaN."""
     if np.isfinite(coefficients).all():
-        return Quartic(coefficients, exponents(3, 4))
+        return Quartic(coefficients)
     return Ellipsoid.of_matrix(matrix) if np.isfinite(matrix).all() else None
 
 

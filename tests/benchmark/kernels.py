@@ -12,7 +12,7 @@ from softjaw.friction.motion import cor_grid, fibonacci_twists
 from softjaw.friction.wrench import friction_limits, friction_wrench, pure_torque
 from softjaw.lsfit.ellipsoid import Ellipsoid, full_ellipsoid
 from softjaw.lsfit.quartic_fit import convex_quartic
-from softjaw.lsfit.samples import normalised_samples, six_samples
+from softjaw.lsfit.samples import normalised_samples
 from softjaw.lsfit.span import span_quartic, span_samples, zhou_quartic
 from softjaw.scoring.contact import SoftContact
 from softjaw.scoring.epsilon import epsilon
@@ -49,7 +49,7 @@ def limit_surfaces() -> dict[str, tuple[Work, str]]:
     few, many = (samples(disc, fibonacci_twists(K, 2.0)) for K in (20, 100))
     noisy = few[0] * lcg_noise(20, 0.3, 11)[:, None]
     motions = lcg_sphere(6, 1024, 5) / [1, 1, 1, 2, 2, 2]
-    six = six_samples(friction_wrench(cylinder, motions, 1.0), motions, cylinder.load.sum(), 2.0)
+    six = normalised_samples(friction_wrench(cylinder, motions, 1.0), motions, cylinder.load.sum(), 2.0)
     return {
         "ellipsoid of any orientation": (lambda: full_ellipsoid(W), "at most 0.1 ms"),
         "convex quartic with its certificate": (lambda: convex_quartic(W, T, gamma=0.0), "at most 1 ms"),

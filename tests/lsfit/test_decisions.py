@@ -22,7 +22,7 @@ from softjaw.lsfit.form import directions, exponents, substitute
 from softjaw.lsfit.lowest import refuse_open
 from softjaw.lsfit.quartic import Quartic
 from softjaw.lsfit.quartic_fit import convex_quartic
-from softjaw.lsfit.samples import fit_error, sample_rank, six_samples, sphere_motions
+from softjaw.lsfit.samples import fit_error, normalised_samples, sample_rank, sphere_motions
 from softjaw.lsfit.surface import FitError, FitFlag, Image, OpenBodyError, UndecidedError
 from tests.generators import cylinder_grid, disc_polar, lcg_patch, points_patch
 from tests.oracles import least_squares_quartic, samples, wrenches_alone
@@ -176,7 +176,7 @@ def test_an_axis_that_no_load_reaches_is_zero():
 def six(K):
     patch = cylinder_grid(1, np.pi / 3, 2, 12, 12)
     twist = sphere_motions(K) / [1, 1, 1, 2, 2, 2]
-    return six_samples(friction_wrench(patch, twist, 0.5), twist, 0.5 * patch.load.sum(), 2.0)
+    return normalised_samples(friction_wrench(patch, twist, 0.5), twist, 0.5 * patch.load.sum(), 2.0)
 
 
 @pytest.mark.parametrize("K", [30, 60, 100])
@@ -207,7 +207,7 @@ def test_loads_in_the_plane_of_a_flat_body_are_in_it():
     def decide(rng):
         R = turn(rng)
         B = R[:, :2] * [1.0, 0.5]
-        bodies = Image(Quartic([1.0, 0, 2, 0, 1], exponents(2, 4)), B), Ellipsoid(B)
+        bodies = Image(Quartic([1.0, 0, 2, 0, 1], 2), B), Ellipsoid(B)
         inside = shaken(rng, w @ B.T)
         return tuple(
             (bool(body.holds(inside).all()), bool(body.holds(inside + 1e-3 * R[:, 2]).any())) for body in bodies
@@ -227,7 +227,7 @@ def test_a_full_body_has_no_outside_across():
     rng = np.random.default_rng(0)
     for _ in range(20):
         B = turn(rng) * [1.0, 1.0, 1e-9] @ turn(rng)
-        body = Image(Quartic(FORMS["ball"][0], exponents(3, 4)), B)
+        body = Image(Quartic(FORMS["ball"][0], 3), B)
         assert np.isfinite(body.value(directions(3, 50) @ B.T)).all()
 
 
@@ -259,7 +259,7 @@ def test_a_polynomial_that_is_zero_at_a_sample_is_endless_there():
 
     def decide(rng):
         R = turn(rng)
-        surface = Quartic(shaken(rng, substitute(cylinder, E, R.T)), E)
+        surface = Quartic(shaken(rng, substitute(cylinder, E, R.T)))
         return fit_error(surface, [R[:, 2]], [R[:, 0]]).Erad
 
     assert outcomes(decide) == {np.inf: TURNS}

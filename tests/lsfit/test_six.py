@@ -8,7 +8,7 @@ from softjaw.lsfit.ellipsoid import full_ellipsoid
 from softjaw.lsfit.form import exponents, hessian_tensor, monomials
 from softjaw.lsfit.quartic import Quartic
 from softjaw.lsfit.quartic_fit import convex_quartic
-from softjaw.lsfit.samples import fit_error, sample_rank, six_samples, sphere_motions
+from softjaw.lsfit.samples import fit_error, normalised_samples, sample_rank, sphere_motions
 from softjaw.lsfit.sos import ball_gram, gram_map
 from softjaw.lsfit.span import span_ellipsoid, span_quartic, span_samples
 from softjaw.lsfit.surface import FitFlag
@@ -23,7 +23,7 @@ def samples(patch, K, unit=1.0):
     """Samples of ``K`` motions; ``unit`` is the size of the caller's unit of length."""
     motion = sphere_motions(K)
     twist = motion / (SIX * [1, 1, 1, unit, unit, unit])
-    return six_samples(friction_wrench(patch, twist, 0.5), twist, 0.5 * patch.load.sum(), RHO * unit)
+    return normalised_samples(friction_wrench(patch, twist, 0.5), twist, 0.5 * patch.load.sum(), RHO * unit)
 
 
 @pytest.fixture(scope="module")
@@ -69,7 +69,7 @@ def test_a_nearly_flat_patch_ends_where_rounding_lets_it():
 
 def plane_samples(c, K=60):
     """Points and normals of ``x^4 + c x^2 y^2 + y^4 = 1``, which is convex for ``0 <= c <= 6``."""
-    surface = Quartic([1, 0, c, 0, 1], exponents(2, 4))
+    surface = Quartic([1, 0, c, 0, 1], 2)
     phi = np.pi * (np.arange(K) + 0.5) / K
     u = np.column_stack([np.cos(phi), np.sin(phi)])
     W = u * surface.radius(u)[:, None]
