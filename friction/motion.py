@@ -7,7 +7,7 @@ direction of a twist matters. A translation has ``omega = 0``: no centre of rota
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
@@ -16,40 +16,6 @@ SLIDE_Y: FloatArray = np.array([0.0, 1.0, 0.0])
 TURN_Z: FloatArray = np.array([0.0, 0.0, 1.0])
 for _twist in (SLIDE_X, SLIDE_Y, TURN_Z):
     _twist.flags.writeable = False
-
-
-def cor_twists(cor: ArrayLike) -> FloatArray:
-    """Unit rotations about axes along z through the centres of rotation, ``[c_y, -c_x, 1]``.
-
-    The opposite sense gives the opposite wrench, so one sense is enough.
-
-    Parameters
-    ----------
-    cor : (m, 2) array
-        Centres of rotation in the contact frame [m].
-
-    Returns
-    -------
-    (m, 3) array
-        Twists [m/s, rad/s].
-
-    Examples
-    --------
-    >>> cor_twists([[0.1, 0.2]])
-    array([[ 0.2, -0.1,  1. ]])
-    """
-    c = np.asarray(cor, float).reshape(-1, 2)
-    return np.column_stack([c[:, 1], -c[:, 0], np.ones(len(c))])
-
-
-def cor_grid(n: int, rho: float) -> FloatArray:
-    """Twists of the paper's grid: ``n x n`` centres of rotation on the square with side ``10 rho``, ``(n * n, 3)``.
-
-    The grid samples torques above half the largest one with about one motion in a hundred; errors of limit surfaces
-    should be judged on `fibonacci_twists`.
-    """
-    c = np.linspace(-5 * rho, 5 * rho, n)
-    return cor_twists(np.stack(np.meshgrid(c, c, indexing="ij"), axis=-1))
 
 
 def fibonacci_twists(K: int, rho: float) -> FloatArray:

@@ -23,7 +23,7 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull, QhullError
+from scipy.spatial import ConvexHull
 
 from softjaw.scoring.contact import Body, ellipsoid_matrix, hull_volume, touching_points, vertices_of
 
@@ -291,29 +291,13 @@ def surface_mesh(body: Body, level: int) -> tuple[FloatArray, IntArray]:
 
 
 def _hull_mesh(vertices: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Faces of the hull; a flat one is given a thickness of 1e-9, so that its rim has normals."""
-    centre = vertices.mean(axis=0)
-    _, extent, axes = np.linalg.svd(vertices - centre)
-    # fewer points than dimensions have fewer singular values
-    extent = np.append(extent, np.zeros(3 - len(extent)))
-    if extent[0] == 0:
-        return vertices, np.zeros((0, 3), dtype=np.intp)
-    flat = extent <= MIN_THICKNESS * extent[0]
-    axes = axes * np.where(flat, MIN_THICKNESS * extent[0], extent)[:, None]
-    points = np.vstack([vertices, centre + axes[flat], centre - axes[flat]])
-    # Hulls turn with linear maps: made as thick as wide, the points cost Qhull no digits.
-    round_points = np.linalg.solve(axes.T, (points - centre).T).T
-    try:
-        hull = ConvexHull(round_points)
-    except QhullError:
-        hull = ConvexHull(round_points, qhull_options="QJ")
+    """Faces of the hull, seen anticlockwise from outside."""
+    hull = ConvexHull(vertices)
     triangles = hull.simplices.astype(np.intp)
-    a, b, c = (round_points[triangles[:, i]] for i in range(3))
-    # a frame that mirrors turns the sense of all triangles
-    outward = hull.equations[:, :3] * np.sign(np.linalg.det(axes))
-    inward = np.einsum("mi,mi->m", np.cross(b - a, c - a), outward) < 0
+    a, b, c = (vertices[triangles[:, i]] for i in range(3))
+    inward = np.einsum("mi,mi->m", np.cross(b - a, c - a), hull.equations[:, :3]) < 0
     triangles[inward] = triangles[inward][:, ::-1]
-    return points, triangles
+    return vertices, triangles
 
 
 @lru_cache(maxsize=8)

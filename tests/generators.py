@@ -15,6 +15,18 @@ from softjaw.friction.patch import ContactPatch
 from softjaw.friction.wrench import REST
 
 
+def cor_twists(cor):
+    """Unit rotations about axes along z through the centres ``(m, 2)``: ``[c_y, -c_x, 1]``."""
+    c = np.asarray(cor, float).reshape(-1, 2)
+    return np.column_stack([c[:, 1], -c[:, 0], np.ones(len(c))])
+
+
+def cor_grid(n, rho):
+    """The paper's grid: ``n x n`` centres of rotation on the square with side ``10 rho``."""
+    c = np.linspace(-5 * rho, 5 * rho, n)
+    return cor_twists(np.stack(np.meshgrid(c, c, indexing="ij"), axis=-1))
+
+
 def _mid(lower, upper, n):
     return lower + (np.arange(n) + 0.5) * (upper - lower) / n
 

@@ -14,7 +14,7 @@ import pytest
 
 from jobs.graspit import graspit_vertices
 from softjaw.friction.frame import FrameFlag, contact_frame, contact_length, in_frame
-from softjaw.friction.motion import cor_grid, cor_twists, fibonacci_twists
+from softjaw.friction.motion import fibonacci_twists
 from softjaw.friction.patch import ContactPatch
 from softjaw.friction.wrench import friction_limits, friction_support, friction_wrench, pure_torque
 from softjaw.lsfit.ellipsoid import Ellipsoid, axis_aligned_ellipsoid, full_ellipsoid, three_motion_ellipsoid
@@ -32,6 +32,8 @@ from softjaw.scoring.quality import score
 from tests.generators import (
     build,
     bump,
+    cor_grid,
+    cor_twists,
     cyl_mesh,
     grid_mesh,
     lcg_noise,

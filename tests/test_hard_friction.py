@@ -9,10 +9,9 @@ import pytest
 from scipy.spatial import ConvexHull, QhullError
 
 from softjaw.friction.frame import FrameFlag, contact_frame, in_frame
-from softjaw.friction.motion import cor_twists
 from softjaw.friction.wrench import friction_limits, friction_wrench
 from softjaw.scoring.contact import fibonacci_vertices, polytope_volume
-from tests.generators import cap_polar, lcg_patch, points_patch
+from tests.generators import cap_polar, cor_twists, lcg_patch, points_patch
 
 X = [1.0, 0.0, 0.0]
 

@@ -23,7 +23,7 @@ ALLOWED = {
     "scoring": {"softjaw.scoring", "clarabel"} | NUMERICS,
     "fem": {"softjaw.fem", "softjaw.friction", "skfem", "petsc4py", "pyvista", "trimesh", "vtkmodules"} | NUMERICS,
     "study": {"h5py", "jinja2", "matplotlib", "mpi4py", "plotly", "pydantic", "pydantic_core", "pyvista", "rich"}
-    | {"vtkmodules", "xarray", "threadpoolctl", "(computed)"}
+    | {"vtkmodules", "xarray", "threadpoolctl", "trimesh", "(computed)"}
     | NUMERICS,
 }
 ALLOWED["study"] |= {f"softjaw.{name}" for name in OWN}

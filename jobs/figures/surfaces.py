@@ -10,7 +10,7 @@ import xarray as xr
 
 from jobs.figures import drawing
 from jobs.figures.contacts import WIDTH
-from softjaw.friction.motion import cor_grid, fibonacci_twists
+from softjaw.friction.motion import fibonacci_twists
 from softjaw.lsfit.samples import fit_error
 from softjaw.study import pictures
 from softjaw.study.case.limit_surface import fitted
@@ -124,7 +124,8 @@ def errors_on_grid(found: StoredSurface) -> dict[str, float]:
     They are those of turns about a grid of centres of rotation, to which the quartic is fitted, too, and of which nine
     in ten are nearly translations.
     """
-    twist = cor_grid(GRID, 1.0)
+    centre = 5 * np.stack(np.meshgrid(*[np.linspace(-1, 1, GRID)] * 2, indexing="ij"), axis=-1).reshape(-1, 2)
+    twist = np.column_stack([centre[:, 1], -centre[:, 0], np.ones(len(centre))])
     W, T = found.wrenches(twist), twist / np.linalg.norm(twist, axis=1, keepdims=True)
     surfaces = found.ellipsoid, fitted(found.ellipsoid, W, T, "quartic", "least_squares")[0]
     return {name: fit_error(surface, W, T).Erad for name, surface in zip(FITS, surfaces, strict=True)}

@@ -57,8 +57,8 @@ def _isaac_grasp(grasp: RankedGrasp) -> dict[str, Any]:
         "confidence": grasp.merit,
         "position": grasp.origin.tolist(),
         "orientation": {"w": w, "xyz": [x, y, z]},
-        "cspace_position": grasp.closed_joints,
-        "pregrasp_cspace_position": grasp.open_joints,
+        "cspace_position": grasp.hold.closed_joints,
+        "pregrasp_cspace_position": grasp.hold.open_joints,
     }
 
 
@@ -80,7 +80,7 @@ def as_graspgen(grasps: Sequence[RankedGrasp], gripper: GripperFrame, ds: xr.Dat
             "forces": [grasp.force for grasp in grasps],
             "widths": [plain(grasp.maps["opening"]) for grasp in grasps],
             "names": [grasp.name for grasp in grasps],
-            "warnings": [[*grasp.warnings, *grasp.unfit] for grasp in grasps],
+            "warnings": [[*grasp.warnings, *grasp.hold.unfit] for grasp in grasps],
         },
         "softjaw": {
             "file": str(ds.attrs["file"]), "units": grasps[0].units if grasps else {}, "meaning": MEANING,
@@ -103,8 +103,8 @@ def _moveit(grasp: RankedGrasp, gripper: GripperFrame) -> dict[str, Any]:
     return {
         "#": grasp.remark,
         "id": grasp.name,
-        "pre_grasp_posture": _posture(grasp.open_joints, []),
-        "grasp_posture": _posture(grasp.closed_joints, [grasp.force]),
+        "pre_grasp_posture": _posture(grasp.hold.open_joints, []),
+        "grasp_posture": _posture(grasp.hold.closed_joints, [grasp.force]),
         "grasp_pose": {"header": _header(gripper.object_frame), "pose": pose},
         "grasp_quality": grasp.merit,
         "pre_grasp_approach": _way(gripper, 1.0),

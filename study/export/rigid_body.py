@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
+from trimesh import Trimesh
 
 from softjaw.study.case.build import build_object, centre_of_mass, own_frame, surface_triangles
 from softjaw.study.messages import OTHER_FILE, StudyError
@@ -76,46 +77,17 @@ def body_of(ds: xr.Dataset, case: dict[str, Any]) -> RigidBody:
         raise StudyError(OTHER_FILE, f"{ds.attrs['file']}: its object cannot be built: {error}") from error
     centre = frame.to_object(centre_of_mass(scene, built)[None])[0]
     points = frame.to_object(np.asarray(points, float))
-    volume, inertia = solid(points[triangles] if getattr(built, "closed", True) else _hull(points))
-    mass = DENSITY * volume if shape.mass is None else shape.mass
+    surface = Trimesh(points, triangles, process=False)
+    solid = surface if getattr(built, "closed", True) else surface.convex_hull
+    mass = DENSITY * solid.volume if shape.mass is None else shape.mass
+    inertia = solid.moment_inertia * mass / solid.volume
     down, pad = np.array(scene.task.direction or (0.0, 0.0, -1.0)), np.array(scene.gripper.pad_size)
-    return RigidBody(points, triangles, mass, shape.mass is not None, centre, inertia * mass / volume, down, pad)
+    return RigidBody(points, triangles, mass, shape.mass is not None, centre, inertia, down, pad)
 
 
 def weight(mass: float, body: RigidBody) -> FloatArray:
     """Weight ``(3,)`` [N] of a mass [kg] in the direction in which the body's own pulls."""
     return mass * GRAVITY * body.down / np.linalg.norm(body.down)
-
-
-def solid(corners: FloatArray) -> tuple[float, FloatArray]:
-    """Volume [m^3] of the body inside closed triangles ``(m, 3, 3)`` [m], and its inertia ``(3, 3)`` over density.
-
-    The inertia [m^5] is about the centroid; both are sums over tetrahedra from a point within.
-
-    >>> corners = np.array([[0.0, 0, 0], [6, 0, 0], [0, 6, 0], [0, 0, 6]])
-    >>> volume, inertia = solid(corners[[[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]])
-    >>> round(volume, 9), round(inertia[0, 0], 9)
-    (36.0, 97.2)
-    """
-    x = corners - 0.5 * (corners.min(axis=(0, 1)) + corners.max(axis=(0, 1)))
-    v = np.einsum("ka,ka->k", x[:, 0], np.cross(x[:, 1], x[:, 2])) / 6
-    total, volume = x.sum(axis=1), float(v.sum())
-    first = v @ total / 4
-    second = (np.einsum("k,kia,kib->ab", v, x, x) + np.einsum("k,ka,kb->ab", v, total, total)) / 20
-    second -= np.outer(first, first) / volume
-    return volume, np.trace(second) * np.eye(3) - second
-
-
-def _hull(points: FloatArray) -> FloatArray:
-    """Triangles ``(m, 3, 3)`` of the convex hull, turned outwards."""
-    from scipy.spatial import ConvexHull  # few objects are not closed
-
-    hull = ConvexHull(points)
-    corners = points[hull.simplices]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    inward = np.einsum("ka,ka->k", normal, hull.equations[:, :3]) < 0
-    corners[inward] = corners[inward][:, ::-1]
-    return np.asarray(corners)
 
 
 def places(values: NDArray[Any]) -> str:

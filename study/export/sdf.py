@@ -32,6 +32,7 @@ from xml.sax.saxutils import escape
 
 import numpy as np
 from scipy.spatial.transform import Rotation
+from trimesh import Trimesh
 
 from softjaw.study.export.point_contact import PAD_MASS, RADIUS, PointContact, cell, numbers, rendered
 from softjaw.study.export.rigid_body import RigidBody
@@ -56,10 +57,7 @@ def as_sdf(grasp: RankedGrasp, body: RigidBody, mesh: str = "object.stl") -> str
 
 def as_stl(body: RigidBody) -> bytes:
     """The object's surface as a binary STL file [m], in the frame of its own file."""
-    triangles = np.zeros(len(body.triangles), [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("colour", "<u2")])
-    triangles["corners"] = corners = body.points[body.triangles]
-    triangles["normal"] = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return b"softjaw".ljust(80) + np.uint32(len(triangles)).tobytes() + triangles.tobytes()
+    return bytes(Trimesh(body.points, body.triangles, process=False).export(file_type="stl"))
 
 
 def _pose(rotation: FloatArray, origin: FloatArray) -> str:

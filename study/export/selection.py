@@ -76,14 +76,23 @@ class GripperFrame:
         return self.closing or self.hand.closing
 
 
+@dataclass(frozen=True)
+class Hold:
+    """How the gripper takes a grasp: joint values before it and in it, depth [m], and why it cannot."""
+
+    open_joints: dict[str, float]
+    closed_joints: dict[str, float]
+    depth: float
+    unfit: tuple[str, ...]
+
+
 @dataclass(frozen=True, eq=False)
 class RankedGrasp:
     """A solved case as planners take it.
 
     ``place`` is the case in words. ``rotation`` ``(3, 3)`` has the gripper's axes as columns, ``origin`` ``(3,)`` [m]
     is where it stands. ``merit`` is what the grasp is ranked by over the largest of all that are written: 1 for the
-    best, 0 where there is nothing. ``open_joints`` and ``closed_joints`` are the gripper's joint values [m or rad]
-    before the grasp and in it, and ``unfit`` says why this gripper cannot take it.
+    best, 0 where there is nothing.
     """
 
     name: str
@@ -94,9 +103,7 @@ class RankedGrasp:
     merit: float
     force: float
     units: dict[str, str]
-    open_joints: dict[str, float]
-    closed_joints: dict[str, float]
-    unfit: tuple[str, ...] = ()
+    hold: Hold
 
     @property
     def maps(self) -> dict[str, float]:
@@ -107,7 +114,7 @@ class RankedGrasp:
     def reasons(self) -> tuple[str, ...]:
         """Why it is no grasp to write: it slips, does harm, holds nothing, or is none for this gripper."""
         lost = tuple(flag.word for flag in flags_in(self.case["flags"] & LOST))
-        return (*lost, *(("payload 0",) if self.maps.get("payload", np.nan) <= 0 else ()), *self.unfit)
+        return (*lost, *(("payload 0",) if self.maps.get("payload", np.nan) <= 0 else ()), *self.hold.unfit)
 
     @property
     def warnings(self) -> list[str]:
@@ -196,19 +203,8 @@ def grasps(ds: xr.Dataset, choice: Selection, gripper: GripperFrame) -> list[Ran
         for approach, hold in holds(ds, case, gripper).items():
             name = f"grasp_{i}" + (f"_{approach.replace('-', '_')}" if len(gripper.approach) > 1 else "")
             R, o = gripper_frame(case, approach, gripper.along, hold.depth)
-            of_gripper = units, hold.open_joints, hold.closed_joints, hold.unfit
-            made.append(RankedGrasp(name, place, case, R, o, merit, case["place"]["normal_force"], *of_gripper))
+            made.append(RankedGrasp(name, place, case, R, o, merit, case["place"]["normal_force"], units, hold))
     return made
-
-
-@dataclass(frozen=True)
-class Hold:
-    """How the gripper takes a grasp: joint values before it and in it, depth [m], and why it cannot."""
-
-    open_joints: dict[str, float]
-    closed_joints: dict[str, float]
-    depth: float
-    unfit: tuple[str, ...]
 
 
 def holds(ds: xr.Dataset, case: dict[str, Any], gripper: GripperFrame) -> dict[str, Hold]:
@@ -255,4 +251,3 @@ def usable(grasps: Sequence[RankedGrasp]) -> tuple[list[RankedGrasp], str]:
     reasons = Counter(reason for grasp in grasps for reason in grasp.reasons)
     listed = ", ".join(f"{reason} ({count})" if len(reasons) > 1 else reason for reason, count in reasons.items())
     return kept, f"{len(grasps) - len(kept)} of {len(grasps)} grasps left out: {listed}" if reasons else ""
-

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from softjaw.friction.frame import contact_frame
-from softjaw.friction.motion import cor_grid, fibonacci_twists
+from softjaw.friction.motion import fibonacci_twists
 from softjaw.friction.wrench import friction_limits, friction_wrench, pure_torque
 from softjaw.lsfit.ellipsoid import Ellipsoid, full_ellipsoid
 from softjaw.lsfit.quartic_fit import convex_quartic
@@ -19,7 +19,7 @@ from softjaw.scoring.epsilon import epsilon
 from softjaw.scoring.pose import pose_volume
 from softjaw.scoring.quality import score
 from tests.benchmark.table import fastest, line, span, title
-from tests.generators import cyl_mesh, cylinder_grid, disc_polar, lcg_noise, lcg_patch, lcg_sphere, mesh_patch
+from tests.generators import cor_grid, cyl_mesh, cylinder_grid, disc_polar, lcg_noise, lcg_patch, lcg_sphere, mesh_patch
 from tests.scoring.grasps import contact_axes
 
 FACES, MOTIONS = 2400, 441

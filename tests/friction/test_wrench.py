@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.special import ellipe
 
-from softjaw.friction.motion import SLIDE_X, SLIDE_Y, cor_grid, cor_twists, fibonacci_twists
+from softjaw.friction.motion import SLIDE_X, SLIDE_Y, fibonacci_twists
 from softjaw.friction.patch import ContactPatch
 from softjaw.friction.wrench import FrictionLimits, friction_limits, friction_sums, friction_support, friction_wrench
-from tests.generators import cap_polar, cylinder_grid, friction_sums_reference, lcg_patch, wedge
+from tests.generators import cap_polar, cor_grid, cor_twists, cylinder_grid, friction_sums_reference, lcg_patch, wedge
 
 SEEDS = range(1, 21)
 

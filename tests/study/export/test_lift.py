@@ -12,7 +12,7 @@ import pytest
 import softjaw as sj
 from softjaw.study.export.mjcf import as_mjcf
 from softjaw.study.export.point_contact import SHARE, carried
-from softjaw.study.export.rigid_body import body_of, solid
+from softjaw.study.export.rigid_body import body_of
 from softjaw.study.export.selection import GripperFrame, Selection, grasps
 from softjaw.study.result.read import open as open_result
 from softjaw.study.units import GRAVITY
@@ -107,14 +107,6 @@ def test_an_elliptic_cylinder_has_its_inertia(cylinder):
     assert body.mass == pytest.approx(1000 * np.pi * a * b * L, rel=0.01)
     expected = np.diag([b * b / 4 + L * L / 12, a * a / 4 + L * L / 12, (a * a + b * b) / 4])
     assert body.inertia == pytest.approx(body.mass * expected, rel=0.01, abs=1e-3 * body.inertia.max())
-
-
-def test_the_inertia_of_a_body_does_not_depend_on_where_it_is():
-    corners = np.array([[0.0, 0, 0], [6, 0, 0], [0, 6, 0], [0, 0, 6]])[[[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]]
-    volume, inertia = solid(corners + np.array([3.0, -50.0, 7.0]))
-    assert volume == pytest.approx(36.0)
-    # of this tetrahedron: int (x - 1.5)^2 dV = 6^5 / 60 - 36 * 1.5^2, int (x - 1.5) (y - 1.5) dV = 6^5 / 120 - 81
-    assert inertia == pytest.approx(np.full((3, 3), 81 - 6**5 / 120) + np.diag([2 * 48.6 - 16.2] * 3))
 
 
 @pytest.mark.long

@@ -40,7 +40,7 @@ def test_a_hand_comes_from_above_only_where_its_palm_stays_over_the_object(path)
     assert room > TOP - STATIONS[4] + 0.005
     assert abs(found[0].rotation[2, 2]) < 0.1
     assert found[4].rotation[2, 2] == pytest.approx(-1.0)
-    assert not any(grasp.unfit for grasp in found)
+    assert not any(grasp.hold.unfit for grasp in found)
 
 
 def test_without_a_palm_every_grasp_is_taken_from_above(path):
@@ -65,8 +65,8 @@ def test_what_the_gripper_cannot_take_is_left_out_with_the_reason(path, hand, wh
 def test_fingers_open_no_wider_than_the_stroke(path):
     hand = Hand(stroke_mm=80)
     for grasp in taken(path, hand):
-        assert grasp.open_joints == pytest.approx({"finger_joint1": 0.040, "finger_joint2": 0.040})
-        assert grasp.closed_joints == pytest.approx({"finger_joint1": 0.034, "finger_joint2": 0.034})
+        assert grasp.hold.open_joints == pytest.approx({"finger_joint1": 0.040, "finger_joint2": 0.040})
+        assert grasp.hold.closed_joints == pytest.approx({"finger_joint1": 0.034, "finger_joint2": 0.034})
 
 
 def test_clearance_of_a_sphere_from_boxes():
