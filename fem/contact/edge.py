@@ -8,8 +8,8 @@ so the moments of a stretch of loaded faces tell its length ``2 a``. With ``t`` 
     <y^2> = a^2 (2 + c) / (8 + 2 c),   <y^4> / <y^2>^2 = (8 + 5 c) (4 + c) / (4 (2 + c)^2)
 
 ``c = 0`` is Hertz's pressure. The fourth moment is noisy on few faces, so it counts as far as the mesh resolves it. A
-stretch from a rim of the pad, where pressure need not vanish, to a free edge at the distance ``b`` has
-``p = sqrt(1 - s / b) (c_0 + c_1 s)``.
+stretch that such edges would lead beyond a rim of the pad, where pressure need not vanish, ends there; to its free edge
+at the distance ``b`` it has ``p = sqrt(1 - s / b) (c_0 + c_1 s)``.
 """
 
 from __future__ import annotations
@@ -37,21 +37,17 @@ def contact_area(patch: ContactPatch, faces: tuple[int, int]) -> float:
 
     Notes
     -----
-    Lengths of loaded stretches are added up over the lines along the width and over those along the length. Each sum is
-    uncertain by whole lines where the edge runs along them, so each counts by the free edge that its lines cross.
+    A face bears as far as both lines of faces through it say, that along the width and that along the length: a line
+    beside an edge that it runs along is loaded as a whole, and only those across it tell how much of it bears.
     """
     assert patch.corners is not None
-    load, place = patch.load.reshape(faces), patch.centroid.reshape(*faces, 3)
+    load, area, place = patch.load.reshape(faces), patch.area.reshape(faces), patch.centroid.reshape(*faces, 3)
     corners = patch.corners.reshape(*faces, 4, 3)
-    along_x, along_y = (_sides(corners, first) for first in (((0, 1), (3, 2)), ((0, 3), (1, 2))))
-    rims_y = _rims(corners[:, [0, -1]], ((0, 1), (3, 2)))
-    rims_x = _rims(corners[[0, -1]].swapaxes(0, 1), ((0, 3), (1, 2)))
-    across = _stretches(load, place, along_y, along_x, rims_y)
-    along = _stretches(load.T, place.swapaxes(0, 1), along_x.T, along_y.T, rims_x)
-    weights = [float(free @ width) for _, width, free in (across, along)]
-    areas = [float(length @ width) for length, width, _ in (across, along)]
-    # a face that bears up to all rims has no edge to reconstruct
-    return float(np.dot(areas, weights) / sum(weights)) if sum(weights) > 0 else areas[0]
+    # corners run round each face from the lowest x and y
+    low_x, high_x, low_y, high_y = (corners[..., pair, :].mean(axis=-2) for pair in ([0, 3], [1, 2], [0, 1], [3, 2]))
+    across = _bearing(load, place, low_y, high_y)
+    along = _bearing(load.T, *(points.swapaxes(0, 1) for points in (place, low_x, high_x))).T
+    return float((np.minimum(across, along) * area).sum())
 
 
 def largest_pressure(patch: ContactPatch, faces: tuple[int, int], per_side: int) -> float:
@@ -94,48 +90,54 @@ def _four(values: FloatArray) -> FloatArray:
     return values[:-1, :-1] + values[1:, :-1] + values[:-1, 1:] + values[1:, 1:]
 
 
-def _sides(corners: FloatArray, sides: tuple[tuple[int, int], ...]) -> FloatArray:
-    """Mean length of two opposite sides of every face [m]."""
-    return np.mean([np.linalg.norm(corners[..., b, :] - corners[..., a, :], axis=-1) for a, b in sides], axis=0)
+def _bearing(load: FloatArray, place: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+    """Share of each face ``(lines, faces)`` that bears by the line through it along the second axis.
 
-
-def _rims(ends: FloatArray, sides: tuple[tuple[int, int], ...]) -> FloatArray:
-    """Middles ``(lines, 2, 3)`` of the outer sides of the first and last face of every line."""
-    return np.stack([ends[:, k, list(side)].mean(axis=1) for k, side in enumerate(sides)], axis=1)
-
-
-def _stretches(
-    load: FloatArray, place: FloatArray, side: FloatArray, width: FloatArray, rims: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Loaded stretches of the lines along the second axis of a grid, each ``(stretches,)``.
-
-    ``place (lines, faces, 3)``, ``side`` of the faces along the lines and ``width`` across them [m]. Returned are the
-    length with the edges inside the faces [m], the mean width by load [m], and the number of ends that are no rim of
-    the pad.
+    ``low, high (lines, faces, 3)`` are the middles of both sides of a face that the line crosses.
     """
-    steps = np.diff(place, axis=1, prepend=rims[:, :1], append=rims[:, 1:])
-    from_rim = np.cumsum(np.linalg.norm(steps, axis=2), axis=1)
+    along = high - low
+    side = np.linalg.norm(along, axis=2)
+    upper = np.cumsum(side, axis=1)
+    lower = upper - side
+    s = lower + np.einsum("ijc,ijc->ij", place - low, along) / side
     on = load > NEGLIGIBLE * load.max()
     beside = np.pad(on, ((0, 0), (1, 1)))
     first, last = on & ~beside[:, :-2], on & ~beside[:, 2:]
-    low, high = np.nonzero(first)[1] == 0, np.nonzero(last)[1] == on.shape[1] - 1
-    starts = np.flatnonzero(first[on])
-    ends = np.flatnonzero(last[on])
-    count = ends - starts + 1
-    # from the rim that a stretch begins at, if only one does
-    reverse = np.repeat(high & ~low, count)
-    s = np.where(reverse, (from_rim[:, -1:] - from_rim[:, :-1])[on], from_rim[:, :-1][on])
-    force, mean, square = (np.add.reduceat(v, starts) for v in (load[on], load[on] * s, load[on] * s**2))
-    mean, square = mean / force, square / force
-    z = s - np.repeat(mean, count)
-    variance, fourth = (np.add.reduceat(load[on] * z**k, starts) / force for k in (2, 4))
+    starts, ends = np.flatnonzero(first[on]), np.flatnonzero(last[on])
     # two faces share a node, so the closest nodes are two of the smallest faces apart
-    spacing, full = 2.0 * np.minimum.reduceat(side[on], starts), np.add.reduceat(side[on], starts)
-    length = np.where(low | high, _from_rim(mean, square, spacing), _between_edges(variance, fourth, spacing))
+    spacing = 2.0 * np.minimum.reduceat(side[on], starts)
+    whole = np.broadcast_to(upper[:, -1:], on.shape)[first]
+    at_rims = np.nonzero(first)[1] == 0, np.nonzero(last)[1] == on.shape[1] - 1
+    begin, end = _edges(load[on], s[on], starts, ends, spacing, whole, at_rims)
+    # where the middle by load is not that of the stretch, one edge lies beyond the loaded faces
+    free = (begin > 0.0) & (end < whole)
+    shift = np.maximum(lower[first] - begin, 0.0) - np.maximum(end - upper[last], 0.0)
+    begin, end = (np.repeat(edge + free * shift, ends - starts + 1) for edge in (begin, end))
+    share = np.zeros(load.shape)
+    share[on] = (np.minimum(upper[on], end) - np.maximum(lower[on], begin)) / side[on]
+    return np.clip(share, 0.0, 1.0)
+
+
+def _edges(
+    load: FloatArray, s: FloatArray, starts: NDArray[np.intp], ends: NDArray[np.intp], spacing: FloatArray,
+    whole: FloatArray, at_rims: tuple[NDArray[np.bool_], NDArray[np.bool_]],
+) -> tuple[FloatArray, FloatArray]:  # fmt: skip
+    """Both edges of loaded stretches [m], from the loads of their faces at distances ``s`` from a rim [m].
+
+    ``starts, ends`` of the stretches among the faces, ``whole`` lengths of their lines [m].
+    """
+    force = np.add.reduceat(load, starts)
+    mean = np.add.reduceat(load * s, starts) / force
+    z = s - np.repeat(mean, ends - starts + 1)
+    variance, fourth = (np.add.reduceat(load * z**k, starts) / force for k in (2, 4))
+    half = 0.5 * _between_edges(variance, fourth, spacing)
+    low, high = at_rims[0] & (mean < half), at_rims[1] & (whole - mean < half)
     # the first idle node is not in contact; beside a rim, where pressure may be singular, all but the last ones are
-    inner = np.where(low, s[np.maximum(ends - 1, starts)], s[np.minimum(starts + 1, ends)]) * (low | high)
-    length = np.where(low & high, full, np.clip(length, inner - 0.5 * spacing, full + spacing))
-    return length, np.add.reduceat(load[on] * width[on], starts) / force, 2.0 - low - high
+    b = np.maximum(_from_rim(mean, variance + mean**2, spacing), s[np.maximum(ends - 1, starts)] - 0.5 * spacing)
+    from_other = _from_rim(whole - mean, variance + (whole - mean) ** 2, spacing)
+    c = np.minimum(whole - from_other, s[np.minimum(starts + 1, ends)] + 0.5 * spacing)
+    begin = np.where(low, 0.0, np.where(high, c, mean - half))
+    return begin, np.where(high, whole, np.where(low, b, mean + half))
 
 
 def _between_edges(variance: FloatArray, fourth: FloatArray, spacing: FloatArray) -> FloatArray:
