@@ -157,6 +157,13 @@ def e_n(state):
 # -- what tests ask of a solver ----------------------------------------------------------------------------------------
 
 
+def tangent_error(problem, x, d, h):
+    """Difference of the tangent along ``d`` from central differences of the residual, over the largest of these."""
+    one, other, two, four = (problem.residual(x + s * h * d) for s in (1, -1, 2, -2))
+    difference = (8 * (one - other) - (two - four)) / (12 * h)
+    return np.abs(dense(problem, x) @ d - difference).max() / np.abs(difference).max()
+
+
 def dense(problem, x=None, values=None):
     """Tangent at ``x``, or other ``values`` in its pattern, as a full matrix."""
     pattern = problem.pattern

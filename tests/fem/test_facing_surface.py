@@ -39,16 +39,6 @@ def bottle(wall, neck=0.012, radius=0.03, height=0.15):
     return [*outer, *inside, [wall, inside[-1, 1]], [wall, 0.0]]
 
 
-def bowl(wall, radius=0.05, height=0.06):
-    """A bowl like half an egg with an open top."""
-    t = np.linspace(0.0, np.pi / 2, 30)
-    outer = np.column_stack([height * (1 - np.cos(t)), radius * np.sin(t)])
-    if not wall:
-        return [*outer, [height, 0.0]]
-    inner = np.column_stack([height - (height - wall) * np.cos(t), (radius - wall) * np.sin(t)])
-    return [*outer, *inner[::-1]]
-
-
 def side(z, angle=0.1, radius=0.03):
     """Pose of a pad whose front stands at the given distance from the axis; its long side lies along z."""
     a = -np.array([np.cos(angle), np.sin(angle), 0.0])
@@ -57,27 +47,6 @@ def side(z, angle=0.1, radius=0.03):
 
 def in_box(n=600, shrunk=0.999, seed=5):
     return np.random.default_rng(seed).uniform(shrunk * BOX[0], shrunk * BOX[1], (n, 3))
-
-
-@pytest.mark.parametrize(("shape", "place", "wall"), [
-    (bottle, (0.105, 0.0215), 0.002), (bowl, (0.025, 0.042), 0.005),
-    *(pytest.param(shape, place, wall, marks=pytest.mark.long) for wall in (0.002, 0.005) for shape, place in (
-        (bottle, (0.06, 0.03)), (bottle, (0.14, 0.012)), (bowl, (0.045, 0.05)))),
-])  # fmt: skip
-def test_an_inner_wall_changes_nothing(shape, place, wall):
-    """The gap of a hollow body is that of its outer surface alone, up to half a wall inside it and behind."""
-    pose = side(place[0], radius=place[1])
-    hollow, solid = (MeshObject(*turned(shape(w))).near(pose, *BOX, 0.002) for w in (wall, None))
-    y = in_box()
-    below = pose.to_object(y)[:, 2] < (0.15 if shape is bottle else 0.06) - 3e-3  # a rim differs from a lid
-    x = pose.to_object(y[below])
-    (g, normal, _), (expected, direction, _) = hollow.gap(x), solid.gap(x)
-    outside = expected > -0.4 * wall
-    assert outside.sum() > 150
-    assert np.abs(g - expected)[outside].max() < 1e-5
-    assert np.abs(normal - direction)[outside & (np.abs(expected) < 0.2 * wall)].max() < 6e-3
-    if place[0] not in (0.14, 0.045):  # slanted lines look into a mouth that is so near
-        assert (g[~outside] < 0).all()
 
 
 def ball(rows=24, columns=48, radius=0.03):
@@ -254,13 +223,6 @@ def test_closest_points_and_rays_of_the_tree_are_those_of_all_triangles():
             assert abs((p - x[triangles[hit, 0]]) @ n) < 1e-12
 
 
-def test_where_nothing_faces_the_finger_the_distance_to_the_mesh_is_taken():
-    mesh = MeshObject(*ball())
-    region = mesh.near(side(0.0, np.pi, -0.02), *BOX, 0.002)
-    x = region.pose.to_object(in_box(100))
-    assert np.abs(region.gap(x)[0] - mesh.gap(x)[0]).max() < 1e-4
-
-
 def test_the_edges_of_a_cylinder_in_single_precision_are_all_creases():
     """They turn by the crease angle itself, which rounding must not decide edge by edge; above it they are facets."""
     for turn in np.linspace(0.0, 0.5, 8):
@@ -281,7 +243,3 @@ def test_wide_facets_that_stay_sharp_are_told_with_what_they_hide(sections, told
         np.testing.assert_allclose(off, 0.025 * (1 - np.cos(np.pi / sections)), rtol=0.02)
     assert bool(MeshObject(body.vertices, body.faces).sharp_facets(0.0055)) == told
 
-
-def test_edges_of_a_box_and_narrow_facets_are_not_told():
-    for body in (trimesh.creation.box((0.04, 0.06, 0.1)), trimesh.creation.cylinder(0.008, 0.1, sections=11)):
-        assert not len(smooth_triangles(body.vertices, body.faces).doubtful(0.0055)[0])

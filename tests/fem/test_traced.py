@@ -240,16 +240,6 @@ def test_what_does_not_fit_is_refused():
         traced(rings(lambda t, z: 0.03 + 0 * t, np.linspace(0, 0.1, 30)), heights=(0.2, 0.3))
 
 
-def test_round_ends_become_domes():
-    rows = np.linspace(0.04, np.pi - 0.04, 60)
-    surface, report = traced(rings(lambda t, z: np.sqrt(0.03**2 - (z - 0.03) ** 2), 0.03 * (1 - np.cos(rows)), 96))
-    assert surface.flat == pytest.approx((0.0, surface.end))
-    assert surface.round
-    assert max(report.lids) < 1e-4
-    ball = surface.jets(*places(surface))[:, 0] - [0, 0, 0.03]
-    assert np.linalg.norm(ball, axis=1) == pytest.approx(0.03, abs=3e-5)
-
-
 def test_prisms_count_as_round_and_turned_flasks_as_unsymmetric():
     assert traced(rings(lambda t, z: 0.03 + 0 * t, np.array([0.0, 0.1]), 32))[0].round
     oval = traced(rings(lambda t, z: 0.03 + 0.002 * np.cos(2 * t - 0.3), np.linspace(0, 0.1, 30)))[0]

@@ -13,7 +13,6 @@ from softjaw.fem.materials import material
 from softjaw.fem.objects.shapes import Sphere
 from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.pad.shape import PadShape
-from softjaw.study.flags import Flag
 from tests.fem import reference
 from tests.hard_cases.closed_forms import FORMULAS
 from tests.hard_cases.conftest import ROW, row
@@ -70,29 +69,6 @@ def source(**keys):
 
 def judged(found, other=None, **keys):
     return judge(HardCase("round", "k", **keys), found, solved() if other is None else other)
-
-
-def test_what_is_right_is_ok():
-    assert judged(solved(), source=source()).word == "ok"
-    assert judged(solved(messages=("", "it slips")), note="slips").wrong == ()
-    refused = Outcome(refused="mu is wrong: 11")
-    assert judged(refused, expect="refused", reason="mu").word == "no number"
-    assert judged(refused, expect="refused", reason="wrong: ([0-9]+)", source=source(told=11.0)).word == "ok"
-    failed = solved(messages=("", "the wall collapsed"), done=(True, False))
-    right = {"expect": "failed", "reason": "collapsed", "up_to_n": 1.0}
-    assert judged(failed, failed, **right, source=source()).word == "ok"
-    assert judged(solved(0.0102), source=source()).wrong == ()
-    lost = solved(messages=(Flag.UNSTABLE.sentence, ""), checks=GOOD | {"ellipticity": -0.1})
-    assert judged(lost, note="ellipticity").wrong == ()
-
-
-def test_a_gap_never_counts_as_ok_and_is_wrong_when_it_has_closed():
-    assert judged(solved(0.02), source=source(), gap="known").word == "gap"
-    assert judged(solved(), source=source(), gap="known").word == "WRONG"
-    failed = solved(messages=("", "the wall collapsed"), done=(True, False))
-    stated = {"expect": "failed", "reason": "collapsed", "gap": "known", "source": source()}
-    assert judged(failed, failed, **stated).word == "gap"
-    assert judged(solved(), **stated).word == "WRONG"
 
 
 @pytest.mark.parametrize(("found", "keys"), [

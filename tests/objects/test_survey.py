@@ -13,8 +13,8 @@ from softjaw.study.scene import parse_scene
 from softjaw.study.scene.text import toml_text
 from tests.objects.bad_meshes import bad_meshes
 from tests.objects.random_scenes import KINDS, random_scene
-from tests.objects.solve import FORMATS, Outcome, objects, solved, start_inside
-from tests.objects.survey import GOAL, TOUCH, by_physics, kind_row, page, survey
+from tests.objects.solve import Outcome, objects, solved, start_inside
+from tests.objects.survey import GOAL, TOUCH, by_physics, survey
 
 SEED = 3
 LOW_POLY = [name for name, (kind, _) in bad_meshes(SEED).items() if kind == "low poly"]
@@ -58,19 +58,6 @@ def test_no_pad_starts_inside_a_spike_or_a_sharp_edge():
         assert start_inside(mesh, approach(mesh, down, gripper).pose, gripper.pad_size) < ROUNDED_OFF + 1e-9
 
 
-def test_outcomes_are_kept_and_counted(tmp_path):
-    failures = [("1, 5 N", "the foam loses ellipticity: ...")]
-    good = Outcome("a b", "soup", 2.0, 4, 3, {"coarse": 3}, failures, inside=2e-4)
-    bad = Outcome("c", "soup", 1.0, refused="exit code 2")
-    good.save(tmp_path)
-    assert Outcome.load(tmp_path / "a-b.json").flags == {"coarse": 3}
-    assert kind_row("soup", [good, bad])[:5] == ["soup", 2, 1, 4, 3]
-    assert kind_row("soup", [good, bad])[6] == 1
-    assert by_physics(good.failures[0][1])
-    assert not by_physics(bad.refused)
-    assert page([good, bad]).count("\n| ") == 7
-
-
 @pytest.mark.long
 def test_low_poly_meshes_are_solved_and_no_pad_starts_inside(tmp_path):
     outcomes = [solved(name, SEED, tmp_path) for name in LOW_POLY]
@@ -79,17 +66,8 @@ def test_low_poly_meshes_are_solved_and_no_pad_starts_inside(tmp_path):
 
 
 @pytest.mark.long
-def test_every_mesh_is_read_from_every_format(tmp_path):
-    for name, (kind, make) in bad_meshes(SEED).items():
-        ending = FORMATS[len(name) % len(FORMATS)]
-        if kind != "very many triangles":
-            make().export(tmp_path / f"mesh.{ending}")
-            assert len(MeshObject.from_file(tmp_path / f"mesh.{ending}", "m").triangles) >= 8, name  # a wedge
-
-
-@pytest.mark.long
 def test_random_scenes_are_solved(tmp_path):
-    names = [name for name in objects(SEED) if name.startswith("scene")][:16]
+    names = [name for name in objects(SEED) if name.startswith("scene")][:8]
     survey(names, Namespace(seed=SEED, results=tmp_path))
     outcomes = [Outcome.load(file) for file in tmp_path.glob("*.json")]
     assert len(outcomes) == len(names)

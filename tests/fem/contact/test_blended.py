@@ -31,7 +31,7 @@ def errors(station, rule):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("station", [40.0, 148.5])
+@pytest.mark.parametrize("station", KNOWN)
 def test_errors_of_both_kinds_cancel(station):
     weighted, blended, nodal = (errors(station, rule) for rule in RULES)
     assert (weighted < -0.004).all()

@@ -52,24 +52,16 @@ def test_tangent_is_the_derivative_of_the_residual(name, contact, complementarit
     assert active.any()
     if name != "plane":
         assert not active.all()
-    K, h = reference.dense(problem, x), 1e-7
     for direction in np.random.default_rng(6).uniform(-1, 1, (4, problem.size)):
-        by_h = [problem.residual(x + s * h * direction) for s in (1, -1, 2, -2)]
-        difference = (8 * (by_h[0] - by_h[1]) - (by_h[2] - by_h[3])) / (12 * h)
-        assert np.abs(K @ direction - difference).max() < 1e-8 * np.abs(difference).max()
+        assert reference.tangent_error(problem, x, direction, 1e-7) < 1e-8
 
 
 @pytest.mark.parametrize("law", ["blatz_ko", "neo_hookean", "linear"])
 def test_tangent_of_triquadratic_elements(law):
     problem = problem_of(OBJECTS["sphere"], element="hex27", law=law)
     problem.control = Control(force=2.0)
-    x = contacting_state(problem)
     direction = np.random.default_rng(6).uniform(-1, 1, problem.size)
-    h = 3e-8
-    by_h = [problem.residual(x + s * h * direction) for s in (1, -1, 2, -2)]
-    difference = (8 * (by_h[0] - by_h[1]) - (by_h[2] - by_h[3])) / (12 * h)
-    analytic = reference.dense(problem, x) @ direction
-    assert np.abs(analytic - difference).max() < 1e-7 * np.abs(difference).max()
+    assert reference.tangent_error(problem, contacting_state(problem), direction, 3e-8) < 1e-7
 
 
 def test_the_displacement_block_is_symmetric_and_the_pressures_couple_transposed():
@@ -130,11 +122,6 @@ def test_a_confined_pad_pressed_flat(element, symmetry):
     det, strain, _ = problem.foam.strains(x, np.eye(3))
     assert det == pytest.approx(stretch, rel=1e-13)
     assert strain == pytest.approx(1 - stretch, rel=1e-12)
-
-
-def test_pressures_are_bounded_and_nothing_else():
-    problem = problem_of(reference.plane)
-    assert (np.arange(problem.size)[problem.non_negative] == np.arange(problem.pad.closing_dof + 1, problem.size)).all()
 
 
 def test_active_set_row_switches_between_pressure_and_gap():

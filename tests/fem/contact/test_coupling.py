@@ -8,7 +8,6 @@ from softjaw.fem.contact.friction import load_steps
 from softjaw.fem.contact.press import Press
 from softjaw.fem.contact.problem import Control, SpringBed
 from softjaw.fem.contact.rigid import RigidProblem
-from softjaw.fem.errors import ConvergenceError
 from softjaw.fem.materials import material
 from softjaw.fem.objects.shapes import EllipticCylinder, Sphere
 from softjaw.fem.pad.mesh import Pad
@@ -93,11 +92,6 @@ def steeper(x):
     return factor * g, gradient, hessian
 
 
-def test_a_gradient_that_is_no_unit_vector_balances_too():
-    (state,) = press(steeper, 0.4, pad_of((False, True))).load_path([2.0])
-    assert state.checks.force_balance < 1e-8
-
-
 @pytest.mark.parametrize("gap", [BALL, steeper])
 @pytest.mark.parametrize("control", [Control(force=3.0), Control(closing=0.003)], ids=["force", "closing"])
 def test_tangent_by_finite_differences(control, gap):
@@ -111,14 +105,11 @@ def test_tangent_by_finite_differences(control, gap):
     x[: pad.closing_dof] += 3e-6 * rng.normal(size=pad.closing_dof)
     problem.accept(before)
     problem.accept(before + 0.5 * (x - before))
-    K = reference.dense(problem, x)
     size = np.linalg.norm((contact := problem.evaluate(x)[0]).traction, axis=-1)
     slips = np.isclose(size, 0.2 * problem.point_pressure(problem.finger, contact), rtol=1e-9) & (size > 0)
     assert slips.any()
     assert ((size > 0) & ~slips).any()
-    d, h = rng.normal(size=pad.size) * 1e-8, 1e-2
-    found = (problem.residual(x + h * d) - problem.residual(x - h * d)) / (2 * h)
-    np.testing.assert_allclose(K @ d, found, atol=1e-5 * np.abs(found).max())
+    assert reference.tangent_error(problem, x, rng.normal(size=pad.size) * 1e-8, 1e-2) < 1e-5
 
 
 @pytest.mark.parametrize("gap", [OVAL, BALL], ids=["cylinder", "sphere"])
@@ -130,17 +121,6 @@ def test_a_force_has_one_state_whatever_other_forces_are_asked_for(gap):
     for other in (among, downward.at(4.0)):
         assert other.unknowns.tobytes() == alone.unknowns.tobytes()
         assert other.points.friction.tobytes() == alone.points.friction.tobytes()
-
-
-def test_a_path_that_has_ended_has_ended_for_all_forces_above():
-    one = press(BALL, 0.4, pad_of(elements=(6, 4, 2)))
-    failures = []
-    for force in (3000.0, 4000.0):
-        with pytest.raises(ConvergenceError) as raised:
-            one.at(force)
-        failures.append(raised.value)
-    assert failures[0] is failures[1]
-    assert one.at(2.0).checks.force_balance < 1e-8
 
 
 def test_newton_steps_to_and_fro_are_damped_and_others_are_not():
@@ -155,13 +135,12 @@ def test_newton_steps_to_and_fro_are_damped_and_others_are_not():
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("gap", [OVAL, BALL], ids=["cylinder", "sphere"])
-def test_finer_steps_and_a_stiffer_stick_change_little(gap, monkeypatch):
-    (state,) = press(gap, 0.4).load_path([6.0])
+def test_finer_steps_and_a_stiffer_stick_change_little(monkeypatch):
+    (state,) = press(BALL, 0.4).load_path([6.0])
     for name, value in (("POWER", 2), ("STICK", 200.0)):
         with monkeypatch.context() as changed:
             changed.setattr(coupling, name, value)
-            (finer,) = press(gap, 0.4).load_path([6.0])
+            (finer,) = press(BALL, 0.4).load_path([6.0])
         # the steps leave some 0.3 %, which the stated error of a case holds
         assert finer.closing == pytest.approx(state.closing, rel=5e-3)
         assert finer.points.load.sum() == pytest.approx(state.points.load.sum(), rel=5e-3)

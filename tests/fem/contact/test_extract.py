@@ -56,18 +56,6 @@ def test_a_half_of_a_pad_on_a_lopsided_object():
     assert abs((full.load * full.centroid[:, 0]).sum() / full.load.sum()) > 1e-3
 
 
-def test_number_and_order_of_the_faces(whole):
-    """``per_side`` times the elements along length and width; numbered along the width first."""
-    element, pad, _, patch = whole
-    nx, ny = pad.shape.patch_faces
-    per_side = {"hex8": 2, "hex27": 3}[element]
-    assert (nx, ny) == (per_side * 8, per_side * 4)
-    centroid = patch.centroid.reshape(nx, ny, 3)
-    assert (np.diff(centroid[..., 0], axis=0) > 0).all()
-    assert (np.diff(centroid[..., 1], axis=1) > 0).all()
-    assert patch.corners.shape == (nx * ny, 4, 3)
-
-
 def test_loads_are_those_of_the_solution(whole):
     """``S`` is the integral of the pressure, the forces add up to the normal force, and nothing pulls aside."""
     element, pad, pressed, patch = whole

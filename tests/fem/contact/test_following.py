@@ -33,7 +33,7 @@ def last(press, forces):
     return state
 
 
-LISTS = [[500], [5, 500], [5, 50, 100, 200, 300, 400, 500], [3, 77, 201, 500], [5, *range(20, 520, 20)]]
+LISTS = [[500], [5, 500], [3, 77, 201, 500]]
 
 
 @pytest.mark.parametrize("forces", LISTS, ids=lambda forces: f"{forces[0]}-{len(forces)}")
@@ -44,15 +44,6 @@ def test_a_state_does_not_depend_on_the_list_of_forces(forces):
     assert state.closing == pytest.approx(13.85589900e-3, rel=1e-7)
     assert reference.e_n(state) == pytest.approx(14.84071815e-3, rel=1e-7)
     assert state.pressure.max() == pytest.approx(2816.678244e3, rel=1e-7)
-
-
-@pytest.mark.parametrize("law", [BLATZ_KO, material("neo_hookean", G, 0.49)], ids=["foam", "rubber"])
-@pytest.mark.parametrize("gap", [ROUND, BALL], ids=["cylinder", "sphere"])
-def test_nor_does_it_with_other_laws_and_objects(law, gap):
-    at_once, stepwise = (last(press_of(law, gap), forces) for forces in ([60], [1, 10, 17, 30, 44, 60]))
-    assert reference.e_n(at_once) == pytest.approx(reference.e_n(stepwise), rel=1e-9)
-    assert at_once.pressure.max() == pytest.approx(stepwise.pressure.max(), rel=1e-8)
-    assert not at_once.path_dependent
 
 
 def test_a_long_step_leads_to_an_unstable_state_and_the_path_to_a_stable_one():
@@ -88,14 +79,6 @@ def test_tangent_of_the_path_by_finite_differences(symmetry, control):
         x = press._stepping.solve(x * (1 + 1e-9), Control(force=20.0), work)
     tangent = problem.path_tangent(x, press.solver.answer)
     np.testing.assert_allclose(tangent, (high.unknowns - low.unknowns) / 0.4, atol=2e-3 * np.abs(tangent).max())
-
-
-def test_looking_for_stability_leaves_the_solver_as_it_was():
-    once, again = press_of(), press_of()
-    ladder = again.load_path([5.0, 20.0])
-    plain, first = list(once.load_path([5.0, 20.0])), next(ladder)
-    again.problem.symmetric_tangent(first.unknowns * 1.001)
-    assert next(ladder).unknowns.tobytes() == plain[1].unknowns.tobytes()
 
 
 # -- jumps of an artificial pad whose force falls while it is pressed on ----------------------------------------------
@@ -200,12 +183,6 @@ def test_a_maximum_of_the_force_is_named_and_the_plate_stays_out_of_the_object()
         steps.displacement_control(np.array([0.5 * MM]), 3.0, Work(), 0.02 * MM)
     with pytest.raises(ConvergenceError):
         steps.solve(np.array([0.5 * MM]), Control(closing=2.2 * MM), Work())
-
-
-def test_a_force_that_takes_too_many_iterations_is_given_up(monkeypatch):
-    monkeypatch.setattr(Press, "MOST_ITERATIONS", 8)
-    with pytest.raises(ConvergenceError):
-        last(press_of(), [60])
 
 
 @pytest.mark.parametrize(("scatter", "passes"), [(1e-7, True), (1e-2, False)])

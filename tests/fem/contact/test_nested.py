@@ -13,7 +13,7 @@ from softjaw.fem.pad.interpolation import interpolated
 from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.pad.shape import PadShape
 from softjaw.fem.petsc import NonlinearSolver, unknown_options
-from tests.fem.contact.test_press import BALL, FOAM, OVAL, SIZE, VI, pad_of, relative
+from tests.fem.contact.test_press import BALL, FOAM, OVAL, SIZE, pad_of, relative
 
 FORCES = [1.0, 3.0, 10.0]
 
@@ -80,16 +80,6 @@ def test_a_start_that_does_not_serve_is_replaced_by_a_walk_from_first_contact(st
     assert not found.path_dependent
 
 
-def test_a_start_at_a_lower_force_is_gone_on_from():
-    """Where the coarse mesh has no state at the force itself, or has jumped before it."""
-    (pad, _), (one, other), expected = pair("hex8"), coarse_states(BALL, forces=(1.0, 10.0)), fine_state(BALL, 10.0)
-    for starts in ([one], [replace(other, path_dependent=True), one]):
-        found = Press(pad, BALL).at(10.0, starts)
-        assert relative(found.unknowns, expected.unknowns) < 1e-9
-        assert found.steps >= 2
-        assert not found.path_dependent
-
-
 def test_a_force_without_a_state_fails_alone_and_within_its_iterations():
     """Far beyond what the foam bears; the force before and after it are solved as ever."""
     pad = pad_of((6, 4, 2), contact="nodal")
@@ -141,13 +131,6 @@ def test_an_ordering_that_ends_the_process_at_full_matrices_is_judged_on_a_spars
     assert unknown_options(options) == ["contact_mat_mumps_icntl"]
 
 
-def test_bounds_on_the_pressures_start_from_the_coarser_mesh_alike():
-    (pad, _), [start] = pair("hex8"), coarse_states(forces=(3.0,))
-    one, other = (Press(pad, OVAL, options).at(3.0, [start]) for options in ({}, VI))
-    assert other.steps == 1
-    assert relative(one.unknowns, other.unknowns) < 3e-9
-
-
 @pytest.mark.parametrize("element", ["hex8", "hex27"])
 @pytest.mark.parametrize("symmetry", [(True, True), (True, False), (False, False)])
 def test_fields_of_the_elements_degree_are_interpolated_exactly(element, symmetry):
@@ -182,10 +165,3 @@ def test_pressures_are_never_interpolated_below_zero():
     assert pressure.min() >= 0.0
     assert pressure.max() >= 1.0 - 1e-12
 
-
-def test_pads_of_other_gaps_share_the_mesh():
-    """A coarse mesh that had to take its fallback pad is as good a start as any."""
-    nodal, weighted = (pad_of((6, 4, 2), contact=contact) for contact in ("nodal", "weighted"))
-    [start] = Press(weighted, OVAL).load_path([3.0])
-    [expected] = Press(nodal, OVAL).load_path([3.0])
-    assert relative(Press(nodal, OVAL).at(3.0, [start]).unknowns, expected.unknowns) < 1e-9

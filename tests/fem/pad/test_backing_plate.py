@@ -64,17 +64,6 @@ def test_travelling_takes_no_force_and_bending_does():
     assert values[1] > 0
 
 
-def test_a_stiff_sheet_is_rigid():
-    """The difference falls with the backing plate's modulus, as one over it."""
-    (rigid,) = Press(pad_of(None), OVAL).load_path([5.0])
-    off = []
-    for modulus in (2e11, 2e12):
-        (state,) = Press(pad_of(BackingPlate(0.002, modulus, 0.3, (0.02, 0.011))), OVAL).load_path([5.0])
-        off.append(np.abs(state.pressure - rigid.pressure).max() / rigid.pressure.max())
-    assert off[0] < 1e-3
-    assert off[0] / off[1] == pytest.approx(10.0, rel=0.01)
-
-
 def test_a_sheet_that_is_no_larger_than_its_support_is_rigid():
     """The finger holds all of it: nothing bends, and the pad is that on a rigid backing plate."""
     held, half = BackingPlate(0.001, 2e9, 0.35, (0.050, 0.022)), BackingPlate(0.001, 2e9, 0.35, (0.050, 0.020))
@@ -101,11 +90,8 @@ def test_tangent_by_finite_differences(control):
     problem = RigidProblem(pad, BALL)
     problem.control = control
     x = SpringBed(pad, BALL).guess(0.003)
-    K = reference.dense(problem, x)
     d = np.random.default_rng(1).normal(size=pad.size) * 1e-4
-    h = 1e-3
-    found = (problem.residual(x + h * d) - problem.residual(x - h * d)) / (2 * h)
-    np.testing.assert_allclose(K @ d, found, atol=1e-6 * np.abs(found).max())
+    assert reference.tangent_error(problem, x, d, 1e-3) < 1e-6
 
 
 def test_refuses_sheets_that_nothing_holds():

@@ -83,7 +83,5 @@ def test_the_tangent_is_that_of_differences():
     problem = RigidProblem(pad, beside(0.002))
     problem.control = Control(force=2.0)
     x = SpringBed(pad, beside(0.002)).guess(0.002)
-    K = reference.dense(problem, x)
     d = np.random.default_rng(1).normal(size=pad.size) * 1e-4
-    found = (problem.residual(x + 1e-3 * d) - problem.residual(x - 1e-3 * d)) / 2e-3
-    np.testing.assert_allclose(K @ d, found, atol=1e-6 * np.abs(found).max())
+    assert reference.tangent_error(problem, x, d, 1e-3) < 1e-6

@@ -55,11 +55,6 @@ def test_quarter_half_and_full_give_the_same(mu):
             np.testing.assert_allclose(b.wall.reaction, a.wall.reaction, atol=1e-7)
 
 
-def test_a_body_of_revolution_is_the_same_from_every_side():
-    for a, b in zip(states(), states(theta=0.7), strict=True):
-        assert b.fingers[0].closing == pytest.approx(a.fingers[0].closing, rel=1e-7)
-
-
 @pytest.mark.parametrize("support", ["standing", pytest.param("free", marks=pytest.mark.long)])
 def test_fingers_object_and_support_are_in_balance(support):
     # near the shoulder the wall leans, and the pads push the can down
@@ -83,20 +78,6 @@ def test_a_very_stiff_wall_is_a_rigid_object():
         assert e_n(a.fingers[0]) == pytest.approx(e_n(b), rel=1e-4)
         np.testing.assert_allclose(a.fingers[0].pressure, b.pressure, atol=1e-3 * b.pressure.max())
     press.destroy()
-
-
-def test_linear_and_nonlinear_walls_agree_while_the_indentation_is_small():
-    for a, b in zip(states(thickness=8e-4), states(thickness=8e-4, level="linear"), strict=True):
-        deepest = np.linalg.norm(a.wall.q.reshape(-1, 6)[:, :3], axis=1).max()
-        assert deepest < 0.3 * 8e-4
-        assert e_n(b.fingers[0]) == pytest.approx(e_n(a.fingers[0]), rel=0.01)
-        assert b.fingers[0].closing == pytest.approx(a.fingers[0].closing, rel=0.01)
-
-
-def test_a_thin_wall_gives_way_and_the_contact_spreads():
-    thick, thin_ = states(thickness=8e-4)[-1], states(thickness=3e-4)[-1]
-    assert thin_.fingers[0].closing > 1.2 * thick.fingers[0].closing
-    assert e_n(thin_.fingers[0]) > e_n(thick.fingers[0])
 
 
 # -- with friction that acts back ------------------------------------------------------------------------------------
@@ -175,12 +156,11 @@ def test_a_force_has_one_state_whatever_other_forces_are_asked_for():
 PROTOTYPE = {
     0.3: {1: (0.860, 8.13), 2: (1.927, 8.88), 3: (2.632, 10.30), 4: (2.875, 11.45), 5: (3.263, 11.69)},
     0.4: {1: (1.050, 8.07), 2: (2.537, 8.66), 3: (4.246, 9.23), 4: (5.730, 9.86), 5: (6.125, 10.84)},
-    0.5: {1: (1.153, 8.05), 2: (2.864, 8.61), 3: (4.986, 9.08), 4: (7.375, 9.46), 5: (9.788, 9.82)},
 }
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("thickness", PROTOTYPE)
+@pytest.mark.parametrize("thickness", [0.3, 0.4])
 def test_through_the_snap_in_as_an_independent_prototype(thickness):
     held = grip(thin(thickness * 1e-3), elements=(15, 10, 10), mesh=FINE)
     work, step = Work(), held._stepping

@@ -56,14 +56,9 @@ def test_a_wall_as_soft_as_foam_collapses_before_the_force_is_reached():
         next(path)
 
 
-@pytest.mark.parametrize(("thickness", "forces", "snapped"), [
-    (2e-4, [0.3, 1.5], [False, True]),
-    pytest.param(2e-4, [0.3, 1.5, 4.0], [False, True, True], marks=pytest.mark.long),
-    pytest.param(1e-3, [0.5, 5.0], [False, False], marks=pytest.mark.long),
-])  # fmt: skip
-def test_a_wall_that_gives_way_is_flagged_and_stays_flagged(thickness, forces, snapped):
-    states = grip(thin(thickness), elements=(6, 4, 2), mesh=ROUGH).load_path(forces)
-    assert [s.wall.snapped for s in states] == snapped
+def test_a_wall_that_gives_way_is_flagged():
+    states = grip(thin(2e-4), elements=(6, 4, 2), mesh=ROUGH).load_path([0.3, 1.5])
+    assert [s.wall.snapped for s in states] == [False, True]
 
 
 @pytest.mark.long
@@ -73,14 +68,6 @@ def test_a_force_beyond_the_snap_is_the_same_state_from_below_and_at_once():
     assert at_once.wall.snapped
     assert stepwise.wall.snapped
     assert at_once.fingers[0].closing == pytest.approx(stepwise.fingers[0].closing, rel=1e-6)
-
-
-@pytest.mark.long
-def test_a_foil_and_tiny_forces_are_solved():
-    *_, foil = grip(thin(5e-5), elements=(6, 4, 2), mesh=ROUGH).load_path([0.005, 0.01])
-    assert foil.fingers[0].checks.force_balance < 1e-8
-    *_, tiny = grip(thin(4e-4), elements=(6, 4, 2), mesh=ROUGH).load_path([1e-3, 1e-2])
-    assert tiny.fingers[0].closing < 1e-4
 
 
 def test_pads_and_wall_must_balance():
@@ -219,29 +206,3 @@ def test_a_force_that_is_never_reached_is_an_error():
     with pytest.raises(ConvergenceError):
         flat.displacement_control(np.zeros(1), 2.0, Work(), 0.5 * MM)
 
-
-def test_what_watches_the_way_can_end_it():
-    steps, seen = stepping(), []
-
-    def watch(x, F):
-        seen.append(F)
-        if x[0] > 1.2 * MM:
-            raise RuntimeError("enough")
-
-    steps.watch = watch
-    with pytest.raises(RuntimeError, match="enough"):
-        steps.displacement_control(np.zeros(1), 4.0, Work(), 0.5 * MM)
-    assert len(seen) >= 3
-
-
-def test_steps_that_keep_failing_end_the_walk():
-    steps = stepping()
-
-    def solve(x, tolerance, *limits):
-        raise ConvergenceError("no luck")
-
-    steps.solver.solve = solve
-    work = Work()
-    with pytest.raises(ConvergenceError):
-        steps.displacement_control(np.zeros(1), 1.0, work, 0.5 * MM)
-    assert work.halvings < 12

@@ -61,28 +61,14 @@ def test_a_wall_is_interpolated_onto_the_same_mesh_and_onto_another(symmetry):
     assert interpolated(one, state(one), other) == pytest.approx(state(other), abs=2e-6)
 
 
-@pytest.mark.parametrize(
-    "allowed", [SYMMETRIES[0], *(pytest.param(own, marks=pytest.mark.long) for own in SYMMETRIES[1:])]
-)
-def test_every_force_by_itself_leads_to_the_state_of_the_load_path(allowed):
-    """Whatever part of the object the coarser mesh covers."""
+def test_every_force_by_itself_leads_to_the_state_of_the_load_path():
     fine = pressed()
-    for start, expected in zip(starts(allowed), ladder(), strict=True):
+    for start, expected in zip(starts(), ladder(), strict=True):
         found = fine.at(start.force, [start])
         assert (found.fingers[0].steps, found.fingers[0].halvings) == (1, 0)
         assert found.fingers[0].iterations <= 7
         assert apart(found, expected) < 1e-8
         assert found.wall.opening == pytest.approx(expected.wall.opening, rel=1e-8)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("allowed", SYMMETRIES[1:])
-def test_a_part_of_the_object_is_enough_to_start_the_whole_of_it(allowed):
-    [expected] = pressed(allowed=allowed).load_path(FORCES[:1])
-    found = pressed(allowed=allowed).at(FORCES[0], starts())
-    assert len(found.fingers) == len(expected.fingers) == (1 if allowed[0] else 2)
-    assert found.fingers[0].steps == 1
-    assert apart(found, expected) < 1e-8
 
 
 def test_not_a_bit_depends_on_what_was_solved_before():
@@ -96,7 +82,7 @@ def test_not_a_bit_depends_on_what_was_solved_before():
 
 
 @pytest.mark.parametrize(
-    "start", ["none", "lower", *(pytest.param(own, marks=pytest.mark.long) for own in ("jumped", "far off", "broken"))]
+    "start", ["none", "lower", *(pytest.param(own, marks=pytest.mark.long) for own in ("jumped", "far off"))]
 )
 def test_a_start_that_does_not_serve_is_replaced_by_one_below_or_by_first_contact(start):
     low, good = starts()
@@ -105,7 +91,6 @@ def test_a_start_that_does_not_serve_is_replaced_by_one_below_or_by_first_contac
         "none": [], "lower": [low],
         "jumped": [replace(good, path_dependent=True), low],
         "far off": [replace(good, unknowns=far, wall=replace(good.wall, q=0 * low.wall.q))],
-        "broken": [replace(good, unknowns=np.full(len(far), np.nan)), low],
     }  # fmt: skip
     found = pressed().at(2.0, given[start])
     assert found.fingers[0].steps > 1
@@ -114,10 +99,9 @@ def test_a_start_that_does_not_serve_is_replaced_by_one_below_or_by_first_contac
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("thickness", [2e-4, 3e-4])
-def test_a_wall_that_gives_way_is_found_where_its_own_load_path_leads(thickness):
+def test_a_wall_that_gives_way_is_found_where_its_own_load_path_leads():
     """The finer mesh gives way earlier than the coarser one, and levels between start on the other side of that."""
-    forces = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0)
+    forces, thickness = (0.5, 1.5, 2.5, 3.0), 3e-4
     coarse, expected = (
         list(pressed(coarser, thickness=thickness, z=0.075).load_path(forces)) for coarser in (True, False)
     )

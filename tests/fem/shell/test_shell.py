@@ -77,21 +77,6 @@ def test_mixed_tangent_uses_the_stress_that_the_last_linear_step_predicted():
     assert np.abs(dense(shell, step, step) - dense(shell, step)).max() == 0
 
 
-def test_entries_rebuild_the_matrix_under_any_numbering():
-    shell = Shell(warped(), E, NU)
-    for row in np.split(shell.column, shell.start[1:-1]):
-        assert (np.diff(row) > 0).all()
-    unknown = np.full(shell.size, -1, dtype=np.int32)
-    free = RNG.permutation(shell.size)[:60]
-    unknown[free] = np.arange(60)
-    rows, columns = shell.entries(unknown)
-    keep = (rows >= 0) & (columns >= 0)
-    K = np.zeros((60, 60))
-    np.add.at(K, (rows[keep], columns[keep]), shell.tangent(np.zeros(shell.size))[keep])
-    expected = dense(shell)[np.ix_(free, free)]
-    np.testing.assert_allclose(K, expected, rtol=0, atol=1e-14 * np.abs(expected).max())  # any order
-
-
 # -- MacNeal and Harder's patch of five elements, 0.24 x 0.12, t = 0.001, E = 1e6, nu = 0.25
 
 INNER = [[0.04, 0.02], [0.18, 0.03], [0.16, 0.08], [0.08, 0.08]]
