@@ -12,12 +12,10 @@ from functools import cached_property
 
 import numpy as np
 from scipy.interpolate import CubicSpline
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from softjaw.fem.errors import MeshError
 from softjaw.fem.objects.gap import FloatArray, IntArray
-from softjaw.fem.objects.traced_outline import sections, smooth_spline
+from softjaw.fem.objects.traced_outline import largest_loops, smooth_spline
 
 HEIGHTS = 161  # at which sections are cut
 FEWEST = 8  # of them that enclose an area
@@ -117,33 +115,3 @@ def centre_line(points: FloatArray, triangles: IntArray, wavelength: float) -> C
     smooth = smooth_spline(z[known], middle[known], wavelength, (z[known][0], z[known][-1]))
     inside = (z >= z[known][0]) & (z <= z[known][-1])
     return CentreLine(z[inside], smooth(z[inside]), loops[inside])
-
-
-def largest_loops(points: FloatArray, triangles: IntArray, z: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Centroids ``(k, 2)`` of the largest loop at every height (NaN: none), and how many loops enclose material."""
-    segments, cut = sections(points, triangles, z)
-    middle, count = np.full((len(z), 2), np.nan), np.zeros(len(z), dtype=np.int64)
-    for k in range(len(z)):
-        areas, centroids = _loops(segments[cut == k])
-        if len(areas) and areas.max() > 0.0:
-            # share of the largest loop's area: what is smaller is noise of a mesh, not an arm
-            middle[k], count[k] = centroids[areas.argmax()], np.count_nonzero(areas > 5e-3 * areas.max())
-    return middle, count
-
-
-def _loops(segments: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Areas ``(l,)``, positive round material, and centroids ``(l, 2)`` of the loops of segments ``(m, 2, 2)``."""
-    # segments of neighbouring triangles share their end points to the last bit, so loops are found without a tolerance
-    ends, number = np.unique(segments.reshape(-1, 2), axis=0, return_inverse=True)
-    first, last = number.reshape(-1, 2).T
-    joined = coo_array((np.ones(len(first)), (first, last)), shape=(len(ends), len(ends)))
-    loops, of_end = connected_components(joined, directed=False)
-    loop = of_end[first]
-    p, q = segments[:, 0], segments[:, 1]
-    base = np.stack([np.bincount(of_end, ends[:, i], loops) / np.bincount(of_end, minlength=loops) for i in (0, 1)], 1)
-    p, q = p - base[loop], q - base[loop]  # about its own middle: far from the axis areas would cancel
-    cross = p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]
-    area = 0.5 * np.bincount(loop, cross, loops)
-    moment = np.stack([np.bincount(loop, cross * (p + q)[:, i], loops) for i in (0, 1)], axis=1)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return area, base + moment / (6.0 * area[:, None])

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.fem.objects.gap import Analytic, FloatArray, Gap, Surface, grid_triangles
-from softjaw.fem.objects.profile import Curve, straight_runs, through
+from softjaw.fem.objects.profile import Curve, through
 from softjaw.friction.patch import NEGLIGIBLE
 
 BLOCK = 8  # segments of the polyline that share one bounding circle
@@ -47,29 +47,17 @@ class Revolution(Analytic):
     profile: FloatArray
     rim: float = 0.002
     curve: Curve = field(init=False, repr=False)
-    smallest_radius: float = field(init=False)
-    overshoot: float = field(init=False)
     _places: FloatArray = field(init=False, repr=False)
     _line: FloatArray = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Draw the curve, and refuse profiles that are no body's."""
         points = _checked_points(self.profile)
-        given, curve = through(points, self.rim)
+        _, curve = through(points, self.rim)
         places = _places(curve)
         line = curve.derivative(places)
         _check_line(line)
-        # of the given part alone: the rims that close it are sharper by choice
-        bend = np.abs(given.curvature(given.inner(16))).max()
-        values = {
-            "profile": points,
-            "curve": curve,
-            "smallest_radius": float(1 / bend) if bend > 1e-9 else np.inf,
-            "overshoot": _overshoot(points, given),
-            "_places": places,
-            "_line": line,
-        }
-        for name, value in values.items():
+        for name, value in {"profile": points, "curve": curve, "_places": places, "_line": line}.items():
             object.__setattr__(self, name, value)
 
     def gap(self, x: FloatArray) -> Gap:
@@ -166,12 +154,3 @@ def _check_line(line: FloatArray) -> None:
             f"the profile crosses or touches itself near z = {a[i[0], 0]:g} m, r = {a[i[0], 1]:g} m; give "
             "the points in order along the outside, and more of them where it bends sharply"
         )
-
-
-def _overshoot(points: FloatArray, given: Curve) -> float:
-    """Largest distance [m] of the curve from the polygon of its points, corners of straight runs left out."""
-    if all(flat for *_, flat in straight_runs(points)):
-        return 0.0
-    x, a, d = given.derivative(given.inner(16)), points[:-1], np.diff(points, axis=0)
-    t = np.clip(((x[:, None] - a) * d).sum(-1) / (d * d).sum(-1), 0, 1)
-    return float(np.linalg.norm(x[:, None] - a - t[..., None] * d, axis=-1).min(axis=1).max())

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
-from scipy.sparse import csc_array, diags_array
+from scipy.sparse import coo_array, csc_array, diags_array
+from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
 from softjaw.fem.errors import MeshError
@@ -63,16 +64,34 @@ def _crossing(points: FloatArray, i: IntArray, j: IntArray, z: FloatArray) -> Fl
     return p[:, :2] + t[:, None] * (q - p)[:, :2]
 
 
-def centroids(points: FloatArray, triangles: IntArray, z: FloatArray) -> FloatArray:
-    """Centroids ``(k, 2)`` of what the cuts at heights ``z (k,)`` enclose [m]; NaN for empty cuts."""
+def largest_loops(points: FloatArray, triangles: IntArray, z: FloatArray) -> tuple[FloatArray, IntArray]:
+    """Centroids ``(k, 2)`` of the largest loop at every height (NaN: none), and how many loops enclose material."""
     segments, cut = sections(points, triangles, z)
+    middle, count = np.full((len(z), 2), np.nan), np.zeros(len(z), dtype=np.int64)
+    for k in range(len(z)):
+        areas, centroids = _loops(segments[cut == k])
+        if len(areas) and areas.max() > 0.0:
+            # share of the largest loop's area: what is smaller is noise of a mesh, not an arm
+            middle[k], count[k] = centroids[areas.argmax()], np.count_nonzero(areas > 5e-3 * areas.max())
+    return middle, count
+
+
+def _loops(segments: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Areas ``(l,)``, positive round material, and centroids ``(l, 2)`` of the loops of segments ``(m, 2, 2)``."""
+    # segments of neighbouring triangles share their end points to the last bit, so loops are found without a tolerance
+    ends, number = np.unique(segments.reshape(-1, 2), axis=0, return_inverse=True)
+    first, last = number.reshape(-1, 2).T
+    joined = coo_array((np.ones(len(first)), (first, last)), shape=(len(ends), len(ends)))
+    loops, of_end = connected_components(joined, directed=False)
+    loop = of_end[first]
     p, q = segments[:, 0], segments[:, 1]
+    base = np.stack([np.bincount(of_end, ends[:, i], loops) / np.bincount(of_end, minlength=loops) for i in (0, 1)], 1)
+    p, q = p - base[loop], q - base[loop]  # about its own middle: far from the axis areas would cancel
     cross = p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]
-    total = lambda weight: np.bincount(cut, weight, minlength=len(z))  # noqa: E731
-    area = total(3.0 * cross)
-    # share of the mesh's width squared: cuts that enclose less are empty
-    area[np.abs(area) <= 1e-12 * np.ptp(points[:, :2], axis=0).max(initial=0.0) ** 2] = np.nan
-    return np.stack([total(cross * (p + q)[:, axis]) / area for axis in (0, 1)], axis=1)
+    area = 0.5 * np.bincount(loop, cross, loops)
+    moment = np.stack([np.bincount(loop, cross * (p + q)[:, i], loops) for i in (0, 1)], axis=1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return area, base + moment / (6.0 * area[:, None])
 
 
 def cast(
@@ -182,7 +201,7 @@ def find_wall(mesh: MeshObject, facet: float, rim: float, wanted: tuple[float, f
     """
     low, high = (float(v) for v in mesh.bounds[:, 2])
     z = low + (np.arange(LEVELS) + 0.5) * (high - low) / LEVELS
-    centre = np.nan_to_num(centroids(mesh.points, mesh.triangles, z))
+    centre = np.nan_to_num(largest_loops(mesh.points, mesh.triangles, z)[0])
     outer, inner = cast(mesh.points, mesh.triangles, z, centre, FEW)
     r = np.nan_to_num(outer).mean(axis=1)
     # share of the height may be folded at either end, as a hollow bottom is, and count as bottom or top

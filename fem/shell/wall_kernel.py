@@ -18,48 +18,6 @@ from softjaw.fem.shell.facing import FAR
 
 
 @njit(cache=True)
-def contact_forces(N, area, lam, gap, normal, wall_nodes, wall_N, R, weighted, facing, pad_force, wall_force):
-    """Weighted gaps and nodal forces of one pad.
-
-    Parameters
-    ----------
-    N, area, lam : (points, k), (faces, points), (faces, k) arrays
-        Shape functions of a face, reference areas [m^2] and nodal pressures [Pa].
-    gap, normal : (faces * points,), (faces * points, 3) arrays
-    wall_nodes, wall_N : (faces * points, 4) arrays
-    R : (3, 3) array
-    weighted, facing, pad_force : (faces, k), (faces, k), (faces, 3, k) arrays, out
-        Weighted gaps [m^3], areas ``int N_i dA`` of the part that faces the wall [m^2], forces [N].
-    wall_force : (wall nodes, 3) array, added to
-        [N].
-    """
-    points, k = N.shape
-    n = np.empty(3)
-    for f in range(area.shape[0]):
-        weighted[f] = facing[f] = 0.0
-        pad_force[f] = 0.0
-        for q in range(points):
-            m = f * points + q
-            if gap[m] == FAR:
-                continue
-            p = 0.0
-            for i in range(k):
-                weighted[f, i] += area[f, q] * N[q, i] * gap[m]
-                facing[f, i] += area[f, q] * N[q, i]
-                p += N[q, i] * lam[f, i]
-            # gaps count at every point that faces the wall, forces only where something presses
-            if p == 0.0:
-                continue
-            load = p * area[f, q]
-            for c in range(3):
-                n[c] = normal[m, 0] * R[0, c] + normal[m, 1] * R[1, c] + normal[m, 2] * R[2, c]
-                for b in range(k):
-                    pad_force[f, c, b] -= load * N[q, b] * n[c]
-                for a in range(4):
-                    wall_force[wall_nodes[m, a], c] += load * wall_N[m, a] * normal[m, c]
-
-
-@njit(cache=True)
 def contact_tangent(N, area, lam, active, kappa, gap, normal, e, wall_nodes, wall_N, H, G, A, R, pad_dofs, pressures,
                     first, second, start, column, values):  # fmt: skip
     """Add one pad's entries of the tangent to the compressed rows; whether all of them had a place.

@@ -26,8 +26,8 @@ from softjaw.fem.contact.friction import Anchor
 from softjaw.fem.contact.problem import ContactProblem, Control, Evaluated, Finger, Gap
 from softjaw.fem.objects.gap import FloatArray, Pose
 from softjaw.fem.pad.mesh import Pad
-from softjaw.fem.shell.facing import FAR, Wall, face
-from softjaw.fem.shell.wall_kernel import contact_forces, contact_tangent, friction_tangent
+from softjaw.fem.shell.facing import FAR, Facing, Wall, face
+from softjaw.fem.shell.wall_kernel import contact_tangent, friction_tangent
 from softjaw.fem.shell.wall_model import NonlinearWall
 
 IntArray = NDArray[np.int32]
@@ -121,14 +121,15 @@ class WallProblem(ContactProblem):
         for f, places in zip(self.fingers, self.places, strict=True):
             points, pad, lam = self._object_points(f, x), f.pad, f.pressure(x)[f.nodes]
             facing = face(f.wall, points, places, v, w)
-            (weighted, part), force = np.empty((2, *f.nodes.shape)), np.empty((len(f.nodes), 3, f.nodes.shape[1]))
-            contact_forces(
-                pad.face_N, pad.face_area, lam, facing.gap, facing.normal, facing.nodes, facing.N, f.R,
-                weighted, part, force, self._wall_force,
-            )  # fmt: skip
+            # points that face no wall are left out, so that a pad over a rim is carried up to the rim
+            area = np.where(facing.gap == FAR, 0.0, pad.face_area.ravel()).reshape(pad.face_area.shape)
+            load = (area * (lam @ pad.face_N.T))[..., None] * facing.normal.reshape(*area.shape, 3)
+            force = -np.einsum("qa,fqi->fia", pad.face_N, load @ f.R)
+            self._bear(facing, load.reshape(-1, 3))
+            weighted = f.nodal((area * facing.gap.reshape(area.shape)) @ pad.face_N)
             # a node that hangs over the rim with most of its area would put all of its pressure on the rest
             # part of a node's area that must face the wall for the node to carry load
-            gaps = np.where(f.nodal(part) > 0.3 * f.area, f.nodal(weighted), FAR * f.area)
+            gaps = np.where(f.nodal(area @ pad.face_N) > 0.3 * f.area, weighted, FAR * f.area)
             contacts.append(Evaluated(points, facing.gap, facing.normal, lam, gaps, f.active(x, gaps), force, facing))
         return contacts
 
@@ -137,9 +138,12 @@ class WallProblem(ContactProblem):
         contacts = super().evaluate(x, tangent)
         for f, c in zip(self.fingers, contacts, strict=True):
             if c.traction is not None:
-                share = f.pad.face_area.ravel()[:, None] * c.surface.N
-                np.add.at(self._wall_force, c.surface.nodes, share[..., None] * c.traction[:, None, :])
+                self._bear(c.surface, f.pad.face_area.reshape(-1, 1) * c.traction)
         return contacts
+
+    def _bear(self, facing: Facing, load: FloatArray) -> None:
+        """Add the forces of points ``(n, 3)`` to those on the wall's nodes [N]."""
+        np.add.at(self._wall_force, facing.nodes, facing.N[..., None] * load[:, None, :])
 
     def residual(self, x: FloatArray) -> FloatArray:
         """See `ContactProblem`."""

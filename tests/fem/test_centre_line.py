@@ -5,7 +5,8 @@ import pytest
 import trimesh
 
 from softjaw.fem.errors import MeshError
-from softjaw.fem.objects.centre_line import centre_line, largest_loops
+from softjaw.fem.objects.centre_line import centre_line
+from softjaw.fem.objects.traced_outline import largest_loops
 
 
 def bent(radius=0.018, bend=0.15, angle=1.0, around=48, along=80):
