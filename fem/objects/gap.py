@@ -53,6 +53,12 @@ class Pose:
         return (x - self.origin) @ self.rotation
 
 
+def about_z(angle: float) -> FloatArray:
+    """Rotation ``(3, 3)`` about the axis z [rad]."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
 class GapFunction(Protocol):
     """Signed distance with its first two derivatives, in the object's frame."""
 

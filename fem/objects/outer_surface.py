@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from softjaw.fem.objects.gap import FloatArray
-from softjaw.fem.objects.profile import Curve, through
+from softjaw.fem.objects.gap import FloatArray, about_z
+from softjaw.fem.objects.profile import Curve
 from softjaw.fem.objects.revolution import Revolution
 from softjaw.friction.patch import NEGLIGIBLE
 
@@ -111,10 +111,8 @@ class OuterSurface:
         (z, a), (z_s, a_s) = (self.curve.derivative(s, order).T for order in (0, 1))
         q, q_t, q_s = self.section(theta + self.angle, s, z, z_s)
         a, a_s, slope = a[:, None], a_s[:, None], z_s[:, None] * self.shift(z, 1)
-        c, t = np.cos(self.angle), np.sin(self.angle)
-        turn = np.array([[c, -t, 0.0], [t, c, 0.0], [0.0, 0.0, 1.0]])
         flat = (a * q + self.shift(z, 0), z), (q_t, 0.0 * z), (a_s * q + a * q_s + slope, z_s)
-        X, around, along = (np.column_stack(part) @ turn for part in flat)
+        X, around, along = (np.column_stack(part) @ about_z(self.angle) for part in flat)
         return X, around, along, a
 
     def station(self, z: float) -> float:
@@ -147,19 +145,12 @@ def of_revolution(body: Revolution) -> OuterSurface:
     return _surface(body, [Section(float(z), float(r)) for z, r in body.profile])
 
 
-def of_sections(sections: Sequence[Section], rim: float = 0.002) -> OuterSurface:
-    """Surface through sections given from bottom to top; ``rim`` rounds the edges at flat ends [m]."""
-    return _surface(Revolution(np.array([[p.z, p.a] for p in sections]), rim), list(sections))
+def of_sections(sections: Sequence[Section]) -> OuterSurface:
+    """Surface through sections given from bottom to top."""
+    return _surface(Revolution(np.array([[p.z, p.a] for p in sections])), sections)
 
 
-def _surface(body: Revolution, sections: list[Section]) -> OuterSurface:
-    given, closed = through(body.profile, body.rim)
-    pieces = len(given.coefficients)
-    lids = len(closed.coefficients) - pieces
-    # lids have varying numbers of pieces, so the given part is found by its coefficients
-    first = next(k for k in range(lids + 1) if (closed.coefficients[k : k + pieces] == given.coefficients).all())
-    s = closed.breaks
-    on_axis = body.profile[[0, -1], 1] == 0
+def _surface(body: Revolution, sections: Sequence[Section]) -> OuterSurface:
     ratio = [1.0 if p.b is None or p.a == 0 else p.b / p.a for p in sections]
     # a section that is a point has no ratio of its own
     ratio[0] = ratio[1] if sections[0].a == 0 else ratio[0]
@@ -170,9 +161,7 @@ def _surface(body: Revolution, sections: list[Section]) -> OuterSurface:
     symmetric = not shift[:, 0].any(), not shift[:, 1].any()
     even = np.abs(np.array([exponent, ratio]) - [[2.0], [1.0]]).max() <= NEGLIGIBLE
     return OuterSurface(
-        closed,
-        (float(s[first]), float(s[first + pieces])),
-        (0.0 if on_axis[0] else float(s[1]), float(s[-1]) if on_axis[1] else float(s[-2])),
+        *body.closed,
         lambda theta, s, z, z_s: _superellipse(theta, *shapes(z, 0).T, *(z_s[:, None] * shapes(z, 1)).T),
         shifts,
         symmetric,

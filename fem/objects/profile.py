@@ -9,6 +9,7 @@ rounded rim and a flat cap; an end on the axis is met at right angles, so that t
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -195,11 +196,24 @@ def rounding(p: FloatArray, t: FloatArray, u: FloatArray, radius: float) -> tupl
     return arc, radius * np.abs(phi)
 
 
-def through(points: FloatArray, rim: float) -> tuple[Curve, Curve]:
-    """Curve through the points, and the same with both ends carried on to the axis.
+Ends = tuple[float, float]
 
-    ``rim`` is the radius of the rounding at corners and open ends [m].
+
+def with_lids(given: Curve, rim: float, heights: Sequence[float | None] = (None, None)) -> tuple[Curve, Ends, Ends]:
+    """Outline with both ends carried on to the axis as `lid` does; the part of s that was given, and between the lids.
+
+    The latter are the ends of the outline where nothing is flat.
     """
+    below, above = (lid(given, height, rim, first=k == 0) for k, height in enumerate(heights))
+    curve = joined([*below, given, *above])
+    s, first = curve.breaks, sum(len(piece.coefficients) for piece in below)
+    low, high = (bool(ends) and not ends[k].coefficients[..., 2:].any() for ends, k in ((below, 0), (above, -1)))
+    wall = float(s[first]), float(s[first + len(given.coefficients)])
+    return curve, wall, (float(s[1]) if low else 0.0, float(s[-2] if high else s[-1]))
+
+
+def through(points: FloatArray, rim: float) -> Curve:
+    """Curve through the points; ``rim`` is the radius of the rounding at corners [m]."""
     runs = straight_runs(points)
     found = (
         (j, _corner(points, runs[k], runs[k + 1], rim))
@@ -219,8 +233,7 @@ def through(points: FloatArray, rim: float) -> tuple[Curve, Curve]:
             start = _end(points, i, i - 1, runs) if i else _open_end(points[0])
             end = _end(points, j, j, runs) if j < len(points) - 1 else _open_end(points[-1])
             pieces.append(spline(points[i : j + 1], start, end))
-    given = joined(pieces)
-    return given, joined([*lid(given, None, rim, first=True), given, *lid(given, None, rim, first=False)])
+    return joined(pieces)
 
 
 def _end(points: FloatArray, at: int, side: int, runs: list[tuple[int, int, bool]]) -> End:

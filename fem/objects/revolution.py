@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.fem.objects.gap import Analytic, FloatArray, Gap, Surface, grid_triangles
-from softjaw.fem.objects.profile import Curve, through
+from softjaw.fem.objects.profile import Curve, through, with_lids
 from softjaw.friction.patch import NEGLIGIBLE
 
 BLOCK = 8  # segments of the polyline that share one bounding circle
@@ -46,19 +46,29 @@ class Revolution(Analytic):
 
     profile: FloatArray
     rim: float = 0.002
-    curve: Curve = field(init=False, repr=False)
-    _places: FloatArray = field(init=False, repr=False)
-    _line: FloatArray = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Draw the curve, and refuse profiles that are no body's."""
-        points = _checked_points(self.profile)
-        _, curve = through(points, self.rim)
-        places = _places(curve)
-        line = curve.derivative(places)
-        _check_line(line)
-        for name, value in {"profile": points, "curve": curve, "_places": places, "_line": line}.items():
-            object.__setattr__(self, name, value)
+        """Refuse profiles that are no body's."""
+        object.__setattr__(self, "profile", _checked_points(self.profile))
+        _check_line(self._line)
+
+    @cached_property
+    def closed(self) -> tuple[Curve, tuple[float, float], tuple[float, float]]:
+        """Outline, the part of it between the profile's ends, and between flat caps; see `with_lids`."""
+        return with_lids(through(self.profile, self.rim), self.rim)
+
+    @property
+    def curve(self) -> Curve:
+        """Outline with its caps."""
+        return self.closed[0]
+
+    @cached_property
+    def _places(self) -> FloatArray:
+        return _places(self.curve)
+
+    @cached_property
+    def _line(self) -> FloatArray:
+        return self.curve.derivative(self._places)
 
     def gap(self, x: FloatArray) -> Gap:
         """Signed distance ``(n,)`` [m], normal ``(n, 3)`` and Hessian ``(n, 3, 3)`` [1/m]."""

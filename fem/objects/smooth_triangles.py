@@ -18,6 +18,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from softjaw.fem.objects.gap import FloatArray, IntArray, edges_of
+from softjaw.fem.objects.triangle_tree import corner_angles
 from softjaw.fem.objects.triangles import area_vectors, neighbours
 
 CREASE_ANGLE = 30.0  # [deg]: edges that turn by less are taken for facets of a smooth surface
@@ -176,11 +177,7 @@ def _corner_normals(
     links = np.concatenate([before, _following(before)]), np.concatenate([_following(after), after])
     m = triangles.size
     group = connected_components(coo_array((np.ones(len(links[0])), links), shape=(m, m)), directed=False)[1]
-    x = points[triangles]
-    along = np.roll(x, -1, axis=1) - x
-    along /= np.maximum(np.linalg.norm(along, axis=2), 1e-300)[:, :, None]
-    angle = np.arccos(np.clip(-np.einsum("mkd,mkd->mk", along, np.roll(along, 1, axis=1)), -1, 1))
-    weight = (angle * np.einsum("md,md->m", area, area)[:, None]).ravel()
+    weight = (corner_angles(points[triangles]) * np.einsum("md,md->m", area, area)[:, None]).ravel()
     total = np.stack([np.bincount(group, weight * np.repeat(normal[:, d], 3)) for d in range(3)], axis=1)
     return (total / np.maximum(np.linalg.norm(total, axis=1), 1e-300)[:, None])[group]
 

@@ -21,6 +21,7 @@ from softjaw.fem.errors import MeshError
 from softjaw.fem.objects.gap import FloatArray, IntArray
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.fem.objects.profile import Curve
+from softjaw.fem.objects.revolution import Revolution
 
 LEVELS = 400  # heights of the first look at a mesh
 FEW = 64  # rays per height of that look
@@ -185,15 +186,13 @@ class Wall:
     radius: float
 
 
-def find_wall(mesh: MeshObject, facet: float, rim: float, wanted: tuple[float, float] | None, tolerance: float) -> Wall:
+def find_wall(mesh: MeshObject, facet: float, wanted: tuple[float, float] | None, tolerance: float) -> Wall:
     """Wall of a mesh, between the part that counts as its bottom and the part that counts as its top.
 
     Parameters
     ----------
     facet : float
         Size of the triangles [m]: smaller folds do not matter.
-    rim : float
-        Height at either end that is left to the rounding of the edge [m].
     wanted : (float, float) or None
         Heights to keep to [m].
     tolerance : float
@@ -208,6 +207,7 @@ def find_wall(mesh: MeshObject, facet: float, rim: float, wanted: tuple[float, f
     at_end = np.abs(z - 0.5 * (low + high)) > 0.4 * (high - low)
     bad, slope = folded(outer, inner, facet).any(axis=1) & at_end, np.gradient(r, z)
     first, last = _run(bad | (slope > STEEP)), len(z) - 1 - _run((bad | (slope < -STEEP))[::-1])
+    rim = Revolution.rim  # left to the rounding of the edge
     steep_ends = max(z[min(first, len(z) - 1)], low + rim), min(z[max(last, 0)], high - rim)
     asked = wanted or (low, high)
     ends = max(steep_ends[0], asked[0]), min(steep_ends[1], asked[1])

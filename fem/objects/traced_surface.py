@@ -20,7 +20,8 @@ from softjaw.fem.errors import MeshError
 from softjaw.fem.objects.gap import FloatArray
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.fem.objects.outer_surface import OuterSurface
-from softjaw.fem.objects.profile import joined, lid
+from softjaw.fem.objects.profile import with_lids
+from softjaw.fem.objects.revolution import Revolution
 from softjaw.fem.objects.splines import SplineSurface, spline_surface
 from softjaw.fem.objects.traced_outline import (
     FEW,
@@ -162,13 +163,7 @@ class TraceReport:
     wavelength: float
 
 
-def traced(
-    mesh: MeshObject,
-    heights: tuple[float, float] | None = None,
-    wavelength: float | None = None,
-    rim: float = 0.002,
-    largest_distance: float | None = None,
-) -> tuple[OuterSurface, TraceReport]:
+def traced(mesh: MeshObject, heights: tuple[float, float] | None = None) -> tuple[OuterSurface, TraceReport]:
     """Smooth surface near a closed mesh with the axis z, for a thin-walled body of the same outside.
 
     Parameters
@@ -176,12 +171,6 @@ def traced(
     mesh : MeshObject
     heights : (float, float), optional
         Part of the mesh to trace [m]; by default all of it but the bottom and the top.
-    wavelength : float, optional
-        Waves shorter than this are smoothed out [m]; by default three facets.
-    rim : float
-        Least rounding of the edges at bottom and top [m].
-    largest_distance : float, optional
-        Allowed between the mesh and the surface [m]; by default 3 % of the mean radius.
 
     Raises
     ------
@@ -189,17 +178,16 @@ def traced(
         For sections that a ray from the centre line leaves more than once, and where the surface does not fit.
     """
     facet, size = facet_size(mesh), float(np.ptp(mesh.bounds, axis=0).max())
-    wall = find_wall(mesh, facet, rim, heights, SYMMETRIC * size)
+    wall = find_wall(mesh, facet, heights, SYMMETRIC * size)
     # the shortest wave has three facets,
     # or a share of the wall's height
-    length = wavelength or min(3.0 * facet, 0.15 * (wall.ends[1] - wall.ends[0]))
+    length = min(3.0 * facet, 0.15 * (wall.ends[1] - wall.ends[0]))
     # a share of the facets' sagitta, which says nothing about the body
     tolerance = max(SYMMETRIC * size, 0.01 * facet**2 / (8 * wall.radius))
     radii = trace_radii(mesh, wall, facet, length, tolerance)
-    surface = _surface(wall, radii, rim)
+    surface = _surface(wall, radii)
     report = _report(surface, mesh, wall, facet, radii.wavelength)
-    limit = OFF * wall.radius if largest_distance is None else largest_distance
-    if report.largest > limit:
+    if report.largest > OFF * wall.radius:
         z, angle = report.place
         raise MeshError(
             f"near z = {z:.4g} m at {np.degrees(angle):.0f} degrees the smooth wall lies {report.largest * 1e3:.3g} mm "
@@ -219,21 +207,19 @@ def facet_size(mesh: MeshObject) -> float:
     return float(side[order][np.searchsorted(total, 0.5 * total[-1])])
 
 
-def _surface(wall: Wall, radii: Radii, rim: float) -> OuterSurface:
+def _surface(wall: Wall, radii: Radii) -> OuterSurface:
     """Surface through radii, with lids."""
     s, R = radii.s, radii.R
     a = smooth_spline(s, R.mean(axis=1), radii.wavelength, (0.0, s[-1]))
     given = curve_of(radii.height, a)
-    below, above = (lid(given, height, rim, first=k == 0) for k, height in enumerate(wall.lids))
-    curve = joined([*below, given, *above])
-    first = sum(len(piece.coefficients) for piece in below)
-    start, end = float(curve.breaks[first]), float(curve.breaks[-1])
+    curve, (start, stop), flat = with_lids(given, Revolution.rim, wall.lids)
+    end = float(curve.breaks[-1])
     # carried on over the lids, so that they have the shape of the last section
     shape = _shape(continued(s + start, R / a(s)[:, None], radii.wavelength, (0.0, end)), R.shape[1])
     return OuterSurface(
         curve,
-        (start, start + float(s[-1])),
-        (float(curve.breaks[1]) if len(below) > 1 else 0.0, float(curve.breaks[-2]) if len(above) > 1 else end),
+        (start, stop),
+        flat,
         lambda theta, s, z, z_s: shape.at(theta, s)[:, :3, :2].transpose(1, 0, 2),
         wall.centre,
         radii.symmetric,

@@ -212,6 +212,14 @@ def _along(x, d, nodes):
     return distance
 
 
+def corner_angles(corners: FloatArray) -> FloatArray:
+    """Angles ``(m, 3)`` of triangles ``(m, 3, 3)`` at their corners [rad]."""
+    along = np.roll(corners, -1, axis=1) - corners
+    along /= np.maximum(np.linalg.norm(along, axis=2), 1e-300)[:, :, None]
+    # rounding can push the cosine beyond 1
+    return np.asarray(np.arccos(np.clip(-np.einsum("mkd,mkd->mk", along, np.roll(along, 1, axis=1)), -1.0, 1.0)))
+
+
 def pseudo_normals(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, np.ndarray]:
     """Outward vectors ``(m, 7, 3)`` of face, edges and corners, and which lie on a border ``(m, 7)``."""
     corners = points[triangles]
@@ -219,9 +227,7 @@ def pseudo_normals(points: FloatArray, triangles: IntArray) -> tuple[FloatArray,
     normal = np.cross(along[:, 0], -along[:, 2])
     size = np.linalg.norm(normal, axis=1)
     normal /= np.where(size > 0, size, 1.0)[:, None]  # a triangle without area has no say
-    unit = along / np.maximum(np.linalg.norm(along, axis=2), 1e-300)[:, :, None]
-    # rounding can push the cosine beyond 1
-    angle = np.arccos(np.clip(-np.einsum("mkd,mkd->mk", unit, np.roll(unit, 1, axis=1)), -1.0, 1.0))
+    angle = corner_angles(corners)
     at_corner = np.stack([
         np.bincount(triangles.ravel(), (angle * normal[:, d : d + 1]).ravel(), len(points)) for d in range(3)
     ], axis=1)  # fmt: skip

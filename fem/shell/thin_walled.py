@@ -8,13 +8,13 @@ turn about its approach (``flipped``), and its results are turned back.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 
-from softjaw.fem.objects.gap import Pose
+from softjaw.fem.objects.gap import Pose, about_z
 from softjaw.fem.objects.outer_surface import OuterSurface
 from softjaw.fem.objects.stacked import wall_surface
 from softjaw.fem.shell.element import FloatArray, Shell
@@ -30,7 +30,7 @@ HALF_TURN = np.diag([-1.0, -1.0, 1.0])
 def supported(
     mesh: BodyMesh, material: WallMaterial, support: str = "free", stiffness: float = 1.0
 ) -> tuple[Shell[BodyMesh], FloatArray]:
-    """Shell of a body with weak springs, and which of its numbers ``(6 k,)`` a support of ``SUPPORTS`` fixes.
+    """Shell of a body with weak springs, and which of its numbers ``(6 k,)`` its support fixes.
 
     Parameters
     ----------
@@ -46,25 +46,15 @@ def supported(
     # spread by area, so that they resist rigid motions alike whatever the mesh
     shell.springs.reshape(-1, 6)[:, :3] = (stiffness * mesh.share * shell.node_area / shell.node_area.sum())[:, None]
     held = np.zeros((shell.nodes, 6), dtype=bool)
-    SUPPORTS[support](mesh, held)
+    if support == "clamped":
+        lines = mesh.s <= max(mesh.surface.flat[0], mesh.s[0]) + NEGLIGIBLE
+        # the mesh of a tube begins off the axis
+        if mesh.s[0] > NEGLIGIBLE:
+            lines |= mesh.s >= min(mesh.surface.flat[1], mesh.s[-1]) - NEGLIGIBLE
+        held[np.unique(mesh.number[:, lines])] = True
+    elif support == "standing":
+        held[mesh.foot, 2] = True
     return shell, held.ravel() | mesh.symmetric
-
-
-def _clamped(mesh: BodyMesh, held: FloatArray) -> None:
-    lines = mesh.s <= max(mesh.surface.flat[0], mesh.s[0]) + NEGLIGIBLE
-    # the mesh of a tube begins off the axis
-    if mesh.s[0] > NEGLIGIBLE:
-        lines |= mesh.s >= min(mesh.surface.flat[1], mesh.s[-1]) - NEGLIGIBLE
-    held[np.unique(mesh.number[:, lines])] = True
-
-
-def _standing(mesh: BodyMesh, held: FloatArray) -> None:
-    held[mesh.foot, 2] = True
-
-
-SUPPORTS: dict[str, Callable[[BodyMesh, FloatArray], None]] = {
-    "clamped": _clamped, "standing": _standing, "free": lambda mesh, held: None,
-}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,8 +191,7 @@ def _footprint(held: Grasp, pad_size: Sequence[float]) -> tuple[float, float, fl
 
 
 def _turned(pose: Pose, angle: float) -> Pose:
-    c, s = np.cos(angle), np.sin(angle)
-    turn = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    turn = about_z(-angle)
     return Pose(turn @ pose.rotation, turn @ pose.origin)
 
 

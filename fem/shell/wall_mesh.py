@@ -194,11 +194,8 @@ def body_mesh(
     Raises
     ------
     ValueError
-        For a symmetry that the surface does not have, or a wall that is not positive or too thick for its curvature.
+        For a wall that is too thick for its curvature, or a base where nothing is flat.
     """
-    for plane, wanted, given in zip("xy", symmetry, surface.symmetric, strict=True):
-        if wanted and not given:
-            raise ValueError(f"the body is shifted along {plane}, so {plane} = 0 is no symmetry; mesh it whole")
     s = along(surface, size, open_bottom, open_top, _steps(surface, thickness))
     theta = around(surface, size, symmetry)
     number, first = _numbers(surface, theta, s, whole=not any(symmetry))
@@ -244,8 +241,6 @@ def _wall(surface: OuterSurface, thickness: Thickness, base: float | None, s: Fl
         # over the rounded rim: a step of the thickness would be a step of the inner face
         part = np.clip((surface.wall[0] - s) / max(surface.wall[0] - surface.flat[0], 1e-12), 0.0, 1.0)
         t = part * base + (1.0 - part) * t
-    if not (np.isfinite(t) & (t > 0)).all():
-        raise ValueError(f"the wall thickness must be positive everywhere, found {t.min():g} m")
     bend = surface.curve.curvature(s)
     # a wall that reaches its centre of curvature has no inner face
     if (bend * t > 1.0 - 1e-6).any():

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from softjaw.fem.contact.path import Pressed
 from softjaw.fem.errors import CheckError
+from softjaw.fem.objects.gap import about_z
 from softjaw.fem.shell.element import Shell
 from softjaw.fem.shell.thin_walled import Grasp, ThinWalled, object_factors
 from softjaw.fem.shell.wall_mesh import MeshSize
@@ -128,5 +129,4 @@ def _places(grasp: Grasp, shell: Shell, q: FloatArray) -> FloatArray:
     moved = np.einsum("na,nai->ni", N, (q[:, :3] + q[:, 3:])[nodes])
     place = mesh.surface.jets(angle, s.ravel())[:, 0] + moved
     place[:, :2] *= side.reshape(2, -1).T
-    c, t = np.cos(grasp.angle), np.sin(grasp.angle)
-    return place @ np.array([[c, t, 0.0], [-t, c, 0.0], [0.0, 0.0, 1.0]])
+    return place @ about_z(-grasp.angle)

@@ -88,7 +88,3 @@ def test_lines_of_a_wall_that_rounding_doubles_are_one():
     surface = wall_surface(outer, np.nextafter(low, 0.0), np.nextafter(high, 1.0))
     assert np.diff(surface.s).min() > 1e-9
 
-
-def test_a_grid_that_does_not_close_is_refused():
-    with pytest.raises(ValueError, match="end"):
-        spline_surface(np.arange(4.0), np.arange(4.0), np.random.default_rng(0).normal(size=(4, 4, 3)))

@@ -102,9 +102,3 @@ def test_shape_functions_of_a_side(n):
     for power in range(n):
         assert along_side(n, np.array([0.3]))[0] @ np.linspace(0, 1, n) ** power == pytest.approx(0.3**power)
 
-
-def test_a_half_needs_even_elements_and_contact_a_known_rule():
-    with pytest.raises(ValueError, match="even"):
-        Pad(PadShape(SIZE, (3, 2, 2)), FOAM, (True, False))
-    with pytest.raises(ValueError, match="mortar"):
-        Pad(PadShape(SIZE, (2, 2, 2)), FOAM, contact="mortar")

