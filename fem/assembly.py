@@ -11,19 +11,10 @@ IntArray = NDArray[np.int32]
 
 
 class Pattern:
-    """Entries of a square matrix in compressed rows; the diagonal is always stored.
+    """Entries of a square matrix in compressed rows (``start, column, values``); the diagonal is always stored.
 
-    Parameters
-    ----------
-    size : int
-        Rows of the matrix.
-    rows, columns : (k,) arrays
-        Places of entries, in any order and with repeats; negative indices are left out.
-
-    Attributes
-    ----------
-    start, column, values : arrays
-        The compressed rows. `grow` replaces them by new arrays.
+    ``rows, columns (k,)`` are places in any order and with repeats; negative ones are left out. `grow` makes new
+    arrays.
     """
 
     def __init__(self, size: int, rows: IntArray, columns: IntArray) -> None:

@@ -118,16 +118,9 @@ def _reached(x, directions, nodes):
 
 @dataclass(frozen=True, eq=False)
 class FacingSheet:
-    """What a finger sees of a mesh.
+    """What a finger sees of a mesh: small triangles of the surface that is seen, and the ``whole`` mesh.
 
-    Attributes
-    ----------
-    sheet : TriangleTree
-        Small triangles of the surface that is seen.
-    whole : TriangleTree
-        The mesh.
-    directions : (k, 3) array
-        Lines of sight, away from the finger.
+    ``directions (k, 3)`` are lines of sight, away from the finger.
     """
 
     sheet: TriangleTree
@@ -186,20 +179,10 @@ def _with_shadows(g: FloatArray, step: float, stairs: float) -> FloatArray:
 def facing_sheet(
     smooth: SmoothTriangles, whole: TriangleTree, closed: bool, pose: Pose, box: FloatArray, step: float
 ) -> FacingSheet:
-    """What a finger at ``pose`` sees of triangles in the ``box (2, 3)`` of its frame, and a little beside it.
+    """What a finger at ``pose`` sees of triangles in the ``box (2, 3)`` of its frame [m].
 
-    Parameters
-    ----------
-    smooth, whole
-        The triangles.
-    closed : bool
-        Whether they are closed surfaces that are turned outwards; the backs of others count as well.
-    pose : Pose
-        The pad's frame.
-    box : (2, 3) array
-        Lower and upper corner [m].
-    step : float
-        Step of the grid on which the distance is to be sampled [m].
+    A little beside it, too. ``closed``: whether they are closed surfaces that are turned outwards; the backs of others
+    count as well. ``step`` is that of the grid on which the distance is to be sampled [m].
     """
     depth = box[1, 2] - box[0, 2]
     lower, upper = box[0] - BOX_MARGIN * depth, box[1] + BOX_MARGIN * depth

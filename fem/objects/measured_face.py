@@ -38,14 +38,7 @@ PASSES, CLOSE = 50, 1e-12  # of Newton's method for the nearest point; step at w
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """Clamped cubic B-splines along one direction, continued by their tangents.
-
-    Parameters
-    ----------
-    ends : (float, float)
-        Of the points [m].
-    cells : int
-    """
+    """Clamped cubic B-splines between the ``ends`` of points on a line [m], continued by their tangents."""
 
     ends: tuple[float, float]
     cells: int

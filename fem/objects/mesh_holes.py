@@ -139,14 +139,9 @@ OFF_CENTRE = 0.5 + 1e-4 * np.sqrt(2.0)  # of a cell, where lines run: not throug
 
 
 def centroid(points: FloatArray, triangles: IntArray, closed: bool) -> tuple[FloatArray, float]:
-    """Centroid ``(3,)`` of the enclosed volume and an estimate of its error [m]; 0 for one closed piece.
+    """Centroid ``(3,)`` of the volume inside triangles turned as their neighbours, and its estimated error [m].
 
-    Parameters
-    ----------
-    points, triangles : (k, 3) array, (m, 3) int array
-        Triangles that are turned as their neighbours [m].
-    closed : bool
-        Whether they are one closed surface, so that the divergence theorem holds.
+    The error is 0 for one ``closed`` surface, of which the divergence theorem holds.
     """
     low, high = points.min(axis=0), points.max(axis=0)
     if closed:

@@ -28,22 +28,11 @@ SHARP = 60.0  # [deg]: edges that turn by less may still be facets of something 
 
 @dataclass(frozen=True, eq=False)
 class SmoothTriangles:
-    """Bezier points of every edge and of every triangle's middle.
+    """Bezier points of every edge ``(e,)`` of a mesh.
 
-    Attributes
-    ----------
-    points, triangles : arrays
-        The mesh.
-    edges : (e, 2) array of int
-        Points of each edge, the smaller number first.
-    edge_of : (m, 3) array of int
-        Edge from corner 0, 1, 2 of each triangle to the next one.
-    inner : (e, 2, 3) array
-        The two inner Bezier points of each edge [m].
-    crease : (e,) array of bool
-        Edges that turn by more than the crease angle.
-    turn : (e,) array
-        Angle between the two triangles of each edge [rad].
+    ``edges (e, 2)``: points of each, the smaller number first; ``edge_of (m, 3)``: edge from corner 0, 1, 2 of each
+    triangle to the next one; ``inner (e, 2, 3)``: inner Bezier points [m]; ``crease (e,)``: edges that turn by more
+    than the crease angle; ``turn (e,)``: angle between their two triangles [rad].
     """
 
     points: FloatArray

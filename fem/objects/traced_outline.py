@@ -138,8 +138,7 @@ def _hits(segments: FloatArray, count: int) -> tuple[IntArray, IntArray, FloatAr
 def smooth_spline(x: FloatArray, y: FloatArray, wavelength: float, ends: tuple[float, float]) -> BSpline:
     """C2 cubic spline on ``ends`` near the samples ``y (n, ...)`` at ``x (n,)``, given at roughly even steps.
 
-    It minimises ``sum (y - f)^2 + (wavelength / 2 pi)^6 integral f'''^2 dx / step``, so parabolas stay as they are and
-    gaps in the samples are bridged; the third derivative is measured by differences of the coefficients (P-spline).
+    It minimises ``sum (y - f)^2 + (wavelength / 2 pi)^6 integral f'''^2 dx / step``: parabolas stay, gaps are bridged.
     """
     pieces = max(4, int(np.ceil((ends[1] - ends[0]) * 4 / wavelength)))  # four knots per wavelength
     width = (ends[1] - ends[0]) / pieces
@@ -166,18 +165,10 @@ def smooth_rings(values: FloatArray, waves: FloatArray, count: int) -> FloatArra
 
 @dataclass(frozen=True)
 class Wall:
-    """Upright part of a mesh.
+    """Upright part of a mesh: first and last height, those of the lids, centres and mean radius [m].
 
-    Attributes
-    ----------
-    ends : (float, float)
-        First and last height [m].
-    lids : (float or None, float or None)
-        Heights of the bottom and of the top [m]; None at an end that was asked for, not found.
-    centre : callable
-        Centres ``(k, 2)`` by height and order of the derivative [m].
-    radius : float
-        Mean [m].
+    A lid is None at an end that was asked for, not found; ``centre`` gives ``(k, 2)`` by height and order of the
+    derivative.
     """
 
     ends: tuple[float, float]
@@ -189,14 +180,8 @@ class Wall:
 def find_wall(mesh: MeshObject, facet: float, wanted: tuple[float, float] | None, tolerance: float) -> Wall:
     """Wall of a mesh, between the part that counts as its bottom and the part that counts as its top.
 
-    Parameters
-    ----------
-    facet : float
-        Size of the triangles [m]: smaller folds do not matter.
-    wanted : (float, float) or None
-        Heights to keep to [m].
-    tolerance : float
-        Centres this close to the axis are on it [m].
+    Folds below the size ``facet`` of the triangles do not matter, centres within ``tolerance`` of the axis are on it,
+    and ``wanted`` are heights to keep to [m].
     """
     low, high = (float(v) for v in mesh.bounds[:, 2])
     z = low + (np.arange(LEVELS) + 0.5) * (high - low) / LEVELS

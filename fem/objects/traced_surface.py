@@ -48,19 +48,9 @@ LID = 24  # places along a lid, and angles, at which its distance to the mesh is
 class Radii:
     """Smooth radii on the wall.
 
-    Attributes
-    ----------
-    s, z : (k,) arrays
-        Places along the outline, from 0 on, and their heights [m].
-    R : (k, n) array
-        Distance from the centre line at even angles from 0 [m]; rough along s.
-    height : BSpline
-        ``z(s)``.
-    wavelength : float
-        Waves shorter than this are taken out [m].
-    symmetric : (bool, bool)
-        Whether x = 0 and y = 0 are planes of symmetry; R then is so exactly.
-    round : bool
+    ``s, z (k,)``: places along the outline, from 0 on, and their heights [m]; ``R (k, n)``: distance from the centre
+    line at even angles from 0 [m], rough along s; ``height``: z(s); ``wavelength``: shorter waves are taken out [m];
+    ``symmetric``, ``round``: as of `OuterSurface`, and R is so exactly.
     """
 
     s: FloatArray
@@ -73,21 +63,10 @@ class Radii:
 
 
 def trace_radii(mesh: MeshObject, wall: Wall, facet: float, wavelength: float, tolerance: float) -> Radii:
-    """Radii of the wall of a mesh.
+    """Radii of the wall of a mesh with triangles of a size, without waves below about ``wavelength`` [m].
 
-    Parameters
-    ----------
-    facet : float
-        Size of the triangles [m]: smaller folds do not matter.
-    wavelength : float
-        Wanted; the grid may need a longer one [m].
-    tolerance : float
-        How exactly a symmetry has to be fulfilled [m].
-
-    Raises
-    ------
-    MeshError
-        For sections that are not star-shaped about their centres.
+    ``tolerance`` is how exactly a symmetry has to be fulfilled [m]. Raises `MeshError` for sections that are not
+    star-shaped about their centres.
     """
     z = np.linspace(*wall.ends, MOST_ALONG)
     outer, inner = cast(mesh.points, mesh.triangles, z, wall.centre(z), FEW)
@@ -138,20 +117,10 @@ def _symmetric(R: FloatArray, on_axis: FloatArray, tolerance: float) -> tuple[Fl
 class TraceReport:
     """What was traced, and how well.
 
-    Attributes
-    ----------
-    heights : (float, float)
-        Covered by the wall [m]; below and above are lids.
-    largest, rms : float
-        Distance of the mesh's corners and middles of triangles on the wall to the traced surface [m].
-    place : (float, float)
-        Height [m] and angle [rad] of the largest.
-    lids : (float, float)
-        Largest distance of bottom and top, with their rounded edges, to the mesh [m]; NaN at an end that was asked for.
-    facet : float
-        Typical shortest side of the triangles [m].
-    wavelength : float
-        Waves of the surface shorter than this are smoothed out [m].
+    ``heights``: covered by the wall [m]; ``largest, rms``: distance of the mesh's corners and middles of triangles on
+    the wall to the traced surface [m], and the ``place`` (height [m], angle [rad]) of the largest; ``lids``: largest
+    distance of bottom and top to the mesh, NaN at an end that was asked for [m]; ``facet``: typical shortest side of
+    the triangles [m]; ``wavelength``: shorter waves are smoothed out [m].
     """
 
     heights: tuple[float, float]

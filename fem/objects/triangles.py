@@ -32,16 +32,8 @@ UNITS = {name: times / over for name, (times, over) in LENGTHS.items()}
 class Neighbours(NamedTuple):
     """Edges of triangles, and which two triangles go on into each other there.
 
-    Attributes
-    ----------
-    edges : (e, 2) array of int
-        Points of each edge, the smaller number first.
-    edge_of : (m, 3) array of int
-        Edge from corner 0, 1, 2 of each triangle to the next one.
-    sides : (e, 2) array of int
-        Both triangles' sides, ``3 * triangle + corner``; -1 twice where the edge has no such pair.
-    at_edge : (e,) array of int
-        How many triangles meet at the edge.
+    ``edges (e, 2)`` and ``edge_of (m, 3)`` as in `SmoothTriangles`; ``sides (e, 2)``: both triangles' sides, ``3 *
+    triangle + corner``, -1 twice where the edge has no such pair; ``at_edge (e,)``: how many triangles meet there.
     """
 
     edges: IntArray
@@ -56,20 +48,10 @@ class Neighbours(NamedTuple):
 
 
 class Triangles(NamedTuple):
-    """Triangles in metres.
+    """Points ``(k, 3)`` [m] and triangles, what was mended or left out, and where in the file's frame.
 
-    Attributes
-    ----------
-    points : (k, 3) array
-        Corners [m].
-    triangles : (m, 3) array of int
-        Corners of each triangle.
-    notes : tuple of str
-        What was mended or left out, and where in the file's frame.
-    lids : (l, 3, 3) array
-        Triangles over the holes that stay open [m].
-    closed : bool
-        Whether every piece is a closed surface that is turned outwards.
+    ``lids (l, 3, 3)`` are triangles over the holes that stay open [m]; ``closed``: whether every piece is a closed
+    surface that is turned outwards.
     """
 
     points: FloatArray
@@ -80,16 +62,7 @@ class Triangles(NamedTuple):
 
 
 def cleaned(points: FloatArray, triangles: IntArray, unit: str = "m") -> Triangles:
-    """Triangles of a file in metres, with notes on what was mended.
-
-    Parameters
-    ----------
-    points : (k, 3) array
-        Corners, in ``unit``.
-    triangles : (m, 3) array of int
-        Corners of each triangle.
-    unit : str
-        One of ``UNITS``.
+    """Triangles of points ``(k, 3)`` in a unit of ``UNITS``, in metres, with notes on what was mended.
 
     Raises
     ------

@@ -82,20 +82,12 @@ def patch(X: FloatArray, normal: FloatArray, thickness: float) -> ShellMesh:
 
 @dataclass(frozen=True)
 class Elements:
-    """What never changes about the ``n`` elements of a shell.
+    """What never changes about the elements of a shell; ``weights`` as in ``fem.shell.element_kernel``.
 
-    Attributes
-    ----------
-    nodes : (n, 4) array
-    weights : (n, 26, 4) array
-        Of the products of samples that make up each strain, see ``fem.shell.element_kernel``.
-    stiffness : (n, 26, 26) array
-        Of the strains: in the middle surface at each Gauss point ``thickness dA E / (1 - nu^2)`` [N], in bending a
-        third of that; of the shear at the centre, the transverse shears on the four sides and the thickness strains.
-    start : (n, 26) array
-        The quadratic forms of the reference state; strains are the differences from it.
-    area : (n, 4) array
-        Reference area of each Gauss point [m^2].
+    ``stiffness`` of the strains: in the middle surface at each Gauss point ``thickness dA E / (1 - nu^2)`` [N], in
+    bending a third of that; of the shear at the centre, the transverse shears on the four sides and the thickness
+    strains. ``start``: the quadratic forms of the reference state, from which strains are differences; ``area``: of
+    each Gauss point [m^2].
     """
 
     nodes: IntArray

@@ -34,18 +34,10 @@ LONGEST_TURN, LONGEST_SLIDE = 0.1, 0.004  # of one iteration [rad], [m]
 
 @dataclass(frozen=True, eq=False)
 class Wall:
-    """Outer face of a structured shell mesh.
+    """Outer face of a structured shell mesh: the undeformed surface, and grid lines.
 
-    Parameters
-    ----------
-    surface : SplineSurface
-        The undeformed face.
-    theta, s : (m + 1,), (k + 1,) arrays
-        Grid lines of the mesh.
-    nodes : (m + 1, k + 1) array
-        Nodes on them; a closed mesh ends with its first line.
-    half : (nodes,) array
-        Half the wall's thickness [m].
+    ``theta (m + 1,)`` [rad], ``s (k + 1,)`` [m]. ``nodes (m + 1, k + 1)`` lie on them, a closed mesh ends with its
+    first line; ``half (nodes,)`` is half the wall [m].
     """
 
     surface: SplineSurface

@@ -89,18 +89,10 @@ class ThinWalled:
 
 @dataclass(frozen=True)
 class Grasp:
-    """Both fingers at first touch in the grasp frame, and the symmetry of the whole.
+    """Both fingers at first touch in the grasp frame, turned by ``angle`` about the object's axis [rad].
 
-    Attributes
-    ----------
-    angle : float
-        Of the grasp frame about the object's axis [rad].
-    poses : tuple of Pose
-        One pose where the plane between the fingers is one of symmetry.
-    flipped : tuple of bool
-        Whether a pose was turned by half a turn about its approach.
-    mirrors : (bool, bool)
-        Planes of symmetry x = 0, y = 0.
+    One pose where the plane between the fingers is one of symmetry; ``flipped``: whether a pose was turned by half a
+    turn about its approach; ``mirrors``: planes of symmetry x = 0, y = 0.
     """
 
     angle: float

@@ -22,19 +22,10 @@ def contact_tangent(N, area, lam, active, kappa, gap, normal, e, wall_nodes, wal
                     first, second, start, column, values):  # fmt: skip
     """Add one pad's entries of the tangent to the compressed rows; whether all of them had a place.
 
-    Parameters
-    ----------
-    active : (faces, k) array of bool
-        Whether a node's complementarity row is its gap.
-    kappa : float
-        Scale of pressures: unknown ``l = lam / kappa``, rows ``kappa int N_i g dA`` [Pa/m].
-    e, H, G, A : arrays
-        As in ``fem.shell.facing.Facing``.
-    pad_dofs, pressures : (faces, 3, k), (faces, k) arrays
-        Unknowns in the whole problem, -1 where fixed.
-    first, second : (wall nodes, 3) arrays
-    start, column, values : arrays
-        Compressed rows, columns ascending.
+    ``active (faces, k)``: whether a node's complementarity row is its gap; ``kappa``: scale of pressures, ``lam /
+    kappa`` are the unknowns and ``kappa int N_i g dA`` the rows [Pa/m]; ``e, H, G, A``: as in `Facing`; ``pad_dofs
+    (faces, 3, k)``, ``pressures (faces, k)``, ``first, second (wall nodes, 3)``: unknowns of the whole problem, -1
+    where fixed.
     """
     points, k = N.shape
     t = 3 * k  # local order of unknowns: pad (component, node), wall first (node, component), wall second, pressures
@@ -158,8 +149,8 @@ def friction_tangent(N, area, held, traction, by_motion, by_normal, by_pressure,
                       values):  # fmt: skip
     """Add what friction on one pad adds to the tangent; whether all entries had a place.
 
-    Parameters as in `contact_tangent`; ``held (n,)`` are the points whose traction counts, and
-    ``old_nodes``, ``old_N`` where their material points lie on the wall.
+    As `contact_tangent`; ``held (n,)`` are points whose traction counts, ``old_nodes, old_N`` where they stuck to the
+    wall.
     """
     points, k = N.shape
     t = 3 * k  # local order: pad (component, node), wall first, wall second, pressures, old place first, second

@@ -71,20 +71,10 @@ class LinearShell:
 
 
 class NonlinearWall:
-    """Shell with finite displacements, as part of a contact problem.
+    """Shell with finite displacements, as part of a contact problem; numbers ``fixed (6 k,)`` are zero.
 
-    Parameters
-    ----------
-    shell : Shell
-    fixed : (6 k,) array of bool
-        Numbers that are zero; the others are the ``n`` unknowns.
-
-    Attributes
-    ----------
-    first, second : (k, 3) arrays
-        Unknowns that move every node's middle and director, -1 where fixed; both move the outer face.
-    entries : (rows, columns)
-        Of `tangent`'s values.
+    ``first, second (k, 3)``: unknowns that move every node's middle and director, -1 where fixed; both move the outer
+    face. ``entries``: rows and columns of `tangent`'s values.
     """
 
     def __init__(self, shell: Shell[BodyMesh], fixed: FloatArray) -> None:
@@ -147,13 +137,9 @@ def _matrix(size: int, entries: tuple[IntArray, IntArray], values: FloatArray) -
 
 @dataclass(frozen=True)
 class FaceState:
-    """Strain and stress of one face at some places.
+    """Strain (Green-Lagrange, 11, 22, gamma_12) and stress (11, 22, 12 [Pa]) of one face ``(..., 3)``.
 
-    Attributes
-    ----------
-    strain, stress : (..., 3) arrays
-        Green-Lagrange strains 11, 22, gamma_12 and second Piola-Kirchhoff stresses 11, 22, 12 [Pa] along the elements'
-        axes: 1 along theta, 2 along s where the lines of these are at right angles.
+    Along the elements' axes: 1 along theta, 2 along s where the lines of these are at right angles.
     """
 
     strain: FloatArray
