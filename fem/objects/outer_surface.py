@@ -123,26 +123,23 @@ class OuterSurface:
         ValueError
             If the wall has no point at this height.
         """
-        s = np.linspace(*self.wall, 2001)
-        off = self.curve.derivative(s)[:, 0] - z
-        # a height at a sample is that sample: a search could end beside it by rounding
-        off[np.abs(off) < 1e-12] = 0.0  # heights this close to a sample of the outline are at it [m]
-        crossing = np.flatnonzero((off[:-1] <= 0) & (off[1:] >= 0))
-        if not len(crossing):
-            raise ValueError(
-                f"the wall runs from z = {z + off.min():g} m to {z + off.max():g} m and has no point at {z:g} m"
-            )
-        k = crossing[0]
-        if off[k] == 0.0 or off[k + 1] == 0.0:
-            return float(s[k] if off[k] == 0.0 else s[k + 1])
-        from scipy.optimize import brentq
+        from scipy.interpolate import PPoly
 
-        return float(brentq(lambda p: self.curve.derivative(np.array([p]))[0, 0] - z, s[k], s[k + 1], xtol=1e-14))
+        height = PPoly(self.curve.coefficients[:, 0, ::-1].T, self.curve.breaks)
+        places, (low, high) = height.solve(z, extrapolate=False), self.wall
+        # an end of the wall is at its height, whatever rounding makes of it [m]
+        ends = [end for end in self.wall if abs(height(end) - z) < 1e-12]
+        found = [*ends, *places[(places >= low) & (places <= high)]]
+        if not found:
+            z_low, *_, z_high = np.sort(height(np.linspace(low, high, 257)))
+            raise ValueError(f"the wall runs from z = {z_low:g} m to {z_high:g} m and has no point at {z:g} m")
+        return float(min(found))
 
 
 def of_revolution(body: Revolution) -> OuterSurface:
     """Surface of a rigid body of revolution, for a thin-walled one of the same profile."""
-    return _surface(body, [Section(float(z), float(r)) for z, r in body.profile])
+    # the ends are enough for circles, and points between them may lie at one height
+    return _surface(body, [Section(float(z), float(r)) for z, r in body.profile[[0, -1]]])
 
 
 def of_sections(sections: Sequence[Section]) -> OuterSurface:

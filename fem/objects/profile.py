@@ -21,30 +21,16 @@ COLLINEAR = 1e-4  # points this close to a line, in units of their shortest step
 ARC_STEP = np.pi / 6  # a rounding is interpolated at least this finely
 
 
-@dataclass(frozen=True)
-class End:
-    """What a spline has to fulfil at one end besides passing its point.
-
-    ``first`` and ``second`` are the derivatives (z, r) with respect to arc length; None means: not prescribed.
-    """
-
-    first: tuple[float | None, float | None] = (None, None)
-    second: tuple[float | None, float | None] = (None, None)
-
-    def conditions(self, component: int) -> list[tuple[int, float]]:
-        """Order and value of the derivatives that are prescribed for z (0) or r (1)."""
-        wanted = ((1, self.first[component]), (2, self.second[component]))
-        return [(order, value) for order, value in wanted if value is not None]
+# What a spline has to fulfil at one end besides passing its point: order and value of derivatives by s, of z and of r.
+End = tuple[list[tuple[int, float]], list[tuple[int, float]]]
+FREE: End = [], []
+POLE: End = [(1, 0.0)], [(2, 0.0)]  # on the axis: at right angles, r odd and z even like on a smooth surface
 
 
-FREE = End()
-POLE = End((0.0, None), (None, 0.0))  # on the axis: at right angles, r odd and z even like on a smooth surface
-
-
-def joint(first: FloatArray, second: FloatArray | None = None) -> End:
+def joint(first: FloatArray, second: Sequence[float] = (0.0, 0.0)) -> End:
     """End at which the neighbour's first and second derivative, zero by default, are taken over."""
-    d2 = np.zeros(2) if second is None else second
-    return End((float(first[0]), float(first[1])), (float(d2[0]), float(d2[1])))
+    z, r = ([(1, float(one)), (2, float(two))] for one, two in zip(first, second, strict=True))
+    return z, r
 
 
 @dataclass(frozen=True)
@@ -102,7 +88,7 @@ def spline(points: FloatArray, start: End, end: End, s: FloatArray | None = None
     """
     if s is None:
         s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-    columns = [_component(points[:, c], s, start.conditions(c), end.conditions(c)) for c in (0, 1)]
+    columns = [_component(points[:, c], s, start[c], end[c]) for c in (0, 1)]
     breaks = np.unique(np.concatenate([knots for knots, _ in columns]))
     c = np.empty((len(breaks) - 1, 2, 4))
     for k, factor in enumerate((1, 1, 2, 6)):
@@ -230,8 +216,8 @@ def through(points: FloatArray, rim: float) -> Curve:
                 pieces.append(spline(corners[i][0], joint(corners[i][2]), joint(corners[i][3]), corners[i][1]))
             pieces.append(line(p, q))
         else:
-            start = _end(points, i, i - 1, runs) if i else _open_end(points[0])
-            end = _end(points, j, j, runs) if j < len(points) - 1 else _open_end(points[-1])
+            start = _end(points, i, i - 1, runs) if i else (FREE if points[0, 1] else POLE)
+            end = _end(points, j, j, runs) if j < len(points) - 1 else (FREE if points[-1, 1] else POLE)
             pieces.append(spline(points[i : j + 1], start, end))
     return joined(pieces)
 
@@ -240,11 +226,6 @@ def _end(points: FloatArray, at: int, side: int, runs: list[tuple[int, int, bool
     """End of a bent run at a straight neighbour, which runs to or from the point ``at``."""
     i, j, _ = next(run for run in runs if run[2] and (run[1] == at if side < at else run[0] == at))
     return joint((points[j] - points[i]) / np.linalg.norm(points[j] - points[i]))
-
-
-def _open_end(p: FloatArray) -> End:
-    """First or last point of the profile: on the axis or free."""
-    return POLE if p[1] == 0 else FREE
 
 
 def _corner(

@@ -26,12 +26,9 @@ FloatArray = NDArray[np.float64]
 class BackStiffness:
     """Stiffness of the backing plate on the back of one mesh.
 
-    Attributes
-    ----------
-    free : (rows, columns, 3) array of bool
-        Displacements of the back's nodes, along x then y, that the finger and the planes of symmetry leave free.
-    K : (k + 1, k + 1) array
-        Forces on them, and last on the finger along the approach, by them and the closing displacement [N/m].
+    ``free (rows, columns, 3)``: displacements of the back's nodes, along x then y, that the finger and the planes of
+    symmetry leave free; ``K (k + 1, k + 1)``: forces on them, and last on the finger along the approach, by them and
+    the closing displacement [N/m].
     """
 
     free: NDArray[np.bool_]

@@ -107,20 +107,9 @@ def _bound_to(laws):
     def elements(law, par, u, dN, w, r, K):
         """Residual ``r`` and tangent ``K`` of hexahedra; returns the smallest ``det F`` [-].
 
-        Parameters
-        ----------
-        law, par : int, (k,) array
-            Material number and parameters (``fem.materials``).
-        u : (n, 3, nodes) array
-            Nodal displacements of each element [m].
-        dN : (n, points, 3, nodes) array
-            Reference gradients of the shape functions [1/m].
-        w : (n, points) array
-            Reference volume of each point [m^3].
-        r : (n, 3, nodes) array, out
-            Nodal forces [N].
-        K : (n, 3, nodes, 3, nodes) array, out
-            Stiffness [N/m]; with size 0 only ``r`` is computed.
+        ``law, par``: as of `Material`; ``u (n, 3, nodes)``: displacements [m]; ``dN (n, points, 3, nodes)``: reference
+        gradients [1/m]; ``w (n, points)``: reference volumes [m^3]; out: ``r (n, 3, nodes)`` [N] and ``K (n, 3, nodes,
+        3, nodes)`` [N/m], with size 0 ``r`` alone.
         """
         if len(laws) == 0:  # read here, so that it enters the key of the cache
             return np.nan
@@ -174,23 +163,13 @@ def contact(N, w, lam, gap, normal, hessian, weighted_gap, force, K_uu, K_ul):
     """Weighted gaps, nodal forces and tangent blocks of the contact face.
 
     ``G_i = int N_i g dA`` and its derivative ``N_i N_a n``; the pressure ``p = sum N_i lam_i`` acts on node ``a`` with
-    ``-int N_a p n dA``, whose derivative is ``-int N_a N_b p Hess(g) dA``.  Nodal collocation is the same with the
+    ``-int N_a p n dA``, whose derivative is ``-int N_a N_b p Hess(g) dA``. Nodal collocation is the same with the
     quadrature points on the nodes.
 
-    Parameters
-    ----------
-    N : (points, nodes) array
-        Shape functions of a face at its quadrature points.
-    w : (n, points) array
-        Reference area of each point [m^2].
-    lam : (n, nodes) array
-        Nodal pressures of each face [Pa].
-    gap, normal, hessian : (n, points), (n, points, 3), (n, points, 3, 3) arrays
-        Of the object at the deformed points [m], [-], [1/m].
-    weighted_gap, force : (n, nodes), (n, 3, nodes) arrays, out
-        [m^3], [N].
-    K_uu, K_ul : (n, 3, nodes, 3, nodes), (n, nodes, 3, nodes) arrays, out
-        ``dforce/du`` [N/m] and ``dG/du`` [m^2]; with size 0 they are not computed.
+    ``N (points, nodes)``, ``w (n, points)`` [m^2], ``lam (n, nodes)`` [Pa], ``gap (n, points)`` [m], ``normal``,
+    ``hessian`` [1/m] of the object at the deformed points; out: ``weighted_gap (n, nodes)`` [m^3], ``force (n, 3,
+    nodes)`` [N], ``K_uu (n, 3, nodes, 3, nodes)`` [N/m], ``K_ul (n, nodes, 3, nodes)`` [m^2]; with size 0 the latter
+    are not computed.
     """
     nodes = N.shape[1]
     tangent = K_uu.size > 0
@@ -226,12 +205,8 @@ def contact(N, w, lam, gap, normal, hessian, weighted_gap, force, K_uu, K_ul):
 class Foam:
     """Foam of a pad; vectors of unknowns are numbered as ``fem.pad.mesh.Pad`` says.
 
-    Attributes
-    ----------
-    rows, columns : (entries,) arrays
-        Where the entries of `stiffness` belong; negative means fixed.
-    closing_entries : (k,) array
-        Those of them in the row of the backing plate's closing displacement.
+    ``rows, columns``: where the entries of `stiffness` belong, negative means fixed; ``closing_entries``: those in the
+    row of the backing plate's closing displacement.
     """
 
     def __init__(self, pad: Pad) -> None:

@@ -72,18 +72,11 @@ class Wall:
 
 @dataclass(frozen=True, eq=False)
 class Facing:
-    """What ``n`` points face; arrays as in the module's formulas.
+    """What ``n`` points face; letters as in the module's formulas.
 
-    Attributes
-    ----------
-    gap : (n,) array
-        Signed distance along the director [m]; `FAR` where the point faces no wall.
-    normal, e : (n, 3) arrays
-    nodes, N : (n, 4) arrays
-        Nodes of the shell element and their shape functions.
-    H, G : (n, 3, 3) arrays
-    A : (n, 4, 3, 3) array
-        ``d(N_a n)/dx``: by how much the share of a node changes when the point moves.
+    ``gap``: signed distance along the director, `FAR` where the point faces no wall [m]; ``nodes, N (n, 4)``: of the
+    shell element and their shape functions; ``A (n, 4, 3, 3)``: ``d(N_a n)/dx``, by how much the share of a node
+    changes when the point moves.
     """
 
     gap: FloatArray

@@ -53,22 +53,11 @@ def jumps(low: tuple[float, float], high: tuple[float, float]) -> bool:
 
 @dataclass(frozen=True)
 class WallState:
-    """The wall at one force.
+    """The wall at one force: its mesh, state ``q (6 k,)`` [m] and contact forces ``load (k, 3)`` on its nodes [N].
 
-    Parameters
-    ----------
-    mesh : BodyMesh
-    q : (6 k,) array
-        State, see ``fem.shell.element`` [m].
-    load : (k, 3) array
-        Contact forces on the shell's nodes [N].
-    reaction : (3,) array
-        Force of supports and springs on the whole object [N].
-    snapped : bool
-        Whether the wall has snapped in before: the force fell while the fingers closed, more force would open them
-        (the stiffness of the grasp is negative), the force hardly grew, or the wall closed far more than in proportion.
-    opening : float
-        Of the wall's inner faces towards each other, see ``fem.shell.opening``: 1 undeformed, 0 where they would meet.
+    ``reaction (3,)``: force of supports and springs on the whole object [N]; ``snapped``: whether the wall has snapped
+    in before, so that the force fell while the fingers closed, more force would open them, the force hardly grew, or
+    the wall closed far more than in proportion; ``opening``: see ``fem.shell.opening``.
     """
 
     mesh: BodyMesh

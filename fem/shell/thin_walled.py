@@ -32,15 +32,9 @@ def supported(
 ) -> tuple[Shell[BodyMesh], FloatArray]:
     """Shell of a body with weak springs, and which of its numbers ``(6 k,)`` its support fixes.
 
-    Parameters
-    ----------
-    mesh : BodyMesh
-    material : WallMaterial
-    support : str
-        "clamped": the flat bottom does not move, or both rims of a tube; "standing": the rim of the bottom keeps its
-        height; "free".
-    stiffness : float
-        Of the weak springs that hold what is left of rigid motions, all together and per direction [N/m].
+    "clamped": the flat bottom does not move, or both rims of a tube; "standing": the rim of the bottom keeps its
+    height; "free". The springs hold what is left of rigid motions: ``stiffness`` is that of all together, per direction
+    [N/m].
     """
     shell = Shell(mesh, material.young_modulus, material.poisson_ratio)
     # spread by area, so that they resist rigid motions alike whatever the mesh
@@ -61,20 +55,8 @@ def supported(
 class ThinWalled:
     """Object that gives way.
 
-    Parameters
-    ----------
-    surface : OuterSurface
-    thickness : float or (k, 2) tuple
-        Of the wall [m], or pairs (z, thickness).
-    material : WallMaterial
-    support : str
-        ``clamped``, ``standing`` or ``free``.
-    open_top, open_bottom : bool
-        Whether it has no lid, and no base.
-    base_thickness : float, optional
-        [m]
-    springs : float
-        Weak springs in place of what friction holds, all together and per direction [N/m].
+    ``thickness`` of the wall [m], or pairs (z, thickness); ``support`` as in `supported`; ``springs``: in place of what
+    friction holds, all together and per direction [N/m]; ``open_top, open_bottom``: whether it has no lid, and no base.
     """
 
     surface: OuterSurface

@@ -118,18 +118,10 @@ def around(surface: OuterSurface, size: MeshSize, symmetry: tuple[bool, bool]) -
 class BodyMesh(ShellMesh):
     """Mesh of a body with its parameters.
 
-    Attributes
-    ----------
-    surface : OuterSurface
-    theta, s : (m + 1,), (n + 1,) arrays
-        Grid lines. Element ``i * n + j`` lies between theta lines i, i + 1 and s lines j, j + 1; its corners are
-        ``number[[i, i + 1, i + 1, i], [j, j, j + 1, j + 1]]``.
-    number : (m + 1, n + 1) array
-        Node on each crossing; the last row of a whole body is the first again, nodes on the axis are one node.
-    symmetry : (bool, bool)
-        Whether x = 0 and y = 0 are planes of symmetry and only one side is meshed.
-    symmetric : (6 k,) array of bool
-        Numbers that these planes fix.
+    Element ``i * n + j`` lies between ``theta`` lines i, i + 1 of m + 1 and ``s`` lines j, j + 1 of n + 1; its corners
+    are ``number[[i, i + 1, i + 1, i], [j, j, j + 1, j + 1]]``. The last row of ``number`` of a whole body is the first
+    again, nodes on the axis are one node. ``symmetry``: whether x = 0 and y = 0 are planes of symmetry and only one
+    side is meshed; ``symmetric (6 k,)``: numbers that these planes fix.
     """
 
     surface: OuterSurface

@@ -29,10 +29,12 @@ PET = wall_material("pet")
 WHOLE, HALF_Y, HALF_X, QUARTER = (False, False), (False, True), (True, False), (True, True)
 
 
-def test_a_revolved_wall_and_the_rigid_body_are_the_same():
-    surface = SURFACES["flask"]
+@pytest.mark.parametrize("body", [FLASK, Revolution(np.array([[0, 0], [0, 15], [0, 30], [50, 30], [90, 20]]) / 1e3)])
+def test_a_revolved_wall_and_the_rigid_body_are_the_same(body):
+    """Also where points of the profile lie at one height."""
+    surface = of_revolution(body)
     theta, s = RNG.uniform(-4, 7, 200), RNG.uniform(0, surface.end, 200)
-    gap, normal, _ = FLASK.gap(surface.jets(theta, s)[:, 0])
+    gap, normal, _ = body.gap(surface.jets(theta, s)[:, 0])
     assert np.abs(gap).max() < 1e-15
     assert np.abs(normal - surface.normals(theta, s)).max() < 1e-12
 
