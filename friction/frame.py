@@ -34,22 +34,10 @@ class FrameFlag(IntFlag):
 class Frame:
     """Right-handed frame of a contact.
 
-    Parameters
-    ----------
-    origin : (3,) array
-        Point of the contact area on the line through the centre of pressure along the normal [m].
-    axes : (3, 3) array
-        Rows are x (along the hint), y and the contact normal z [-].
-    iterations : int
-        Passes of the iteration for origin and normal.
-    flag : FrameFlag
-        0 if nothing is unusual.
-    centre_of_pressure : (3,) array
-        Mean of the centres weighted with the loads [m].
-    overhang_count : int
-        Loaded faces whose normal is more than 90 degrees from z.
-    overhang_share : float
-        Their share of the sum of the loads [-].
+    ``origin (3,)`` is the point of the contact area on the line through the ``centre_of_pressure (3,)``, the mean of
+    the centres weighted with the loads, along the normal [m]; the rows of ``axes (3, 3)`` are x (along the hint), y and
+    the contact normal z. ``iterations`` are the passes for both. ``overhang_count`` loaded faces, with
+    ``overhang_share`` of the sum of the loads, have a normal that is more than 90 degrees from z.
     """
 
     origin: FloatArray
@@ -250,7 +238,6 @@ def opposing(faces: ContactPatch, turned: NDArray[np.bool_]) -> bool:
         return False
     tree, count = cKDTree(faces.centroid), min(5, len(turned))
     # all faces as far away as the last neighbour count, or which one does would hang on rounding
-    # faces as far away as the last neighbour are neighbours too
     reach = tree.query(faces.centroid[turned], k=[count])[0][:, 0] * (1 + 1e-6)
     near = tree.query_ball_point(faces.centroid[turned], reach)
     pairs = zip(faces.normal[turned], near, strict=True)

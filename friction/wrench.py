@@ -223,20 +223,13 @@ _REST_SQUARED = REST**2
 def friction_sums(arm, normal, load, twist, out):  # pragma: no cover - compiled
     """Wrench and dissipation of unit friction for each motion.
 
-    A face slides with ``c = n x v`` turned by a right angle in its plane, so ``|P v| = |c|`` and ``P v = c x n``:
-    both are free of cancellation. The velocity is formed as a difference from the arm, which keeps its digits when
-    the centre of rotation lies next to the face.
+    A face slides with ``c = n x v`` turned by a right angle in its plane, so ``|P v| = |c|`` and ``P v = c x n``: both
+    are free of cancellation. The velocity is formed as a difference from the arm, which keeps its digits when the
+    centre of rotation lies next to the face.
 
-    Parameters
-    ----------
-    arm, normal : (3, n) array
-        Positions relative to the origin and unit normals, component by component.
-    load : (n,) array
-        Normal force of each face.
-    twist : (m, 6) array
-        ``[v, omega]``, scaled so that the largest of ``v`` and of ``omega`` times ``arm`` is some 1.
-    out : (m, 7) array
-        Receives force, torque and ``H = sum load |P v|``.
+    ``arm, normal (3, n)`` and ``load (n,)`` are of the faces, ``twist (m, 6)`` is ``[v, omega]`` scaled so that the
+    largest of ``v`` and of ``omega`` times ``arm`` is some 1; ``out (m, 7)`` receives force, torque and ``sum load |P
+    v|``.
     """
     for k in range(twist.shape[0]):
         v0, v1, v2 = twist[k, 0], twist[k, 1], twist[k, 2]
@@ -260,29 +253,13 @@ def friction_sums(arm, normal, load, twist, out):  # pragma: no cover - compiled
         out[k, 0], out[k, 1], out[k, 2], out[k, 3], out[k, 4], out[k, 5], out[k, 6] = f0, f1, f2, t0, t1, t2, H
 
 
-def pure_torque(patch: ContactPatch, mu: float, model: str = "ccm", tolerance: float = 1e-9) -> float:
-    """Torque limit at zero net force: the least ``H(v_x, v_y, 1)`` over all sliding velocities.
+def pure_torque(patch: ContactPatch, mu: float, model: str = "ccm") -> float:
+    """Torque limit at zero net force [N m]: the least ``H(v_x, v_y, 1)`` over all sliding velocities.
 
     `FrictionLimits.tau_z` is the largest torque about the origin whatever force comes with it; on asymmetric patches
     this one is smaller. The function is convex and has kinks at face centres (flat patch: its minimiser is the median
     of the faces, weighted with their loads), so it is minimised by shrinking ellipses, which need no smoothness and
-    bound the error left.
-
-    Parameters
-    ----------
-    patch : ContactPatch
-        ``n`` faces in the contact frame.
-    mu : float
-        Coulomb friction coefficient [-].
-    model : str
-        ``ccm``, ``pcm`` or ``pcm_projected``.
-    tolerance : float
-        Bound of the error, relative to the torque about the origin [-].
-
-    Returns
-    -------
-    float
-        Torque [N m].
+    bound the error left: 1e-9 of the torque about the origin. Parameters as in `friction_wrench`.
     """
     mu = checked_mu(mu)
     arm, normal, load = model_faces(patch, model)
@@ -295,13 +272,13 @@ def pure_torque(patch: ContactPatch, mu: float, model: str = "ccm", tolerance: f
         twist[0, :2] = v
         friction_sums(arm, normal, load, twist, sums)
         T, g = sums[0, 6], sums[0, :2]
-        best, limit = min(best, T), limit if cut else tolerance * T
+        best, limit = min(best, T), limit if cut else 1e-9 * T
         width = np.sqrt(max(g @ P @ g, 0.0))
         # the function is convex: nowhere in the ellipse is it below the tangent plane's lowest point
         if T - width >= best - limit:
             return float(mu * size * best)
         v, P = _smaller_ellipse(v, P, g / width, (T - best) / width)
-    raise ArithmeticError(f"pure torque not found to {tolerance:g} after {cut + 1} cuts: ask for a larger tolerance")
+    raise ArithmeticError(f"pure torque not found to 1e-9 after {cut + 1} cuts: its faces differ too much in size")
 
 
 def _radius(patch: ContactPatch) -> float:

@@ -37,14 +37,8 @@ class ExactSurface:
     `radius`, which needs the surface between motions, takes the hull of ``count`` wrenches and their opposites, which
     lies inside and misses in proportion to ``1 / count``.
 
-    Parameters
-    ----------
-    wrench : function
-        Wrenches ``(m, 3)`` for motions ``(m, 3)`` of any length but zero, in one set of units.
-    rho : float
-        Length of the contact by which the motions of the samples are spread evenly; 1 for normalised wrenches.
-    count : int
-        Number of samples for hulls.
+    ``wrench`` gives wrenches ``(m, 3)`` for motions ``(m, 3)`` of any length but zero, in one set of units; ``rho`` is
+    the length of the contact by which the motions of samples are spread evenly, 1 for normalised wrenches.
     """
 
     wrench: Callable[[FloatArray], FloatArray]

@@ -140,20 +140,9 @@ class Ellipsoid(LimitSurface):
 def three_motion_ellipsoid(f_x: float, f_y: float, tau_z: float, rho: float) -> Ellipsoid:
     """The paper's limit surface: ellipsoid through the largest forces along x and y and the largest torque.
 
-    Parameters
-    ----------
-    f_x, f_y : float
-        Largest forces [N].
-    tau_z : float
-        Largest torque [N m].
-    rho : float
-        Length of the contact, by which a torque counts as zero [m].
-
-    Notes
-    -----
-    A force or torque (by ``rho``) below `ZERO_SHARE` of the largest force is the rounding of a contact that carries
-    none; its semi-axis is 0. The ellipsoid encloses more than the exact limit surface: 11 to 13 % more volume for usual
-    patches.
+    A force [N] or torque [N m] (by ``rho``, the length of the contact [m]) below `ZERO_SHARE` of the largest force is
+    the rounding of a contact that carries none; its semi-axis is 0. The ellipsoid encloses more than the exact limit
+    surface: 11 to 13 % more volume for usual patches.
     """
     least = ZERO_SHARE * max(f_x, f_y)
     return Ellipsoid.of_axes(
@@ -164,21 +153,9 @@ def three_motion_ellipsoid(f_x: float, f_y: float, tau_z: float, rho: float) -> 
 def axis_aligned_ellipsoid(W: ArrayLike) -> Ellipsoid:
     """Ellipsoid ``sum a_i w_i^2`` with the least mean square of ``P(w) - 1``, all ``a_i`` positive.
 
-    Parameters
-    ----------
-    W : (m, 3) array
-        Normalised wrenches [-].
-
-    Returns
-    -------
-    Ellipsoid
-        With the semi-axis 0 along components that no sample has. Samples that would make it endless (``a_i`` not above
-        1e-9) give a semi-axis of `MAX_REACH_RATIO` times their largest component, and the flag says so.
-
-    Raises
-    ------
-    ValueError
-        If a wrench is not finite, or all are zero.
+    ``W (m, 3)`` are normalised wrenches [-]. Components that no sample has get the semi-axis 0. Samples that would make
+    it endless (``a_i`` not above 1e-9) give a semi-axis of `MAX_REACH_RATIO` times their largest component, and the
+    flag says so. `ValueError`: a wrench is not finite, or all are zero.
     """
     W = checked_wrenches(W, 3)
     B, _, flag = principal_frame(W)
@@ -200,22 +177,9 @@ def axis_aligned_ellipsoid(W: ArrayLike) -> Ellipsoid:
 def full_ellipsoid(W: ArrayLike) -> Ellipsoid:
     """Ellipsoid ``w' A w`` with the least mean square of ``P(w) - 1``, in any number of dimensions.
 
-    Parameters
-    ----------
-    W : (m, d) array
-        Normalised wrenches [-].
-
-    Returns
-    -------
-    Ellipsoid
-        Flat, and flagged, if the wrenches lie in a subspace. Where they do not determine ``A``, the ellipsoid nearest
-        to their principal axes; where they would make it endless, the best one that reaches at most
-        `MAX_REACH_RATIO` times as far as they do.
-
-    Raises
-    ------
-    ValueError
-        If a wrench is not finite, or all are zero.
+    ``W (m, d)`` are normalised wrenches [-]. It is flat, and flagged, if they lie in a subspace. Where they do not
+    determine ``A``, it is the ellipsoid nearest to their principal axes; where they would make it endless, the best one
+    that reaches at most `MAX_REACH_RATIO` times as far as they do. `ValueError`: one is not finite, or all are zero.
     """
     W = checked_wrenches(W)
     B, Y, flag = principal_frame(W)

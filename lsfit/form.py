@@ -195,12 +195,8 @@ def _rule_monomials(dimension: int, n: int) -> FloatArray:
 def quartic_volume(coefficients: FloatArray, dimension: int) -> float:
     """Volume ``1/d int P(u)^(-d / 4) du`` over the unit sphere, for a closed body, round within a factor of a few.
 
-    Rules of growing order are tried until two agree, to 1e-12 in up to three dimensions and to 1e-6 beyond.
-
-    Raises
-    ------
-    FitError
-        If they never agree to 1e-8 (1e-3).
+    Rules of growing order are tried until two agree, to 1e-12 in up to three dimensions and to 1e-6 beyond; `FitError`
+    if they never agree to 1e-8 (1e-3).
     """
     # beyond three dimensions a rule of order n has some n^(d - 1) points, so fewer digits must do
     orders: tuple[int, ...] = (10, 14, 20, 28, 40, 56, 80, 112, 160)
@@ -241,20 +237,9 @@ def round_frame(value: Callable[[FloatArray], FloatArray], dimension: int, degre
 def quartic_shadow(coefficients: FloatArray, reach: FloatArray) -> float:
     """Area of the shadow of a closed quartic body in 3-D on the first two components.
 
-    The shadow of a convex body is the level set of ``min over tau of P(x, y, tau)``, whose area is a periodic
-    integral: equal steps converge fastest.
-
-    Parameters
-    ----------
-    coefficients : (15,) array
-        In the order of ``exponents(3, 4)``.
-    reach : (3,) array
-        About the reach along the axes, by which the variables are divided.
-
-    Raises
-    ------
-    FitError
-        If the area is not found to 1e-9.
+    The shadow of a convex body is the level set of ``min over tau of P(x, y, tau)``, whose area is a periodic integral:
+    equal steps converge fastest. ``reach (3,)``, about that along the axes, divides the variables. `FitError`: the area
+    is not found to 1e-9.
     """
     c = coefficients * np.prod(reach ** exponents(3, 4), axis=1)
     area, change, n = 0.0, math.inf, 16

@@ -128,26 +128,14 @@ def _missed(dimension: int) -> float:
 def refuse_open(coefficients: FloatArray, dimension: int, placed: FloatArray) -> None:
     """Refuse a quartic form whose level set ``P = 1`` is not closed, or not known to be.
 
-    It is closed if ``P`` exceeds `ZERO_SHARE` of its largest value all over the sphere, and open if it is below minus
-    that somewhere or does not depend on a variable at all. A form of the sum of forms in variables of their own is
-    closed if each of these is; so a short axis beside long ones is judged by its own size where no monomial mixes them.
+    It is closed if ``P`` exceeds `ZERO_SHARE` of its largest value all over the sphere, and open (`OpenBodyError`) if
+    it is below minus that somewhere or does not depend on a variable at all; else it is undecided (`UndecidedError`). A
+    form of the sum of forms in variables of their own is closed if each of these is; so a short axis beside long ones
+    is judged by its own size where no monomial mixes them. ``placed (d, d)`` maps the variables to those of the
+    message.
 
     Coefficients of 16 digits that were turned or fitted are off by some 1e-15 of the largest. A body that reaches 1000
     times as far as its narrowest width is at the margin, since the reach is ``P^(-1/4)``.
-
-    Parameters
-    ----------
-    coefficients : (k,) array
-        In the order of ``exponents(dimension, 4)``.
-    placed : (d, d) array
-        Map from the variables to those that the message is to name.
-
-    Raises
-    ------
-    OpenBodyError
-        If the form is negative somewhere.
-    UndecidedError
-        If its smallest value is too small to be distinct from zero.
     """
     E, undecided = exponents(dimension, 4), ""
     for group in _groups(coefficients, E):

@@ -79,13 +79,7 @@ class Quartic(LimitSurface):
 
     @cached_property
     def frame(self) -> FloatArray:
-        """Map ``L (d, d)`` from a body that is nearly round onto this one.
-
-        Raises
-        ------
-        OpenBodyError, UndecidedError
-            If the level set is not closed, or not known to be.
-        """
+        """Map ``L (d, d)`` from a body that is nearly round onto this one; errors as of `refuse_open`."""
         # a fit knows the frame in which its coefficients are exact; it judges better than the components do
         if self.ball_map is not None:
             refuse_open(substitute(self.coefficients, self.exponents, self.ball_map), self.dimension, self.ball_map)
@@ -108,13 +102,7 @@ class Quartic(LimitSurface):
 
     @cached_property
     def shadow_area(self) -> float:
-        """Area of the shadow on the plane of the first two components; that of the hull in more than three dimensions.
-
-        Raises
-        ------
-        OpenBodyError, UndecidedError
-            If the level set is not closed, or not known to be.
-        """
+        """Area of the shadow on the first two components; that of the hull in more than three dimensions."""
         if self.dimension == 3:
             return quartic_shadow(self.coefficients, np.linalg.norm(self.frame, axis=1))
         if self.dimension == 2:
@@ -122,16 +110,9 @@ class Quartic(LimitSurface):
         return supported_shadow(self.support, self.dimension) if self.dimension > 1 else 0.0
 
     def support(self, t: ArrayLike) -> FloatArray:
-        """Largest ``w . t`` over the body, ``(m, d) -> (m,)``; to 1e-12 of itself.
+        """Largest ``w . t`` over the body, ``(m, d) -> (m,)``; to 1e-12 of itself. The body has to be convex.
 
-        The body has to be convex.
-
-        Raises
-        ------
-        OpenBodyError, UndecidedError
-            If the level set is not closed, or not known to be.
-        FitError
-            If a search stops short.
+        `OpenBodyError`, `UndecidedError`: as of `refuse_open`; `FitError`: a search stops short.
         """
         T = rows(t, self.dimension)
         return (T * self.support_points(T)).sum(axis=1)
@@ -186,20 +167,8 @@ def farthest_points(tensor: FloatArray, T: FloatArray, w: FloatArray) -> FloatAr
     """Points ``(m, d)`` of a closed convex quartic surface farthest along unit normals ``T``, by Newton's method.
 
     ``P(w) - t . w`` is smallest on the ray through the point of the surface that is wanted. Steps are halved until the
-    function falls; where the second derivative is singular it is shifted.
-
-    Parameters
-    ----------
-    tensor : (d, d, d, d) array
-        ``Q``, symmetric: the second derivative is ``H_ij = Q_ijkl w_k w_l``.
-    T : (m, d) array
-    w : (m, d) array
-        Points near the ones wanted, of any length.
-
-    Raises
-    ------
-    FitError
-        If a search does not converge.
+    function falls; where the second derivative, ``H_ij = Q_ijkl w_k w_l`` of the symmetric ``tensor``, is singular it
+    is shifted. ``w (m, d)`` are points near the ones wanted, of any length. `FitError`: a search does not converge.
     """
     P = _second(tensor, w)[2]
     # along a ray P - t . w is least where 4 P s^3 = t . w; the floor keeps starts across t from collapsing to 0

@@ -155,20 +155,9 @@ def fill_residuals(Y, T, inverse, E, gamma, out):  # pragma: no cover - compiled
     """Write what ``P`` and ``sqrt(gamma) (I - t t') grad P`` are per coefficient, for every sample.
 
     In ``d`` dimensions the ``d - 1`` directions across a motion hold all of the latter: columns of the reflection that
-    takes the motion to the last axis.
-
-    Parameters
-    ----------
-    Y : (m, r) array
-        Wrenches ``w = B y``.
-    T : (m, d) array
-        Unit motions, or zero where they do not count.
-    inverse : (r, d) array
-        Pseudo-inverse of B, which takes gradients along ``y`` to those along ``w``.
-    E : (k, r) array of int
-        Exponents of degree 4.
-    out : (k, d, m) array
-        Receives P and then its slopes.
+    takes the motion to the last axis. ``Y (m, r)`` are wrenches ``w = B y``, ``T (m, d)`` unit motions, or zero where
+    they do not count, ``inverse (r, d)`` is the pseudo-inverse of B, which takes gradients along ``y`` to those along
+    ``w``, and ``E (k, r)`` are exponents; ``out (k, d, m)`` receives P and then its slopes.
     """
     (k, r), d, m = E.shape, T.shape[1], len(Y)
     power = powers(Y, E)

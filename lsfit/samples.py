@@ -118,14 +118,8 @@ def _pressed(W: FloatArray) -> NDArray[np.bool_]:
 def principal_frame(W: FloatArray) -> tuple[FloatArray, FloatArray, FitFlag]:
     """Coordinates ``w = B y`` in the span of the samples, in which their components have the mean square 1.
 
-    Returns
-    -------
-    B : (d, r) array
-        Map onto the span; its rank is `sample_rank`.
-    Y : (m, r) array
-        The samples.
-    flag : FitFlag
-        Whether the samples are flat or thin.
+    Returns the map ``B (d, r)`` onto the span, whose rank is `sample_rank`, the samples ``Y (m, r)``, and whether they
+    are flat or thin.
     """
     # of W itself: the product W'W squares the ratio of long and short directions, and loses the short
     U, values, V = np.linalg.svd(W, full_matrices=False)

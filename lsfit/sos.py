@@ -101,22 +101,11 @@ def convex_least_squares(
 ) -> tuple[FloatArray, FloatArray]:
     """Coefficients ``v (k,)`` that minimise ``v' N v / 2 - b . v`` among sos-convex quartics; free numbers ``(f,)``.
 
-    The solver's last digits may leave an eigenvalue just below ``floor``. Then the result moves towards a ball by as
-    little as brings it back to half of it: some ``1e-8`` of its length.
-
-    Parameters
-    ----------
-    N, b
-        Normal equations in coordinates in which the body is nearly the unit ball.
-    loose : bool
-        Whether ``N`` leaves directions undetermined; of all solutions the one nearest to the ball is taken then.
-    floor : float
-        Smallest eigenvalue of the Gram matrix, below 4. The body reaches at most ``(12 / floor)^(1/4)`` far.
-
-    Raises
-    ------
-    FitError
-        If the programme is not solved.
+    The normal equations ``N, b`` are in coordinates in which the body is nearly the unit ball; where they leave
+    directions undetermined (``loose``) the solution nearest to the ball is taken. ``floor``, below 4, is the smallest
+    eigenvalue of the Gram matrix: the body reaches at most ``(12 / floor)^(1/4)`` far. The solver's last digits may
+    leave an eigenvalue just below it. Then the result moves towards a ball by as little as brings it back to half of
+    it: some ``1e-8`` of its length. `FitError`: the programme is not solved.
     """
     k, ball = len(b), ball_gram(dimension)
     # an objective of size one: the solvers' tolerances are partly absolute
@@ -148,21 +137,8 @@ def smallest(matrix: FloatArray) -> float:
 def least_in_cone(N: FloatArray, b: FloatArray, triangle: csr_array, floor: float) -> FloatArray:
     """Minimiser of ``x' N x / 2 - b . x`` among the ``x`` whose symmetric matrix has no eigenvalue below ``floor``.
 
-    Parameters
-    ----------
-    N : (n, n) array
-        Positive semidefinite.
-    b : (n,) array
-        Slope at zero with opposite sign.
-    triangle : (s (s + 1) / 2, n) sparse array
-        Upper triangle of the matrix as `upper_triangle` orders it.
-    floor : float
-        Smallest eigenvalue allowed.
-
-    Raises
-    ------
-    FitError
-        If the programme is not solved.
+    ``N (n, n)`` is positive semidefinite; ``triangle (s (s + 1) / 2, n)`` gives the matrix's upper triangle as
+    `upper_triangle` orders it. `FitError`: the programme is not solved.
     """
     size = side(triangle)
     # the columns of the upper triangle are the rows of the lower one
@@ -180,10 +156,7 @@ def side(triangle: csr_array) -> int:
 def conic_solution(P: csc_array, q: FloatArray, A: csr_array, b: FloatArray, cones: list) -> FloatArray:
     """Minimiser of ``x' P x / 2 + q . x`` with ``b - A x`` in the cones, by Clarabel.
 
-    Raises
-    ------
-    FitError
-        If Clarabel's own tolerance is not reached, nor a gap and residuals of `ENOUGH`.
+    `FitError`: neither Clarabel's own tolerance is reached, nor a gap and residuals of `ENOUGH`.
     """
     settings = clarabel.DefaultSettings()
     settings.verbose = False

@@ -62,21 +62,12 @@ class SpanSamples(NamedTuple):
 
 
 def span_samples(W: ArrayLike, T: ArrayLike) -> SpanSamples:
-    """Samples within their span, scaled.
+    """Samples within their span, scaled; ``W, T (m, d)`` are normalised wrenches and unit motions [-].
 
     A plane patch gives wrenches of rank 3 among the six components, a curved one of rank 6. Every component is divided
     by its largest magnitude (as in the published fits in six dimensions), or every principal direction if the samples
-    do not span all components that they use. Motions that meet no friction are left out.
-
-    Parameters
-    ----------
-    W, T : (m, d) array
-        Normalised wrenches and unit motions [-].
-
-    Raises
-    ------
-    ValueError
-        If shapes differ, a value is not finite, or all wrenches are zero.
+    do not span all components that they use. Motions that meet no friction are left out. `ValueError`: shapes differ, a
+    value is not finite, or all wrenches are zero.
     """
     wrenches, motions = np.atleast_2d(np.asarray(W, float)), np.atleast_2d(np.asarray(T, float))
     if wrenches.shape != motions.shape or not (np.isfinite(wrenches).all() and np.isfinite(motions).all()):
@@ -150,10 +141,7 @@ def placed(surface: LimitSurface, samples: SpanSamples) -> LimitSurface:
 def zhou_quartic(samples: SpanSamples, weights: tuple[float, float, float] = ZHOU_WEIGHTS) -> LimitSurface:
     """Sos-convex quartic with the least objective, see the head of this file, in the coordinates of the samples.
 
-    Raises
-    ------
-    FitError
-        If the surface runs away from the samples, or the solver fails.
+    `FitError`: the surface runs away from the samples, or the solver fails.
     """
     r, E = samples.rank, exponents(samples.rank, 4)
     M, G = monomials(samples.Y, E), monomial_gradients(samples.Y, r, 4)

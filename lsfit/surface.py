@@ -147,16 +147,9 @@ def supported_shadow(support: Callable[[FloatArray], FloatArray], dimension: int
 
 @dataclass(frozen=True, eq=False)
 class Image(LimitSurface):
-    """The surface ``{B y : P(y) = 1}`` of another one; flat if ``B`` has fewer columns than rows.
+    """The surface ``{B y : P(y) = 1}`` of another one of full rank, ``inner``; flat if ``B (d, r)`` has ``r < d``.
 
-    Parameters
-    ----------
-    inner : LimitSurface
-        Surface in ``r`` dimensions, of full rank.
-    B : (d, r) array
-        Linear map with independent columns.
-    flag : FitFlag
-        What the reader should know.
+    The columns of ``B`` are independent.
     """
 
     inner: LimitSurface

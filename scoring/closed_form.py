@@ -68,16 +68,9 @@ def volume_l1(V1: float, A1: float, V2: float, A2: float, d: float) -> float:
 def epsilon_linf(contact1: Axes, contact2: Axes, arm1: float, arm2: float) -> float:
     """Radius of the largest ball around 0 in the L-infinity grasp wrench space [-].
 
-    Parameters
-    ----------
-    contact1, contact2 : (3,) sequence
-        Semi-axes ``(f_x, f_y, tau_z)`` per unit normal force, the torque divided by its length.
-    arm1, arm2 : float
-        Positions of the contacts along their line, measured from the centre of mass and divided by the length for arms;
-        of opposite sign if the centre of mass lies between them.
+    Contacts are semi-axes ``(f_x, f_y, tau_z)`` per unit normal force, the torque divided by its length; arms are their
+    positions along their line from the centre of mass, over the length for arms, of opposite sign if it lies between.
 
-    Examples
-    --------
     >>> round(epsilon_linf((1, 1, 0.2), (1, 1, 0.2), -0.5, 0.5), 6) == round(0.4 / 1.04**0.5, 6)
     True
     """

@@ -42,10 +42,7 @@ class Body(Protocol):
 class PolytopeBody:
     """Hull of wrenches, such as samples of a limit surface or the vertices of a linearised one.
 
-    Parameters
-    ----------
-    vertices : (k, 3) array
-        ``(f_x, f_y, tau_z)`` per unit normal force [-, -, m]; 0 must not lie outside.
+    ``vertices (k, 3)`` are ``(f_x, f_y, tau_z)`` per unit normal force [-, -, m]; 0 must not lie outside.
     """
 
     vertices: FloatArray
@@ -230,21 +227,10 @@ class SoftContact:
     def wrench_map(
         self, object_length: ArrayLike, contact_length: float, centre_of_mass: ArrayLike = (0.0, 0.0, 0.0)
     ) -> FloatArray:
-        """Wrenches on the object of a unit normal force, ``f_x``, ``f_y`` and ``tau_z``.
+        """Wrenches ``(6, 4)`` on the object of a unit normal force, ``f_x``, ``f_y`` and ``tau_z`` [-].
 
-        Parameters
-        ----------
-        object_length : float or (3,) array
-            Length by which the arms of forces are divided, or one along each of x, y and z [m].
-        contact_length : float
-            Length by which the torque about the contact's normal is divided [m].
-        centre_of_mass : (3,) array
-            Point about which torques are taken [m].
-
-        Returns
-        -------
-        (6, 4) array
-            Columns as named above; rows are three forces and three torques [-].
+        ``object_length``, one or one along each of x, y and z, divides the arms of forces, ``contact_length`` the
+        torque about the contact's normal [m]; torques are taken about ``centre_of_mass`` [m].
         """
         lengths = np.asarray(object_length, float)
         for name, length in (("object_length", lengths), ("contact_length", np.asarray(contact_length, float))):

@@ -36,16 +36,9 @@ MIN_SINGULAR_VALUE = 1e-200  # instead of a singular value 0
 
 @dataclass(frozen=True, eq=False)
 class Span:
-    """A contact's span of 4 dimensions, split along T.
+    """A contact's span of 4 dimensions, split along T: its wrench map ``C (6, 4)``, and orthonormal bases.
 
-    Parameters
-    ----------
-    C : (6, 4) array
-        Wrench map of the contact.
-    T : (6, 2) array
-        Orthonormal basis of the plane T.
-    U : (6, 2) array
-        Orthonormal basis of the rest of the span, across T.
+    ``T (6, 2)`` is the basis of the plane T, ``U (6, 2)`` that of the rest of the span, across T.
     """
 
     C: FloatArray
@@ -264,19 +257,10 @@ MIN_THICKNESS = 1e-9  # of the longest extent, which flat bodies are given so th
 
 
 def surface_mesh(body: Body, level: int) -> tuple[FloatArray, IntArray]:
-    """Triangles inscribed in the body's surface, seen anticlockwise from outside.
+    """Points ``(k, 3)`` and triangles ``(m, 3)`` inscribed in the body's surface, seen anticlockwise from outside.
 
-    Parameters
-    ----------
-    body : Body
-        A polytope, whose faces are returned whatever the level, or a smooth body.
-    level : int
-        Each level has four times as many triangles as the one before, 20 at level 0.
-
-    Returns
-    -------
-    points : (k, 3) array
-    triangles : (m, 3) array of int
+    Those of a polytope are its faces, whatever the level; of a smooth body each level has four times as many as the one
+    before, 20 at level 0.
     """
     vertices = vertices_of(body)
     if vertices is not None:
@@ -319,15 +303,8 @@ def sphere_mesh(level: int) -> tuple[FloatArray, IntArray]:
 
 
 def fan_area(support: FloatArray) -> float:
-    """Area of the hull of a convex figure and 0.
+    """Area of the hull of a convex figure and 0, from its support ``(k,)`` at equal steps of the full turn.
 
-    Parameters
-    ----------
-    support : (k,) array
-        Support function of the figure at ``k`` equal steps of the full turn; negative where 0 lies outside.
-
-    Notes
-    -----
     The hull consists of the triangles between 0 and the sides that look away from it: ``1/2 int h (h + h'')`` over the
     directions with ``h > 0``. Trigonometric interpolation to 64 points per step leaves only the error of ``h`` itself.
     """

@@ -41,16 +41,9 @@ TORQUE_OFFSET = 1e-11  # torque at which K is taken, so that no two bases of the
 class Payload:
     """Largest force that is held.
 
-    Parameters
-    ----------
-    force : float
-        Of a load at the centre of mass [N], as proved; 0 where the squeeze itself is not borne.
-    upper : float
-        What it is at most [N].
-    direction : (3,) array
-        In which the load pulls then.
-    borne : bool
-        Whether friction bears the squeeze itself; at the limit, and without friction, it does not.
+    ``force`` is that of a load at the centre of mass, as proved, 0 where the squeeze itself is not borne, ``upper``
+    what it is at most [N], ``direction (3,)`` in which the load pulls then. ``borne`` says whether friction bears the
+    squeeze itself; at the limit, and without friction, it does not.
     """
 
     force: float

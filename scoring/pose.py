@@ -55,28 +55,12 @@ def pose_volume(
     relative_error: float = 1e-5,
     with_l1: bool = True,
 ) -> PoseVolume:
-    """Volumes of the L-infinity and L1 grasp wrench spaces of two contacts.
+    """Volumes of the L-infinity and L1 grasp wrench spaces of two contacts in any pose [-].
 
-    Parameters
-    ----------
-    contact1, contact2 : SoftContact
-        In any pose; ellipsoids are fastest, polytopes exact.
-    object_length : float or (3,) array
-        As in `scoring.contact.SoftContact.wrench_map` [m].
-    contact_length : float
-        Lengths by which arms and torques about the normals are divided [m].
-    centre_of_mass : (3,) array
-        Point about which torques are taken [m]; the volumes do not depend on it.
-    relative_error : float
-        Pieces of surface are divided until two divisions agree so far, or to the finest division, which leaves
-        up to 1e-4 for bodies that are neither ellipsoids nor polytopes.
-    with_l1 : bool
-        Whether the L1 volume is wanted, which takes a third of the time; NaN if not.
-
-    Returns
-    -------
-    PoseVolume
-        Both volumes [-], extrapolated, and the difference left between divisions.
+    Ellipsoids are fastest, polytopes exact. Lengths and centre are as in `scoring.contact.SoftContact.wrench_map`; the
+    volumes do not depend on the centre. Pieces of surface are divided until two divisions agree to ``relative_error``,
+    or to the finest division, which leaves up to 1e-4 for bodies that are neither. The L1 volume, NaN unless it is
+    asked for, takes a third of the time.
     """
     (C1, body1), (C2, body2) = (
         _evened(c.wrench_map(object_length, contact_length, centre_of_mass), c.body) for c in (contact1, contact2)
@@ -160,10 +144,7 @@ def _spans(C1: FloatArray, body1: Body, C2: FloatArray, body2: Body) -> tuple[Sp
 def mixed_area(sides1: FloatArray, sides2: FloatArray) -> float:
     """Mixed area of two convex polygons, ``1/2 sum h_1(n) |n|`` over the sides n of the second.
 
-    Parameters
-    ----------
-    sides1, sides2 : (m, 2) array
-        Outward normals in any order, as long as their sides; each set sums to 0.
+    Sides ``(m, 2)`` are outward normals in any order, as long as their sides; each set sums to 0.
     """
     first, second = np.arctan2(sides1[:, 1], sides1[:, 0]), np.arctan2(sides2[:, 1], sides2[:, 0])
     order = np.argsort(first)
@@ -176,15 +157,7 @@ def mixed_area(sides1: FloatArray, sides2: FloatArray) -> float:
 
 
 def joint_pairs(normals1: FloatArray, normals2: FloatArray, direction: FloatArray) -> float:
-    """Sum of ``|n_1 x n_2|`` over the pairs with the direction between ``-n_1`` and ``n_2``.
-
-    Parameters
-    ----------
-    normals1, normals2 : (m, 2) array
-        Vectors in any order.
-    direction : (2,) array
-        Not zero.
-    """
+    """Sum of ``|n_1 x n_2|`` over the pairs of normals ``(m, 2)`` with the direction between ``-n_1`` and ``n_2``."""
     x, y = direction / np.linalg.norm(direction)
     turn = np.array([[x, -y], [y, x]])
     a, b = -normals1 @ turn, normals2 @ turn

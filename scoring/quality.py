@@ -28,24 +28,11 @@ class ScoreFlag(IntFlag):
 
 @dataclass(frozen=True)
 class Score:
-    """Qualities of a grasp, for normal forces of one.
+    """Qualities of a grasp, for normal forces of one [-].
 
-    Parameters
-    ----------
-    quality : float
-        Volume of the L-infinity grasp wrench space [-].
-    quality_l1 : float
-        Volume of the L1 grasp wrench space [-].
-    epsilon : float
-        Radius of the largest ball around 0 in the L-infinity grasp wrench space [-].
-    flag : ScoreFlag
-        0 if nothing is unusual.
-    epsilon_l1 : float
-        The same radius in the L1 grasp wrench space [-].
-    method : str
-        How the volumes were found: "antipodal" in closed form, "pose" by division of the surfaces.
-    error : float
-        Relative error of the volumes left by that method [-].
+    ``quality`` and ``quality_l1`` are the volumes of the L-infinity and L1 grasp wrench spaces, ``epsilon`` and
+    ``epsilon_l1`` the radii of the largest balls around 0 in them. ``method`` says how the volumes were found,
+    "antipodal" in closed form or "pose" by division of the surfaces, and ``error`` the relative error that it leaves.
     """
 
     quality: float
@@ -66,20 +53,10 @@ def score(
 ) -> Score:
     """Score of two soft contacts that face each other, about a centre of mass halfway between them.
 
-    Parameters
-    ----------
-    contact1, contact2 : (3,) sequence
-        Semi-axes ``(f_x, f_y, tau_z)`` of an ellipsoid, per unit normal force [-, -, m]; ``(mu, mu, mu e_n)`` is the
-        simplified surface of Eq. (12). Other bodies go to `grasp_score`.
-    distance : float
-        Distance of the contacts [m].
-    object_length : float
-        Length by which the arms of the contacts are divided [m].
-    contact_length : float
-        Length by which the torques about the normals are divided [m].
+    Contacts are semi-axes ``(f_x, f_y, tau_z)`` of ellipsoids per unit normal force [-, -, m]; other bodies go to
+    `grasp_score`. ``distance`` is that of the contacts, ``object_length`` divides their arms and ``contact_length`` the
+    torques about the normals [m].
 
-    Examples
-    --------
     >>> score((1, 1, 0.01), (1, 1, 0.01), distance=0.06, object_length=0.06, contact_length=0.05).flag
     <ScoreFlag.CLEAN: 0>
     """
@@ -135,28 +112,11 @@ def grasp_score(
     tolerance: float = 1e-4,
     with_epsilon: bool = True,
 ) -> Score:
-    """Score of two soft contacts in any poses, with any limit surfaces.
+    """Score of two soft contacts in any poses, with any limit surfaces; lengths and centre as in `scoring.epsilon`.
 
-    Parameters
-    ----------
-    contacts : two SoftContact
-    object_length : float
-        Length by which the arms of the contacts are divided [m].
-    contact_length : float
-        Length by which the torques about the normals are divided [m].
-    centre_of_mass : (3,) array
-        Point about which torques are taken [m]; only epsilon depends on it.
-    tolerance : float
-        Two contacts count as facing each other, and the closed form is used, if both normals are within this angle of
-        the line of the contacts [rad]; the volume is then off by up to some 10 times its square.
-    with_epsilon : bool
-        Whether to find both epsilons, which without a closed form takes longer than the volumes; else they are nan.
-
-    Returns
-    -------
-    Score
-        Epsilon is the lower bound if `scoring.epsilon` left a gap.
-
+    The contacts count as facing each other, and the closed form is used, if both normals are within ``tolerance`` of
+    the line of the contacts [rad]; the volume is then off by up to some 10 times its square. Both epsilons, nan unless
+    asked for, take longer than the volumes without a closed form; they are the lower bounds if a gap was left.
     """
     if len(contacts) != 2:
         raise ValueError(f"contacts: found {len(contacts)}, expected the two of a parallel gripper")
