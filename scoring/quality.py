@@ -60,11 +60,9 @@ def score(
     >>> score((1, 1, 0.01), (1, 1, 0.01), distance=0.06, object_length=0.06, contact_length=0.05).flag
     <ScoreFlag.CLEAN: 0>
     """
-    rho = _positive("contact_length", contact_length)
-    L = _positive("object_length", object_length)
-    d = _positive("distance", distance) / L
-    a, b = _scaled("contact1", contact1, rho), _scaled("contact2", contact2, rho)
-    (V1, A1), (V2, A2) = _volume_and_shadow(a), _volume_and_shadow(b)
+    d = distance / object_length
+    a, b = ((f_x, f_y, tau_z / contact_length) for f_x, f_y, tau_z in (map(float, contact1), map(float, contact2)))
+    (V1, A1), (V2, A2) = ((4 / 3 * math.pi * math.prod(axes), math.pi * axes[0] * axes[1]) for axes in (a, b))
     linf, l1 = volume_linf(V1, A1, V2, A2, d), volume_l1(V1, A1, V2, A2, d)
     return Score(linf, l1, epsilon_linf(a, b, -d / 2, d / 2), _lacking(a, b), epsilon_l1(a, b, -d / 2, d / 2))
 
@@ -83,25 +81,6 @@ def _lacking(*contacts: Sequence[float]) -> ScoreFlag:
         if f_x <= least or f_y <= least:
             flag |= ScoreFlag.NO_FORCE
     return flag
-
-
-def _scaled(name: str, contact: Iterable[float], length: float) -> tuple[float, float, float]:
-    f_x, f_y, tau_z = map(float, contact)
-    for label, value in (("f_x", f_x), ("f_y", f_y), ("tau_z", tau_z)):
-        if not 0 <= value < math.inf:
-            raise ValueError(f"{name}: {label} is {value}; semi-axes must be finite and not negative")
-    return f_x, f_y, tau_z / length
-
-
-def _positive(name: str, value: float) -> float:
-    if not 0 < value < math.inf:
-        raise ValueError(f"{name} is {value}: it must be a positive length in metres")
-    return float(value)
-
-
-def _volume_and_shadow(axes: tuple[float, float, float]) -> tuple[float, float]:
-    f_x, f_y, tau_z = axes
-    return 4 / 3 * math.pi * f_x * f_y * tau_z, math.pi * f_x * f_y
 
 
 def grasp_score(

@@ -117,21 +117,6 @@ def test_the_score_has_no_unit():
     )
 
 
-@pytest.mark.parametrize(
-    ("arguments", "match"),
-    [
-        (((1, -1, 0.1), (1, 1, 0.1), 1, 1, 1), "contact1: f_y is -1"),
-        (((1, 1, 0.1), (1, 1, math.nan), 1, 1, 1), "contact2: tau_z is nan"),
-        (((1, 1, 0.1), (1, 1, 0.1), 0, 1, 1), "distance is 0"),
-        (((1, 1, 0.1), (1, 1, 0.1), 1, math.inf, 1), "object_length is inf"),
-        (((1, 1, 0.1), (1, 1, 0.1), 1, 1, 0.0), "contact_length is 0"),
-    ],
-)
-def test_bad_arguments_are_named(arguments, match):
-    with pytest.raises(ValueError, match=match):
-        score(*arguments)
-
-
 def test_linearised_surfaces_are_inscribed_and_flat_ones_have_no_volume():
     np.testing.assert_allclose(((fibonacci_vertices(A, 20) / A) ** 2).sum(axis=1), 1, rtol=1e-14)
     volumes = [polytope_volume(fibonacci_vertices(A, m)) for m in (100, 400, 1600)]
