@@ -25,14 +25,8 @@ FEWEST = 8  # of them that enclose an area
 class CentreLine:
     """Middle of an object over the height.
 
-    Parameters
-    ----------
-    z : (k,) array
-        Ascending heights [m].
-    middle : (k, 2) array
-        Centroids of the largest loops, smoothed [m].
-    loops : (k,) array of int
-        Closed loops that enclose material at each height; more than one: the object has arms there.
+    ``middle (k, 2)``: smoothed centroids of the largest loops at heights ``z (k,)`` [m]; ``loops (k,)``: closed loops
+    that enclose material; more than one: the object has arms there.
     """
 
     z: FloatArray

@@ -25,12 +25,8 @@ GRAZE = 1e-9  # depth that a point has to reach to have met the object [m]: less
 class Pose:
     """Where a pad stands: ``x_object = rotation @ x_pad + origin``.
 
-    Parameters
-    ----------
-    rotation : (3, 3) array
-        Columns are the pad's long side, its short side and its approach direction, in the object's frame.
-    origin : (3,) array
-        Centre of the pad's undeformed contact face [m].
+    Columns of the rotation are the pad's long side, its short side and its approach direction in the object's frame,
+    the origin is the centre of its undeformed contact face [m].
     """
 
     rotation: FloatArray

@@ -67,16 +67,9 @@ class Line:
 class MeasuredFace:
     """Face ``z = h(x, y)`` with the object above it, ``z`` along the approach, in the frame of the pad at closing 0.
 
-    Parameters
-    ----------
-    x, y : Line
-        ``x`` is None for a contour, which is the same all along the pad.
-    coefficients : (p, q) array
-        Of the products of both splines; ``p`` is 1 for a contour [m].
-    noise : float
-        Standard deviation of the points from the face [m].
-    doubt : float
-        Largest standard error of the face at a point (Wahba's Bayesian one, which holds its bias, too) [m].
+    ``x`` is None for a contour, which is the same all along the pad; ``coefficients (p, q)`` are of the products of
+    both splines, p = 1 for a contour [m]; ``noise``: standard deviation of the points from the face [m]; ``doubt``:
+    largest standard error of the face at a point (Wahba's Bayesian one, which holds its bias, too) [m].
     """
 
     x: Line | None

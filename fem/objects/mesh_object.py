@@ -36,26 +36,13 @@ TURNS = {"x": [1, 2, 0], "y": [2, 0, 1], "z": [0, 1, 2]}  # cyclic, so that no m
 
 @dataclass(frozen=True, eq=False)
 class MeshObject:
-    """Triangles that a finger can meet, on whichever of their sides.
+    """Triangles that a finger can meet, on whichever of their sides; points and lids in the object's frame [m].
 
-    Parameters
-    ----------
-    points : (k, 3) array
-        Corners in the object's frame [m].
-    triangles : (m, 3) array of int
-        Corners of each triangle.
-    grid_step : float or None
-        Step of the sampling grid [m]; by default a quarter of the pad's element.
-    notes : tuple of str
-        What was mended or left open when the mesh was read.
-    crease_angle : float
-        Edges that turn by less are taken for facets of a smooth surface [deg]; 0 keeps every facet flat.
-    lids : (l, 3, 3) array
-        Corners of triangles over the holes of the mesh [m]: where a pad stands over one, its case is flagged.
-    placed : Pose
-        Where the object's frame lies in that of the mesh file [m].
-    closed : bool
-        Whether the triangles are closed surfaces, counterclockwise from outside.
+    ``grid_step`` of the sampling grid is by default a quarter of the pad's element [m]; ``notes``: what was mended or
+    left open when the mesh was read; edges that turn by less than ``crease_angle`` [deg] are taken for facets of a
+    smooth surface, 0 keeps every facet flat; ``lids (l, 3, 3)``: triangles over the holes, where a pad before one is
+    flagged; ``placed``: where the object's frame lies in that of the mesh file [m]; ``closed``: whether the triangles
+    are closed surfaces, counterclockwise from outside.
     """
 
     points: FloatArray

@@ -17,16 +17,9 @@ PER_SIDE = {"hex8": 2, "hex27": 3}  # nodes along a side of each element
 class PadShape:
     """Dimensions and mesh of a pad.
 
-    Parameters
-    ----------
-    size : tuple of 3 floats
-        Length (x), width (y), thickness (z) [m].
-    elements : tuple of 3 ints
-        Of the whole pad along x, y, z.
-    grading : tuple of 3 floats
-        Size of the elements at the rim (x, y) and at the back (z) over that at the centre and at the contact face [-].
-    element : str
-        ``"hex8"`` (trilinear, 2 x 2 x 2 points) or ``"hex27"`` (triquadratic, 3 x 3 x 3 points).
+    ``size``: length (x), width (y), thickness (z) [m]; ``elements`` of the whole pad along these; ``grading``: size of
+    the elements at the rim (x, y) and at the back (z) over that at the centre and at the contact face; ``element``:
+    "hex8" (trilinear, 2 x 2 x 2 points) or "hex27" (triquadratic, 3 x 3 x 3 points).
     """
 
     size: tuple[float, float, float]

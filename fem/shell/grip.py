@@ -71,14 +71,7 @@ class WallState:
 class Grip(LoadPath[WallProblem]):
     """Pads on a thin-walled object.
 
-    Parameters
-    ----------
-    problems : sequence of callables
-        They make the problem, and the same one with nodal gaps, for forces at which it has no solution.
-    options : dict
-        PETSc options with the prefix ``contact_``.
-    stride : int
-        As in `fem.contact.path.LoadPath`.
+    ``problems`` make it with weighted gaps, and with nodal ones, for forces at which the former have no solution.
     """
 
     MOST_ITERATIONS = 200  # with weighted and with nodal gaps each; usual ones take 6

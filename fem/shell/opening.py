@@ -33,16 +33,8 @@ class Opening:
 
     The grasp frame's x axis is the approach, so a node is compared with the one that it looks at along x: its own image
     where x = 0 is a plane of symmetry, else the nearest across from it. An indentation turns back at its deepest place,
-    where it is level; so the node that lies nearest there is good enough.
-
-    Parameters
-    ----------
-    mesh : BodyMesh
-
-    Attributes
-    ----------
-    last : (float, float)
-        Opening and force [N] of the last state that was watched.
+    where it is level; so the node that lies nearest there is good enough. ``last``: opening and force [N] of the last
+    state that was watched.
     """
 
     def __init__(self, mesh: BodyMesh) -> None:

@@ -170,18 +170,10 @@ def body_mesh(
 ) -> BodyMesh:
     """Mesh of the wall inside a surface; its outer face lies on the surface.
 
-    Parameters
-    ----------
-    surface : OuterSurface
-    thickness : float or (k, 2) list
-        Wall thickness [m], or pairs (z, thickness) between which it is interpolated.
-    size : MeshSize
-    symmetry : (bool, bool)
-        Planes of symmetry x = 0 and y = 0: the half y >= 0 or x >= 0, or the quarter, is meshed.
-    open_top, open_bottom : bool
-        Whether the mesh ends at the last or begins at the first given section instead of on the axis.
-    base_thickness : float, optional
-        Thickness of the flat bottom [m]; the rim above it changes over to the wall's.
+    ``thickness`` [m] may be pairs (z, thickness) between which it is interpolated; ``symmetry``: planes x = 0 and y =
+    0, of which the half y >= 0 or x >= 0, or the quarter, is meshed; ``open_top, open_bottom``: whether the mesh ends
+    at the last or begins at the first given section instead of on the axis; ``base_thickness`` of the flat bottom [m],
+    the rim above it changes over to the wall's.
 
     Raises
     ------

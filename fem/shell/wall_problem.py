@@ -35,16 +35,10 @@ ROUNDING = 1.5e-18  # norm of the residual over the wall's modulus [m^2]: its fo
 
 
 class WallProblem(ContactProblem):
-    """One or two pads on a deformable wall.
+    """One or two pads on a deformable wall, whose unknowns come first.
 
-    Parameters
-    ----------
-    model : NonlinearWall or LinearWall
-        The wall; its unknowns come first.
-    pads : sequence of (Pad, Gap, Pose, Wall)
-        One where a plane of symmetry lies between the fingers, else two; see `fem.contact.problem.Finger`.
-    mu : float, optional
-        Friction coefficient; without it no friction acts back on the pressures.
+    One pad where a plane of symmetry lies between the fingers, else two, as of `fem.contact.problem.Finger`; without
+    ``mu`` no friction acts back on the pressures.
     """
 
     longest_closing = 1e-3
