@@ -1,6 +1,7 @@
 """Closed forms that the solver is measured against: energies, homogeneous states, Hertz, and rigid objects.
 
-Nothing here uses the code under test, but for ``placed``, which puts an object before the pad, and ``e_n``.
+Nothing here uses the code under test, but for ``placed``, which puts an object before the pad, ``e_n``, and the usual
+pad with two objects.
 """
 
 from __future__ import annotations
@@ -13,7 +14,9 @@ from scipy.sparse import csr_matrix
 from softjaw.fem.contact.extract import extract
 from softjaw.fem.contact.load_stepping import Work
 from softjaw.fem.contact.problem import Control
+from softjaw.fem.materials import material
 from softjaw.fem.objects.gap import Pose
+from softjaw.fem.objects.shapes import EllipticCylinder, Sphere
 from softjaw.friction.frame import contact_frame, in_frame
 from softjaw.friction.wrench import friction_limits
 
@@ -178,3 +181,8 @@ def at_closing(press, closing, x=None):
     start = press.problem.guess(closing) if x is None else x
     x = press._stepping.solve(start, Control(closing=closing), Work())
     return x, press.problem.normal_force(x)
+
+
+SIZE, FOAM = (0.050, 0.022, 0.015), material("blatz_ko", 0.040e6)  # of the usual pad
+OVAL = placed(EllipticCylinder(0.025, 0.020, 0.1), facing(0.025))
+BALL = placed(Sphere(0.025), facing(0.025))

@@ -150,8 +150,3 @@ def test_principal_axes(scale):
     assert np.abs(vectors @ np.diag(values) @ vectors.T - M).max() < 1e-14 * np.abs(M).max() * 10
     assert np.abs(vectors.T @ vectors - np.eye(3)).max() < 1e-14
 
-
-def test_constants():
-    foam = material("blatz_ko", G)
-    assert (foam.young_modulus, foam.poisson_ratio) == (pytest.approx(2.5 * G), 0.25)
-    assert material("hyperfoam", poisson_ratio=0.1, **TWO_TERMS).shear_modulus == pytest.approx(2e4)

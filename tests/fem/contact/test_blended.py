@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from softjaw.fem.contact.press import Press
-from softjaw.fem.materials import material
 from softjaw.fem.pad.mesh import RULES, Pad
 from softjaw.fem.pad.shape import PadShape
 from softjaw.study.case.build import build_object
@@ -14,9 +13,9 @@ from softjaw.study.case.model import approach
 from softjaw.study.case.poses import axis_poses
 from softjaw.study.scene import parse_scene
 from tests.fem import reference
+from tests.fem.reference import FOAM
 
 BOTTLE = Path(__file__).parents[3] / "jobs" / "bottle-rigid.toml"
-FOAM = material("blatz_ko", 4e4)
 FORCES = (1.0, 2.0, 4.0, 7.0, 13.0)
 # e_n [mm] at 1, 2, 4, 7, 13 N with hex27, 16 x 24 x 4 elements, twice as thick at the back as at the contact face
 KNOWN = {40.0: (4.2641, 5.0145, 5.8450, 6.5922, 7.5044), 148.5: (3.3351, 3.9995, 4.6951, 5.2494, 5.8079)}

@@ -9,15 +9,10 @@ from softjaw.fem.contact.press import Press
 from softjaw.fem.contact.problem import Control, SpringBed
 from softjaw.fem.contact.rigid import RigidProblem
 from softjaw.fem.materials import material
-from softjaw.fem.objects.shapes import EllipticCylinder, Sphere
 from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.pad.shape import PadShape
 from tests.fem import reference
-
-SIZE = (0.050, 0.022, 0.015)
-FOAM = material("blatz_ko", 0.040e6)
-OVAL = reference.placed(EllipticCylinder(0.025, 0.020, 0.1), reference.facing(0.025))
-BALL = reference.placed(Sphere(0.025), reference.facing(0.025))
+from tests.fem.reference import BALL, FOAM, OVAL, SIZE
 
 
 def pad_of(symmetry=(True, True), elements=(8, 4, 3), law=FOAM):

@@ -7,7 +7,6 @@ from scipy.interpolate import RegularGridInterpolator
 from softjaw.fem.contact.extract import extract
 from softjaw.fem.contact.measured import NOISE_MARGIN, LiftedFace, MeasuredPress
 from softjaw.fem.contact.press import Press
-from softjaw.fem.materials import material
 from softjaw.fem.objects.gap import NoContactError
 from softjaw.fem.objects.measured_face import cell_of, measured_face
 from softjaw.fem.objects.shapes import EllipticCylinder
@@ -15,8 +14,9 @@ from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.pad.shape import PadShape
 from softjaw.study.case.contact import Contact
 from tests.fem import reference
+from tests.fem.reference import FOAM, SIZE
 
-SIZE, FOAM, NOISE = (0.050, 0.022, 0.015), material("blatz_ko", 0.040e6), 1e-4
+NOISE = 1e-4
 CYLINDER = reference.placed(EllipticCylinder(0.025, 0.025, 0.2), reference.facing(0.025))
 
 

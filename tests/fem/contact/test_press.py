@@ -8,17 +8,14 @@ import pytest
 from softjaw.fem.contact.press import Press
 from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.fem.materials import material
-from softjaw.fem.objects.shapes import EllipticCylinder, Sphere
+from softjaw.fem.objects.shapes import EllipticCylinder
 from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.pad.shape import PadShape
 from softjaw.fem.petsc import PETSc
 from tests.fem import reference
+from tests.fem.reference import BALL, FOAM, OVAL, SIZE
 
 G = 0.040e6
-SIZE = (0.050, 0.022, 0.015)
-FOAM = material("blatz_ko", G)
-OVAL = reference.placed(EllipticCylinder(0.025, 0.020, 0.1), reference.facing(0.025))
-BALL = reference.placed(Sphere(0.025), reference.facing(0.025))
 FORCES = [1.0, 3.0, 10.0, 20.0]
 VI = {"contact_snes_type": "vinewtonrsls"}
 

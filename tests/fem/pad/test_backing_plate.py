@@ -6,17 +6,12 @@ import pytest
 from softjaw.fem.contact.press import Press
 from softjaw.fem.contact.problem import Control, SpringBed
 from softjaw.fem.contact.rigid import RigidProblem
-from softjaw.fem.materials import material
-from softjaw.fem.objects.shapes import EllipticCylinder, Sphere
 from softjaw.fem.pad.backing_plate import back_stiffness, relative_compliance
 from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.pad.shape import BackingPlate, PadShape
 from tests.fem import reference
+from tests.fem.reference import BALL, FOAM, OVAL, SIZE
 
-SIZE = (0.050, 0.022, 0.015)
-FOAM = material("blatz_ko", 0.040e6)
-OVAL = reference.placed(EllipticCylinder(0.025, 0.020, 0.1), reference.facing(0.025))
-BALL = reference.placed(Sphere(0.025), reference.facing(0.025))
 PLASTIC = BackingPlate(0.001, 2e9, 0.35, (0.02, 0.011))
 X, Y = tuple(np.linspace(-0.025, 0.025, 21)), tuple(np.linspace(-0.011, 0.011, 5))
 WHOLE = (False, False)

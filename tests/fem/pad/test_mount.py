@@ -6,14 +6,13 @@ import pytest
 from softjaw.fem.contact.press import Press
 from softjaw.fem.contact.problem import Control, SpringBed
 from softjaw.fem.contact.rigid import RigidProblem
-from softjaw.fem.materials import material
 from softjaw.fem.objects.gap import Pose
 from softjaw.fem.objects.shapes import EllipticCylinder
 from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.pad.shape import PadShape, TiltingMount
 from tests.fem import reference
+from tests.fem.reference import FOAM, SIZE
 
-SIZE, FOAM = (0.050, 0.022, 0.015), material("blatz_ko", 0.040e6)
 GLUE = 1e4 * FOAM.young_modulus / SIZE[2]
 CYLINDER = EllipticCylinder(0.025, 0.025, 0.2)
 

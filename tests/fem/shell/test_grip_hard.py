@@ -61,15 +61,6 @@ def test_a_wall_that_gives_way_is_flagged():
     assert [s.wall.snapped for s in states] == [False, True]
 
 
-@pytest.mark.long
-def test_a_force_beyond_the_snap_is_the_same_state_from_below_and_at_once():
-    at_once = next(grip(thin(3e-4), elements=(6, 4, 2), mesh=ROUGH).load_path([4.0]))
-    *_, stepwise = grip(thin(3e-4), elements=(6, 4, 2), mesh=ROUGH).load_path([1.0, 2.5, 3.0, 4.0])
-    assert at_once.wall.snapped
-    assert stepwise.wall.snapped
-    assert at_once.fingers[0].closing == pytest.approx(stepwise.fingers[0].closing, rel=1e-6)
-
-
 def test_pads_and_wall_must_balance():
     held = grip(thin(), elements=(6, 4, 2), mesh=ROUGH)
     state = next(held.load_path([1.0]))
