@@ -11,7 +11,6 @@ from scipy.spatial import cKDTree
 
 from softjaw.friction.patch import CANCEL, NEGLIGIBLE, ContactPatch, FloatArray, slivers
 
-SAME = 1e-6  # of a usual face's size: corners no farther apart are one
 UNLOADED = 0.01  # weight of a face's own normal, in mean loads of all faces: the object's counts where there is load
 
 
@@ -108,7 +107,8 @@ class ContactFace:
             raise ValueError("corners: found faces that are wound both ways about their normals, expected one sense")
         plane_normal *= np.sign(sense)
         share = patch.load[:, None] * patch.normal + UNLOADED * patch.load.mean() * plane_normal
-        corner = _numbered(q.reshape(-1, 3), SAME * np.median(np.ptp(q, axis=1).max(axis=1)))
+        # corners no farther apart than this share of a usual face's size are one
+        corner = _numbered(q.reshape(-1, 3), 1e-6 * np.median(np.ptp(q, axis=1).max(axis=1)))
         weight = np.repeat(share, 4, axis=0)
         total = np.column_stack([np.bincount(corner, weight[:, k]) for k in range(3)])
         length = np.linalg.norm(total, axis=1, keepdims=True)

@@ -16,7 +16,6 @@ from softjaw.lsfit.surface import FitError
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
-MOST_STEPS = 4096  # round a shadow
 
 
 @lru_cache
@@ -244,7 +243,7 @@ def quartic_shadow(coefficients: FloatArray, reach: FloatArray) -> float:
     c = coefficients * np.prod(reach ** exponents(3, 4), axis=1)
     area, change, n = 0.0, math.inf, 16
     # equal steps converge exponentially for a smooth outline, so two that agree are both right
-    while change > 1e-13 * area and n < MOST_STEPS:
+    while change > 1e-13 * area and n < 4096:
         n, last = 2 * n, area
         # half a turn stands for the whole, which cancels the half of 1/2 int r^2; r^2 is 1 / sqrt(P)
         area = np.pi / n * float((1.0 / np.sqrt(_floors(c, _plane_monomials(n)))).sum())

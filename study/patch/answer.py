@@ -23,7 +23,6 @@ from softjaw.study.patch.faces import ReadPatch, refuse
 from softjaw.study.patch.patch_reader import ENDINGS, Reading, checked_file, read_table
 from softjaw.study.quantities import MODELS
 
-EXACT = 2000  # motions whose hull gives the volume of the limit surface itself, to some 1e-4
 HALF_TURN = np.diag([1.0, -1.0, -1.0])  # about x: how the second of two equal fingers stands
 SURFACES = {  # as a scene names them, and in the text
     "three_motions": "ellipsoid, three motions",
@@ -124,9 +123,9 @@ def grasp_lengths(
 
 
 def exact_surface(contact: Contact, model: str) -> ExactSurface:
-    """The limit surface itself of a contact, per unit of S [-, -, m]."""
+    """The limit surface itself of a contact, per unit of S [-, -, m]; 2000 motions give its volume to some 1e-4."""
     share = contact.mu / contact.limits[model].S
-    return ExactSurface(lambda t: friction_wrench(contact.local, t, share, model)[:, [0, 1, 5]], contact.rho, EXACT)
+    return ExactSurface(lambda t: friction_wrench(contact.local, t, share, model)[:, [0, 1, 5]], contact.rho, 2000)
 
 
 class EvaluatedPatch:

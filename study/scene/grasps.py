@@ -20,7 +20,6 @@ EXAMPLE = "for example `stations = 35` with `stations_mm = [25, 175]`"
 BUDGET = 120  # cases of a refinement
 # keys that stations, poses and a sampler share
 OF_EVERY_KIND = ("roll_deg", "shift_mm", "refine")
-ALONG = 0.996  # cosine between approach and long side from which they are parallel
 
 
 class GraspPose(SceneSection):
@@ -51,7 +50,7 @@ class GraspPose(SceneSection):
     def rules(self) -> Errors:
         """Directions that do not fix a frame, points far from any object."""
         cosine = sum(a * b for a, b in zip(_unit(self.approach), _unit(self.long_side), strict=True))
-        if abs(cosine) > ALONG:
+        if abs(cosine) > 0.996:  # parallel, to some 5 degrees
             yield wrong(self.long_side, "a direction across the approach, in the pad's face", "long_side")
         if max(map(abs, self.point_mm)) > LARGEST_MM:
             yield wrong(self.point_mm, f"a point within {LARGEST_MM:g} mm of the origin, in mm", "point_mm")
