@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 import os
+from bisect import bisect_right
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -49,10 +51,6 @@ class ResultWriter:
         self._sessions = self._file[f"{ROOT}/provenance/sessions"]
         self.session, self._wanted = 0, wanted
 
-    def layout_of(self, _row: int) -> Layout:
-        """Layout of the file that a row is stored in."""
-        return self.layout
-
     def codes(self) -> np.ndarray:
         """State of every row, ``(rows,)``."""
         codes: np.ndarray = self._code[()]
@@ -65,8 +63,8 @@ class ResultWriter:
         # a row with the values of a coarser mesh was begun once for these
         return np.maximum(self._attempts[()].ravel().astype(int) - (self._code[()].ravel() == DONE), 0)
 
-    def count_attempt(self, row: int, change: int = 1) -> None:
-        """Note that a case is about to be solved (or, with -1, that it was given up in an orderly way)."""
+    def count_attempt(self, row: int, change: int) -> None:
+        """Note that a case is about to be solved (1), or was given up in an orderly way (-1)."""
         index = self._index(row)
         # One byte holds it, which must neither wrap round nor fall below 0.
         self._attempts[index] = min(max(int(self._attempts[index]) + change, 0), 255)
@@ -178,6 +176,33 @@ class ResultWriter:
     def close(self) -> None:
         """Close on all ranks."""
         self._file.close()
+
+
+class Files:
+    """Result files as one: their rows are counted through, those of the first one first; closing is collective."""
+
+    def __init__(self, path: Path, writers: Sequence[ResultWriter]) -> None:
+        self.path, self.writers = path, writers
+        self._first = np.cumsum([0, *(writer.layout.rows for writer in writers)]).tolist()
+
+    def at(self, row: int) -> tuple[ResultWriter, int]:
+        """The file that has a row, and the row's number there."""
+        k = bisect_right(self._first, row) - 1
+        return self.writers[k], row - self._first[k]
+
+    def counted(self, number: int, units: Sequence[Any]) -> list[Any]:
+        """Units of work on one of the files, with rows as they are counted here."""
+        first = self._first[number]
+        return [replace(u, rows=tuple(tuple(first + row for row in rows) for rows in u.rows)) for u in units]
+
+    def codes(self) -> np.ndarray:
+        """State of every row, ``(rows,)``."""
+        return np.concatenate([writer.codes() for writer in self.writers])
+
+    def close(self) -> None:
+        """Close on all ranks."""
+        for writer in self.writers:
+            writer.close()
 
 
 def _write_block(dataset: h5py.Dataset, index: tuple[int, ...], value: np.ndarray) -> None:

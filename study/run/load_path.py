@@ -16,7 +16,7 @@ from softjaw.study.case.result import CaseFailure, CaseResult, TimeLimitError
 from softjaw.study.quantities import NO_GRASP
 from softjaw.study.result.layout import FAILED, MISSING
 from softjaw.study.result.lock import OpenedFile
-from softjaw.study.result.write import record
+from softjaw.study.result.write import Files, record
 from softjaw.study.run.limits import AbandonedError, Stopper, is_out_of_memory
 from softjaw.study.run.schedule import LostRanks
 from softjaw.study.run.shares import Share
@@ -74,14 +74,14 @@ class PathSolver:
 
     def __init__(
         self,
-        writer: Any,
+        files: Files,
         solve_unit: Callable,
         image: Callable | None,
         claims: Any,
         lost: LostRanks,
         state: OpenedFile,
     ) -> None:
-        self._writer, self._solve_unit, self._image, self._claims = writer, solve_unit, image, claims
+        self._files, self._solve_unit, self._image, self._claims = files, solve_unit, image, claims
         self._lost, self._state = lost, state
         self._begun: list[int] = []
 
@@ -134,21 +134,22 @@ class PathSolver:
         # No longer begun before it is stored: a stop amid the writes must not count it back.
         self._begun = [row for row in self._begun if row not in rows]
         for c, row in served:
+            writer, at = self._files.at(row)
             if isinstance(result, CaseFailure):
                 with self._state.writing():
-                    self._writer.fail(row, result.message, seconds=math.nan if c else seconds)
+                    writer.fail(at, result.message, seconds=math.nan if c else seconds)
                 continue
             mine = self._image(result, unit, c) if self._image else result
-            values = record(self._writer.layout_of(row), _with_work(mine, c, seconds))
+            values = record(writer.layout, _with_work(mine, c, seconds))
             with self._state.writing():
-                self._writer.write(row, values)
+                writer.write(at, values)
 
     def _fail(self, unit: Any, pending: Pending, message: str, seconds: float) -> None:
         """Note what failed, and take it from what is pending: the lowest force, and those above that depend on it."""
         self._begun = []
         failed = {k: pending[k] for k in ([min(pending)] if unit.apart else pending)}
         with self._state.writing():
-            fail_from(self._writer, failed, message, NOT_TRIED, seconds)
+            fail_from(self._files, failed, message, NOT_TRIED, seconds)
         for k in failed:
             del pending[k]
 
@@ -157,33 +158,35 @@ class PathSolver:
         # Complete forces are solved again on the way and leave the rows as they were: these are counted once.
         if rows != self._begun:
             self._uncount()
-            with self._state.writing():
-                for row in rows:
-                    self._writer.count_attempt(row)
+            self._add(rows, 1)
             self._begun = rows
 
     def _uncount(self) -> None:
         # Taken away first: a signal that calls this again meanwhile must not count twice.
         rows, self._begun = self._begun, []
+        self._add(rows, -1)
+
+    def _add(self, rows: Iterable[int], change: int) -> None:
         with self._state.writing():
-            for row in rows:
-                self._writer.count_attempt(row, -1)
+            for writer, at in map(self._files.at, rows):
+                writer.count_attempt(at, change)
 
 
-def give_up(writer: Any, share: Share, patience: float) -> None:
+def give_up(files: Files, share: Share, patience: float) -> None:
     """Mark what is missing of a share as failed, because the rank that solves it hangs; by any other rank."""
     above = LEFT if share.unit.apart else NOT_TRIED
-    fail_from(writer, _pending(share, writer.codes()), HUNG.format(patience=patience), above)
+    fail_from(files, _pending(share, files.codes()), HUNG.format(patience=patience), above)
 
 
-def fail_from(writer: Any, pending: Pending, message: str, above: str, seconds: float = math.nan) -> None:
+def fail_from(files: Files, pending: Pending, message: str, above: str, seconds: float = math.nan) -> None:
     """Store why the lowest of the pending forces failed, after ``seconds``, and of those ``above`` why not tried."""
     lowest = min(pending, default=0)
     for k, served in pending.items():
         for n, (_, row) in enumerate(served):
             first = k == lowest and n == 0  # the time is spent once for all candidates that are served
             text = message if k == lowest else above.format(text=message)
-            writer.fail(row, text, seconds=seconds if first else math.nan)
+            writer, at = files.at(row)
+            writer.fail(at, text, seconds=seconds if first else math.nan)
 
 
 def _pending(share: Share, codes: np.ndarray) -> Pending:

@@ -13,8 +13,8 @@ import os
 import sys
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -29,13 +29,13 @@ from softjaw.study.result import index
 from softjaw.study.result.read import dataset, values_of
 from softjaw.study.result.skeleton import rewrite
 from softjaw.study.result.store import open_result
-from softjaw.study.run.batch import Files, ObjectsSession, Part, settled
+from softjaw.study.result.write import Files, ResultWriter
 from softjaw.study.run.limits import AbandonedError, Stopper, limited_memory
-from softjaw.study.run.load_path import sentence
+from softjaw.study.run.load_path import sentence, settle
 from softjaw.study.run.object_folder import ObjectFolder, key_of
 from softjaw.study.run.plan import Plan
 from softjaw.study.run.schedule import Claims
-from softjaw.study.run.session import Work, file_of, finish_alone, locked, on_rank0, rounds_in
+from softjaw.study.run.session import Session, Work, file_of, finish_alone, locked, on_rank0, rounds_in
 from softjaw.study.scene import Scene, SceneError
 from softjaw.study.table import Row
 from softjaw.study.units import in_si
@@ -45,6 +45,17 @@ REASON_LETTERS = 400
 FATAL = (messages.CANNOT_WRITE, messages.IN_USE)  # codes of errors that the objects after it would meet, too
 T = TypeVar("T")
 Study = Callable[[Scene, tuple[str, ...]], tuple[Plan, Work]]
+
+
+@dataclass(frozen=True)
+class Part:
+    """One object of a batch as all ranks know it: its number in the folder, file, plan, and rows that are torn."""
+
+    number: int
+    path: Path
+    plan: Plan
+    torn: tuple[int, ...]
+    seconds: float
 
 
 def run_objects(
@@ -118,7 +129,7 @@ class _ObjectsRun:
 
     def _divide(self, numbers: list[int], function: Callable[[int], Any]) -> tuple[dict[int, Any], bool]:
         """What ``function`` gives for each object, or its state and why not; and whether a signal came."""
-        claims = Claims(self._comm, len(numbers))
+        claims = Claims(self._comm, [1] * len(numbers))
         stopper = Stopper(claims.stop, self._work.time_limit)
         answers, fatal = dict[int, Any](), None
         with stopper, limited_memory(self._work.memory, claims.node.size):
@@ -158,14 +169,17 @@ class _ObjectsRun:
 
     def _cases(self, parts: list[Part]) -> bool:
         """Solve what is missing of some objects; whether a signal came."""
-        files = Files(self._out, parts, self._comm)
-        codes = on_rank0(self._comm, settled, files, parts, self._retry)
-        session = ObjectsSession(files.units(parts), parts[0].plan, self._work, files, self._comm, codes)
+        writers = [ResultWriter(part.path, part.plan.layout, self._comm, part.plan.wanted) for part in parts]
+        files = Files(self._out, writers)
+        codes = on_rank0(self._comm, _settled, writers, parts, self._retry)
+        units = [files.counted(i, part.plan.units) for i, part in enumerate(parts)]
+        # A rank that hangs ends the run, and the next one derives what follows from all cases.
+        session = Session(units, self._work, files, self._comm, codes, more=True)
         code = session.solve()
-        for part, number in zip(parts, files.session, strict=True):
+        for part, writer in zip(parts, writers, strict=True):
             if part.number in self._mine:
                 _, work = self._mine[part.number]
-                end = work, part.path, part.plan, number, session.signal
+                end = work, part.path, part.plan, writer.session, session.signal
                 self._alone(part.number, finish_alone, *end)
         # Nobody reads a file that is being finished.
         self._comm.Barrier()
@@ -251,6 +265,12 @@ def _rows_of(folder: ObjectFolder, out: Path, retry_failed: bool) -> list[Row]:
             row = before | ({"state": index.MISSING} if before["state"] in again else {})
         rows.append(row | {"key": key, "mass": np.nan if mass is None else in_si("mass_g", mass)})
     return rows
+
+
+def _settled(writers: Sequence[ResultWriter], parts: Sequence[Part], retry_failed: bool) -> np.ndarray:
+    """State of every case of some objects as their run begins; by one process."""
+    each = zip(writers, parts, strict=True)
+    return np.concatenate([settle(writer, part.plan.units, part.torn, retry_failed) for writer, part in each])
 
 
 def _why(error: BaseException, limit: float) -> tuple[str, str]:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-NEXT, STOP, SPOKEN = range(3)  # what the counters of a node are for
+NEXT, STOP, SPOKEN, TAKEN = range(4)  # what the counters of a node are for; those of the groups come last
 PATIENCE_LIMITS = 2.0  # of the time limit, after which a rank that has not even heard its own alarm counts as lost
 IDLE = -1
 
@@ -23,23 +23,25 @@ def _shared(node: Any, count: int, kind: type) -> tuple[Any, np.ndarray]:
 
 
 class Claims:
-    """Positions ``0 .. count - 1``, each handed to one rank; creating and freeing are collective.
+    """Positions ``0, 1, ...``, each handed to one rank; creating and freeing are collective.
 
-    Inside a node the next position comes from a counter in shared memory, which needs no help from a rank that is
-    computing. Between nodes the positions are dealt out in turn: a counter on another node would wait until the rank
-    that holds it leaves its solver.
+    They stand in groups, as those of an object do. A rank takes a group that nobody on its node has begun, stays with
+    it as long as it has positions, then helps with the one that has most left. Inside a node the next ones come from
+    counters in shared memory, which need no help from a rank that is computing. Between nodes the groups are dealt out
+    in turn: a counter on another node would wait until the rank that holds it leaves its solver.
 
-    ``comm``: all ranks of the run. ``count``: number of positions. ``node``: the ranks that share this rank's memory;
-    found from ``comm`` where it is not given.
+    ``comm``: all ranks of the run. ``sizes``: number of positions of every group, 1 where no two belong together.
+    ``node``: the ranks that share this rank's memory; found from ``comm`` where it is not given.
     """
 
-    def __init__(self, comm: Any, count: int, node: Any = None) -> None:
+    def __init__(self, comm: Any, sizes: Sequence[int], node: Any = None) -> None:
         self._own = node is None
         self.node = comm.Split_type(MPI.COMM_TYPE_SHARED) if node is None else node
         # Sorted, because all ranks have to number the nodes alike.
         leaders = sorted(set(comm.allgather(self.node.bcast(comm.rank))))
-        self._first, self._step, self._count = leaders.index(self.node.bcast(comm.rank)), len(leaders), count
-        self._window, self._shared = _shared(self.node, 3, np.int64)
+        self._sizes, self._first = np.array(sizes, np.int64), np.cumsum([0, *sizes])
+        self._groups = np.arange(leaders.index(self.node.bcast(comm.rank)), len(sizes), len(leaders))
+        self._window, self._shared = _shared(self.node, TAKEN + len(sizes), np.int64)
         if self.node.rank == 0:
             self._shared[:] = 0
         # Nobody may count before the counters are 0.
@@ -49,22 +51,24 @@ class Claims:
 
     def __iter__(self) -> Iterator[int]:
         """Positions of this rank, until there are none left or somebody called `stop`."""
-        while not self.stopped:
-            position = self._first + self._add_one(NEXT) * self._step
-            if position >= self._count:
+        while not self.stopped and (n := self._add_one(NEXT)) < len(self._groups):
+            yield from self._of(self._groups[n])
+        while not self.stopped and len(self._groups):
+            left = self._sizes[self._groups] - self._shared[TAKEN:][self._groups]
+            if left.max() <= 0:
                 return
-            yield position
+            yield from self._of(self._groups[left.argmax()])
+
+    def _of(self, group: int) -> Iterator[int]:
+        while not self.stopped and (i := self._add_one(TAKEN + group)) < self._sizes[group]:
+            yield int(self._first[group]) + i
 
     def _add_one(self, counter: int) -> int:
-        return self._counted(self._window, counter)
-
-    @staticmethod
-    def _counted(window: Any, counter: int) -> int:
         """What a counter had before this rank added one."""
         before = np.zeros(1, np.int64)
-        window.Fetch_and_op(np.ones(1, np.int64), before, 0, counter, MPI.SUM)
+        self._window.Fetch_and_op(np.ones(1, np.int64), before, 0, counter, MPI.SUM)
         # Only after this the answer has arrived.
-        window.Flush(0)
+        self._window.Flush(0)
         return int(before[0])
 
     def stop(self) -> None:
@@ -82,56 +86,13 @@ class Claims:
         return self._add_one(SPOKEN) == 0
 
     def free(self) -> None:
-        """Give the counter back."""
-        stopped = self.stopped
-        self._window.Unlock_all()
+        """Give the counters back."""
         # Memory of the window is gone after this; whoever still asks reads a copy.
-        self._shared = np.array([0, stopped, 0], np.int64)
+        self._shared = self._shared.copy()
+        self._window.Unlock_all()
         self._window.Free()
         if self._own:
             self.node.Free()
-
-
-class ObjectClaims(Claims):
-    """Positions of several objects, one after the other: a rank stays with an object as long as it has positions.
-
-    It takes an object that nobody on its node has begun, then helps with the one that has most positions left. Between
-    nodes the objects are dealt out in turn.
-
-    ``comm``: all ranks of the run. ``sizes``: number of positions of every object.
-    """
-
-    def __init__(self, comm: Any, sizes: Sequence[int]) -> None:
-        super().__init__(comm, len(sizes))
-        self._sizes = np.array(sizes, np.int64)
-        self._mine = np.arange(self._first, len(sizes), self._step)
-        self._of_objects, self._taken = _shared(self.node, max(len(sizes), 1), np.int64)
-        if self.node.rank == 0:
-            self._taken[:] = 0
-        self.node.Barrier()
-        self._of_objects.Lock_all()
-
-    def __iter__(self) -> Iterator[int]:
-        """Positions of this rank, until there are none left or somebody called `stop`."""
-        for number in super().__iter__():
-            yield from self._of(number)
-        while self._mine.size and not self.stopped:
-            left = self._sizes[self._mine] - self._taken[self._mine]
-            if left.max() <= 0:
-                return
-            yield from self._of(int(self._mine[left.argmax()]))
-
-    def _of(self, number: int) -> Iterator[int]:
-        first = int(self._sizes[:number].sum())
-        while not self.stopped and (i := self._counted(self._of_objects, number)) < self._sizes[number]:
-            yield first + i
-
-    def free(self) -> None:
-        """Give the counters back."""
-        self._of_objects.Unlock_all()
-        self._taken = np.zeros(0, np.int64)
-        self._of_objects.Free()
-        super().free()
 
 
 class LostRanks:

@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -26,14 +27,14 @@ from softjaw.study.result.layout import FAILED, MISSING
 from softjaw.study.result.lock import Lock, OpenedFile
 from softjaw.study.result.skeleton import create, rewrite
 from softjaw.study.result.store import Result, open_result, torn_rows
-from softjaw.study.result.write import MESH, ResultWriter, codes_on, verify
+from softjaw.study.result.write import MESH, Files, ResultWriter, codes_on, verify
 from softjaw.study.run.limits import GRACE, Stopper, limited_memory
 from softjaw.study.run.load_path import PathSolver, give_up, rows_again, settle
 from softjaw.study.run.plan import Plan
 from softjaw.study.run.progress import Progress
 from softjaw.study.run.refine import Rounds, round_text
 from softjaw.study.run.schedule import Claims, LostRanks
-from softjaw.study.run.shares import Share, shares
+from softjaw.study.run.shares import divided
 
 T = TypeVar("T")
 
@@ -148,10 +149,13 @@ def _solve(plan: Plan, work: Work, path: Path, comm: Any, retry_failed: bool) ->
     writer = ResultWriter(path, plan.layout, comm, plan.wanted)
     # Decided by one rank: all must agree on what is missing, whatever is written meanwhile.
     codes = on_rank0(comm, settle, writer, plan.units, torn, retry_failed)
-    session = Session(plan, work, writer, comm, codes)
+    session = Session([plan.units], work, Files(path, [writer]), comm, codes)
     if comm.rank == 0:
         print(_begins(path, codes, len(torn), comm.size, created), flush=True)
-    return session.solve()
+    code = session.solve()
+    if comm.rank == 0:
+        finish_alone(work, path, plan, writer.session, session.signal)
+    return code
 
 
 def rounds_in(path: Path, plan: Plan) -> Rounds:
@@ -199,30 +203,27 @@ def _begins(path: Path, codes: np.ndarray, torn: int, ranks: int, created: bool)
 class Session:
     """The ranks that solve the cases which ``codes`` calls missing; creating and solving are collective over ``comm``.
 
-    ``plan``, ``work``: as for `run_study`; ``writer`` is a `ResultWriter` or stands for one. ``signal`` names the
-    signal that ended it, if one did.
+    ``objects``: units of work on each of the ``files``. ``more``: whether the run goes on after these cases. ``signal``
+    names the signal that ended it, if one did.
     """
 
     signal = ""
 
-    def __init__(self, plan: Plan, work: Work, writer: Any, comm: Any, codes: np.ndarray) -> None:
-        self._plan, self._work, self._writer, self._comm, self._codes = plan, work, writer, comm, codes
-        self._state = OpenedFile(writer.path)
-        self._todo = self._divided(plan, codes)
+    def __init__(
+        self, objects: Sequence[Sequence[Any]], work: Work, files: Files, comm: Any, codes: np.ndarray,
+        more: bool = False,
+    ) -> None:  # fmt: skip
+        self._work, self._files, self._comm, self._codes, self._more = work, files, comm, codes, more
+        self._state = OpenedFile(files.path)
+        self._todo, self._groups = divided(objects, codes, comm.size)
         hosts = len(set(comm.allgather(MPI.Get_processor_name())))
-        if comm.rank == 0:
-            writer.begin_session(**provenance.session(comm.size, hosts, MPI.Get_library_version()))
-        # Every rank needs it: the one that ends a hanging run writes how the session ended.
-        writer.session = comm.bcast(writer.session)
-        self._progress = _progress(plan, codes, comm.size) if comm.rank == 0 else None
-
-    def _divided(self, plan: Plan, codes: np.ndarray) -> list[Share]:
-        """What is missing, in the order of work."""
-        return shares(plan.units, codes, self._comm.size)
-
-    def _claims(self) -> Claims:
-        """Who solves which of it."""
-        return Claims(self._comm, len(self._todo))
+        about = provenance.session(comm.size, hosts, MPI.Get_library_version()) if comm.rank == 0 else {}
+        for writer in files.writers:
+            if comm.rank == 0:
+                writer.begin_session(**about)
+            # Every rank needs it: the one that ends a hanging run writes how the session ended.
+            writer.session = comm.bcast(writer.session)
+        self._progress = _progress(objects, codes, comm.size) if comm.rank == 0 else None
 
     def solve(self) -> int:
         """Solve, wait for all ranks, close the file; the exit code.
@@ -230,33 +231,33 @@ class Session:
         Raises `StudyError`: the file cannot be written any more; with several ranks all of them are ended at once
         instead.
         """
-        claims = self._claims()
+        claims = Claims(self._comm, self._groups)
         lost = LostRanks(claims.node, self._work.time_limit)
         try:
             arrived, name = self._solve_share(claims, lost)
         except StudyError as error:
             _end_all(self._comm, claims, error)
             with contextlib.suppress(OSError, RuntimeError):  # where it could not be written, it may not be closed
-                self._writer.close()
+                self._files.close()
             raise
         if not arrived:  # the rank that hangs can neither close the file nor be waited for
-            self._finish(self._writer, name)
-            print_summary(self._work, self._writer.path)
-            self._comm.Abort(code_of(self._writer.codes()))
+            for writer in self._files.writers:
+                finish(self._work, writer, name)
+            print_summary(self._work, self._files.path)
+            self._comm.Abort(STOPPED if self._more else code_of(self._files.codes()))
         # A signal may reach some ranks only; any name is larger than no name.
         self.signal = name = max(self._comm.allgather(name))
         lost.free()
         claims.free()
-        code = code_of(self._writer.codes())
-        self._writer.close()
+        code = code_of(self._files.codes())
+        self._files.close()
         if self._progress:
             self._progress.clear()
-            self._finish_alone(name)
         return code
 
     def _solve_share(self, claims: Claims, lost: LostRanks) -> tuple[bool, str]:
         """Solve this rank's share and wait for the others; whether all of them came, and the signal that came."""
-        solver = PathSolver(self._writer, self._work.solve_unit, self._work.image, claims, lost, self._state)
+        solver = PathSolver(self._files, self._work.solve_unit, self._work.image, claims, lost, self._state)
         # A rank that is alone on its node has nobody beside it to see that it hangs.
         unseen = claims.node.size == 1 and self._work.time_limit < math.inf
         stopper = Stopper(solver.on_stop, self._work.time_limit, lost.patience if unseen else None)
@@ -276,23 +277,13 @@ class Session:
         """Mark the cases of ranks that hang as failed; whether there are such ranks, and nothing else to wait for."""
         positions = lost.positions()
         for position in positions:
-            give_up(self._writer, self._todo[position], lost.patience)
+            give_up(self._files, self._todo[position], lost.patience)
         # After a signal nobody begins anything new, so what is missing then stays missing.
-        return bool(positions) and (
-            stopper.overdue > max(GRACE.values()) or not np.any(self._writer.codes() == MISSING)
-        )
+        return bool(positions) and (stopper.overdue > max(GRACE.values()) or not np.any(self._files.codes() == MISSING))
 
     def _look(self) -> None:
         if self._progress and self._progress.due():
-            self._progress.update(self._writer.codes())
-
-    def _finish_alone(self, name: str) -> None:
-        """Finish by a process that has the file for itself, so that nothing it does there has to be done by all."""
-        finish_alone(self._work, self._writer.path, self._plan, self._writer.session, name)
-
-    def _finish(self, writer: ResultWriter, name: str) -> None:
-        """Finish by one rank that has the file together with others."""
-        finish(self._work, writer, name)
+            self._progress.update(self._files.codes())
 
 
 def finish_alone(work: Work, path: Path, plan: Plan, session: int, name: str) -> int:
@@ -344,9 +335,9 @@ def _end_all(comm: Any, claims: Claims, error: StudyError) -> None:
         comm.Abort(error.code)
 
 
-def _progress(plan: Plan, codes: np.ndarray, ranks: int) -> Progress:
+def _progress(objects: Iterable[Iterable[Any]], codes: np.ndarray, ranks: int) -> Progress:
     weights = np.ones(codes.size)
-    for unit in plan.units:
+    for unit in chain.from_iterable(objects):
         for rows in unit.rows:
             # A unit costs the same however many candidates it serves, so they share its weight.
             weights[list(rows)] = unit.cost / max(len(rows) * len(unit.rows), 1) or 1.0

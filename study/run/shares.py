@@ -83,6 +83,24 @@ def shares(units: Iterable[Any], codes: np.ndarray, ranks: int) -> list[Share]:
     return _in_order(divided)
 
 
+def divided(objects: Sequence[Sequence[Any]], codes: np.ndarray, ranks: int) -> tuple[list[Share], list[int]]:
+    """What is missing of some objects, given by their units, in the order of work, and in what groups ranks take it.
+
+    Object after object, the costliest first, each a group; forces are divided where little comes after. Of one object
+    every share is a group.
+    """
+    whole = [shares(units, codes, 1) for units in objects]
+    costs = [sum(share.cost for share in some) for some in whole]
+    left, todo, sizes = sum(costs), list[Share](), list[int]()
+    for k in by_cost(costs):
+        left -= costs[k]
+        busy = left >= ranks * max((share.cost for share in whole[k]), default=0.0)
+        some = whole[k] if busy else shares(objects[k], codes, ranks)
+        todo += some
+        sizes += [len(some)] if len(objects) > 1 else [1] * len(some)
+    return todo, sizes
+
+
 def _in_order(listed: Sequence[Share]) -> list[Share]:
     """The costliest first, so that no rank ends long after the others."""
     return [listed[i] for i in by_cost([share.cost for share in listed])]

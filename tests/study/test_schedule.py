@@ -37,7 +37,7 @@ from softjaw.study.run.schedule import Claims
 import time
 comm = MPI.COMM_WORLD
 node = comm.Split({color}) if {color} is not None else None
-claims = Claims(comm, {count}, node)
+claims = Claims(comm, [1] * {count}, node)
 mine = []
 for position in claims:
     mine.append(position)
