@@ -15,6 +15,7 @@ from softjaw.study.case.build import has_wall
 from softjaw.study.quantities import BY_KEY
 from softjaw.study.result.read import axes_of, values_of
 from softjaw.study.scene import Scene, parse_scene
+from softjaw.study.table import aligned
 
 FloatArray = NDArray[np.float64]
 FINENESS = (0.5, 0.7, 1.0, 1.4)  # elements per direction over those of the scene
@@ -156,8 +157,7 @@ def cost_text(ds: xr.Dataset) -> str:
         for s in sorted(settings, key=lambda s: s.seconds)
         if not s.reference
     ]  # fmt: skip
-    widths = [max(map(len, column)) for column in zip(head, *rows, strict=True)]
-    lines = ["  ".join(map(str.ljust, row, widths)).rstrip() for row in (head, *rows)]
+    lines = aligned(head, rows, range(len(head)))
     last = ", ".join(f"{key} = {value}" for key, value in reference.values.items())
     about = f"largest error of {ds.status.size // len(settings)} cases (in brackets the median), against {last}"
     return "\n".join([*lines, f"{about}, which takes {reference.seconds:.2g} s"])

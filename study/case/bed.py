@@ -8,7 +8,7 @@ need no closed mesh and no normals, and inner walls or thin parts behind do not 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -152,6 +152,16 @@ class JawsOnSurface:
         return -self.sides[0].touch - self.sides[1].touch
 
     @property
+    def depth(self) -> float:
+        """From the gripper's point to the middle between both contacts, along the approach [m]."""
+        return 0.5 * (self.sides[0].touch - self.sides[1].touch)
+
+    @property
+    def middle(self) -> FloatArray:
+        """Middle between both contacts on the line of approach ``(3,)`` [m]."""
+        return self.point + self.depth * self.axes[:, 2]
+
+    @property
     def tilt(self) -> FloatArray:
         """Approach that meets both contacts squarely, in the frame of the gripper ``(3,)``."""
         one, two = (side.normal for side in self.sides)
@@ -217,6 +227,20 @@ class JawsOnSurface:
         (x, y), (u, v) = self.sides[0].centre, self.sides[1].centre
         line = np.array([u - x, -v - y, self.opening])
         return angle(first, -two), max(angle(first, line), angle(-two, line))
+
+
+def grips(
+    surface: tuple[FloatArray, IntArray], frames: Iterable[tuple[FloatArray, FloatArray]], jaws: Jaws,
+    lids: FloatArray | None,
+) -> Iterator[JawsOnSurface]:  # fmt: skip
+    """Both pads in frames ``(point, axes)``, without those that miss the surface or lie over a hole."""
+    for point, axes in frames:
+        try:
+            grip = JawsOnSurface(surface, point, axes, jaws)
+        except NoContactError:
+            continue
+        if lids is None or not grip.over(lids):
+            yield grip
 
 
 def held(contacts: Sequence[Contact], task: Task) -> float:

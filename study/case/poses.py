@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -51,6 +52,22 @@ def explicit_poses(pose: GraspPose, placed: Pose) -> tuple[Pose, Pose]:
     approach = (np.array(pose.approach) / np.linalg.norm(pose.approach)) @ placed.rotation
     long_side = across(approach, np.array(pose.long_side) @ placed.rotation)
     return opposed_poses(placed.to_pad(np.array(pose.point)), approach, long_side)
+
+
+def in_file(point: FloatArray, approach: FloatArray, long_side: FloatArray, placed: Pose) -> tuple[float, ...]:
+    """A grasp in the frame of the object's own file: point [mm], approach, long side; nine numbers.
+
+    Rounded to 1 um and 1e-6, so that they are the same on every machine.
+    """
+    mm, sides = 1e3 * placed.to_object(point), np.concatenate([placed.rotation @ approach, placed.rotation @ long_side])
+    # Adding 0 turns -0 into 0.
+    return (*(round(float(x), 3) + 0.0 for x in mm), *(round(float(x), 6) + 0.0 for x in sides))
+
+
+def pose_of(numbers: Sequence[float], prefix: str = "") -> GraspPose:
+    """The pose of a scene that nine numbers of `in_file` give, labelled by its place."""
+    pose = GraspPose(point_mm=numbers[:3], approach=numbers[3:6], long_side=numbers[6:])  # type: ignore[arg-type]
+    return pose.model_copy(update={"label": prefix + pose.place})
 
 
 def across(approach: FloatArray, along: FloatArray) -> FloatArray:

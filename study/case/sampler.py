@@ -16,20 +16,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softjaw.fem.objects.gap import Pose
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.friction.patch import NoContactError
-from softjaw.study.case.bed import JawsOnSurface, Side, held
+from softjaw.study.case.bed import JawsOnSurface, Side, grips, held
 from softjaw.study.case.build import build_object, forces_apart, own_frame, surface_triangles
 from softjaw.study.case.contact import slips
 from softjaw.study.case.fit import Jaws, fit_of, jaws_of
-from softjaw.study.case.poses import across, pad_axes
+from softjaw.study.case.poses import across, in_file, pad_axes, pose_of
 from softjaw.study.case.task import Task, task_of
 from softjaw.study.messages import USAGE, NoGraspError
 from softjaw.study.quantities import LISTED_TARGET, MISSING, SLIPS, STATES
 from softjaw.study.scene import Scene
-from softjaw.study.scene.grasps import OF_EVERY_KIND, Candidates, GraspPose
-from softjaw.study.units import converted
+from softjaw.study.scene.grasps import OF_EVERY_KIND, Candidates
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -79,9 +77,7 @@ def straightened(
     for _ in range(TURNS):
         tilt, shift = grip.tilt, grip.shift
         approach = grip.axes @ tilt
-        # the middle between both contacts, along the approach
-        depth = 0.5 * (grip.sides[0].touch - grip.sides[1].touch)
-        point = grip.point + grip.axes @ np.array([*shift, depth])
+        point = grip.point + grip.axes @ np.array([*shift, grip.depth])
         axes = axes_of(approach / np.linalg.norm(approach), grip.axes[:, 0])
         # shift between two rounds that ends them [m]
         done = tilt[2] > math.cos(STRAIGHT) and np.abs(shift).max() < 5e-4
@@ -185,17 +181,10 @@ def climbed(
         shifts = [point + sign * share * jaws.pad[k] * axes[:, k] for k in (0, 1) for sign in (1.0, -1.0)]
         rolls = [axes[:, 0] + sign * math.tan(share * ROLLED / CLIMBS[0]) * axes[:, 1] for sign in (1.0, -1.0)]
         frames = [*((place, axes) for place in shifts), *((point, axes_of(axes[:, 2], roll)) for roll in rolls)]
-        for place, turned in frames:
-            try:
-                grip = JawsOnSurface(surface, place, turned, jaws)
-            except NoContactError:
-                continue
-            if lids is not None and grip.over(lids):
-                continue
+        for grip in grips(surface, frames, jaws, lids):
             other = judged(grip, task)
             if not other.state and other.payload > (1.0 + WORTHWHILE) * grasp.payload:
-                middle = 0.5 * (grip.sides[0].touch - grip.sides[1].touch)
-                grasp = replace(other, point=other.point + middle * turned[:, 2])
+                grasp = replace(other, point=grip.middle)
     return grasp
 
 
@@ -291,7 +280,8 @@ def with_sampled_grasps(scene: Scene) -> Scene:
     task = task_of(scene, obj)
     found = antipodal_grasps(surface, jaws_of(scene), task, given.sampled or 1, lids=lids_of(obj))
     placed = own_frame(scene.object)
-    poses = tuple(_as_pose(grasp, placed) for grasp in found if not grasp.state)
+    given_as = [(in_file(grasp.point, grasp.approach, grasp.long_side, placed), grasp.state) for grasp in found]
+    poses = tuple(pose_of(numbers) for numbers, state in given_as if not state)
     if not poses:
         states = [STATES[state] for state in sorted({grasp.state for grasp in found})] or ["the pads miss the object"]
         raise NoGraspError(
@@ -302,8 +292,7 @@ def with_sampled_grasps(scene: Scene) -> Scene:
     kept = {key: getattr(given, key) for key in OF_EVERY_KIND}
     # how many were asked for stays, which tells that they are screened
     where = Candidates(poses=poses, **kept).model_copy(update={"sampled": given.sampled})
-    bad = ((_as_pose(grasp, placed), grasp.state) for grasp in found if grasp.state)
-    where._rejected = tuple((*pose.point_mm, *pose.approach, *pose.long_side, state) for pose, state in bad)
+    where._rejected = tuple((*numbers, state) for numbers, state in given_as if state)
     parts: dict[str, Any] = {"candidates": where}
     if forces_apart(scene) and scene.accuracy.target is None:
         parts["accuracy"] = scene.accuracy.model_copy(update={"target": LISTED_TARGET})
@@ -313,17 +302,3 @@ def with_sampled_grasps(scene: Scene) -> Scene:
 def lids_of(obj: Any) -> FloatArray | None:
     """Corners ``(n, 3, 3)`` of the triangles that close holes of a mesh [m]; None for other objects."""
     return obj.lids if isinstance(obj, MeshObject) else None
-
-
-def _as_pose(grasp: SampledGrasp, placed: Pose) -> GraspPose:
-    """A grasp in the frame of the object's own file, as a scene gives it."""
-    place = _rounded([converted(float(x), "m", "mm") for x in placed.to_object(grasp.point)], 3)
-    approach, long_side = (_rounded(placed.rotation @ v, 6) for v in (grasp.approach, grasp.long_side))
-    pose = GraspPose(point_mm=place, approach=approach, long_side=long_side)
-    return pose.model_copy(update={"label": pose.place})
-
-
-def _rounded(v: Sequence[float] | FloatArray, digits: int) -> tuple[float, float, float]:
-    """A vector in so many digits; 0.0 makes of a negative zero a positive one."""
-    x, y, z = (round(float(part), digits) + 0.0 for part in v)
-    return x, y, z

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from softjaw.study.case.poses import pose_of
 from softjaw.study.case.result import UNDECIDED
 from softjaw.study.flags import LOST
 from softjaw.study.quantities import DONE, MISSING
@@ -49,12 +50,7 @@ def refined(scene: Scene, rounds: Rounds) -> Scene:
 
 def with_places(poses: Sequence[GraspPose], rounds: Sequence[Sequence[Place]]) -> tuple[GraspPose, ...]:
     """The poses of a scene, then those that rounds added, which are named by round and place."""
-    made = [
-        (GraspPose(point_mm=x[1:4], approach=x[4:7], long_side=x[7:10]), f"round {r}")  # type: ignore[arg-type]
-        for r, added in enumerate(rounds, start=1)
-        for x in added
-    ]
-    return (*poses, *(pose.model_copy(update={"label": f"{name}: {pose.place}"}) for pose, name in made))
+    return (*poses, *(pose_of(x[1:], f"round {r}: ") for r, added in enumerate(rounds, start=1) for x in added))
 
 
 def _renumbered(

@@ -22,12 +22,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softjaw.friction.patch import NoContactError
 from softjaw.study import ranking
-from softjaw.study.case.bed import JawsOnSurface, held
+from softjaw.study.case.bed import JawsOnSurface, grips, held
 from softjaw.study.case.build import build_object, own_frame, shapes_of, surface_triangles
 from softjaw.study.case.fit import jaws_of
-from softjaw.study.case.poses import STANDOFF, explicit_poses
+from softjaw.study.case.poses import STANDOFF, explicit_poses, in_file
 from softjaw.study.case.result import UNDECIDED, surely_below
 from softjaw.study.case.sampler import lids_of
 from softjaw.study.case.task import task_of
@@ -102,19 +101,16 @@ def _neighbours(scene: Scene, rounds: Any, values: FloatArray, share: float) -> 
     for best in best_places(values):
         # payload on a bed of springs, below which it is none [kg]
         reference = max(promise(JawsOnSurface(surface, *known[best], jaws)), 1e-9)
-        for point, axes in _moved(known[best], share, jaws.pad):
-            if any(apart((point, axes), other, jaws.pad) < SAME_POSE_STEPS * share for other in known):
-                continue
-            try:
-                grip = JawsOnSurface(surface, point, axes, jaws)
-            except NoContactError:
-                continue
-            if lids is not None and grip.over(lids):
-                continue  # pads bear on no hole
+        frames = (
+            frame
+            for frame in _moved(known[best], share, jaws.pad)
+            if not any(apart(frame, other, jaws.pad) < SAME_POSE_STEPS * share for other in known)
+        )
+        for grip in grips(surface, frames, jaws, lids):
             # In the middle between both contacts, where the next tilt turns about.
-            point = point + 0.5 * (grip.sides[0].touch - grip.sides[1].touch) * axes[:, 2]
-            known.append((point, axes))
-            poses.append((round(promise(grip) / reference, 3), (share, *_in_file(point, axes, placed))))
+            known.append((grip.middle, grip.axes))
+            place = in_file(grip.middle, grip.axes[:, 2], grip.axes[:, 0], placed)
+            poses.append((round(promise(grip) / reference, 3), (share, *place)))
     return [place for _, place in sorted(poses, key=lambda pair: -pair[0])]
 
 
@@ -122,14 +118,6 @@ def _frame(pose: GraspPose, placed: Any) -> Frame:
     """A grasp in the object's frame."""
     axes = explicit_poses(pose, placed)[0]
     return axes.origin + STANDOFF * axes.rotation[:, 2], axes.rotation
-
-
-def _in_file(point: FloatArray, axes: FloatArray, placed: Any) -> Place:
-    """A grasp in the frame of the object's own file, to 1 um and 1e-6: the same on every machine."""
-    mm = 1e3 * placed.to_object(point)
-    sides = (placed.rotation @ axes[:, k] for k in (2, 0))
-    # Adding 0 turns -0 into 0.
-    return tuple(round(float(v), 3) + 0.0 for v in mm) + tuple(round(float(v), 6) + 0.0 for side in sides for v in side)
 
 
 def _moved(frame: Frame, share: float, pad: Sequence[float]) -> Iterator[Frame]:
