@@ -24,7 +24,7 @@ from softjaw.study.case.candidates import check_poses, decided, units, with_samp
 from softjaw.study.case.contact import Contact
 from softjaw.study.case.limit_surface import finger_surface
 from softjaw.study.case.model import check_petsc
-from softjaw.study.case.result import CaseFailure, CaseResult
+from softjaw.study.case.result import CaseFailure, CaseResult, GraspNumbers
 from softjaw.study.flags import Flag, flags_in
 from softjaw.study.messages import SOME_FAILED, StudyError
 from softjaw.study.quantities import BY_KEY, MAIN, MODELS, STATES, TABLE, checked_model
@@ -45,7 +45,7 @@ class CaseError(StudyError):
 
 
 @dataclass(frozen=True, eq=False)
-class Case:
+class Case(GraspNumbers):
     """A grasp candidate at a normal force, solved; made by `softjaw.press`.
 
     Attributes
@@ -92,26 +92,6 @@ class Case:
             for q in TABLE
             if q.error and q.of_error.key in self.result.values
         }
-
-    @property
-    def e_n(self) -> float:
-        """Eccentricity parameter of the weaker finger, CCM [m]."""
-        return self.value("e_n")
-
-    @property
-    def quality(self) -> float:
-        """Grasp quality, CCM [-]."""
-        return self.value("quality")
-
-    @property
-    def payload(self) -> float:
-        """Largest mass that is held, CCM [kg]."""
-        return self.value("payload")
-
-    @property
-    def opening(self) -> float:
-        """Distance of the undeformed pads as they touch the object [m]: open the gripper wider."""
-        return self.value("opening")
 
     @property
     def pose(self) -> tuple[FloatArray, FloatArray]:

@@ -102,7 +102,7 @@ def _result(
     if coarse:
         other = _state_values(coarse)
         values |= mesh_errors(
-            contacts, coarse.contacts, values, other, settings, coarse.views, solved.pairs_of_contacts,
+            contacts, coarse.contacts, values, other, settings, coarse.views, solved.pairs,
             solved.floor, choice.skipped_share(k),
         )  # fmt: skip
         # only where every case has a target: without one the sums at the end say how many cases miss the usual one
@@ -127,11 +127,11 @@ def _result(
     return CaseResult(values, patch, message, effects, tuple(contacts))
 
 
-def _outcomes(choice: EffectChoice, wanted: Collection[int] | None) -> Iterator[tuple[int, Solved | CaseFailure]]:
+def _outcomes(choice: EffectChoice, wanted: Collection[int]) -> Iterator[tuple[int, Solved | CaseFailure]]:
     """For every force the solutions of its case, or why there are none."""
     forces, apart = choice.solver.forces, forces_apart(choice.solver.scene)
     last, failed = "no force below it was solved", None
-    for k in sorted(wanted) if apart and wanted is not None else range(len(forces)):
+    for k in sorted(wanted) if apart else range(len(forces)):
         try:
             yield k, choice.case(k)
             last = f"the last good force is {forces[k]:g} N"

@@ -40,15 +40,14 @@ MOST_NAMED = 5  # poses that a message names
 
 @dataclass(frozen=True)
 class Candidate:
-    """One place to grasp: station along the object's axis [m], angle about it, roll about the approach [rad].
+    """One place to grasp: station along the object's axis [m], angle about it [rad].
 
-    With explicit poses ``station`` is the candidate's number and ``angle`` and ``roll`` are 0. ``note`` is what the
-    reader of a result should know about its place.
+    With explicit poses ``station`` is the candidate's number and ``angle`` is 0. ``note`` is what the reader of a
+    result should know about its place.
     """
 
     station: float
     angle: float
-    roll: float
     poses: tuple[Pose, Pose]
     label: str
     note: str = ""
@@ -60,7 +59,7 @@ def candidates(scene: Scene) -> list[Candidate]:
     if where.poses:
         placed = own_frame(scene.object)
         return [
-            Candidate(float(i), 0.0, 0.0, moved(explicit_poses(pose, placed), where.shift, where.roll), label)
+            Candidate(float(i), 0.0, moved(explicit_poses(pose, placed), where.shift, where.roll), label)
             for i, (pose, label) in enumerate(zip(where.poses, where.labels, strict=True))
         ]
     middle, half = middle_of(scene), in_si("half_extent_mm", where.half_extent_mm(scene.gripper))
@@ -68,7 +67,7 @@ def candidates(scene: Scene) -> list[Candidate]:
     places = product(where.station_values, where.angles)
     return [
         Candidate(
-            station, angle, where.roll, moved(axis_poses(station, angle, where.roll, middle), where.shift, 0.0),
+            station, angle, moved(axis_poses(station, angle, where.roll, middle), where.shift, 0.0),
             label, notes[station],
         )
         for (station, angle), label in zip(places, where.labels, strict=True)

@@ -238,24 +238,22 @@ class EffectChoice:
     def _compared(self, name: str, step: Step, k: int) -> tuple[float, float, float]:
         pair = self._coarse_pair(name, step, k)
         # on a few elements e_n follows from their size, and what other gaps change is no measure of the effect
-        if pair is None or any(
+        if not pair or any(
             a.on_few_elements or b.on_few_elements or a.nodal_instead != b.nodal_instead
-            for a, b in zip(*(side.contacts for side in pair), strict=True)
+            for a, b in zip(*pair, strict=True)
         ):
             return nan, nan, nan
-        low, high = (self._judged(side.contacts) for side in pair)
+        low, high = (self._judged(contacts) for contacts in pair)
         e_n, held, score = (b / a - 1.0 if a > 0 else nan for a, b in zip(low, high, strict=True))
         return e_n, held, score
 
-    def _coarse_pair(self, name: str, step: Step, k: int) -> tuple[Solution, Solution] | None:
-        """Solutions on the coarse mesh without and with a step; None where one of them does not exist."""
-        try:
-            low, high = (
-                self.solver.solve(k, COARSE, self.levels._replace(**{name: level})) for level in (step.low, step.high)
-            )
-        except TOO_SMALL:
-            return None
-        return low, high
+    def _coarse_pair(
+        self, name: str, step: Step, k: int
+    ) -> tuple[Sequence[PressedContact], Sequence[PressedContact]] | None:
+        """Contacts on the coarse mesh without and with a step; None where one of them does not exist."""
+        low = self.coarse(k, self.levels._replace(**{name: step.low}))
+        high = low and self.coarse(k, self.levels._replace(**{name: step.high}))
+        return (low, high) if low and high else None
 
     def _judged(self, contacts: Sequence[PressedContact]) -> tuple[float, float, float]:
         """e_n of the weaker finger [m], payload [kg] and quality, NaN where that cannot be told."""

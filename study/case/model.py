@@ -169,15 +169,19 @@ def usable_symmetry(scene: Scene, finger: Finger, elements: tuple[int, int, int]
     planes = mirror_planes(finger, scene.gripper.pad_size)
     usable = planes[0] and elements[0] % 2 == 0, planes[1] and elements[1] % 2 == 0
     # a coarser mesh for error estimates takes what it can use
-    need = {"auto": 0, "half": 1, "quarter": 2}[wanted] if elements == scene.gripper.elements else 0
-    if sum(usable) < need:
-        raise ValueError(
-            f"effects.model_size = '{wanted}' needs {need} plane(s) of symmetry, but object and mesh have "
-            f"{sum(usable)} here; use 'auto'"
-        )
+    if elements == scene.gripper.elements:
+        require_planes(wanted, sum(usable))
     if wanted == "half" and all(usable):
         return False, True
     return usable
+
+
+def require_planes(wanted: str, planes: int) -> None:
+    """Refuse fewer planes of symmetry than ``effects.model_size`` needs."""
+    need = {"half": 1, "quarter": 2}.get(wanted, 0)
+    if planes < need:
+        text = f"needs {need} plane(s) of symmetry, but object, fingers and mesh share {planes} here; use 'auto'"
+        raise ValueError(f"effects.model_size = '{wanted}' {text}")
 
 
 def pad_of(scene: Scene, symmetry: tuple[bool, bool], rule: str, coarser: bool) -> Pad:

@@ -20,7 +20,7 @@ from softjaw.friction.patch import ContactPatch
 from softjaw.friction.wrench import FrictionLimits
 from softjaw.study.case.build import has_wall, pad_shape
 from softjaw.study.case.contact import Contact
-from softjaw.study.case.model import Finger, contact_rules, image_signs, pad_of, press_of
+from softjaw.study.case.model import Finger, contact_rules, image_signs, pad_of, press_of, require_planes
 from softjaw.study.case.poses import turn_of_pose
 from softjaw.study.case.result import UNDECIDED
 from softjaw.study.case.wall import thin_body, wall_values
@@ -266,13 +266,8 @@ def grasp_of(scene: Scene, fingers: Sequence[Finger], coarser: bool = False) -> 
     # One plane was asked for where both exist: that between the fingers is given up.
     if wanted == "half" and all(grasp_frame.mirrors):
         grasp_frame = grasp(body, poses, (False, True))
-    # a coarser mesh for error estimates takes what it can use
-    need = {"half": 1, "quarter": 2}.get(wanted, 0) if not coarser else 0
-    if sum(grasp_frame.mirrors) < need:
-        raise ValueError(
-            f"effects.model_size = '{wanted}' needs {need} plane(s) of symmetry, but object, fingers and mesh share "
-            f"{sum(grasp_frame.mirrors)} here; use 'auto'"
-        )
+    if not coarser:
+        require_planes(wanted, sum(grasp_frame.mirrors))
     return grasp_frame
 
 

@@ -36,6 +36,34 @@ class TimeLimitError(BaseException):
     """The case in flight has had its time; not an ``Exception``, so that no solver takes it for a failed step."""
 
 
+class GraspNumbers:
+    """The main numbers of a grasp by name, for who has a `value`: of a case in memory, or of points of a map."""
+
+    def value(self, name: str, model: str = "ccm") -> Any:
+        """A quantity of the grasp in SI units, of one friction model where it has several."""
+        raise NotImplementedError
+
+    @property
+    def e_n(self) -> Any:
+        """Eccentricity parameter of the weaker finger, CCM [m]."""
+        return self.value("e_n")
+
+    @property
+    def quality(self) -> Any:
+        """Grasp quality, CCM [-]."""
+        return self.value("quality")
+
+    @property
+    def payload(self) -> Any:
+        """Largest mass that is held, CCM [kg]."""
+        return self.value("payload")
+
+    @property
+    def opening(self) -> Any:
+        """Distance of the undeformed pads as they touch the object [m]: open the gripper wider."""
+        return self.value("opening")
+
+
 def surely_below(value: float, limit: float) -> bool:
     """Whether a value is below a limit by more than `UNDECIDED`; no where that is undecided, or the value is NaN.
 

@@ -51,11 +51,9 @@ class Levels(NamedTuple):
 class Solution:
     """Both fingers in equilibrium at one force on one mesh.
 
-    ``mesh``: `COARSE`, `FINE`, or finer. ``fingers``: what was pressed. ``states``: of its parts. ``contacts``: of both
-    fingers.
+    ``fingers``: what was pressed. ``states``: of its parts. ``contacts``: of both fingers.
     """
 
-    mesh: int
     fingers: OnRigid | OnWall
     states: Sequence[Pressed]
     contacts: Sequence[PressedContact]
@@ -75,12 +73,12 @@ class Solution:
 class Solved:
     """Solutions of one case on all its meshes, the finest first, and a note on meshes that have none.
 
-    Each of the ``pairs`` on the coarse mesh differs by what the steps of the load path, or an effect, leave.
+    The ``pairs`` of contacts on the coarse mesh differ by what the steps of the load path, or an effect, leave.
     """
 
     meshes: Sequence[Solution]
     note: str = ""
-    pairs: Sequence[tuple[Solution, Solution]] = ()
+    pairs: Sequence[tuple[Sequence[PressedContact], Sequence[PressedContact]]] = ()
 
     @property
     def fine(self) -> Solution:
@@ -91,11 +89,6 @@ class Solved:
     def coarse(self) -> Solution | None:
         """That on the next coarser mesh, which tells the error."""
         return self.meshes[1] if len(self.meshes) > 1 else None
-
-    @property
-    def pairs_of_contacts(self) -> list[tuple[Sequence[PressedContact], Sequence[PressedContact]]]:
-        """Contacts of the ``pairs``."""
-        return [(one.contacts, other.contacts) for one, other in self.pairs]
 
     @property
     def floor(self) -> float:
@@ -170,7 +163,7 @@ class CandidateSolver:
             for state in states:
                 if isinstance(state, Failure):
                     raise state
-            self._solutions[k, mesh, levels] = Solution(mesh, fingers, states, fingers.contacts(states))
+            self._solutions[k, mesh, levels] = Solution(fingers, states, fingers.contacts(states))
         return self._solutions[k, mesh, levels]
 
     def failure(self, k: int, mesh: int, levels: Levels) -> Failure | None:
@@ -199,7 +192,7 @@ class CandidateSolver:
         if failure := self.failure(k, LONG_STEPS, levels):
             return replace(solved, note=NO_PATH_ERROR.format(reason=failure))
         assert solved.coarse is not None
-        return replace(solved, pairs=[(solved.coarse, self.solve(k, LONG_STEPS, levels))])
+        return replace(solved, pairs=[(solved.coarse.contacts, self.solve(k, LONG_STEPS, levels).contacts)])
 
     @property
     def seconds(self) -> Seconds:
@@ -213,8 +206,7 @@ class CandidateSolver:
         if coarse is None:
             return math.nan
         settings = settings_of(self.scene, build_object(self.scene.object))
-        pairs, floor = solved.pairs_of_contacts, solved.floor
-        return error_of(name, fine.contacts, coarse.contacts, coarse.views, settings, pairs, floor)
+        return error_of(name, fine.contacts, coarse.contacts, coarse.views, settings, solved.pairs, solved.floor)
 
     def _refined(self, solved: Solved, k: int, levels: Levels) -> Solved:
         """The case as it is where its error is surely below the target, else on further meshes.

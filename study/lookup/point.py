@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from softjaw.lsfit.surface import LimitSurface
+from softjaw.study.case.result import GraspNumbers
 from softjaw.study.flags import flags_in
 from softjaw.study.lookup.interpolation import Corners, FloatArray, blend, corners, plain
 from softjaw.study.quantities import BOTH_ENDS, BY_KEY, DONE, FAILED, FORCE_RANGE, MAIN, MISSING
@@ -18,7 +19,7 @@ INSIDE, OUTSIDE, NO_RESULT, SNAP, JUMP = range(5)
 
 
 @dataclass(frozen=True, eq=False)
-class GraspPoint:
+class GraspPoint(GraspNumbers):
     """A map at points of this ``shape``; numbers for one point, arrays for many. Made by ``GraspMap.at``.
 
     Where a point is not inside, values are NaN and `reason` says why.
@@ -83,26 +84,6 @@ class GraspPoint:
         values = self.map.interpolated(name if "/" in name else f"fingers/{name}", model, self.corners)
         values[self.states != INSIDE] = np.nan
         return values.reshape(self.shape + values.shape[1:])
-
-    @property
-    def e_n(self) -> Any:
-        """Eccentricity parameter of the weaker finger, CCM [m]."""
-        return self.value("e_n")
-
-    @property
-    def quality(self) -> Any:
-        """Grasp quality, CCM [-]."""
-        return self.value("quality")
-
-    @property
-    def payload(self) -> Any:
-        """Largest mass that is held, CCM [kg]."""
-        return self.value("payload")
-
-    @property
-    def opening(self) -> Any:
-        """Distance of the undeformed pads as they touch the object [m]: open the gripper wider."""
-        return self.value("opening")
 
     @property
     def pose(self) -> tuple[FloatArray, FloatArray]:

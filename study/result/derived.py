@@ -100,9 +100,7 @@ def crossing_error(forces: ArrayLike, values: ArrayLike, limit: float, stated: A
     >>> crossing_error([1.0, 2.0], [[1.0, 4.0]], 2.5, [[0.02, 0.03]]).round(3).tolist()  # 3 % of 2.5 over 3
     [0.108]
     """
-    x = np.concatenate([[0.0], np.asarray(forces, float)])
-    values = np.asarray(values, float)
-    y = np.concatenate([np.zeros((*values.shape[:-1], 1)), values], axis=-1)
+    x, y = _from_nothing(forces, values)
     at = first_crossing(forces, values, limit)
     if len(x) < 3:
         return np.full(at.shape, np.nan)
@@ -110,14 +108,21 @@ def crossing_error(forces: ArrayLike, values: ArrayLike, limit: float, stated: A
     slope = np.diff(y, axis=-1) / step
     bend = np.abs(2 * np.diff(slope, axis=-1) / (step[1:] + step[:-1]))  # of every node but the first and the last
     k = np.clip(np.searchsorted(x, at) - 1, 0, len(step) - 1)[..., None]  # interval of the crossing
-    # the ends of the interval that have a bend
-    ends = [np.take_along_axis(bend, np.clip(k + shift, 0, bend.shape[-1] - 1), -1)[..., 0] for shift in (-1, 0)]
-    rise, stated = np.take_along_axis(slope, k, -1)[..., 0], np.broadcast_to(stated, values.shape)
-    # the errors at both ends of the interval; at no force there is none
-    shares = [np.take_along_axis(stated, np.clip(k + shift, 0, stated.shape[-1] - 1), -1)[..., 0] for shift in (-1, 0)]
-    k = k[..., 0]
+
+    def at_ends(parts: FloatArray) -> list[FloatArray]:
+        """What there is at both ends of the interval: at no force there is neither a bend nor an error."""
+        return [np.take_along_axis(parts, np.clip(k + i, 0, parts.shape[-1] - 1), -1)[..., 0] for i in (-1, 0)]
+
+    ends, shares = at_ends(bend), at_ends(np.broadcast_to(stated, np.shape(values)))
+    rise, k = np.take_along_axis(slope, k, -1)[..., 0], k[..., 0]
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray((np.fmax(*ends) / 2 * (at - x[k]) * (x[k + 1] - at) + np.fmax(*shares) * limit) / rise)
+
+
+def _from_nothing(forces: ArrayLike, values: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Forces and values with those at no force before them."""
+    y = np.asarray(values, float)
+    return np.append(0.0, np.asarray(forces, float)), np.insert(y, 0, 0.0, axis=-1)
 
 
 def first_crossing(forces: ArrayLike, values: ArrayLike, limit: float) -> FloatArray:
@@ -128,9 +133,7 @@ def first_crossing(forces: ArrayLike, values: ArrayLike, limit: float) -> FloatA
     >>> first_crossing([1.0, 2.0], [[0.5, 1.5], [0.5, 0.9]], 1.0).tolist()
     [1.5, nan]
     """
-    x = np.concatenate([[0.0], np.asarray(forces, float)])
-    values = np.asarray(values, float)
-    y = np.concatenate([np.zeros((*values.shape[:-1], 1)), values], axis=-1)
+    x, y = _from_nothing(forces, values)
     # Nothing beyond the first gap is used: the true crossing may lie inside it.
     known = np.cumprod(np.isfinite(y), axis=-1).astype(bool)
     above = known & (y >= limit * (1.0 - UNDECIDED))

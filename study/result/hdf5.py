@@ -27,6 +27,10 @@ class StoredFile:
         """Close the file."""
         self._file.close()
 
+    def damaged(self, what: str, cure: str = "restore it from a copy") -> StudyError:
+        """The error for a file that is not as it was written."""
+        return StudyError(OTHER_FILE, f"{self.path}: damaged ({what}); {cure}")
+
     def attributes(self, path: str = "") -> dict[str, Any]:
         """Attributes of a group or dataset: texts, and lists as arrays."""
         with self._damage(path or "/"):
@@ -37,8 +41,7 @@ class StoredFile:
         """A dataset that has the expected shape and type."""
         dataset = self.plain(path)
         if dataset.shape != shape or dataset.dtype != dtype:
-            text = f"{path} has shape {dataset.shape} of {dataset.dtype}, expected {shape} of {dtype}"
-            raise StudyError(OTHER_FILE, f"{self.path}: damaged ({text}); restore it from a copy")
+            raise self.damaged(f"{path} has shape {dataset.shape} of {dataset.dtype}, expected {shape} of {dtype}")
         return dataset
 
     def plain(self, path: str) -> h5py.Dataset:
@@ -46,7 +49,7 @@ class StoredFile:
         with self._damage(path):
             dataset = self._node(path)
             if not isinstance(dataset, h5py.Dataset):
-                raise StudyError(OTHER_FILE, f"{self.path}: damaged ({path} is not a dataset); restore it from a copy")
+                raise self.damaged(f"{path} is not a dataset")
             plist = dataset.id.get_create_plist()
             virtual = plist.get_layout() == h5py.h5d.VIRTUAL
             nbytes = dataset.size * max(dataset.dtype.itemsize, 1) if dataset.shape is not None else 0
@@ -62,8 +65,7 @@ class StoredFile:
         with self._damage(path):
             dataset = self.plain(path)
             if dataset.ndim != 1 or not h5py.check_string_dtype(dataset.dtype):
-                text = f"{path} is not a list of texts"
-                raise StudyError(OTHER_FILE, f"{self.path}: damaged ({text}); restore it from a copy")
+                raise self.damaged(f"{path} is not a list of texts")
             return [text_of(text) for text in dataset[()].tolist()]
 
     def values(self, dataset: h5py.Dataset, index: Any = ()) -> Any:
@@ -87,8 +89,7 @@ class StoredFile:
         try:
             yield
         except BROKEN as error:
-            text = f"{self.path}: damaged ({path}: {reason(error)}); restore it from a copy"
-            raise StudyError(OTHER_FILE, text) from error
+            raise self.damaged(f"{path}: {reason(error)}") from error
 
 
 def opened(path: Path, kind: str, make: Callable[[StoredFile], Any]) -> Any:

@@ -15,7 +15,7 @@ import h5py
 import numpy as np
 
 from softjaw.study import messages
-from softjaw.study.messages import OTHER_FILE, StudyError, beside
+from softjaw.study.messages import beside
 from softjaw.study.result.hdf5 import StoredFile, opened
 from softjaw.study.result.layout import PROGRAM
 from softjaw.study.table import Row
@@ -110,7 +110,7 @@ def read_index(path: Path) -> tuple[list[Row], dict[str, Any]]:
         for name, (kind, *_) in COLUMNS.items():
             values[name] = file.texts(name) if kind is str else file.values(file.plain(name)).tolist()
         if len({len(column) for column in values.values()}) != 1:
-            raise StudyError(OTHER_FILE, f"{path}: damaged (columns of different lengths); run the scene again")
+            raise file.damaged("columns of different lengths", "run the scene again")
         return [dict(zip(values, row, strict=True)) for row in zip(*values.values(), strict=True)], file.attributes()
     finally:
         file.close()

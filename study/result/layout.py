@@ -176,11 +176,10 @@ class Layout:
 
     def places(self, row: int) -> list[tuple[int, ...] | None]:
         """Where a row's values stand in the columns' datasets; None for what is stored of other candidates only."""
-        index = tuple(int(i) for i in np.unravel_index(row, self.shape))
-        number = index[-3] * self.shape[-2] + index[-2]
-        slot = self.sampled.index(number) if number in self.sampled else None
-        among = None if slot is None else (*index[:-3], slot, index[-1])
-        return [among if c.sampled else index for c in self.columns]
+        *lead, station, angle, force = (int(i) for i in np.unravel_index(row, self.shape))
+        number = station * self.shape[-2] + angle
+        among = (*lead, self.sampled.index(number), force) if number in self.sampled else None
+        return [among if c.sampled else (*lead, station, angle, force) for c in self.columns]
 
     def lines(self, column: Column, rows: NDArray[Any]) -> NDArray[Any]:
         """Where rows stand in a column's dataset, counted over the axes of the rows in it; -1 where they have none."""

@@ -43,8 +43,7 @@ class Lock:
             holder = os.read(self._fd, 200).decode(errors="replace").strip()
             self.release()
             if attempt == 5:
-                who = holder or "name unknown"
-                raise StudyError(IN_USE, f"{self.result}: in use by another run ({who}); wait for it")
+                raise self._in_use(holder or "name unknown")
             time.sleep(0.1)
         # A shorter name must not keep the end of a longer one that a killed run left.
         os.ftruncate(self._fd, 0)
@@ -68,7 +67,10 @@ class Lock:
         """On rank 0, when all ranks hold the lock: raise `StudyError` if another run was quicker."""
         holder = os.pread(self._fd, 200, 0).decode(errors="replace").strip()
         if holder != self.owner:
-            raise StudyError(IN_USE, f"{self.result}: in use by another run ({holder}); wait for it")
+            raise self._in_use(holder)
+
+    def _in_use(self, holder: str) -> StudyError:
+        return StudyError(IN_USE, f"{self.result}: in use by another run ({holder}); wait for it")
 
     def remove(self) -> None:
         """On rank 0, at the end of the run, while all ranks still hold the lock: take the file away."""

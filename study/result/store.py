@@ -205,7 +205,7 @@ class Result:
 
     def _damaged(self, what: str) -> StudyError:
         cure = "restore it from a copy, or run the scene again, which solves damaged cases anew"
-        return StudyError(OTHER_FILE, f"{self.path}: damaged ({what}); {cure}")
+        return self.file.damaged(what, cure)
 
     def _checked(self, path: str) -> Any:
         expected = self._known.get(f"{ROOT}/{path}")

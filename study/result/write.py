@@ -63,8 +63,8 @@ class ResultWriter:
         # a row with the values of a coarser mesh was begun once for these
         return np.maximum(self._attempts[()].ravel().astype(int) - (self._code[()].ravel() == DONE), 0)
 
-    def count_attempt(self, row: int, change: int) -> None:
-        """Note that a case is about to be solved (1), or was given up in an orderly way (-1)."""
+    def count_attempt(self, row: int, change: int = 1) -> None:
+        """Note that a case is about to be solved (or, with -1, that it was given up in an orderly way)."""
         index = self._index(row)
         # One byte holds it, which must neither wrap round nor fall below 0.
         self._attempts[index] = min(max(int(self._attempts[index]) + change, 0), 255)
@@ -285,6 +285,6 @@ def verify(path: Path, layout: Layout, header: Header) -> bool:
         wrong = checksums.broken_states(result.file, layout, codes, result.killed)
         # Solving them again would write over results that may be right.
         if lost := int(np.sum(codes[wrong] == MISSING)):
-            text = f"{path}: damaged (the states of {lost} cases are lost, but not their results)"
-            raise StudyError(OTHER_FILE, f"{text}; restore it from a copy, or choose another file with -o")
+            text = f"the states of {lost} cases are lost, but not their results"
+            raise result.file.damaged(text, "restore it from a copy, or choose another file with -o")
     return packed

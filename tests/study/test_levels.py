@@ -261,9 +261,9 @@ def test_the_steps_of_the_load_path_are_part_of_the_errors():
     levels = Levels("rigid", "rigid", "tangential")
     solved = solver.case(1, levels)
     [(coarse, longer)] = solved.pairs
-    assert coarse is solved.coarse
-    assert longer.states[0].steps < coarse.states[0].steps
-    change = abs(longer.states[0].closing / coarse.states[0].closing - 1.0)
+    assert coarse is solved.coarse.contacts
+    assert longer[0].state.steps < coarse[0].state.steps
+    change = abs(longer[0].state.closing / coarse[0].state.closing - 1.0)
     assert 0.0 < change < 0.01
     solver.destroy()
     assert whole(ROUGH)[1].values["maps/closing_error"] > change
