@@ -60,9 +60,13 @@ def fresh(path: Path, layout: Layout, header: Header) -> None:
     path.write_bytes(SKELETONS[kind])
 
 
-def written(path: Path, layout: Layout, case, scene=SCENE, title="made", labels=()) -> Path:
-    """A file whose case at an index is ``case(index)``: a result, None where it is missing, or why it failed."""
-    fresh(path, layout, Header("d" * 64, scene, title, "made.toml", labels=labels))
+def written(path: Path, layout: Layout, case, header: Header | None = None, **about) -> Path:
+    """A file whose case at an index is ``case(index)``: a result, None where it is missing, or why it failed.
+
+    ``about``: what a header that is not given says.
+    """
+    known = {"digest": "d" * 64, "scene": SCENE, "title": "made", "scene_file": "made.toml"}
+    fresh(path, layout, header or Header(**known | about))
     writer = ResultWriter(path, layout, None)
     for row, index in enumerate(np.ndindex(layout.shape)):
         if isinstance(made := case(index), str):

@@ -57,8 +57,13 @@ def here(program, *words):
 
 
 def start(ranks, *words):
-    """Start the fake study and come back at once; a process group of its own, without ``timeout`` in between."""
-    words = command(ranks, SCRIPT, *words)
+    """Start the fake study and come back at once."""
+    return begin(ranks, SCRIPT, *words)
+
+
+def begin(ranks, *words):
+    """Start a program and come back at once; a process group of its own, without ``timeout`` in between."""
+    words = command(ranks, *words)
     words = words[words.index("mpirun") :] if ranks else words
     return subprocess.Popen(
         words, env=launch_environment(), cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,

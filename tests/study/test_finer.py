@@ -1,14 +1,11 @@
 """Coarse first, fine where it matters: which cases the finer meshes get, and that no value is lost on the way."""
 
-import subprocess
-
 import numpy as np
 import pytest
 import trimesh
 
 from softjaw.study.case.candidates import with_sampled_grasps
 from softjaw.study.case.result import CaseResult
-from softjaw.study.doctor import launch_environment
 from softjaw.study.quantities import DONE, LISTED, MISSING
 from softjaw.study.ranking import Place
 from softjaw.study.result.skeleton import create
@@ -17,23 +14,11 @@ from softjaw.study.result.write import ResultWriter, record
 from softjaw.study.run.plan import make_plan
 from softjaw.study.run.rounds import rivals
 from softjaw.study.scene import load_scene
-from tests.study.launching import ROOT, command, contents, differing, launch, wait_for
+from tests.study.launching import begin, contents, differing, launch, wait_for
+from tests.study.scenes import mesh_of, text_of
 
-SCENE = """
-[object]
-shape = "mesh"
-mesh = "block.stl"
-unit = "mm"
-[gripper]
-max_opening_mm = 85
-elements = [8, 4, 3]
-[candidates]
-sampled = 14
-[load]
-normal_force_n = [2, 5]
-[limit_surface]
-samples = 80
-"""
+PAD = "[8, 4, 3]\nmax_opening_mm = 85"
+SCENE = text_of(mesh_of("block.stl"), "sampled = 14\n", forces="[2, 5]", elements=PAD) + "[limit_surface]\nsamples = 80"
 
 
 @pytest.fixture
@@ -114,8 +99,7 @@ def test_the_best_of_a_sampled_study_are_solved_well_with_the_same_bits_on_any_r
     best = np.sort((payload - payload * error)[~unsolved, 1])[-LISTED]
     assert ((payload * (1 + error))[unsolved, 1] <= best + 1e-9).all()
     killed = scene.with_name("killed.hdf")
-    words = [word for word in command(0, "-m", "softjaw", "run", scene, "-o", killed)]
-    process = subprocess.Popen(words, env=launch_environment(), cwd=ROOT, stdout=subprocess.DEVNULL)
+    process = begin(0, "-m", "softjaw", "run", scene, "-o", killed)
 
     def begun():
         with open_result(killed, unchecked=True) as result:
@@ -124,7 +108,7 @@ def test_the_best_of_a_sampled_study_are_solved_well_with_the_same_bits_on_any_r
     wait_for(killed.exists)
     wait_for(begun)
     process.kill()
-    process.wait()
+    process.communicate()
     with open_result(killed) as result:
         assert (result.status == DONE).all()  # coarse values stand in for finer ones
     assert launch(0, "-m", "softjaw", "run", scene, "-o", killed)[0] == 0

@@ -14,7 +14,7 @@ from softjaw.study.result.layout import DONE, MISSING
 from softjaw.study.result.store import open_result
 from softjaw.study.run.plan import make_plan
 from softjaw.study.run.shares import shares
-from tests.study.launching import ROOT, contents, differing, launch, softjaw, wait_for
+from tests.study.launching import ROOT, begin, contents, differing, launch, softjaw, wait_for
 from tests.study.scenes import BOX, NO_COUPLING, scene_of
 
 pytestmark = pytest.mark.ranks
@@ -128,10 +128,7 @@ def test_any_number_of_ranks_writes_the_same_bits(tmp_path, scene, alone, ranks)
 )
 def test_a_run_that_is_stopped_or_killed_goes_on_with_other_ranks_to_the_same_bits(tmp_path, scene, alone, how, ranks):
     path = tmp_path / f"{how}.hdf"
-    process = subprocess.Popen(
-        [sys.executable, "-c", SLOWLY, "run", str(scene), "-o", str(path)], env=launch_environment(), cwd=ROOT,
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, stdin=subprocess.DEVNULL,
-    )  # fmt: skip
+    process = begin(0, "-c", SLOWLY, "run", scene, "-o", path)
     wait_for(lambda: path.exists() and done(path) >= 2)
     process.send_signal(getattr(signal, how))
     process.communicate(timeout=60)

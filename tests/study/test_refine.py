@@ -1,6 +1,5 @@
 """Refinement of the stations: where the next ones go, what a grown file keeps, and the same bits on any ranks."""
 
-import subprocess
 from itertools import combinations
 from types import SimpleNamespace
 
@@ -9,7 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from softjaw.study.doctor import launch_environment
+from softjaw.study.case.result import CaseResult
 from softjaw.study.quantities import DONE, MISSING, WIDE
 from softjaw.study.result.layout import layout_from_options
 from softjaw.study.result.skeleton import rewrite
@@ -19,8 +18,9 @@ from softjaw.study.run.plan import make_plan
 from softjaw.study.run.refine import FINEST_SPACING_SHARE, chances, gained, next_stations, with_places
 from softjaw.study.run.rounds import FINEST_STEP_SHARE, SAME_POSE_STEPS, apart, next_poses
 from softjaw.study.scene import load_scene, parse_scene
-from tests.study.launching import ROOT, command, contents, differing, launch, wait_for
-from tests.study.scenes import pose_of
+from tests.study.formula_results import written
+from tests.study.launching import begin, contents, differing, launch, wait_for
+from tests.study.scenes import mesh_of, pose_of, text_of
 
 GIVEN = np.linspace(25.0, 175.0, 35)
 BEST_WITHIN = 0.02
@@ -83,22 +83,10 @@ def test_grasps_that_cannot_be_used_are_no_best_ones():
     assert found[2] == 0  # both ends cannot be used
 
 
-SCENE = """
-[object]
-shape = "revolution"
-profile_mm = [[0, 30], [20, 30], [40, 26], [50, 25], [60, 26], [80, 30], [100, 30]]
-[gripper]
-elements = [8, 4, 2]
-[candidates]
-stations_mm = [28, 38, 46, 54, 64]
-angles_deg = [0, 90]
-refine = 12
-[load]
-normal_force_n = [1, 2]
-[limit_surface]
-samples = 80
-wrench_samples = [2, "54 mm, 90 deg"]
-"""
+VASE = 'shape = "revolution"\nprofile_mm = [[0, 30], [20, 30], [40, 26], [50, 25], [60, 26], [80, 30], [100, 30]]'
+PLACES = "stations_mm = [28, 38, 46, 54, 64]\nangles_deg = [0, 90]\nrefine = 12\n"
+SAMPLES = "[limit_surface]\nsamples = 80\nwrench_samples = "
+SCENE = text_of(VASE, PLACES, forces="[1, 2]") + SAMPLES + '[2, "54 mm, 90 deg"]'
 
 
 def test_a_grown_file_keeps_every_row(tmp_path):
@@ -130,18 +118,14 @@ def test_a_grown_file_keeps_every_row(tmp_path):
 
 def filled(path, plan):
     """A file of this plan with numbers of a formula in every row."""
-    from softjaw.study.case.result import CaseResult
-    from softjaw.study.result.skeleton import create
-    from softjaw.study.result.write import ResultWriter, record
-    create(path, plan.layout, plan.header)
-    writer = ResultWriter(path, plan.layout, None)
-    for row in range(plan.layout.rows):
-        random = np.random.default_rng(row)
+
+    def case(index):
+        random = np.random.default_rng(index)
         values = {f"maps/{name}": random.random(3) for name in ("quality", "e_n")} | {"maps/flags": 0.0}
         patch = {"pressure": random.random((2, plan.layout.faces))}
-        values["wrenches/wrench"] = random.random((2, 3, plan.layout.samples, 3))
-        writer.write(row, record(plan.layout, CaseResult(values, patch)))
-    writer.close()
+        return CaseResult(values | {"wrenches/wrench": random.random((2, 3, plan.layout.samples, 3))}, patch)
+
+    written(path, plan.layout, case, plan.header)
 
 
 def refined(scene, name, ranks, *words):
@@ -178,27 +162,18 @@ def test_a_refined_study_has_the_same_bits_on_any_number_of_ranks(tmp_path):
 
 
 PAD = (0.05, 0.02, 0.015)
-POSES = """
-[object]
-shape = "box"
-size_mm = [60, 40, 120]
-edge_radius_mm = 6
-[gripper]
-elements = [8, 4, 2]
-max_opening_mm = 65
-[candidates]
-refine = BUDGET
-PLACES
-[load]
-normal_force_n = [1, 2]
-[limit_surface]
-samples = 80
-wrench_samples = ["wide"]
-""".replace("PLACES\n", pose_of((0, 0, 8), label="wide") + pose_of((0, 0, -20), (0, 1, 0), (1, 0, 0)))
+BODY = 'shape = "box"\nsize_mm = [60, 40, 120]\nedge_radius_mm = 6'
 
 
-def scene_with(budget):
-    return parse_scene(POSES.replace("BUDGET", str(budget)))
+def posed(budget, shape=BODY):
+    """The text of a scene of two poses that may be refined."""
+    places = pose_of((0, 0, 8), label="wide") + pose_of((0, 0, -20), (0, 1, 0), (1, 0, 0))
+    pad = "[8, 4, 2]\nmax_opening_mm = 65"
+    return text_of(shape, f"refine = {budget}\n{places}", forces="[1, 2]", elements=pad) + SAMPLES + '["wide"]'
+
+
+def scene_with(budget, shape=BODY):
+    return parse_scene(posed(budget, shape))
 
 
 def turned(axis, degrees):
@@ -286,9 +261,8 @@ def test_no_neighbour_is_put_over_a_hole_of_a_mesh(tmp_path):
     assert 2 <= hole.sum() < 30
     body.update_faces(~hole)
     body.export(tmp_path / "body.stl")
-    shape = f'shape = "mesh"\nmesh = "{tmp_path}/body.stl"\nunit = "mm"\n'
-    text = POSES.replace("BUDGET", "10").replace('shape = "box"\nsize_mm = [60, 40, 120]\nedge_radius_mm = 6\n', shape)
-    rounds, _ = searched(lambda point, approach, _: 0.1 * (approach[0] > 0.9), parse_scene(text))
+    scene = scene_with(10, mesh_of(tmp_path / "body.stl"))
+    rounds, _ = searched(lambda point, approach, _: 0.1 * (approach[0] > 0.9), scene)
     shifts = [x[3] for added in rounds for x in added if x[0] == 1.0]
     assert min(shifts) == pytest.approx(8 - 12.5)
     assert max(shifts) == pytest.approx(8)
@@ -344,19 +318,16 @@ def test_refined_poses_have_the_same_bits_on_any_number_of_ranks_and_after_a_kil
         with open_result(path) as result:
             return result.layout.added
 
-    scene.write_text(POSES.replace("BUDGET", "12"))
+    scene.write_text(posed(12))
     alone, _ = refined(scene, "alone.hdf", 0)
     assert len(added(alone)) >= 2
     expected = contents(alone)
     same_bits(scene, expected, 4)
     killed = tmp_path / "killed.hdf"
-    process = subprocess.Popen(
-        command(0, "-m", "softjaw", "run", scene, "-o", killed), env=launch_environment(), cwd=ROOT,
-        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, stdin=subprocess.DEVNULL,
-    )  # fmt: skip
+    process = begin(0, "-m", "softjaw", "run", scene, "-o", killed)
     wait_for(lambda: len(added(killed)) == 1)
     process.kill()
-    process.wait(timeout=30)
+    process.communicate(timeout=30)
     assert len(added(killed)) >= 1
     refined(scene, "killed.hdf", 2)
     assert differing(killed, expected) == []

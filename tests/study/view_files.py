@@ -89,4 +89,4 @@ def make(path, scene=SCENE, patches=True, failed=FAILED):
             return "no </script> convergence"
         return None if index == (0, 0, 1) else solved(layout, index)
 
-    return written(path, layout, case, scene, "<b>thing</b>")
+    return written(path, layout, case, scene=scene, title="<b>thing</b>")

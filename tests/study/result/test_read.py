@@ -15,24 +15,18 @@ from softjaw.study.quantities import STATES
 from softjaw.study.result.derived import first_crossing
 from softjaw.study.result.layout import DONE, FAILED, MISSING
 from softjaw.study.result.read import FIELDS, read_field
-from softjaw.study.result.skeleton import create
 from softjaw.study.result.store import open_result
-from softjaw.study.result.write import ResultWriter, record
 from tests.study.fake_run import fake_plan, fake_result
-from tests.study.formula_results import ANGLES, FORCES, STATIONS, make
+from tests.study.formula_results import ANGLES, FORCES, STATIONS, make, written
 
 
 @pytest.fixture(scope="module")
 def half(tmp_path_factory):
     """A file with patches in which rows 0 to 9 are solved, 10 failed, and the others are missing."""
-    path, plan = tmp_path_factory.mktemp("read") / "half.hdf", fake_plan()
-    create(path, plan.layout, plan.header)
-    writer = ResultWriter(path, plan.layout, None)
-    for row in range(10):
-        writer.write(row, record(plan.layout, fake_result(row)))
-    writer.fail(10, "no contact at this force")
-    writer.close()
-    return path
+    plan = fake_plan()
+    cases = [*map(fake_result, range(10)), "no contact at this force"]
+    rows = iter([*cases, *[None] * (plan.layout.rows - len(cases))])
+    return written(tmp_path_factory.mktemp("read") / "half.hdf", plan.layout, lambda _: next(rows), plan.header)
 
 
 def test_maps_stand_over_their_coordinates_with_units_and_definitions(tmp_path):

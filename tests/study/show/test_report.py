@@ -85,7 +85,7 @@ def make(path, layout, state=lambda index: "done", scene=SCENE, title="thing", m
         what = state(index)
         return {"done": solved(layout, index, message, **changes), "missing": None}.get(what, what)
 
-    return written(path, layout, case, scene, title, labels)
+    return written(path, layout, case, scene=scene, title=title, labels=labels)
 
 
 class Page(HTMLParser):
