@@ -73,17 +73,20 @@ def _on_sides(corners: FloatArray, half: FloatArray) -> FloatArray:
 
 def _on_corners(corners: FloatArray, half: FloatArray) -> FloatArray:
     """Heights of the triangles above the rectangle's corners."""
+    z, over = heights_over(corners, half * [[-1, -1], [-1, 1], [1, -1], [1, 1]])
+    return z[over]
+
+
+def heights_over(corners: FloatArray, points: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Heights of the planes of triangles ``(m, 3, 3)`` over ``points (n, 2)``, ``(n, m)``, and which lie over them."""
     a, u, v = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     area = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
     # seen from its edge a triangle has no height of its own: its neighbours have it
     a, u, v, area = (part[area != 0.0] for part in (a, u, v, area))
-    depths = []
-    for sign in ((-1, -1), (-1, 1), (1, -1), (1, 1)):
-        x, y = (np.array(sign) * half - a[:, :2]).T
-        s, t = (x * v[:, 1] - y * v[:, 0]) / area, (u[:, 0] * y - u[:, 1] * x) / area
-        over = (s >= 0.0) & (t >= 0.0) & (s + t <= 1.0)
-        depths.append((a[:, 2] + s * u[:, 2] + t * v[:, 2])[over])
-    return np.concatenate(depths)
+    x, y = points[:, :1] - a[:, 0], points[:, 1:] - a[:, 1]
+    s, t = (x * v[:, 1] - y * v[:, 0]) / area, (u[:, 0] * y - u[:, 1] * x) / area
+    over = (s >= -1e-12) & (t >= -1e-12) & (s + t <= 1.0 + 1e-12)
+    return a[:, 2] + s * u[:, 2] + t * v[:, 2], over
 
 
 def fit_of(points: FloatArray, triangles: IntArray, jaws: Jaws, doubt: float = 0.0) -> tuple[int, str]:

@@ -165,7 +165,9 @@ def surface_values(
     values = {f"limit_surface/{name}": [[of(b) for b in finger] for finger in every] for name, of in per_model.items()}
     curved = [finger["ccm"] for finger in fits]
     if six:
-        values |= six_values(contacts)
+        sixes = [six_ellipsoid(c.local, c.rho, c.unit_limits["ccm"].S) for c in contacts]
+        for name, part in zip(("matrix_6d", "rank_6d", "fit_error_6d"), zip(*sixes, strict=True), strict=True):
+            values[f"limit_surface/{name}"] = list(part)
     if sampled:
         values["wrenches/wrench"] = [
             [c.mu * b.wrench[:, [0, 1, 5]] for b in finger] for c, finger in zip(contacts, every, strict=True)
@@ -177,13 +179,6 @@ def surface_values(
         "maps/overclaim": np.max([b.overclaim for b in curved]),
         "maps/overclaim_ellipsoid": np.max([b.ellipsoid_overclaim for b in curved]),
     }
-
-
-def six_values(contacts: Sequence[Contact]) -> dict[str, Any]:
-    """The 6-D ellipsoids of both fingers in the curved model, keyed as in ``study.quantities``."""
-    fits = [six_ellipsoid(c.local, c.rho, c.unit_limits["ccm"].S) for c in contacts]
-    names = ("matrix_6d", "rank_6d", "fit_error_6d")
-    return {f"limit_surface/{name}": list(part) for name, part in zip(names, zip(*fits, strict=True), strict=True)}
 
 
 def six_ellipsoid(patch: ContactPatch, rho: float, S: float) -> tuple[FloatArray, int, FitErrors]:

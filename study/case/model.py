@@ -153,11 +153,6 @@ def image_signs(first: Finger, other: Finger, size: tuple[float, float, float]) 
     return next((signs for signs in choices if looks_alike(first, other, signs, size)), None)
 
 
-def mirror_planes(finger: Finger, size: tuple[float, float, float]) -> tuple[bool, bool]:
-    """Whether the object, as far as the pad sees it, is its own mirror image in the planes ``x = 0`` and ``y = 0``."""
-    return looks_alike(finger, finger, (-1, 1), size), looks_alike(finger, finger, (1, -1), size)
-
-
 def usable_symmetry(scene: Scene, finger: Finger, elements: tuple[int, int, int]) -> tuple[bool, bool]:
     """Planes of symmetry used with this mesh: those that exist, halve it evenly and are allowed by the effects.
 
@@ -166,7 +161,7 @@ def usable_symmetry(scene: Scene, finger: Finger, elements: tuple[int, int, int]
     wanted = scene.effects.model_size
     if wanted == "full":
         return False, False
-    planes = mirror_planes(finger, scene.gripper.pad_size)
+    planes = [looks_alike(finger, finger, signs, scene.gripper.pad_size) for signs in ((-1, 1), (1, -1))]
     usable = planes[0] and elements[0] % 2 == 0, planes[1] and elements[1] % 2 == 0
     # a coarser mesh for error estimates takes what it can use
     if elements == scene.gripper.elements:

@@ -79,24 +79,24 @@ class GraspMap:
 
     def __init__(self, file: str | Path | xr.Dataset, where: Mapping[str, Any] | None = None) -> None:
         ds = file if isinstance(file, xr.Dataset) else open_dataset(file)
-        self.source: Source = Source(ds, dict(where or {}))
-        station, angle, force = self.source.axes
+        self.file_axes = axes_of(ds)
+        station, angle, force = self.file_axes[-3:]
+        self.index, point = _sweep_point(self.file_axes[:-3], dict(where or {}))
+        self.data = ds.isel(dict(zip(ds.status.dims, self.index, strict=False)), drop=True)
+        self.status = self.data.status.values
+        #: unit and definition of everything that `value` knows
+        self.quantities = {name: (unit, ds[name].definition) for name, unit in maps_in(ds).items()}
         self.by_poses = not station.units
-        period, half_turn = (2 * math.pi, False) if self.by_poses else turning(self.source)
+        period, half_turn = (2 * math.pi, False) if self.by_poses else turning(ds.scene, point)
         angles = circle("angle", "rad", angle.values, 0.0 if self.by_poses else period, half_turn)
         stations = plain("candidate" if self.by_poses else "station", station.units, station.values, self.by_poses)
         self.axes: tuple[Nodes, Nodes, Nodes] = (stations, angles, plain("force", "N", force.values))
         self.shape = tuple(len(nodes.x) for nodes in self.axes)
-        self.done = self._grid(self.source.status == DONE)
-        self.snapped = self.done & (self._grid(self.source.read("flags")) & Flag.SNAPPED > 0)
+        self.done = self._grid(self.status == DONE)
+        self.snapped = self.done & (self._grid(self.read("flags")) & Flag.SNAPPED > 0)
         self.kind = self._kinds()
         self._tables: dict[tuple[str, str], FloatArray] = {}
         self._bends: dict[tuple[str, str], FloatArray] = {}
-
-    @property
-    def quantities(self) -> dict[str, tuple[str, str]]:
-        """Unit and definition of everything that `value` knows."""
-        return dict(self.source.maps)
 
     def at(
         self, station: ArrayLike | None = None, angle: ArrayLike | None = None, force: ArrayLike | None = None, *,
@@ -121,7 +121,7 @@ class GraspMap:
         if candidate is not None:
             raise ValueError("the candidates of this map are stations and angles: give at(station, angle, force)")
         along = _one(station, station_mm, "mm", "station")
-        angles = self.source.axes[1].values
+        angles = self.file_axes[-2].values
         turn = _one(angle, angle_deg, "deg", "angle", angles[0] if len(angles) == 1 or self.axes[1].free else None)
         return self.point(along, turn, force)
 
@@ -138,20 +138,19 @@ class GraspMap:
             Solved force [N] at which they are ranked, and which the points have. By default that of ``softjaw show``;
             where the object's mass is known each point then has its own force to use.
         """
-        ds = self.source.data
-        flags, forces = judged(ds), self.source.axes[2].values
+        ds, (stations, angles, forces) = self.data, (axis.values for axis in self.file_axes[-3:])
+        flags = judged(ds)
         k, _ = shown_level(ds, flags) if force is None else (int(np.abs(forces - force).argmin()), "")
         if force is not None and not np.isclose(forces[k], force):
             raise ValueError(f"force is {force:g}: solved are {', '.join(f'{f:g}' for f in forces)} N")
         order = ranked(ds, k, by)[:n]
         each = force is None and "force_low" in ds
-        low = ds["force_low"].values.ravel() if each else np.full(self.source.status[..., k].size, np.nan)
+        low = ds["force_low"].values.ravel() if each else np.full(self.status[..., k].size, np.nan)
         points = []
         for i in order:
-            station, angle = np.unravel_index(i, self.source.status.shape[:-1])
-            at = self.source.axes[0].values[station], self.source.axes[1].values[angle]
+            station, angle = np.unravel_index(i, self.status.shape[:-1])
             use = forces[k] if np.isnan(low[i]) else max(low[i], forces[0])
-            points.append(self.point(int(station) if self.by_poses else at[0], at[1], use))
+            points.append(self.point(int(station) if self.by_poses else stations[station], angles[angle], use))
         return points
 
     def value(
@@ -211,6 +210,24 @@ class GraspMap:
         at = corners(self.axes, flat)
         return GraspPoint(self, parts[0].shape, flat, at, self.states(at))
 
+    def read(self, name: str, model: str = "ccm") -> np.ndarray:
+        """A map, or a finger's dataset ``(station, angle, force, finger, ...)`` in one friction model."""
+        if name in self.quantities:
+            return values_of(self.data, name, model)
+        if not self.has(name):
+            raise KeyError(f"{name} is not in {self.data.file}; it has {', '.join(sorted(self.quantities))}")
+        variable = self.data[BY_KEY[name].variable]
+        return (variable.sel(model=model) if "model" in variable.dims else variable).values
+
+    def has(self, name: str) -> bool:
+        """Whether the file has such a map or dataset of the fingers."""
+        q = BY_KEY.get(name)
+        return name in self.quantities or bool(q and "finger" in q.dims and q.variable in self.data)
+
+    def case(self, index: tuple[int, ...]) -> str:
+        """A case in words, by its index along station, angle and force."""
+        return place_text(self.file_axes, self.data.label.values, (*self.index, *index))
+
     def _grid(self, values: np.ndarray) -> np.ndarray:
         for axis, nodes in enumerate(self.axes):
             values = np.take(values, nodes.take, axis=axis)
@@ -218,7 +235,7 @@ class GraspMap:
 
     def _read(self, name: str, model: str = "ccm") -> FloatArray:
         """A quantity at the nodes, that of the fingers exchanged where a turn exchanges them."""
-        grid = self._grid(self.source.read(name, model))
+        grid = self._grid(self.read(name, model))
         if "/" in name:
             grid = np.where(_like(self.axes[1].swapped[:, None], grid), grid[:, :, :, ::-1], grid)
         return grid
@@ -226,7 +243,7 @@ class GraspMap:
     def _kinds(self) -> np.ndarray:
         """A number for each kind of contact at the nodes; 0 where a file does not tell."""
         kinds = np.zeros(self.shape, np.int64)
-        for name, most in KINDS.items() if self.source.has("fingers/rims") else ():
+        for name, most in KINDS.items() if self.has("fingers/rims") else ():
             values = contact_kinds(name, self._read(f"fingers/{name}"))
             for finger in range(values.shape[-1]):
                 kinds = kinds * (most + 1) + values[..., finger]
@@ -242,44 +259,6 @@ def _one(si: Any, other: Any, unit: str, name: str, default: Any = None) -> Any:
 def _like(mask: np.ndarray, values: np.ndarray, lead: int = 1) -> np.ndarray:
     """A mask with as many axes as the values that it is for; ``lead`` axes of the values come before it."""
     return mask.reshape((1,) * lead + mask.shape + (1,) * (values.ndim - mask.ndim - lead))
-
-
-# --- what a look-up takes out of a file -------------------------------------------------------------------------------
-
-
-class Source:
-    """A result file at one point of its sweep.
-
-    ``axes`` are station, angle and force; ``point`` holds the values of the swept keys as the scene writes them;
-    ``maps`` gives unit and definition of every quantity of a case.
-    """
-
-    def __init__(self, ds: xr.Dataset, where: Mapping[str, Any]) -> None:
-        self.file, self.scene, self.labels = Path(ds.file), ds.scene, ds.label.values
-        self.all_axes = axes_of(ds)
-        self.axes = self.all_axes[-3:]
-        self.index, self.point = _sweep_point(self.all_axes[:-3], where)
-        self.data = ds.isel(dict(zip(ds.status.dims, self.index, strict=False)), drop=True)
-        self.status, self.messages = self.data.status.values, self.data.message.values
-        self.maps = {name: (unit, ds[name].definition) for name, unit in maps_in(ds).items()}
-
-    def read(self, name: str, model: str = "ccm") -> np.ndarray:
-        """A map, or a finger's dataset ``(station, angle, force, finger, ...)`` in one friction model."""
-        if name in self.maps:
-            return values_of(self.data, name, model)
-        if not self.has(name):
-            raise KeyError(f"{name} is not in {self.file}; it has {', '.join(sorted(self.maps))}")
-        variable = self.data[BY_KEY[name].variable]
-        return (variable.sel(model=model) if "model" in variable.dims else variable).values
-
-    def has(self, name: str) -> bool:
-        """Whether the file has such a map or dataset of the fingers."""
-        q = BY_KEY.get(name)
-        return name in self.maps or bool(q and "finger" in q.dims and q.variable in self.data)
-
-    def case(self, index: tuple[int, ...]) -> str:
-        """A case in words, by its index along station, angle and force."""
-        return place_text(self.all_axes, self.labels, (*self.index, *index))
 
 
 def _sweep_point(axes: Any, where: Mapping[str, Any]) -> tuple[tuple[int, ...], dict[str, Any]]:
@@ -318,15 +297,15 @@ def _text(value: Any) -> str:
     return value if isinstance(value, str) else f"{value:.6g}"
 
 
-def turning(source: Source) -> tuple[float, bool]:
+def turning(text: str, point: Mapping[str, Any]) -> tuple[float, bool]:
     """Period of the angles [rad], 0 for a body of revolution, and whether a period exchanges the fingers.
 
     Half a turn of the gripper is the same grasp with the fingers exchanged, if both stand alike (roll 0). A scene that
-    this version cannot read has a whole turn as its period.
+    this version cannot read has a whole turn as its period. ``point``: of the scene's sweep.
     """
     try:
-        scene = parse_scene(source.scene, check_files=False)
-        scene = scene.with_values(source.point) if source.point else scene
+        scene = parse_scene(text, check_files=False)
+        scene = scene.with_values(point) if point else scene
     except SceneError:
         return 2 * math.pi, False
     order, swap = scene.axis_symmetry, abs(math.sin(scene.candidates.roll)) < 1e-9

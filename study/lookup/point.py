@@ -75,7 +75,7 @@ class GraspPoint(GraspNumbers):
         """
         errors, values = (of(name, model, self.corners) for of in (self.map.errors, self.map.interpolated))
         q = BY_KEY.get(f"maps/{name}")
-        if q is not None and q.error and self.map.source.has(q.of_error.name):
+        if q is not None and q.error and self.map.has(q.of_error.name):
             errors = errors + q.error_in_unit(self.map.interpolated(q.of_error.name, "ccm", self.corners), values)
         return self._shaped(np.where((self.states == INSIDE) & np.isfinite(values), errors, np.nan))
 
@@ -92,13 +92,14 @@ class GraspPoint(GraspNumbers):
         ``x = rotation x_pad + origin`` in the frame of the object's own file; between cases the nearest rotation to
         their mean. NaN at angles outside of the solved ones, where values are those of an image by symmetry.
         """
-        source, (stations, angles, _) = self.map.source, self.map.axes
+        stations, angles, _ = self.map.axes
         # As they stand: no angle is folded to an image of itself.
-        turns = angles if self.map.by_poses else plain("angle", "rad", source.axes[1].values)
+        turns = angles if self.map.by_poses else plain("angle", "rad", self.map.file_axes[-2].values)
         at = corners((stations, turns, plain("force", "N", [0.0])), self.place * [1.0, 1.0, 0.0])
-        solved = (source.status == DONE).argmax(axis=-1)  # a pose is the same at every force
+        solved = (self.map.status == DONE).argmax(axis=-1)  # a pose is the same at every force
         cases = np.ix_(stations.take, turns.take)
-        tables = (source.read(f"fingers/{name}")[(*cases, solved[cases])] for name in ("pose_rotation", "pose_origin"))
+        both = (self.map.read(f"fingers/{name}") for name in ("pose_rotation", "pose_origin"))
+        tables = (values[(*cases, solved[cases])] for values in both)
         R, x = (blend(np.repeat(table.reshape(-1, *table.shape[2:]), 2, axis=0), at) for table in tables)
         outside = (self.states != INSIDE) | ~at.inside.all(axis=1)
         U, _, V = np.linalg.svd(R[~outside])
@@ -150,7 +151,7 @@ class GraspPoint(GraspNumbers):
         lines = [", ".join(words)]
         if self.reason:
             return f"{lines[0]}: {self.reason}"
-        for name in (n for n in (*MAIN, *FORCE_RANGE) if self.map.source.has(n)):
+        for name in (n for n in (*MAIN, *FORCE_RANGE) if self.map.has(n)):
             units, value, error = self.map.quantities[name][0], self.value(name), self.error(name)
             lines.append(f"  {name:<14} {shown_text(value, units, 5)}  +- {shown_text(error, units, 2)}")
         lines += [f"  {flag.sentence}" for flag in flags_in(self.flags)]
@@ -160,25 +161,25 @@ class GraspPoint(GraspNumbers):
         return values.reshape(self.shape) if self.shape else values[0].item()
 
     def _reason(self, i: int) -> str:
-        state, source = int(self.states[i]), self.map.source
+        state = int(self.states[i])
         if state == OUTSIDE:
             return self._outside(i)
         cases = self._cases(i)
         if state == NO_RESULT:
             bad = next(c for c, n in cases if not self.map.done.ravel()[n])
-            state = source.status[bad]
+            state = self.map.status[bad]
             what = "is not solved yet"
             if state != MISSING:
                 word = "failed" if state == FAILED else f"is no grasp, {OF_CASES[state]}"
-                what = f"{word}: {source.messages[bad]}"
-            return f"no value: the case beside it at {source.case(bad)} {what}"
+                what = f"{word}: {self.map.data.message.values[bad]}"
+            return f"no value: the case beside it at {self.map.case(bad)} {what}"
         if state == SNAP:
-            before, after = (next(c for c, n in cases if self.map.snapped.ravel()[n] == side) for side in (False, True))
-            return f"no value: the wall snaps in between {source.case(before)} and {source.case(after)}; ask at a case"
+            sides = {bool(self.map.snapped.ravel()[n]): self.map.case(c) for c, n in reversed(cases)}
+            return f"no value: the wall snaps in between {sides[False]} and {sides[True]}; ask at a case"
         if state == JUMP:
             kind = self.map.kind.ravel()
             unlike = [cases[0], next(case for case in cases if kind[case[1]] != kind[cases[0][1]])]
-            first, other = (f"{source.case(c)} ({self._contact(n)})" for c, n in unlike)
+            first, other = (f"{self.map.case(c)} ({self._contact(n)})" for c, n in unlike)
             return f"no smooth value: the contact changes between {first} and {other}; take `nearest`, a solved case"
         return ""
 
@@ -194,7 +195,7 @@ class GraspPoint(GraspNumbers):
 
     def _outside(self, i: int) -> str:
         a = int(np.argmin(self.corners.inside[i]))
-        nodes, value, axis = self.map.axes[a], self.place[i, a], self.map.source.axes[a]
+        nodes, value, axis = self.map.axes[a], self.place[i, a], self.map.file_axes[-3 + a]
         text = f"outside the map: {nodes.name} {shown_text(value, nodes.units, 5)}"
         if nodes.exact:
             return f"{text}, there are candidates 0 to {len(axis.values) - 1} and nothing between them"

@@ -198,13 +198,10 @@ def _about(q: Quantity) -> dict[str, Any]:
 
 def _coordinates(result: Result, variables: dict[str, Any]) -> dict[str, Any]:
     layout = result.layout
-    coordinates: dict[str, Any] = {
-        name: xr.Variable(name, axis.values, {"units": axis.units, "long_name": axis.long_name})
-        for name, axis in zip(layout.names, result.axes, strict=True)
-    }
-    for name, axis in zip(layout.names, result.axes, strict=True):
-        if axis.options:
-            coordinates[name].attrs["options"] = axis.options
+    coordinates: dict[str, Any] = {}
+    for axis in result.axes:
+        about = {"units": axis.units, "long_name": axis.long_name} | ({"options": axis.options} if axis.options else {})
+        coordinates[axis.name] = xr.Variable(axis.name, axis.values, about)
     coordinates["label"] = xr.Variable(layout.names[-3:-1], result.labels, {"long_name": "name of the candidate"})
     known = {"finger": [*range(1, FINGERS + 1)], "model": [*MODELS], "component": [*XYZ], "component_2": [*XYZ]}
     used = {dim for variable in variables.values() for dim in variable.dims}

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from softjaw.study.case.build import surface_triangles
 from softjaw.study.case.candidates import meshes_cost
-from softjaw.study.case.fit import bed_closing, doubt, jaws_of
+from softjaw.study.case.fit import bed_closing, doubt, heights_over, jaws_of
 from softjaw.study.case.poses import turn_of_pose
 from softjaw.study.messages import OTHER_FILE, StudyError
 from softjaw.study.result.layout import Layout
@@ -98,14 +98,7 @@ def heights(
                        indexing="ij")  # fmt: skip
     corners, half = points[triangles], 0.5 * np.array(sides)
     near = (corners[..., :2].min(axis=1) <= half) & (corners[..., :2].max(axis=1) >= -half)
-    corners = corners[near.all(axis=1)]
-    a, u, v = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    area = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
-    a, u, v, area = (part[area != 0.0] for part in (a, u, v, area))
-    dx, dy = x.ravel()[:, None] - a[:, 0], y.ravel()[:, None] - a[:, 1]
-    s, t = (dx * v[:, 1] - dy * v[:, 0]) / area, (u[:, 0] * dy - u[:, 1] * dx) / area
-    over = (s >= -1e-12) & (t >= -1e-12) & (s + t <= 1 + 1e-12)
-    z = a[:, 2] + s * u[:, 2] + t * v[:, 2]
+    z, over = heights_over(corners[near.all(axis=1)], np.column_stack([x.ravel(), y.ravel()]))
     low = np.where(over, z, np.inf).min(axis=1, initial=np.inf)
     high = np.where(over, z, -np.inf).max(axis=1, initial=-np.inf)
     return low.reshape(FACE_GRID), high.reshape(FACE_GRID)
