@@ -107,7 +107,8 @@ def settings_in(ds: xr.Dataset) -> list[Setting]:
     settings = []
     for i, index in enumerate(np.ndindex(shape)):
         values = {axis.long_name: scene.sweep[axis.long_name][j] for axis, j in zip(swept, index, strict=True)}
-        given = all(_same(tables[key.partition(".")[0]].get(key.partition(".")[2]), v) for key, v in values.items())
+        keys = {key: key.partition(".")[::2] for key in values}
+        given = all(np.array_equal(tables[s].get(name), values[key]) for key, (s, name) in keys.items())
         known = {name: error[i][np.isfinite(error[i])] for name, error in errors.items()}
         worst, median = ({n: float(f(e)) if e.size else np.nan for n, e in known.items()} for f in (np.max, np.median))
         stated = {n: float(np.fmax.reduce(claims[n][i])) if n in claims else np.nan for n in maps}
@@ -121,10 +122,6 @@ def settings_in(ds: xr.Dataset) -> list[Setting]:
 def _by_point(values: FloatArray, shape: Sequence[int]) -> FloatArray:
     """Values over the cases ``(points, cases)``."""
     return values.reshape(int(np.prod(shape)), -1)
-
-
-def _same(value: Any, other: Any) -> bool:
-    return bool(np.array_equal(value, other))
 
 
 def _words(value: Any) -> str:

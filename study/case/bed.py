@@ -177,7 +177,10 @@ class JawsOnSurface:
     @property
     def misalignment(self) -> tuple[float, float]:
         """Angle between one contact normal and the other reversed, and of their line to a normal [rad]."""
-        return self._angles(self.sides[0].normal, self.sides[1].normal)
+        first, two = self.sides[0].normal, self.sides[1].normal * [1.0, -1.0, -1.0]
+        (x, y), (u, v) = self.sides[0].centre, self.sides[1].centre
+        line = np.array([u - x, -v - y, self.opening])
+        return angle(first, -two), max(angle(first, line), angle(-two, line))
 
     @property
     def contacts(self) -> list[Contact]:
@@ -221,12 +224,6 @@ class JawsOnSurface:
         beside = ((low[:, :2] <= reach) & (high[:, :2] >= -reach)).all(axis=1)
         faces = self.sides[0].touch, -self.sides[1].touch
         return any(bool((beside & (low[:, 2] <= z + thick) & (high[:, 2] >= z - thick)).any()) for z in faces)
-
-    def _angles(self, first: FloatArray, other: FloatArray) -> tuple[float, float]:
-        two = other * [1.0, -1.0, -1.0]
-        (x, y), (u, v) = self.sides[0].centre, self.sides[1].centre
-        line = np.array([u - x, -v - y, self.opening])
-        return angle(first, -two), max(angle(first, line), angle(-two, line))
 
 
 def grips(

@@ -40,7 +40,7 @@ def build_object(shape: Any) -> GapObject:
         case "revolution":
             return _revolution(shape)
         case "sections":
-            return geometry().stacked(outer_surface(shape))
+            return geometry().Stacked(outer_surface(shape))
         case "elliptic_cylinder":
             return objects.EllipticCylinder(shape.semi_axis_a, shape.semi_axis_b, shape.length)
         case "sphere":

@@ -191,7 +191,6 @@ class EffectChoice:
     def __init__(self, solver: CandidateSolver) -> None:
         self.solver, self.count = solver, len(solver.forces)
         self.target = solver.scene.accuracy.target or E_N_TARGET
-        self._changes: dict[tuple[str, str, int], tuple[float, float, float]] = {}
         self._wanted = wanted_levels(solver.scene)
         cheapest = {name: STEPS[name][0].low for name in Levels._fields}
         self.levels = Levels(*(cheapest[n] if level == "auto" else level for n, level in self._wanted.items()))
@@ -228,12 +227,10 @@ class EffectChoice:
         NaN where they are not known. Of effects that all forces share they are those at the force where they are
         largest.
         """
-        if (name, step.high, k) not in self._changes:
-            forces = [k] if name in EACH_FORCE else range(self.count)
-            # what is not known at some force may be the largest
-            compared = [self._compared(name, step, i) for i in forces]
-            self._changes[name, step.high, k] = max(compared, key=lambda c: inf if np.isnan(largest(c)) else largest(c))
-        return self._changes[name, step.high, k]
+        forces = [k] if name in EACH_FORCE else range(self.count)
+        # what is not known at some force may be the largest
+        compared = [self._compared(name, step, i) for i in forces]
+        return max(compared, key=lambda c: inf if np.isnan(largest(c)) else largest(c))
 
     def _compared(self, name: str, step: Step, k: int) -> tuple[float, float, float]:
         pair = self._coarse_pair(name, step, k)

@@ -16,10 +16,9 @@ from numpy.typing import NDArray
 
 from softjaw.fem.errors import MeshError
 from softjaw.fem.objects.centre_line import CentreLine, centre_line
-from softjaw.fem.objects.gap import GapObject
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.fem.objects.outer_surface import OuterSurface
-from softjaw.fem.objects.stacked import Stacked
+from softjaw.fem.objects.stacked import Stacked as Stacked
 from softjaw.fem.objects.traced_surface import TraceReport, traced
 from softjaw.fem.shell.wall_material import WallMaterial, wall_material
 from softjaw.fem.shell.wall_mesh import MeshSize, along, around, body_mesh
@@ -38,11 +37,6 @@ def middle_of(shape: Mesh, pad_length: float) -> CentreLine:
     """Line through the middles of a mesh's sections, without waves that a pad of this length [m] would not follow."""
     mesh = mesh_object(shape)
     return centre_line(mesh.points, mesh.triangles, 0.5 * pad_length)
-
-
-def stacked(surface: OuterSurface) -> GapObject:
-    """The object of stacked sections."""
-    return Stacked(surface)
 
 
 @lru_cache(maxsize=8)

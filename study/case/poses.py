@@ -88,11 +88,8 @@ def opposed_poses(point: FloatArray, approach: FloatArray, long_side: FloatArray
     unit vectors: finger 1's approach, and the long side of both pads. Returns finger 1 and finger 2, each `STANDOFF`
     away from the point.
     """
-    return (_pose(point, approach, long_side), _pose(point, -approach, long_side))
-
-
-def _pose(point: FloatArray, approach: FloatArray, long_side: FloatArray) -> Pose:
-    return Pose(pad_axes(approach, long_side), point - STANDOFF * approach)
+    first, second = (Pose(pad_axes(a, long_side), point - STANDOFF * a) for a in (approach, -approach))
+    return first, second
 
 
 def turn_of_pose(first: Pose, other: Pose, axis_symmetry: int) -> float | None:

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -62,25 +63,15 @@ def create(path: Path, layout: Layout, header: Header, *, packed: bool = False) 
     """
     if not packed:  # space first: a study must not find out after hours that the disk is full
         _reserve(path, layout.nbytes)
-    part = path.with_name(path.name + ".part")
-    try:
+    with _whole(path, path.with_name(path.name + ".part")) as part:
         with h5py.File(part, "w", libver=HDF5_VERSIONS) as file:
             _write_skeleton(file, layout, header, packed)
         # Opened anew: the sums are of what a reader will find in the file.
         with h5py.File(part, "r+", libver=HDF5_VERSIONS) as file:
             _write_checksums(file, StoredFile(part, file), layout)
-        with part.open("r+b") as handle:
-            if not packed:  # blocks that exist now cannot be missing when a rank writes
+        if not packed:  # blocks that exist now cannot be missing when a rank writes
+            with part.open("r+b") as handle:
                 os.posix_fallocate(handle.fileno(), 0, part.stat().st_size)
-            # On disk before it has its name: a power cut leaves no file or a whole one.
-            os.fsync(handle.fileno())
-    except (OSError, ValueError, RuntimeError) as error:  # h5py has all three for a write that failed
-        remove(part)
-        # A wrong layout is a bug and must not look like a full disk.
-        if not isinstance(error, OSError) and "write" not in str(error):
-            raise
-        raise StudyError(CANNOT_WRITE, f"{path}: cannot be created: {reason(error)}") from error
-    put_in_place(part, path)
 
 
 def rewrite(path: Path, layout: Layout, header: Header, *, packed: bool = False) -> None:
@@ -90,9 +81,8 @@ def rewrite(path: Path, layout: Layout, header: Header, *, packed: bool = False)
     Rows are copied with their checksums: a torn one stays torn, and is solved again. What is filled once nothing is
     missing is copied where no station is added.
     """
-    new = path.with_name(path.name + ".new")
-    create(new, layout, header, packed=packed)
-    try:
+    with _whole(path, path.with_name(path.name + ".new")) as new:
+        create(new, layout, header, packed=packed)
         with open_result(path, unchecked=True) as old, h5py.File(new, "r+", libver=HDF5_VERSIONS) as file:
             places = _places(old.layout, layout)
             left_out = () if old.layout.shape == layout.shape else NOT_COPIED
@@ -103,12 +93,26 @@ def rewrite(path: Path, layout: Layout, header: Header, *, packed: bool = False)
                 target[...] = _spread(values, dataset, places).astype(target.dtype)  # texts with their encoding
             for name in (SESSION_ROWS, *([] if left_out else [REPORT])):
                 file[name][...] = old.file.values(old.file.plain(name))
-        with new.open("r+b") as handle:
+
+
+@contextmanager
+def _whole(path: Path, part: Path) -> Iterator[Path]:
+    """A part that gets the name of a file at once and for good, when it is whole and on disk."""
+    try:
+        yield part
+        with part.open("r+b") as handle:
             os.fsync(handle.fileno())
-    except (OSError, RuntimeError) as error:
-        remove(new)
-        raise StudyError(CANNOT_WRITE, f"{path}: cannot be written again: {reason(error)}") from error
-    put_in_place(new, path)
+    except (OSError, ValueError, RuntimeError) as error:  # h5py has all three for a write that failed
+        remove(part)
+        # A wrong layout is a bug and must not look like a full disk.
+        if not isinstance(error, OSError) and "write" not in str(error):
+            raise
+        raise StudyError(CANNOT_WRITE, f"{path}: cannot be created: {reason(error)}") from error
+    part.replace(path)
+    # The new name is on disk only when the folder is.
+    folder = os.open(path.parent, os.O_RDONLY)
+    os.fsync(folder)
+    os.close(folder)
 
 
 def _places(old: Layout, new: Layout) -> dict[str, Any]:
@@ -131,15 +135,6 @@ def _spread(values: np.ndarray, dataset: Dataset, places: dict[str, Any]) -> np.
             index[axis] = places[name]
     spread[tuple(index)] = values
     return spread
-
-
-def put_in_place(part: Path, path: Path) -> None:
-    """Give a file that is on disk its name, at once and for good."""
-    part.replace(path)
-    # The new name is on disk only when the folder is.
-    folder = os.open(path.parent, os.O_RDONLY)
-    os.fsync(folder)
-    os.close(folder)
 
 
 def _reserve(path: Path, need: int) -> None:
