@@ -362,11 +362,13 @@ class NonlinearSolver:
         return solution
 
     def forget(self) -> None:
-        """Let the next solve be that of a new solver: MUMPS orders by the first values that it sees."""
+        """Let the next solve be that of a new solver."""
         self._end, self._pattern = None, self.problem.pattern
         if self._pattern.start is not self._stored:
             self._grow()
-        self._snes.getKSP().getPC().reset()
+        # MUMPS orders symmetric matrices, and those of walls, by the first values that it sees
+        if self._condensed or not hasattr(self.problem, "symmetric"):
+            self._snes.getKSP().getPC().reset()
 
     def destroy(self) -> None:
         """Give the factors' memory back."""

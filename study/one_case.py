@@ -32,8 +32,7 @@ from softjaw.study.scene import Scene
 from softjaw.study.units import converted, shown_text
 
 FloatArray = NDArray[np.float64]
-MOST_SOLVERS = 4  # of as many candidates, which hold factors of their matrices: 10 to 100 MB each
-_SOLVERS: dict[tuple[Scene, int], pipeline.UnitSolver] = {}  # the last one used comes last
+READY = 4  # candidates whose matrices are kept for further forces: 10 to 100 MB each
 SAME = {"rel_tol": 1e-9, "abs_tol": 1e-12}  # stations [m], angles [deg] and forces [N] that are the scene's own
 
 
@@ -186,15 +185,12 @@ def solved_case(
 
 def _outcome(unit: Any, k: int, what: str) -> CaseResult:
     """Result of the ``k``-th force of a unit; the solvers of the last few units are kept for further forces."""
-    key = unit.scene, unit.index
     try:
-        solver = _SOLVERS.pop(key, None) or pipeline.UnitSolver(unit, unit.scene)
+        solver = pipeline.solver_of(unit, unit.scene)
         result = next(result for number, result in solver.cases([k]) if number == k)
     except (ArithmeticError, MemoryError, RuntimeError, ValueError) as error:  # a run stores it as the case's failure
         raise CaseError(f"{what}: {type(error).__name__}: {error}") from error
-    _SOLVERS[key] = solver
-    if len(_SOLVERS) > MOST_SOLVERS:
-        _SOLVERS.pop(next(iter(_SOLVERS))).destroy()
+    pipeline.keep(unit, unit.scene, solver, READY)
     if isinstance(result, CaseFailure):
         raise CaseError(f"{what}: {result.message}")
     return result

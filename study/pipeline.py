@@ -30,6 +30,8 @@ from softjaw.study.quantities import misses
 from softjaw.study.scene import Scene
 from softjaw.study.scene.sections import COARSE, FINEST
 
+MOST_SOLVERS = 64  # whose solutions are kept: some MB each
+
 
 def solve_unit(
     unit: Any, wanted: Collection[int] | None = None
@@ -43,11 +45,15 @@ def solve_unit(
     coarse = [k for k in forces if unit.finest and unit.finest[k] == COARSE]
     for some, scene in ((coarse, screened(unit.scene)), ([k for k in forces if k not in coarse], unit.scene)):
         if some:
-            solver = UnitSolver(unit, scene)
+            solver = solver_of(unit, scene)
             try:
                 yield from solver.cases(some)
-            finally:
-                solver.destroy()
+            except GeneratorExit:  # nobody asks for more
+                return keep(unit, scene, solver)
+            except BaseException:  # interrupted amid a solve, it is not kept
+                solver.put_away()
+                raise
+            keep(unit, scene, solver)
 
 
 def screened(scene: Scene) -> Scene:
@@ -65,25 +71,46 @@ class UnitSolver:
     """Cases of a unit as a scene solves them, its own or the screened one; states and choices of effects are kept."""
 
     def __init__(self, unit: Any, scene: Scene) -> None:
-        self._unit, self._settings = unit, settings_of(scene, build_object(scene.object))
+        self.unit, self._settings = unit, settings_of(scene, build_object(scene.object))
         self._solver = CandidateSolver(scene, unit.candidate.poses, finest=unit.finest)
         self._choice: EffectChoice | None = None
 
     def cases(self, wanted: Collection[int]) -> Generator[tuple[int, CaseResult | CaseFailure], None, None]:
         """Cases at these forces, upward."""
         start, before = time.perf_counter(), self._solver.seconds
+        self._solver.finest = tuple(self.unit.finest) or self._solver.finest
         choice = self._choice = self._choice or EffectChoice(self._solver)
         for k, outcome in _outcomes(choice, wanted):
             if isinstance(outcome, CaseFailure):
                 yield k, outcome
             elif k in wanted:
                 # the first case has the time in which the effects of all were chosen
-                yield k, _result(self._settings, choice, k, outcome, self._unit, start, before)
+                yield k, _result(self._settings, choice, k, outcome, self.unit, start, before)
                 start, before = time.perf_counter(), self._solver.seconds
 
-    def destroy(self) -> None:
-        """Give the factors' memory back."""
-        self._solver.destroy()
+    def put_away(self) -> None:
+        """Give the memory of meshes and factors back; what was solved stays."""
+        self._solver.put_away()
+
+
+# of units, by scene and number; the last one used comes last
+_SOLVERS: dict[tuple[Scene, int], UnitSolver] = {}
+
+
+def solver_of(unit: Any, scene: Scene) -> UnitSolver:
+    """Solver of a unit, with what an earlier round or question has solved if it was kept."""
+    solver = _SOLVERS.pop((scene, unit.index), None) or UnitSolver(unit, scene)
+    solver.unit = unit
+    return solver
+
+
+def keep(unit: Any, scene: Scene, solver: UnitSolver, ready: int = 0) -> None:
+    """Keep what a solver has solved; the last few, ``ready``, keep their meshes and factors, too."""
+    _SOLVERS[scene, unit.index] = solver
+    for older in list(_SOLVERS.values())[: len(_SOLVERS) - ready]:
+        older.put_away()
+    if len(_SOLVERS) > MOST_SOLVERS:
+        del _SOLVERS[next(iter(_SOLVERS))]
 
 
 def _result(

@@ -185,7 +185,7 @@ def level_named(effect: str, name: str) -> str:
 class EffectChoice:
     """Levels of the effects of one candidate, chosen where its scene leaves them open; solves its cases at them.
 
-    ``levels``: those that all forces have. ``chosen``: for each effect with steps its `Level` at every force.
+    ``levels``: those that all forces have.
     """
 
     def __init__(self, solver: CandidateSolver) -> None:
@@ -194,21 +194,29 @@ class EffectChoice:
         self._wanted = wanted_levels(solver.scene)
         cheapest = {name: STEPS[name][0].low for name in Levels._fields}
         self.levels = Levels(*(cheapest[n] if level == "auto" else level for n, level in self._wanted.items()))
-        self.chosen = {name: self._chosen(name) for name in Levels._fields}
+        self._chosen: dict[tuple[str, int], Level] = {}
+        for name in Levels._fields:
+            if name not in EACH_FORCE:
+                self.level(name, self.count - 1)
 
-    def _chosen(self, name: str) -> list[Level]:
-        """Level of one effect at every force; what all forces share is noted in ``levels``."""
+    def level(self, name: str, k: int) -> Level:
+        """Level of one effect with steps at the ``k``-th force."""
+        k = k if name in EACH_FORCE else self.count - 1
+        if (name, k) not in self._chosen:
+            self._chosen[name, k] = self._choose(name, k)
+        return self._chosen[name, k]
+
+    def _choose(self, name: str, k: int) -> Level:
+        """Choose the level of one effect at the ``k``-th force; what all forces share is noted in ``levels``."""
         wanted, steps = self._wanted[name], STEPS[name]
         if name == "object" and not self.solver.walled:
-            return [Level(level_named(name, steps[0].low), reason=NO_WALL)] * self.count
+            return Level(level_named(name, steps[0].low), reason=NO_WALL)
         if wanted != "auto":
             # of a force by itself the solved state tells it, see `effects_at`: nothing is solved for it here
-            indicator = nan if name in EACH_FORCE else steps[-1].indicator(self, self.count - 1)
-            return [Level(level_named(name, wanted), indicator, FORCED)] * self.count
-        forces = range(self.count) if name in EACH_FORCE else [self.count - 1]
+            indicator = nan if name in EACH_FORCE else steps[-1].indicator(self, k)
+            return Level(level_named(name, wanted), indicator, FORCED)
         # what is stated is the last step's indicator, whichever step was decided last
-        levels = [self._at(name, k)._replace(indicator=steps[-1].indicator(self, k)) for k in forces]
-        return levels if name in EACH_FORCE else levels * self.count
+        return self._at(name, k)._replace(indicator=steps[-1].indicator(self, k))
 
     def _at(self, name: str, k: int) -> Level:
         """Level of one effect at the ``k``-th force: each step is skipped, taken, or measured."""
@@ -292,13 +300,13 @@ class EffectChoice:
         solved = self._solved(k)
         if solved.coarse is None:
             return solved
-        names = [name for name in ("sheet", COUPLING) if self.chosen[name][k].reason == LITTLE]
+        names = [name for name in ("sheet", COUPLING) if self.level(name, k).reason == LITTLE]
         pairs = [self._coarse_pair(name, STEPS[name][0], k) for name in names]
         return replace(solved, pairs=[*solved.pairs, *filter(None, pairs)])
 
     def _solved(self, k: int) -> Solved:
         """A case without what its effects leave out."""
-        level, coupled = self.chosen[COUPLING][k], self.levels._replace(friction_pressure_coupling="tangential")
+        level, coupled = self.level(COUPLING, k), self.levels._replace(friction_pressure_coupling="tangential")
         if level.reason == FORCED or level.level != level_named(COUPLING, "tangential"):
             return self.solver.case(k, self.levels)
         try:
@@ -308,13 +316,13 @@ class EffectChoice:
                 raise ConvergenceError(f"on the coarse mesh {lost}")
             return self.solver.case(k, coupled)
         except (ConvergenceError, CheckError) as error:
-            self.chosen[COUPLING][k] = level._replace(level=level_named(COUPLING, "none"), reason=FAILED)
+            self._chosen[COUPLING, k] = level._replace(level=level_named(COUPLING, "none"), reason=FAILED)
             solved = self.solver.case(k, self.levels)
             return replace(solved, note=join_notes(LEFT_OUT.format(reason=error), solved.note))
 
     def effects_at(self, k: int, contacts: Sequence[PressedContact]) -> dict[str, Level]:
         """Levels of the effects that are chosen at the ``k``-th force, whose contacts are solved."""
-        levels = {name: chosen[k] for name, chosen in self.chosen.items()}
+        levels = {name: self.level(name, k) for name in Levels._fields}
         if levels[COUPLING].reason == FORCED:
             indicator = max(neglected_traction(c.state, c.mu) for c in contacts)
             levels[COUPLING] = levels[COUPLING]._replace(indicator=indicator)
@@ -322,12 +330,12 @@ class EffectChoice:
 
     def skipped_share(self, k: int) -> float:
         """What friction that its indicator left out may change of any number, as a share."""
-        level = self.chosen[COUPLING][k]
+        level = self.level(COUPLING, k)
         return E_N_TARGET / SMALL_TRACTION * level.indicator if level.reason == BELOW else 0.0
 
     def flags_at(self, k: int) -> Flag:
         """Flag of a case that lacks an effect that moves its numbers by more than the target."""
-        return Flag.LEFT_OUT if self.chosen[COUPLING][k].reason == FAILED else Flag(0)
+        return Flag.LEFT_OUT if self.level(COUPLING, k).reason == FAILED else Flag(0)
 
 
 def wanted_levels(scene: Scene) -> dict[str, str]:

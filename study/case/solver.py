@@ -133,6 +133,7 @@ class CandidateSolver:
         self._paths: dict[tuple[int, Levels, int], Iterator[Any]] = {}
         self._states: dict[tuple[int, int, Levels, int], Any] = {}  # or failures, of every part
         self._solutions: dict[tuple[int, int, Levels], Solution] = {}
+        self._spent = Seconds()  # by what was put away
 
     def at_levels(self, levels: Levels) -> Scene:
         """The scene with these levels of its effects."""
@@ -168,6 +169,8 @@ class CandidateSolver:
 
     def failure(self, k: int, mesh: int, levels: Levels) -> Failure | None:
         """Why there is no solution at the ``k``-th force; None where there is one."""
+        if (k, mesh, levels) in self._solutions:
+            return None
         parts = range(len(self.pressing(mesh, levels).parts))
         return next((s for part in parts if isinstance(s := self._state(k, mesh, levels, part), Failure)), None)
 
@@ -198,6 +201,7 @@ class CandidateSolver:
     def seconds(self) -> Seconds:
         """Where the time of all solves so far has gone."""
         spent = [part.solver.seconds for fingers in self._pressing.values() for part in fingers.parts]
+        spent.append(self._spent)
         return Seconds(*(sum(getattr(s, name) for s in spent) for name in ("assembly", "factorisation", "total")))
 
     def error(self, solved: Solved) -> float:
@@ -260,11 +264,14 @@ class CandidateSolver:
         states = (self._state(i, mesh - 1, levels, part) for i in forces)
         return [state for state in states if not isinstance(state, Failure)][:MOST_STARTS]
 
-    def destroy(self) -> None:
-        """Give the factors' memory back."""
+    def put_away(self) -> None:
+        """Give the memory of meshes and factors back; solutions stay, and what else is asked for makes them anew."""
+        self._spent = self.seconds
         for fingers in self._pressing.values():
             for part in fingers.parts:
                 part.destroy()
+            fingers.parts = []
+        self._pressing, self._paths = {}, {}
 
 
 def join_notes(*notes: str) -> str:

@@ -108,19 +108,24 @@ def choice(monkeypatch):
     return lambda *arguments, **more: EffectChoice(Prepared(*arguments, **more))
 
 
+def levels_of(choice):
+    """Level of friction acting back at every force."""
+    return [choice.level(COUPLING, k) for k in range(choice.count)]
+
+
 def test_the_level_at_a_force_does_not_depend_on_other_forces(choice):
     """As measured at 175 mm of the bottle: e_n changes by 8 %, -0.4 % and -29 %, the payload in the middle by 5 %."""
-    levels = choice([0.077, -0.0042, -0.292], [0.1, 0.05, -0.3]).chosen[COUPLING]
+    levels = levels_of(choice([0.077, -0.0042, -0.292], [0.1, 0.05, -0.3]))
     assert [level.reason for level in levels] == [effects.MUCH] * 3
-    [alone] = choice([-0.0042], [0.05]).chosen[COUPLING]
+    [alone] = levels_of(choice([-0.0042], [0.05]))
     assert alone == levels[1]
-    levels = choice([0.0042, 0.005, 0.006]).chosen[COUPLING]
+    levels = levels_of(choice([0.0042, 0.005, 0.006]))
     assert [level.reason for level in levels] == [effects.LITTLE] * 3
     assert [level.change for level in levels] == pytest.approx([0.0042, 0.005, 0.006], rel=1e-9)
 
 
 def test_what_is_measured_on_a_few_elements_is_not_known(choice):
-    [level] = choice([np.nan]).chosen[COUPLING]
+    [level] = levels_of(choice([np.nan]))
     assert (level.reason, level.indicator) == (effects.UNDECIDED, 0.1)
     assert np.isnan(level.change)
 
@@ -137,7 +142,7 @@ def test_friction_is_left_out_on_a_wall_whose_coarse_path_with_it_has_ended(choi
     solved = [found.case(k) for k in range(3)]
     assert [own.fine.friction_pressure_coupling for own in solved] == ["tangential", "none", "tangential"]
     assert [bool(own.note) for own in solved] == [False, True, False]
-    assert [level.level for level in found.chosen[COUPLING]] == [TAKEN, FREE, TAKEN]
+    assert [level.level for level in levels_of(found)] == [TAKEN, FREE, TAKEN]
     assert [found.flags_at(k) for k in range(3)] == [Flag(0), Flag.LEFT_OUT, Flag(0)]
 
 
@@ -150,7 +155,7 @@ def test_friction_that_cannot_be_solved_on_the_scenes_mesh_is_left_out(choice, m
     found = choice([0.2])
     found.solver.case = case
     assert found.case(0).note.endswith("; own note")
-    assert found.chosen[COUPLING][0].reason == effects.FAILED
+    assert found.level(COUPLING, 0).reason == effects.FAILED
     assert found.flags_at(0) == Flag.LEFT_OUT
 
 

@@ -265,5 +265,5 @@ def test_the_steps_of_the_load_path_are_part_of_the_errors():
     assert longer[0].state.steps < coarse[0].state.steps
     change = abs(longer[0].state.closing / coarse[0].state.closing - 1.0)
     assert 0.0 < change < 0.01
-    solver.destroy()
+    solver.put_away()
     assert whole(ROUGH)[1].values["maps/closing_error"] > change

@@ -9,7 +9,7 @@ from mpi4py import MPI
 from threadpoolctl import threadpool_limits
 
 import softjaw as sj
-from softjaw.study import one_case
+from softjaw.study import pipeline
 from softjaw.study.one_case import CaseError
 from softjaw.study.quantities import BY_KEY, MODELS
 from softjaw.study.result.store import open_result
@@ -81,7 +81,7 @@ def test_an_image_by_symmetry_stands_where_the_run_has_it(solved):
 
 def test_no_bit_depends_on_whether_the_solver_was_kept(solved, monkeypatch):
     scene, _, case = solved
-    monkeypatch.setattr(one_case, "MOST_SOLVERS", 0)
+    monkeypatch.setattr(pipeline, "MOST_SOLVERS", 0)
     kept, new = (sj.press(scene, station=0.0, angle=0.0, force=2.0) for _ in range(2))
     for key, value in case.result.values.items():
         if not key.startswith("work/"):

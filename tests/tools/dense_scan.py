@@ -83,7 +83,7 @@ def payload_at(scene, poses):
         contacts = solver.solve(0, FINE, RIGID).contacts
         settings = settings_of(scene, build_object(scene.object))
         payload = payload_alone(contacts, settings.surface.samples, settings.task)["maps/payload"]
-        solver.destroy()
+        solver.put_away()
     except FAILURES:
         return 0.0
     return payload

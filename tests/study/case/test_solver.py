@@ -51,7 +51,7 @@ def test_a_state_or_its_failure_is_solved_once(counted):
     coupled = solver.solve(0, COARSE, PLAIN._replace(friction_pressure_coupling="tangential"))
     assert coupled.contacts[0].limits["ccm"].e_n != case.coarse.contacts[0].limits["ccm"].e_n
     assert counted == {1.0: 4, 2.0: 2, "path": 2}
-    solver.destroy()
+    solver.put_away()
 
 
 def test_a_fine_state_starts_from_the_three_nearest_coarse_ones(monkeypatch):
@@ -70,4 +70,4 @@ def test_a_fine_state_starts_from_the_three_nearest_coarse_ones(monkeypatch):
     finer = solver.solve(0, FINE + 1, PLAIN)
     assert given == [[3.0, 2.0, 1.5]] * 2 + [[1.0]] * 4
     assert finer.contacts[0].state.pad.shape.elements == (12, 6, 3)
-    solver.destroy()
+    solver.put_away()

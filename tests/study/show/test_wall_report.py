@@ -88,7 +88,7 @@ def test_the_size_of_a_shell_is_that_of_the_mesh_that_is_solved(solved):
     solver = CandidateSolver(scene, unit.candidate.poses)
     fingers = solver.pressing(FINE, EffectChoice(solver).levels)
     assert size["shell"] == pytest.approx(6 * fingers.shell.nodes, rel=0.1)  # the axis is one node
-    solver.destroy()
+    solver.put_away()
     fine = scene.with_values({"accuracy.wall_element_mm": 1.5})
     assert wall_unknowns(fine)["shell"] > 4 * size["shell"]
     assert memory(fine) > memory(scene)
