@@ -148,7 +148,7 @@ def objects_of(options: Namespace) -> ObjectFolder | None:
     if options.objects is not None:
         meshes = Path(options.objects).absolute()
         pattern = meshes / "*" if meshes.is_dir() else meshes
-        options.overrides.append(f"object.mesh={json.dumps(str(pattern))}")
+        options.overrides = [*options.overrides, f"object.mesh={json.dumps(str(pattern))}"]
     with wrong_scenes_are_bad_usage():
         return folder_of(options.scene, [*options.overrides, *petsc_overrides(options.petsc)])
 
