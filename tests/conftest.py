@@ -3,3 +3,13 @@
 import os
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # before numpy: bits must not depend on the machine's cores
+
+import pytest  # noqa: E402
+
+from softjaw.study import pipeline  # noqa: E402
+
+
+@pytest.fixture(autouse=True)
+def nothing_solved(monkeypatch):
+    """Each test begins without what others have solved."""
+    monkeypatch.setattr(pipeline, "_SOLVERS", {})

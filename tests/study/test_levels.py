@@ -25,6 +25,11 @@ BOTH = pytest.mark.parametrize("overrides", [(), WALL], ids=["rigid", "wall"])
 ROUGH = ("effects.friction_pressure_coupling='tangential'",)
 
 
+@pytest.fixture(autouse=True)
+def every_solve_begins_anew(monkeypatch):
+    monkeypatch.setattr(pipeline, "MOST_SOLVERS", 0)
+
+
 def unit_of(*overrides):
     [unit] = units_of(scene_of(CONE, "accuracy.meshes=2", NO_COUPLING, *overrides, where=POSE, forces="[1, 2, 5]"))
     return unit
