@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from softjaw.friction.patch import CANCEL, NEGLIGIBLE, ContactPatch, FloatArray, slivers
+from softjaw.friction.patch import NEGLIGIBLE, ContactPatch, FloatArray, slivers
 
 UNLOADED = 0.01  # weight of a face's own normal, in mean loads of all faces: the object's counts where there is load
 
@@ -95,17 +95,12 @@ class ContactFace:
         load: where there is no load the object may be far away, and its nearest point jump.
         """
         q = patch.corners
-        if q is None or q.shape[1] != 4:
-            count = "none" if q is None else f"{q.shape[1]}"
-            raise ValueError(f"corners: found {count} around each face, expected 4; a contact face has quadrilaterals")
+        assert q is not None
         # the diagonals give the area vector of a warped face too, whichever way it is split
         plane_normal = np.cross(q[:, 2] - q[:, 0], q[:, 3] - q[:, 1])
         length = np.linalg.norm(plane_normal, axis=1)
         plane_normal = plane_normal * (~slivers(q) / np.where(length > 0, length, 1.0))[:, None]
-        sense = patch.load @ (plane_normal * patch.normal).sum(axis=1) / patch.load.sum()
-        if abs(sense) <= CANCEL:
-            raise ValueError("corners: found faces that are wound both ways about their normals, expected one sense")
-        plane_normal *= np.sign(sense)
+        plane_normal *= np.sign(patch.load @ (plane_normal * patch.normal).sum(axis=1))
         share = patch.load[:, None] * patch.normal + UNLOADED * patch.load.mean() * plane_normal
         # corners no farther apart than this share of a usual face's size are one
         corner = _numbered(q.reshape(-1, 3), 1e-6 * np.median(np.ptp(q, axis=1).max(axis=1)))

@@ -28,7 +28,7 @@ from numba import njit
 from numpy.typing import ArrayLike
 
 from softjaw.friction.motion import SLIDE_X, SLIDE_Y, TURN_Z
-from softjaw.friction.patch import CANCEL, ContactPatch, FloatArray, NoContactError
+from softjaw.friction.patch import CANCEL, ContactPatch, FloatArray
 
 MODELS = ("ccm", "pcm", "pcm_projected")
 SEARCH_WIDTH = 1e-3  # at which the search for the direction of the largest force ends [rad]
@@ -160,8 +160,6 @@ def model_faces(patch: ContactPatch, model: str) -> tuple[FloatArray, FloatArray
 
     Parameters as in `friction_wrench`; faces that carry no force are left out.
     """
-    if model not in MODELS:
-        raise ValueError(f"model is {model!r}: choose one of {', '.join(MODELS)}")
     # exactly: a face without load is what the data say, not what a calculation left
     keep = patch.load > 0
     arm, normal, load = patch.centroid[keep].T.copy(), patch.normal[keep].T.copy(), patch.load[keep]
@@ -285,10 +283,7 @@ def _radius(patch: ContactPatch) -> float:
     """Radius around the origin that holds every centre of rotation no worse than the origin itself [m]."""
     r, upright = np.linalg.norm(patch.centroid, axis=1), np.abs(patch.normal[:, 2])
     # farther out every face costs at least its upright share of the distance, more than at the origin
-    weight = patch.load @ upright
-    if weight <= CANCEL * patch.load.sum():
-        raise NoContactError("all faces stand parallel to the contact normal: bring the patch into its contact frame")
-    return float(patch.load @ (r * (1 + upright)) / weight)
+    return float(patch.load @ (r * (1 + upright)) / (patch.load @ upright))
 
 
 def _smaller_ellipse(v: FloatArray, P: FloatArray, g: FloatArray, depth: float) -> tuple[FloatArray, FloatArray]:

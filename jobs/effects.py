@@ -22,7 +22,7 @@ import numpy as np
 from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.friction.motion import fibonacci_twists
 from softjaw.friction.wrench import friction_wrench
-from softjaw.scoring.contact import polytope_volume
+from softjaw.scoring.contact import PolytopeBody
 from softjaw.study import pictures
 from softjaw.study.case import effects
 from softjaw.study.case.build import build_object
@@ -128,8 +128,8 @@ def off(low: float, high: float) -> float:
 def volume(contact: Contact, found: SurfaceFit) -> float:
     """Quality of two such contacts face to face with a fitted surface over that with the exact one."""
     w = friction_wrench(contact.local, fibonacci_twists(HULL, contact.rho), 1.0)[:, [0, 1, 5]]
-    V, A = polytope_volume(np.vstack([w, -w]) / contact.limits["ccm"].S / [1, 1, contact.rho])
-    return found.surface.volume * found.surface.shadow_area / (V * A)
+    exact = PolytopeBody(np.vstack([w, -w]) / contact.limits["ccm"].S / [1, 1, contact.rho])
+    return found.surface.volume * found.surface.shadow_area / (exact.volume * exact.shadow_area)
 
 
 def of_patch(name: str, contacts: list[Contact]) -> Iterator[Row]:

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 import softjaw as sj
 from softjaw.lsfit.ellipsoid import Ellipsoid
 from softjaw.scoring.closed_form import volume_linf
-from softjaw.scoring.contact import polytope_volume
+from softjaw.scoring.contact import PolytopeBody
 
 
 def graspit_vertices(semi_axes: ArrayLike) -> np.ndarray:
@@ -37,8 +37,10 @@ def volume_share(first: ArrayLike, second: ArrayLike, torques: float) -> float:
     ``torques`` is the length by which torques are divided [m], which decides where GraspIt!'s points lie.
     """
     axes = [np.asarray(a, float) / [1.0, 1.0, torques] for a in (first, second)]
-    exact = [(body.volume, body.shadow_area) for body in map(Ellipsoid.of_axes, axes)]
-    hulls = [polytope_volume(graspit_vertices(a)) for a in axes]
+    hulls, exact = (
+        [(body.volume, body.shadow_area) for body in bodies]
+        for bodies in ([PolytopeBody(graspit_vertices(a)) for a in axes], map(Ellipsoid.of_axes, axes))
+    )
     return volume_linf(*hulls[0], *hulls[1], 1.0) / volume_linf(*exact[0], *exact[1], 1.0)
 
 

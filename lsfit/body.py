@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import ConvexHull
 
 from softjaw.lsfit.form import directions
-from softjaw.lsfit.samples import checked_wrenches, sample_rank
+from softjaw.lsfit.samples import pressed, sample_rank
 from softjaw.lsfit.surface import OUT_OF_SPAN, ZERO_SHARE, rows, supported_shadow
 
 FloatArray = NDArray[np.float64]
@@ -88,11 +88,14 @@ class ExactSurface:
     def support(self, t: ArrayLike) -> FloatArray:
         """Largest ``w . t`` over the body, ``(m, 3) -> (m,)``; exact."""
         T = rows(t, 3)
-        # without a motion friction has no direction, yet the support is 0
-        moving = T.any(axis=1)
-        h = np.zeros(len(T))
-        h[moving] = (np.asarray(self.wrench(T[moving])) * T[moving]).sum(axis=1)
-        return h
+        return (self.support_points(T) * T).sum(axis=1)
+
+    def support_points(self, t: ArrayLike) -> FloatArray:
+        """Wrenches of motions, the farthest along them, ``(m, 3) -> (m, 3)``; 0 without a motion."""
+        T = rows(t, 3)
+        points, moving = np.zeros(T.shape), T.any(axis=1)
+        points[moving] = self.wrench(T[moving])
+        return points
 
     @cached_property
     def semi_axes(self) -> FloatArray:
@@ -113,7 +116,8 @@ class ExactSurface:
 
     @cached_property
     def _hull_samples(self) -> FloatArray:
-        return checked_wrenches(self.samples(), 3)
+        W = self.samples()
+        return W[pressed(W)]
 
     @cached_property
     def _facets(self) -> FloatArray:

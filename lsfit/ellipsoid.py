@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import nnls
 
 from softjaw.lsfit.form import exponents, monomials
-from softjaw.lsfit.samples import FLAT_RATIO, checked_wrenches, principal_frame
+from softjaw.lsfit.samples import FLAT_RATIO, pressed, principal_frame
 from softjaw.lsfit.sos import least_in_cone, quadratic_parts
-from softjaw.lsfit.surface import ZERO_SHARE, FitFlag, LimitSurface, checked_factors, mapped_value, rows
+from softjaw.lsfit.surface import ZERO_SHARE, FitFlag, LimitSurface, mapped_value, rows
 
 FloatArray = NDArray[np.float64]
 
@@ -46,40 +46,18 @@ class Ellipsoid(LimitSurface):
     flag: FitFlag = FitFlag.CLEAN
     degree = 2
 
-    def __post_init__(self) -> None:
-        """Freeze the map."""
-        F = np.array(self.F, float)
-        F.flags.writeable = False
-        object.__setattr__(self, "F", F)
-
     @classmethod
     def of_axes(cls, semi_axes: ArrayLike, flag: FitFlag = FitFlag.CLEAN) -> Ellipsoid:
         """Ellipsoid with semi-axes ``(d,)`` along the components, flat where one is 0."""
         axes = np.array(semi_axes, dtype=float)
-        if axes.ndim != 1 or not np.isfinite(axes).all() or (axes < 0).any():
-            raise ValueError(f"semi_axes is {axes.tolist()}: expected finite numbers that are not negative")
         return cls(np.diag(axes)[:, axes > 0], flag)
 
     @classmethod
-    def of_matrix(cls, A: ArrayLike) -> Ellipsoid:
+    def of_matrix(cls, A: FloatArray) -> Ellipsoid:
         """Ellipsoid ``w' A w <= 1``; ``A (d, d)`` symmetric, and positive definite to `ZERO_SHARE`."""
-        A = np.array(A, float)
-        if A.ndim != 2 or A.shape[0] != A.shape[1] or not np.isfinite(A).all():
-            raise ValueError(f"A has shape {A.shape}: expected finite numbers in a square matrix")
-        # rounding leaves 1e-16; more than this is another matrix than the caller meant
-        if abs(A - A.T).max() > 1e-9 * abs(A).max():
-            raise ValueError("A is not symmetric: give (A + A') / 2, which has the same quadratic form")
-        diagonal = A.diagonal()
-        if (diagonal <= 0).any():
-            raise ValueError(f"A has the diagonal {diagonal.tolist()}: an ellipsoid needs a positive definite matrix")
         # axes of very different length keep their digits if they are made equal first
-        size = 1 / np.sqrt(diagonal)
-        even = A * np.outer(size, size)
-        lowest = float(np.linalg.eigvalsh(even)[0])
-        if lowest < ZERO_SHARE:
-            kind = "negative" if lowest < -ZERO_SHARE else "less than rounding can tell from zero"
-            raise ValueError(f"A has the eigenvalue {lowest:.1e} once its diagonal is 1, {kind}: give the semi-axes")
-        return cls(size[:, None] * np.linalg.inv(np.linalg.cholesky(even)).T)
+        size = 1 / np.sqrt(np.diagonal(A))
+        return cls(size[:, None] * np.linalg.inv(np.linalg.cholesky(A * np.outer(size, size))).T)
 
     @cached_property
     def inverse(self) -> FloatArray:
@@ -132,9 +110,15 @@ class Ellipsoid(LimitSurface):
         """Largest ``w . t`` over the body, ``(m, d) -> (m,)``."""
         return np.linalg.norm(rows(t, self.dimension) @ self.F, axis=1)
 
+    def support_points(self, t: ArrayLike) -> FloatArray:
+        """Points of the surface farthest along ``t``, ``(m, d) -> (m, d)``; 0 for ``t = 0``."""
+        felt = rows(t, self.dimension) @ self.F
+        length = np.linalg.norm(felt, axis=1, keepdims=True)
+        return felt / np.where(length > 0, length, 1.0) @ self.F.T
+
     def scaled(self, factors: ArrayLike) -> Ellipsoid:
         """Image of the body under ``w -> factors * w``, ``(d,)``, factors not zero."""
-        return Ellipsoid(checked_factors(factors, self.dimension)[:, None] * self.F, self.flag)
+        return Ellipsoid(np.asarray(factors, float)[:, None] * self.F, self.flag)
 
 
 def three_motion_ellipsoid(f_x: float, f_y: float, tau_z: float, rho: float) -> Ellipsoid:
@@ -155,9 +139,9 @@ def axis_aligned_ellipsoid(W: ArrayLike) -> Ellipsoid:
 
     ``W (m, 3)`` are normalised wrenches [-]. Components that no sample has get the semi-axis 0. Samples that would make
     it endless (``a_i`` not above 1e-9) give a semi-axis of `MAX_REACH_RATIO` times their largest component, and the
-    flag says so. `ValueError`: a wrench is not finite, or all are zero.
+    flag says so.
     """
-    W = checked_wrenches(W, 3)
+    W = np.asarray(W, float)[pressed(W)]
     B, _, flag = principal_frame(W)
     reach = np.abs(W).max(axis=0)
     # each component by its own reach: the squares of unequal ones would lose the small ones' digits
@@ -179,9 +163,9 @@ def full_ellipsoid(W: ArrayLike) -> Ellipsoid:
 
     ``W (m, d)`` are normalised wrenches [-]. It is flat, and flagged, if they lie in a subspace. Where they do not
     determine ``A``, it is the ellipsoid nearest to their principal axes; where they would make it endless, the best one
-    that reaches at most `MAX_REACH_RATIO` times as far as they do. `ValueError`: one is not finite, or all are zero.
+    that reaches at most `MAX_REACH_RATIO` times as far as they do.
     """
-    W = checked_wrenches(W)
+    W = np.asarray(W, float)[pressed(W)]
     B, Y, flag = principal_frame(W)
     A, more = _quadratic_form(Y)
     # A = L L' makes the body |L' y| <= 1, the image of the ball under the inverse of L'

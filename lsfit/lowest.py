@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, cKDTree
 
 from softjaw.lsfit.form import derivative, directions, exponents, half_sphere_monomials, hessian_tensor, monomials
-from softjaw.lsfit.surface import ZERO_SHARE, OpenBodyError, UndecidedError
+from softjaw.lsfit.surface import ZERO_SHARE
 
 FloatArray = NDArray[np.float64]
 
@@ -123,48 +123,3 @@ def _missed(dimension: int) -> float:
     rise = 8 * h**2
     # the rise is a share of the true magnitude, of which samples may miss as much
     return rise / (1 - rise)
-
-
-def refuse_open(coefficients: FloatArray, dimension: int, placed: FloatArray) -> None:
-    """Refuse a quartic form whose level set ``P = 1`` is not closed, or not known to be.
-
-    It is closed if ``P`` exceeds `ZERO_SHARE` of its largest value all over the sphere, and open (`OpenBodyError`) if
-    it is below minus that somewhere or does not depend on a variable at all; else it is undecided (`UndecidedError`). A
-    form of the sum of forms in variables of their own is closed if each of these is; so a short axis beside long ones
-    is judged by its own size where no monomial mixes them. ``placed (d, d)`` maps the variables to those of the
-    message.
-
-    Coefficients of 16 digits that were turned or fitted are off by some 1e-15 of the largest. A body that reaches 1000
-    times as far as its narrowest width is at the margin, since the reach is ``P^(-1/4)``.
-    """
-    E, undecided = exponents(dimension, 4), ""
-    for group in _groups(coefficients, E):
-        form = coefficients[(E[:, ~group] == 0).all(axis=1)]
-        n = int(group.sum())
-        # the margin follows the size of the group's own form: a short axis is not lost in the rounding of long ones
-        margin = ZERO_SHARE * float(np.abs(half_sphere_monomials(n, 200) @ form).max())
-        if margin > 0 and lies_above(form, n, margin):
-            continue
-        value, u = smallest_value(form, n)
-        along = placed[:, group] @ u
-        where = f"P is {value:.3g} along {(along / np.linalg.norm(along)).round(6).tolist()}"
-        if value < -margin or margin == 0:
-            raise OpenBodyError(f"{where}: the level set is not closed, so it bounds no body")
-        undecided = where
-    if undecided:
-        raise UndecidedError(
-            f"{undecided}, less than rounding can tell from zero ({ZERO_SHARE:g} of its largest value): whether the "
-            "level set is closed is undecided; if its axes differ by more than a factor of 1000, give their sizes as "
-            "units"
-        )
-
-
-def _groups(coefficients: FloatArray, E: NDArray[np.int64]) -> list[NDArray[np.bool_]]:
-    """Sets of variables, as masks ``(d,)``, that share no monomial with the others."""
-    # a fit with all its monomials is the usual case, and needs no search
-    if coefficients.all():
-        return [np.ones(E.shape[1], dtype=bool)]
-    used = (E[coefficients != 0] > 0).astype(float)
-    # a chain of variables has at most d links, so this power joins all that hang together
-    joined = np.linalg.matrix_power(used.T @ used + np.eye(E.shape[1]), E.shape[1]) > 0
-    return list(np.unique(joined, axis=0))

@@ -21,8 +21,7 @@ from softjaw.lsfit.form import (
     round_frame,
     substitute,
 )
-from softjaw.lsfit.lowest import refuse_open
-from softjaw.lsfit.surface import FitError, FitFlag, LimitSurface, checked_factors, rows, supported_shadow
+from softjaw.lsfit.surface import FitError, FitFlag, LimitSurface, rows, supported_shadow
 
 FloatArray = NDArray[np.float64]
 
@@ -42,8 +41,7 @@ class Quartic(LimitSurface):
     ball_map : (d, d) array, optional
         Map from a ball onto an ellipsoid near the body, where one is known.
     units : (d,) array, optional
-        Sizes of the components in which all coefficients are equally exact, 1 if not given. Measures of the body ask
-        whether it is closed, and what is rounding is judged in these units (or in those of ``ball_map``).
+        Sizes of the components in which all coefficients are equally exact, 1 if not given.
     """
 
     coefficients: FloatArray
@@ -52,16 +50,6 @@ class Quartic(LimitSurface):
     ball_map: FloatArray | None = field(default=None, repr=False)
     units: FloatArray | None = field(default=None, repr=False)
     degree = 4
-
-    def __post_init__(self) -> None:
-        """Refuse what is no quartic, then freeze the coefficients."""
-        c, count = np.array(self.coefficients, float), len(self.exponents)
-        if c.shape != (count,) or not np.isfinite(c).all():
-            raise ValueError(
-                f"coefficients has shape {c.shape}: expected {count} finite numbers, one for each monomial"
-            )
-        c.flags.writeable = False
-        object.__setattr__(self, "coefficients", c)
 
     @property
     def exponents(self) -> NDArray[np.int64]:
@@ -79,14 +67,12 @@ class Quartic(LimitSurface):
 
     @cached_property
     def frame(self) -> FloatArray:
-        """Map ``L (d, d)`` from a body that is nearly round onto this one; errors as of `refuse_open`."""
-        # a fit knows the frame in which its coefficients are exact; it judges better than the components do
+        """Map ``L (d, d)`` from a body that is nearly round onto this one, which has to be closed."""
+        # a fit knows the frame in which its coefficients are exact
         if self.ball_map is not None:
-            refuse_open(substitute(self.coefficients, self.exponents, self.ball_map), self.dimension, self.ball_map)
             return self.ball_map
         units = np.ones(self.dimension) if self.units is None else self.units
         even = Quartic(self.coefficients * np.prod(units**self.exponents, axis=1), self.dimension)
-        refuse_open(even.coefficients, self.dimension, np.diag(units))
         return units[:, None] * round_frame(even.value, self.dimension, 4)
 
     @property
@@ -109,16 +95,8 @@ class Quartic(LimitSurface):
             return self.volume
         return supported_shadow(self.support, self.dimension) if self.dimension > 1 else 0.0
 
-    def support(self, t: ArrayLike) -> FloatArray:
-        """Largest ``w . t`` over the body, ``(m, d) -> (m,)``; to 1e-12 of itself. The body has to be convex.
-
-        `OpenBodyError`, `UndecidedError`: as of `refuse_open`; `FitError`: a search stops short.
-        """
-        T = rows(t, self.dimension)
-        return (T * self.support_points(T)).sum(axis=1)
-
     def support_points(self, t: ArrayLike) -> FloatArray:
-        """Points of the surface farthest along ``t``, ``(m, d) -> (m, d)``; 0 for ``t = 0``."""
+        """Points of the surface farthest along ``t``, ``(m, d) -> (m, d)``; 0 for ``t = 0``. It has to be convex."""
         T = rows(t, self.dimension) @ self.frame
         length = np.linalg.norm(T, axis=1)
         moving = length > 0
@@ -141,7 +119,7 @@ class Quartic(LimitSurface):
 
     def scaled(self, factors: ArrayLike) -> Quartic:
         """Image of the body under ``w -> factors * w``, ``(d,)``, factors not zero."""
-        f = checked_factors(factors, self.dimension)
+        f = np.asarray(factors, float)
         ball_map = None if self.ball_map is None else f[:, None] * self.ball_map
         units = np.abs(f) if self.units is None else np.abs(f) * self.units
         return Quartic(

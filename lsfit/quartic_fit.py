@@ -17,7 +17,7 @@ from softjaw.lsfit.ellipsoid import MAX_REACH_RATIO, full_ellipsoid, nearest_sol
 from softjaw.lsfit.form import exponents, powers, substitute
 from softjaw.lsfit.lowest import lies_above
 from softjaw.lsfit.quartic import Quartic
-from softjaw.lsfit.samples import checked_motions, principal_frame
+from softjaw.lsfit.samples import pressed, principal_frame
 from softjaw.lsfit.sos import MIN_EIGENVALUE, ball_gram, convex_least_squares, gram_matrix, smallest
 from softjaw.lsfit.surface import FitError, FitFlag, Image
 
@@ -51,8 +51,6 @@ def convex_quartic(W: ArrayLike, T: ArrayLike, gamma: float = 0.01) -> tuple[Qua
 
     Raises
     ------
-    ValueError
-        If a sample is not finite, or all wrenches are zero.
     FitError
         If the programme is not solved, or its result fails the certificate.
     """
@@ -101,7 +99,7 @@ class RoundSamples(NamedTuple):
 
 def round_samples(W: ArrayLike, T: ArrayLike) -> RoundSamples:
     """Samples in the frame of their ellipsoid, in which forms of degree 4 have coefficients of one size."""
-    W, T = checked_motions(W, T)
+    W, T = (np.asarray(X, float)[pressed(W)] for X in (W, T))
     ball = full_ellipsoid(W)
     B, inverse = ball.F, ball.inverse
     if ball.flag & FitFlag.BOUNDED:  # the samples' own lengths are a better scale than an ellipsoid far outside them

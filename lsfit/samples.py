@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import ndtri
 
@@ -39,17 +37,12 @@ def normalised_samples(wrench: ArrayLike, twist: ArrayLike, force: float, rho: f
         Wrenches and unit motions [-].
     """
     w, t = np.atleast_2d(np.asarray(wrench, float)), np.atleast_2d(np.asarray(twist, float))
-    if not (force > 0 and rho > 0):
-        raise ValueError(f"force is {force} and rho is {rho}: samples are normalised by a positive force and length")
     planar = t.shape[1] == 3
     w = w[:, [0, 1, 5]] if planar and w.shape[1] == 6 else w
     size = np.array([1.0, 1.0, rho] if planar else [1.0, 1.0, 1.0, rho, rho, rho])
     # a torque is divided by rho and a rotation multiplied by it: powers keep their value
     T = t * size
-    length = np.sqrt(np.einsum("md,md->m", T, T))
-    if not length.all():
-        raise ValueError(f"twist[{int(np.argmin(length))}] is zero: a sample needs a direction of motion")
-    return w / force / size, T / length[:, None]
+    return w / force / size, T / np.sqrt(np.einsum("md,md->m", T, T))[:, None]
 
 
 def sphere_motions(count: int, dimension: int = 6) -> FloatArray:
@@ -74,45 +67,10 @@ def sample_rank(W: ArrayLike) -> int:
     return int((values > FLAT_RATIO * values.max(initial=0.0)).sum())
 
 
-def checked_wrenches(W: ArrayLike, dimension: int | None = None) -> FloatArray:
-    """Wrenches to fit a surface to, ``(m, d)``, without those that are zero, or the rounding of that (`ZERO_SHARE`).
-
-    Raises
-    ------
-    ValueError
-        If there are none, one is not finite, or they do not have ``dimension`` components.
-    """
-    W = np.asarray(W, float)
-    if W.ndim != 2 or len(W) == 0 or (dimension is not None and W.shape[1] != dimension):
-        raise ValueError(f"W has shape {W.shape}: expected wrenches as rows, (m, {dimension or 'd'})")
-    if not np.isfinite(W).all():
-        raise ValueError(f"W[{int(np.argmin(np.isfinite(W).all(axis=1)))}] is not finite: drop it or correct it")
-    pressed = _pressed(W)
-    if not pressed.any():
-        raise ValueError("all wrenches are zero: a contact without friction has no limit surface to fit")
-    return W if pressed.all() else W[pressed]
-
-
-def checked_motions(W: ArrayLike, T: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """`checked_wrenches` with their motions ``(m, d)``, which must have the length 1."""
-    W, T = np.asarray(W, float), np.asarray(T, float)
-    if W.shape != T.shape:
-        raise ValueError(f"W has shape {W.shape} and T {T.shape}: every wrench needs its motion")
-    wrenches = checked_wrenches(W)
-    length = np.sqrt(np.einsum("md,md->m", T, T))
-    # asked this way round, a length that is not a number fails too
-    if not abs(length - 1).max() <= 1e-5:
-        # nan counts as infinitely wrong, so that the message names it first
-        n = int(np.argmax(np.where(np.isfinite(length), abs(length - 1), np.inf)))
-        raise ValueError(f"T[{n}] has length {length[n]}: expected unit motions, as normalised_samples gives them")
-    return wrenches, T if len(wrenches) == len(T) else T[_pressed(W)]
-
-
-def _pressed(W: FloatArray) -> NDArray[np.bool_]:
-    """Which wrenches are not zero, ``(m,)``."""
-    # squares of lengths, hence the square of the share
-    size = np.einsum("md,md->m", W, W)
-    return size > ZERO_SHARE**2 * size.max()
+def pressed(W: ArrayLike) -> NDArray[np.bool_]:
+    """Which wrenches ``(m, d)`` are not zero, or the rounding of that (`ZERO_SHARE`): the others fit no surface."""
+    size = np.linalg.norm(np.asarray(W, float), axis=1)
+    return size > ZERO_SHARE * size.max()
 
 
 def principal_frame(W: FloatArray) -> tuple[FloatArray, FloatArray, FitFlag]:
@@ -152,25 +110,13 @@ def fit_error(model: LimitSurface, W: ArrayLike, T: ArrayLike) -> FitErrors:
     ``E1`` infinite) for wrenches out of its span, and is normal to every motion out of it: its angle is the one
     between the motion and the nearest of its normals. Where the polynomial is not above `ZERO_SHARE` the radius is
     infinite.
-
-    Raises
-    ------
-    ValueError
-        If a sample is not finite, a motion has not the length 1, or all wrenches are zero.
     """
-    W, motions = checked_motions(W, T)
-    P, G = model.value(W), model.gradient(W)
-    # the usual case is one compiled loop; a flat model has no angle of its own to most motions
-    if model.rank == model.dimension:
-        E1, Erad, angle = mean_errors(P, np.ascontiguousarray(G), np.ascontiguousarray(motions), model.degree)
-        return FitErrors(E1, Erad, math.degrees(angle))
+    W, motions = (np.asarray(X, float)[pressed(W)] for X in (W, T))
+    P = model.value(W)
     with np.errstate(divide="ignore"):
         radius = np.where(P > ZERO_SHARE, P, 0.0) ** (-1 / model.degree)
-    return FitErrors(
-        float(np.abs(P - 1).mean()),
-        float(np.abs(radius - 1).mean()),
-        float(np.degrees(_angles(G, motions, model.span)).mean()),
-    )
+    angles = np.degrees(_angles(model.gradient(W), motions, model.span))
+    return FitErrors(float(np.abs(P - 1).mean()), float(np.abs(radius - 1).mean()), float(angles.mean()))
 
 
 def overclaim(model: LimitSurface, W: ArrayLike) -> float:
@@ -178,48 +124,26 @@ def overclaim(model: LimitSurface, W: ArrayLike) -> float:
 
     0 where it claims nowhere more, infinite where it has no end. Samples without a wrench are left out.
     """
-    P = model.value(checked_wrenches(W))
+    P = model.value(np.asarray(W, float)[pressed(W)])
     with np.errstate(divide="ignore"):
         radius = np.where(P > ZERO_SHARE, P, 0.0) ** (-1 / model.degree)
     return max(float(radius.max()) - 1.0, 0.0)
 
 
 def _angles(G: FloatArray, T: FloatArray, span: FloatArray) -> FloatArray:
-    """Angles ``(m,)`` between motions and all that is normal to a flat surface: gradients plus what leaves its span."""
-    length = np.linalg.norm(G, axis=1, keepdims=True)
-    u = G / np.where(length > 0, length, 1.0)
-    across = T - T @ span @ span.T
-    # no normal of a flat body points against the gradient
-    ahead = np.maximum(((T - across) * u).sum(axis=1, keepdims=True), 0.0)
-    u = across + ahead * u
-    size = np.linalg.norm(u, axis=1, keepdims=True)
-    u /= np.where(size > OUT_OF_SPAN, size, 1.0)
-    # The half-angle form keeps its digits where the arc cosine of a number near one loses them. A motion against the
-    # gradient is a right angle away from all that is normal to the span.
-    angle = 2 * np.arctan2(np.linalg.norm(u - T, axis=1), np.linalg.norm(u + T, axis=1))
-    return np.where(size[:, 0] > OUT_OF_SPAN, angle, np.pi / 2)
+    """Angles ``(m,)`` between motions and all that is normal to a surface: gradients plus what leaves its span."""
+    u = _unit(G)
+    if span.shape[1] < len(span):
+        across = T - T @ span @ span.T
+        # no normal of a flat body points against the gradient
+        ahead = np.maximum(((T - across) * u).sum(axis=1, keepdims=True), 0.0)
+        u = _unit(across + ahead * u)
+    # The half-angle form keeps its digits where the arc cosine of a number near one loses them; it is a right angle for
+    # a motion against the gradient, which has no part along a normal.
+    return 2 * np.arctan2(np.linalg.norm(u - T, axis=1), np.linalg.norm(u + T, axis=1))
 
 
-@njit(cache=True)
-def mean_errors(P, G, T, degree):  # pragma: no cover - compiled
-    """Means of ``|P - 1|``, ``|P^(-1/degree) - 1|`` and the angle [rad] between the rows of ``G`` and ``T (m, d)``."""
-    m, d = G.shape
-    value = radius = angle = 0.0
-    for n in range(m):
-        value += abs(P[n] - 1.0)
-        if P[n] > ZERO_SHARE:
-            radius += abs((1.0 / math.sqrt(math.sqrt(P[n])) if degree == 4 else P[n] ** (-1.0 / degree)) - 1.0)
-        else:
-            radius += np.inf
-        length = 0.0
-        for i in range(d):
-            length += G[n, i] ** 2
-        length = math.sqrt(length) if length > 0.0 else 1.0
-        less = more = 0.0
-        for i in range(d):
-            u = G[n, i] / length
-            less += (u - T[n, i]) ** 2
-            more += (u + T[n, i]) ** 2
-        # The half-angle form keeps its digits where the arc cosine of a number near one loses them.
-        angle += 2.0 * math.atan2(math.sqrt(less), math.sqrt(more))
-    return value / m, radius / m, angle / m
+def _unit(v: FloatArray) -> FloatArray:
+    """Rows of length 1, those of rounding 0."""
+    length = np.linalg.norm(v, axis=1, keepdims=True)
+    return v * (length > OUT_OF_SPAN) / np.where(length > 0, length, 1.0)

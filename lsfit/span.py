@@ -66,17 +66,10 @@ def span_samples(W: ArrayLike, T: ArrayLike) -> SpanSamples:
 
     A plane patch gives wrenches of rank 3 among the six components, a curved one of rank 6. Every component is divided
     by its largest magnitude (as in the published fits in six dimensions), or every principal direction if the samples
-    do not span all components that they use. Motions that meet no friction are left out. `ValueError`: shapes differ, a
-    value is not finite, or all wrenches are zero.
+    do not span all components that they use. Motions that meet no friction are left out.
     """
-    wrenches, motions = np.atleast_2d(np.asarray(W, float)), np.atleast_2d(np.asarray(T, float))
-    if wrenches.shape != motions.shape or not (np.isfinite(wrenches).all() and np.isfinite(motions).all()):
-        raise ValueError(
-            f"wrenches {wrenches.shape} and motions {motions.shape} must be finite and of one shape (m, d)"
-        )
-    largest = np.abs(wrenches).max(axis=0, initial=0.0)
-    if not largest.any():
-        raise ValueError("all wrenches are zero: a contact without friction has no limit surface to fit")
+    wrenches, motions = np.asarray(W, float), np.asarray(T, float)
+    largest = np.abs(wrenches).max(axis=0)
     B, flag = _map(wrenches, largest)
     # a motion that meets no friction has a wrench of rounding, whose direction means nothing
     used = largest > FLAT_RATIO * largest.max()

@@ -18,14 +18,6 @@ class FitError(ArithmeticError):
     """A fit, or a measure of a fitted body, that could not be completed."""
 
 
-class OpenBodyError(FitError):
-    """A level set that is not closed: it has no volume, and no support in some direction."""
-
-
-class UndecidedError(FitError):
-    """A question that rounding would answer: the value that decides is too small to be distinct from zero."""
-
-
 class FitFlag(IntFlag):
     """What the reader of a fitted limit surface should know; flags add up."""
 
@@ -88,9 +80,14 @@ class LimitSurface(ABC):
     def gradient(self, w: ArrayLike) -> FloatArray:
         """Gradient of ``P``, the direction of motion, ``(m, d) -> (m, d)``; within the span of a flat body."""
 
-    @abstractmethod
     def support(self, t: ArrayLike) -> FloatArray:
         """Largest ``w . t`` over the body, ``(m, d) -> (m,)``."""
+        T = rows(t, self.dimension)
+        return (T * self.support_points(T)).sum(axis=1)
+
+    @abstractmethod
+    def support_points(self, t: ArrayLike) -> FloatArray:
+        """Points of the surface farthest along ``t``, ``(m, d) -> (m, d)``; 0 for ``t = 0``."""
 
     @abstractmethod
     def scaled(self, factors: ArrayLike) -> LimitSurface:
@@ -122,14 +119,6 @@ def rows(w: ArrayLike, dimension: int) -> FloatArray:
     return W
 
 
-def checked_factors(factors: ArrayLike, dimension: int) -> FloatArray:
-    """Factors of a change of units, ``(d,)``, refused if they do not keep the body's rank."""
-    f = np.asarray(factors, float)
-    if f.shape != (dimension,) or not np.isfinite(f).all() or (f == 0).any():
-        raise ValueError(f"factors is {f.tolist()}: expected {dimension} finite numbers, none of them zero")
-    return f
-
-
 def supported_shadow(support: Callable[[FloatArray], FloatArray], dimension: int, n: int = 1024) -> float:
     """Area of a body's shadow on its first two components, ``1/2 int (h^2 - h'^2) dphi``.
 
@@ -155,17 +144,6 @@ class Image(LimitSurface):
     inner: LimitSurface
     B: FloatArray
     flag: FitFlag = FitFlag.CLEAN
-
-    def __post_init__(self) -> None:
-        """Refuse a map that does not fit the surface, or that flattens it further."""
-        B = np.array(self.B, float)
-        if B.ndim != 2 or B.shape[1] != self.inner.dimension or not np.isfinite(B).all():
-            raise ValueError(f"B has shape {B.shape}: expected finite numbers (d, {self.inner.dimension})")
-        # columns of one size first: a thin body is thin, not flat
-        if np.linalg.matrix_rank(B / np.abs(B).max(axis=0), 1e-13) < B.shape[1]:
-            raise ValueError("the columns of B depend on each other: give a map onto the body's own span")
-        B.flags.writeable = False
-        object.__setattr__(self, "B", B)
 
     @property
     def degree(self) -> int:
@@ -207,13 +185,13 @@ class Image(LimitSurface):
         """Gradient of ``P`` within the span, ``(m, d) -> (m, d)``."""
         return self.inner.gradient(self._inner(rows(w, self.dimension))) @ np.linalg.pinv(self.B)
 
-    def support(self, t: ArrayLike) -> FloatArray:
-        """Largest ``w . t`` over the body, ``(m, d) -> (m,)``."""
-        return self.inner.support(rows(t, self.dimension) @ self.B)
+    def support_points(self, t: ArrayLike) -> FloatArray:
+        """Points of the surface farthest along ``t``, ``(m, d) -> (m, d)``."""
+        return self.inner.support_points(rows(t, self.dimension) @ self.B) @ self.B.T
 
     def scaled(self, factors: ArrayLike) -> Image:
         """Image of the body under ``w -> factors * w``, ``(d,)``, factors not zero."""
-        return Image(self.inner, checked_factors(factors, self.dimension)[:, None] * self.B, self.flag)
+        return Image(self.inner, np.asarray(factors, float)[:, None] * self.B, self.flag)
 
     def _inner(self, W: FloatArray) -> FloatArray:
         return W @ np.linalg.pinv(self.B).T

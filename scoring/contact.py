@@ -16,7 +16,6 @@ from scipy.spatial import ConvexHull, QhullError
 
 FloatArray = NDArray[np.float64]
 ROUNDING_SHARE = 1e-12  # of the largest number of its kind: an extent, a load or an arm below it is the rounding of 0
-SUPPORT_STEP = 1e-5  # of differences of a support function of size 1: rounding and bending both leave some 1e-10
 
 
 class Body(Protocol):
@@ -37,6 +36,9 @@ class Body(Protocol):
     def support(self, t: ArrayLike) -> FloatArray:
         """Largest ``w . t`` over the body, ``(m, 3) -> (m,)``."""
 
+    def support_points(self, t: ArrayLike) -> FloatArray:
+        """A point of the body that is farthest in each direction, ``(m, 3) -> (m, 3)``; 0 for no direction."""
+
 
 @dataclass(frozen=True, eq=False)
 class PolytopeBody:
@@ -47,31 +49,23 @@ class PolytopeBody:
 
     vertices: FloatArray
 
-    def __post_init__(self) -> None:
-        """Refuse what is no set of wrenches."""
-        points = np.array(self.vertices, dtype=float)
-        if points.ndim != 2 or points.shape[1] != 3 or len(points) == 0 or not np.isfinite(points).all():
-            raise ValueError(f"vertices has shape {points.shape}: expected finite wrenches, (k, 3)")
-        points.flags.writeable = False
-        object.__setattr__(self, "vertices", points)
-
     @cached_property
-    def _sizes(self) -> tuple[float, float]:
-        return polytope_volume(self.vertices)
-
-    @property
     def volume(self) -> float:
         """Volume of the hull."""
-        return self._sizes[0]
+        return hull_volume(self.vertices)
 
-    @property
+    @cached_property
     def shadow_area(self) -> float:
         """Area of the hull's shadow on the plane of the forces."""
-        return self._sizes[1]
+        return hull_volume(self.vertices[:, :2])
 
     def support(self, t: ArrayLike) -> FloatArray:
         """Largest ``w . t`` over the body, ``(m, 3) -> (m,)``."""
         return (np.atleast_2d(np.asarray(t, float)) @ self.vertices.T).max(axis=1)
+
+    def support_points(self, t: ArrayLike) -> FloatArray:
+        """A vertex that is farthest in each direction, ``(m, 3) -> (m, 3)``."""
+        return self.vertices[(np.atleast_2d(np.asarray(t, float)) @ self.vertices.T).argmax(axis=1)]
 
     def scaled(self, factors: ArrayLike) -> PolytopeBody:
         """Image of the hull under ``w -> factors * w``."""
@@ -117,33 +111,6 @@ def ellipsoid_inside(body: Body) -> FloatArray:
     return np.diag(axes * max(h.min() - spacing * h.max() / (1 - spacing), 0))
 
 
-def touching_points(body: Body, t: ArrayLike) -> FloatArray:
-    """A point of the body that is farthest in each direction, ``(m, 3) -> (m, 3)``; 0 for no direction."""
-    T = np.atleast_2d(np.asarray(t, float))
-    vertices = vertices_of(body)
-    if vertices is not None:
-        return vertices[(T @ vertices.T).argmax(axis=1)]
-    if (F := ball_map(body)) is not None:
-        felt = T @ F
-        length = np.linalg.norm(felt, axis=1, keepdims=True)
-        return felt / np.where(length > 0, length, 1.0) @ F.T
-    # points by Newton's method are exact to more digits than differences of the support
-    if hasattr(body, "support_points"):
-        return np.asarray(body.support_points(T))
-    reach = body.support(np.eye(3))
-    scale = 1 / np.where(reach > 0, reach, 1.0)
-    S = T / scale
-    length = np.linalg.norm(S, axis=1, keepdims=True)
-    S /= np.where(length > 0, length, 1.0)
-    steps = SUPPORT_STEP * np.vstack([np.eye(3), -np.eye(3), np.zeros((1, 3))])
-    h = body.support(((S[None] + steps[:, None]) * scale).reshape(-1, 3)).reshape(7, len(S))
-    # the gradient of a support function is the point that touches
-    p = (h[:3] - h[3:6]).T / (2 * SUPPORT_STEP)
-    # along the direction itself the support is known better than its differences are
-    along = (p * S).sum(axis=1)
-    return p * np.where(along > 0, h[6] / np.where(along > 0, along, 1.0), 1.0)[:, None] / scale
-
-
 def joint_support(C: FloatArray, bodies: Sequence[Body], u: FloatArray, kind: str) -> FloatArray:
     """Support ``(m,)`` of the grasp wrench space of contacts ``C (n, r, 4)`` along ``u (m, r)``; kind: `joined`."""
     felt = np.einsum("mr,irc->imc", u, C)
@@ -166,15 +133,6 @@ def fibonacci_vertices(semi_axes: ArrayLike, m: int) -> FloatArray:
     phi = i * np.pi * (3 - np.sqrt(5))
     r = np.sqrt(1 - z**2)
     return np.column_stack([r * np.cos(phi), r * np.sin(phi), z]) * np.asarray(semi_axes, float)
-
-
-def polytope_volume(vertices: ArrayLike) -> tuple[float, float]:
-    """Volume of the hull of the vertices ``(m, 3)`` and area of its shadow on the first two coordinates.
-
-    Flat vertices give the volume 0, and vertices on a line through the shadow the area 0.
-    """
-    points = np.asarray(vertices, float)
-    return hull_volume(points), hull_volume(points[:, :2])
 
 
 def hull_volume(points: FloatArray) -> float:
@@ -210,20 +168,6 @@ class SoftContact:
     axes: FloatArray
     body: Body
 
-    def __post_init__(self) -> None:
-        """Refuse a frame that is none."""
-        object.__setattr__(self, "position", _vector("position", self.position))
-        axes = np.array(self.axes, dtype=float)
-        if axes.shape != (3, 3) or not np.isfinite(axes).all():
-            raise ValueError(f"axes has shape {axes.shape}: expected three rows x, y, N of finite numbers")
-        # a left-handed frame would turn the torque about the normal round
-        if np.abs(axes @ axes.T - np.eye(3)).max() > 1e-9 or np.linalg.det(axes) < 0:
-            raise ValueError(
-                f"axes is {axes.tolist()}: rows x, y, N must be perpendicular unit vectors with x cross y = N"
-            )
-        axes.flags.writeable = False
-        object.__setattr__(self, "axes", axes)
-
     def wrench_map(
         self, object_length: ArrayLike, contact_length: float, centre_of_mass: ArrayLike = (0.0, 0.0, 0.0)
     ) -> FloatArray:
@@ -232,22 +176,9 @@ class SoftContact:
         ``object_length``, one or one along each of x, y and z, divides the arms of forces, ``contact_length`` the
         torque about the contact's normal [m]; torques are taken about ``centre_of_mass`` [m].
         """
-        lengths = np.asarray(object_length, float)
-        for name, length in (("object_length", lengths), ("contact_length", np.asarray(contact_length, float))):
-            if not np.all((length > 0) & np.isfinite(length)):
-                raise ValueError(f"{name} is {length}: it must be a positive length in metres")
-        arm = (self.position - _vector("centre_of_mass", centre_of_mass)) / lengths
+        arm = (self.position - np.asarray(centre_of_mass, float)) / object_length
         x, y, N = self.axes
         C, forces = np.zeros((6, 4)), np.array([N, x, y])
         C[:3, :3], C[3:, :3] = forces.T, np.cross(arm, forces).T
         C[3:, 3] = N / contact_length
         return C
-
-
-def _vector(name: str, value: ArrayLike | Sequence[float]) -> FloatArray:
-    # a copy, as the caller's array is to stay writeable
-    vector = np.array(value, dtype=float)
-    if vector.shape != (3,) or not np.isfinite(vector).all():
-        raise ValueError(f"{name} is {vector.tolist()}: expected three finite numbers")
-    vector.flags.writeable = False
-    return vector

@@ -47,7 +47,6 @@ from softjaw.scoring.contact import (
     fibonacci_vertices,
     joined,
     joint_support,
-    touching_points,
 )
 
 FloatArray = NDArray[np.float64]
@@ -95,11 +94,7 @@ def epsilon(
     bound, which leaves a gap as large as its fit error; the upper bound uses its own support.
 
     """
-    if kind not in ("linf", "l1"):
-        raise ValueError(f"kind is {kind!r}: take 'linf' or 'l1'")
     C = np.array([contact.wrench_map(object_length, contact_length, centre_of_mass) for contact in contacts])
-    if not len(C):
-        raise ValueError("contacts is empty: a grasp needs at least one contact")
     c, bodies = C[:, :, 0], [contact.body for contact in contacts]
     D = np.array([ellipsoid_inside(body) @ Ci[:, 1:].T for body, Ci in zip(bodies, C, strict=True)])
     exact = all(ball_map(body) is not None for body in bodies)
@@ -248,7 +243,7 @@ def _cuts(C: FloatArray, bodies: Sequence[Body], towards: Sequence[FloatArray], 
     """Rows of ``(u, s)``, at most 0 each, of the points of the bodies that are farthest ``towards`` some loads."""
     rows = []
     for i, (body, t) in enumerate(zip(bodies, towards, strict=True)):
-        points = touching_points(body, t)
+        points = body.support_points(t)
         wrenches = C[i, :, 0] + points @ C[i, :, 1:].T
         rows.append(np.hstack([wrenches, -np.tile(np.eye(k)[i % k], (len(points), 1))]))
     return np.vstack(rows)

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
-from softjaw.scoring.contact import Body, ellipsoid_matrix, hull_volume, touching_points, vertices_of
+from softjaw.scoring.contact import Body, ellipsoid_matrix, hull_volume, vertices_of
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
@@ -271,7 +271,7 @@ def surface_mesh(body: Body, level: int) -> tuple[FloatArray, IntArray]:
     if hasattr(body, "radius") and (reach > 0).all():
         u = points * reach
         return u * np.asarray(body.radius(u))[:, None], triangles
-    return touching_points(body, points / np.where(reach > 0, reach, 1.0)), triangles
+    return body.support_points(points / np.where(reach > 0, reach, 1.0)), triangles
 
 
 def _hull_mesh(vertices: FloatArray) -> tuple[FloatArray, IntArray]:

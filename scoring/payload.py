@@ -27,7 +27,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from softjaw.scoring.contact import PolytopeBody, SoftContact
+from softjaw.scoring.contact import SoftContact
 
 FloatArray = NDArray[np.float64]
 KINDS = ("shared", "up_to", "fixed")
@@ -74,10 +74,6 @@ def payload(
     kind : str
         What happens to the normal forces: one of `KINDS`.
     """
-    if kind not in KINDS:
-        raise ValueError(f"kind is {kind!r}: take one of {', '.join(KINDS)}")
-    if len(contacts) != 2 or not all(isinstance(c.body, PolytopeBody) for c in contacts):
-        raise ValueError("a payload takes two contacts with polytopes as limit surfaces")
     centre, P = np.asarray(centre_of_mass, float), np.asarray(pressure, float)
     length = max(float(np.linalg.norm(c.position - centre)) for c in contacts) or 1.0
     C = np.array([c.wrench_map(length, length, centre) for c in contacts])

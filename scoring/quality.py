@@ -97,11 +97,7 @@ def grasp_score(
     the line of the contacts [rad]; the volume is then off by up to some 10 times its square. Both epsilons, nan unless
     asked for, take longer than the volumes without a closed form; they are the lower bounds if a gap was left.
     """
-    if len(contacts) != 2:
-        raise ValueError(f"contacts: found {len(contacts)}, expected the two of a parallel gripper")
     lengths = object_length, contact_length, centre_of_mass
-    # the closed form would take any length
-    contacts[0].wrench_map(*lengths)  # refuses lengths that are none
     bodies = [contact.body for contact in contacts]
     if faces(contacts, tolerance):
         d = float(np.linalg.norm(contacts[1].position - contacts[0].position)) / object_length

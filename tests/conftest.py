@@ -4,9 +4,9 @@ import os
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # before numpy: bits must not depend on the machine's cores
 
-import pytest  # noqa: E402
+import pytest
 
-from softjaw.study import pipeline  # noqa: E402
+from softjaw.study import pipeline
 
 
 @pytest.fixture(autouse=True)

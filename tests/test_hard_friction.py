@@ -10,7 +10,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from softjaw.friction.frame import FrameFlag, contact_frame, in_frame
 from softjaw.friction.wrench import friction_limits, friction_wrench
-from softjaw.scoring.contact import fibonacci_vertices, polytope_volume
+from softjaw.scoring.contact import fibonacci_vertices, hull_volume
 from tests.generators import cap_polar, cor_twists, lcg_patch, points_patch
 
 X = [1.0, 0.0, 0.0]
@@ -57,7 +57,7 @@ def test_digits_next_to_an_element():
 def test_failure_of_qhull():
     """A hull that Qhull refuses is joggled; its volume is right to 1e-4."""
     vertices = fibonacci_vertices((0.8, 0.6, 0.15), 30)
-    exact = polytope_volume(vertices)
+    exact = hull_volume(vertices)
 
     def moody(points, qhull_options=None, **options):
         if qhull_options is None:
@@ -65,4 +65,4 @@ def test_failure_of_qhull():
         return ConvexHull(points, qhull_options=qhull_options, **options)
 
     with mock.patch("softjaw.scoring.contact.ConvexHull", moody):
-        np.testing.assert_allclose(polytope_volume(vertices), exact, rtol=1e-4)
+        np.testing.assert_allclose(hull_volume(vertices), exact, rtol=1e-4)

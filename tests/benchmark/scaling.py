@@ -22,6 +22,7 @@ def main(result: Path, figure: Path) -> None:
     """Print the table of hours, and draw it."""
     mpl.use("Agg")
     from matplotlib import pyplot as plt
+
     with open_result(result) as file:
         seconds, (write, service, _) = file.read("work/seconds_total").ravel(), row_writes(file.layout)
     seconds = np.sort(seconds[np.isfinite(seconds)])[::-1]

@@ -99,7 +99,6 @@ def test_planar_models_have_no_force_out_of_their_plane():
         (lambda p: friction_wrench(p, [[np.inf, 0, 1]], 0.5), r"twist\[0\] is .*omega = 0"),
         (lambda p: friction_wrench(p, SLIDE_X, -0.5), "mu is -0.5"),
         (lambda p: friction_limits(p, np.nan), "mu is nan"),
-        (lambda p: friction_limits(p, 0.5, "planar"), "model is 'planar'"),
     ],
 )
 def test_bad_arguments_are_named(call, match):

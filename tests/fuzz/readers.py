@@ -150,6 +150,7 @@ def packed(*models, kind=zipfile.ZIP_DEFLATED):
 
 def _scene(path):
     from softjaw.study.scene import load_scene
+
     scene = load_scene(path)
     return scene.effective_toml(), scene.digest
 
@@ -157,11 +158,13 @@ def _scene(path):
 def _patch(path):
     from softjaw.study.patch.answer import read_patch
     from softjaw.study.patch.patch_reader import Reading
+
     return read_patch(str(path), Reading("mm", "kpa"))
 
 
 def _mesh(path):
     from softjaw.fem.objects.mesh_object import MeshObject
+
     return MeshObject.from_file(path, "mm")
 
 
@@ -174,6 +177,7 @@ def _model(path):
 
 def _metres(path):
     from softjaw.fem.objects.mesh_object import MeshObject
+
     return MeshObject.from_file(path, "m")
 
 
@@ -184,6 +188,7 @@ def _result(path):
     from softjaw.study.show.best_grasps import best
     from softjaw.study.show.status import status_text
     from softjaw.study.table import as_json
+
     with open_result(path) as result:
         ds = dataset(result)
         return as_csv(ds), as_json(best(ds, None, 3)), status_text(result, 80)
@@ -209,6 +214,7 @@ def slow_readers(folder: Path) -> dict[str, Reader]:
     """Readers whose libraries have to be kept apart, with files that take a while to make."""
     from tests.study.formula_results import make
     from tests.study.patch_files import cylinder_mesh, vtk
+
     points, cells = cylinder_mesh()
     grids = [vtk(folder / f"seed.{end}", points, cells, [("pressure", np.ones(len(cells)))]) for end in ("vtu", "vtp")]
     return {

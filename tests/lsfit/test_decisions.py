@@ -19,11 +19,10 @@ from softjaw.lsfit.ellipsoid import (
     three_motion_ellipsoid,
 )
 from softjaw.lsfit.form import directions, exponents, substitute
-from softjaw.lsfit.lowest import refuse_open
 from softjaw.lsfit.quartic import Quartic
 from softjaw.lsfit.quartic_fit import convex_quartic
 from softjaw.lsfit.samples import fit_error, normalised_samples, sample_rank, sphere_motions
-from softjaw.lsfit.surface import FitError, FitFlag, Image, OpenBodyError, UndecidedError
+from softjaw.lsfit.surface import FitError, FitFlag, Image
 from tests.generators import cylinder_grid, disc_polar, lcg_patch, points_patch
 from tests.oracles import least_squares_quartic, samples, wrenches_alone
 from tests.turns import TURNS, shaken
@@ -53,9 +52,6 @@ def outcomes(decide, times=TURNS):
     return found
 
 
-# Closed bodies ------------------------------------------------------------------------------------------------------
-
-
 def powers(**coefficients):
     """Quartic of x, y, z (and u, v) with coefficients such as ``xxyy=2``."""
     names, d = "xyzuv", 1 + max("xyzuv".index(c) for name in coefficients for c in name)
@@ -65,45 +61,7 @@ def powers(**coefficients):
     return v
 
 
-FORMS = {
-    "ball": (powers(xxxx=1, yyyy=1, zzzz=1, xxyy=2, xxzz=2, yyzz=2), None),
-    "31 times as long as wide": (powers(xxxx=1, xxyy=2, yyyy=1, zzzz=1e-6), None),
-    "cylinder": (powers(xxxx=1, xxyy=2, yyyy=1, zzzz=0), UndecidedError),
-    "two parallel planes": (powers(xxxx=1, zzzz=0), UndecidedError),
-    "zero on a cone": (powers(xxxx=1, yyyy=1, zzzz=1, xxyy=2, xxzz=-2, yyzz=-2), UndecidedError),
-    "all but closed": (powers(xxxx=1, xxyy=2, yyyy=1, zzzz=1e-15), UndecidedError),
-    "hyperboloid": (powers(xxxx=1, xxyy=2, yyyy=1, zzzz=-1e-6), OpenBodyError),
-    "saddle": (powers(xxxx=1, yyyy=1, zzzz=1, xxyy=-2.001), OpenBodyError),
-    "plane ball": (powers(xxxx=1, xxyy=2, yyyy=1), None),
-    "plane strip": (powers(xxxx=1, yyyy=0), UndecidedError),
-    "five dimensions": (powers(xxxx=1, yyyy=1, zzzz=2, uuuu=1, vvvv=0.5), None),
-    "open in the fifth": (powers(xxxx=1, yyyy=1, zzzz=2, uuuu=1, vvvv=0), UndecidedError),
-}
-
-
-@pytest.mark.parametrize("name", FORMS)
-def test_whether_a_level_set_is_closed(name):
-    """Margin 1e-12 of the largest value on the sphere; a volume, a support and a shadow follow the same decision."""
-    form, expected = FORMS[name]
-    d = {5: 2, 15: 3, 70: 5}[len(form)]
-    E = exponents(d, 4)
-
-    def decide(rng):
-        return refuse_open(shaken(rng, substitute(form, E, turn(rng, d))), d, np.eye(d))
-
-    assert outcomes(decide, TURNS if d < 5 else 10) == {expected: TURNS if d < 5 else 10}
-
-
-@pytest.mark.parametrize(("least", "outcome"), [(0, ValueError), (1e-17, ValueError), (1e-6, 3), (-1e-6, ValueError)])
-def test_whether_a_matrix_is_that_of_an_ellipsoid(least, outcome):
-    """Margin 1e-12 of the smallest eigenvalue once the diagonal is 1."""
-
-    def decide(rng):
-        R = turn(rng)
-        A = shaken(rng, R @ np.diag([1, 1, least]) @ R.T)
-        return Ellipsoid.of_matrix((A + A.T) / 2).rank
-
-    assert outcomes(decide) == {outcome: TURNS}
+BALL = powers(xxxx=1, yyyy=1, zzzz=1, xxyy=2, xxzz=2, yyzz=2)
 
 
 # Ranks and flags of fits --------------------------------------------------------------------------------------------
@@ -227,7 +185,7 @@ def test_a_full_body_has_no_outside_across():
     rng = np.random.default_rng(0)
     for _ in range(20):
         B = turn(rng) * [1.0, 1.0, 1e-9] @ turn(rng)
-        body = Image(Quartic(FORMS["ball"][0], 3), B)
+        body = Image(Quartic(BALL, 3), B)
         assert np.isfinite(body.value(directions(3, 50) @ B.T)).all()
 
 
@@ -255,7 +213,7 @@ def test_a_motion_against_a_flat_body_is_at_a_right_angle_to_its_normals():
 
 def test_a_polynomial_that_is_zero_at_a_sample_is_endless_there():
     """Margin 1e-12, a radius of 1000."""
-    cylinder, E = FORMS["cylinder"][0], exponents(3, 4)
+    cylinder, E = powers(xxxx=1, xxyy=2, yyyy=1, zzzz=0), exponents(3, 4)
 
     def decide(rng):
         R = turn(rng)

@@ -215,21 +215,6 @@ def test_few_samples_are_flagged_and_stay_bounded(K):
         assert np.isfinite(fit_error(surface, W, T)).all()
 
 
-@pytest.mark.parametrize(
-    ("W", "T", "message"),
-    [
-        (np.zeros((3, 3)), np.eye(3), "all wrenches are zero"),
-        ([[1.0, np.nan, 0.0]], [[1.0, 0.0, 0.0]], r"W\[0\] is not finite"),
-        (np.empty((0, 3)), np.empty((0, 3)), "W has shape"),
-        (np.eye(3), np.eye(3)[:2], "every wrench needs its motion"),
-        (np.eye(3), 2 * np.eye(3), r"T\[0\] has length 2"),
-    ],
-)
-def test_samples_that_cannot_be_fitted_are_refused(W, T, message):
-    with pytest.raises(ValueError, match=message):
-        convex_quartic(W, T)
-
-
 def test_a_programme_that_is_not_solved_is_an_error():
     """``x >= 1`` and the slope to minus infinity: there is no least value."""
     _, triangle = quadratic_parts(2)

@@ -203,9 +203,3 @@ def test_a_surface_that_nothing_holds_is_bounded_and_flagged():
     for bounded in (span_ellipsoid(W, T)[0], span_quartic(W, T)):
         assert FitFlag.BOUNDED in bounded.flag
         assert bounded.semi_axes.max() < 15
-
-
-@pytest.mark.parametrize(("W", "T"), [(np.zeros((3, 2)), np.ones((3, 2))), (np.ones((3, 2)), np.ones((2, 2)))])
-def test_bad_samples_are_refused(W, T):
-    with pytest.raises(ValueError, match="wrenches"):
-        span_samples(W, T)

@@ -9,8 +9,8 @@ from softjaw.friction.motion import fibonacci_twists
 from softjaw.lsfit.ellipsoid import Ellipsoid
 from softjaw.lsfit.form import exponents, monomials, quartic_volume
 from softjaw.lsfit.quartic import Quartic
-from softjaw.lsfit.samples import fit_error, normalised_samples, overclaim, sample_rank
-from softjaw.lsfit.surface import FitFlag, Image, OpenBodyError, UndecidedError, supported_shadow
+from softjaw.lsfit.samples import fit_error, overclaim, sample_rank
+from softjaw.lsfit.surface import FitFlag, Image, supported_shadow
 
 AXES = np.array([1.0, 0.7, 0.1])
 E = exponents(3, 4)
@@ -51,7 +51,7 @@ SURFACES = {
 }
 FLAT = {
     "ellipsoid": Ellipsoid.of_axes([1.0, 0.0, 0.2]),
-    "tilted": Ellipsoid([[1.0, 0.0], [0.2, 0.0], [0.0, 0.3]]),
+    "tilted": Ellipsoid(np.array([[1.0, 0.0], [0.2, 0.0], [0.0, 0.3]])),
     "image": Image(squared(np.diag([1.0, 2.0])), np.array([[1.0, 0.3], [0.5, 1.0], [0.1, 0.0]])),
 }
 every = pytest.mark.parametrize("surface", SURFACES.values(), ids=SURFACES)
@@ -107,8 +107,6 @@ def test_another_unit_changes_nothing_but_the_numbers(surface):
     assert other.volume == pytest.approx(surface.volume * factors.prod(), rel=1e-10)
     assert other.shadow_area == pytest.approx(surface.shadow_area * 9, rel=1e-10)
     np.testing.assert_allclose(other.semi_axes, factors * surface.semi_axes, rtol=1e-11)
-    with pytest.raises(ValueError, match="factors"):
-        surface.scaled([1.0, 0.0, 1.0])
 
 
 @every
@@ -195,51 +193,17 @@ def test_errors_of_flat_bodies_are_numbers(surface):
     assert off.Erad == pytest.approx(1)
 
 
-MEASURES = pytest.mark.parametrize("measure", ["volume", "semi_axes", "shadow_area", "ellipsoid"])
-
-
-@MEASURES
-def test_an_unbounded_quartic_is_refused(measure):
-    """A cylinder is not told from a body that is long or open; with its end left out it is open for sure."""
-    P = coefficients(lambda w: (w[:, 0] ** 2 + w[:, 1] ** 2) ** 2)
-    with pytest.raises(UndecidedError):
-        getattr(Quartic(P), measure)
-    for surely in (np.where(E[:, 2] > 0, 0.0, P), P - 1e-6 * fourth_powers().coefficients):
-        with pytest.raises(OpenBodyError):
-            getattr(Quartic(surely), measure)
-
-
-@MEASURES
-def test_how_thin_a_body_may_be_is_judged_in_its_units(measure):
-    """A thousandth in one direction, mixed with the others: closed only where coefficients have such digits."""
+def test_a_thin_body_is_measured_in_its_units():
+    """A thousandth in one direction, mixed with the others: only there have coefficients such digits."""
     thin = rounded_box().scaled([1.0, 1.0, 1e-5])
     again = Quartic(thin.coefficients, units=np.array([1.0, 1.0, 1e-5]))
-    for surface in (thin, again, again.scaled([1e-3, 1e4, 1.0])):
-        getattr(surface, measure)
-    with pytest.raises(UndecidedError):
-        getattr(Quartic(thin.coefficients), measure)
-    assert thin.volume == pytest.approx(1e-5 * rounded_box().volume, rel=1e-11)
+    for surface, size in ((thin, 1e-5), (again, 1e-5), (again.scaled([1e-3, 1e4, 1.0]), 1e-4)):
+        assert surface.volume == pytest.approx(size * rounded_box().volume, rel=1e-11)
 
 
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: Quartic(np.ones(14)), "expected 15 finite numbers"),
-        (lambda: Quartic(np.full(15, np.nan)), "finite"),
-        (lambda: Ellipsoid.of_axes([1, 1, -1]), "semi_axes is"),
-        (lambda: Ellipsoid.of_axes([1, np.nan, 1]), "semi_axes is"),
-        (lambda: Ellipsoid.of_axes([1, 1, np.inf]), "semi_axes is"),
-        (lambda: Ellipsoid.of_matrix(np.diag([1.0, 1.0, -1.0])), "positive"),
-        (lambda: Ellipsoid.of_matrix([[1.0, 2.0], [2.0, 1.0]]), "negative"),
-        (lambda: Ellipsoid.of_matrix([[1.0, 0.5], [0.0, 1.0]]), "not symmetric"),
-        (lambda: Image(fourth_powers(), np.ones((3, 3))), "depend on each other"),
-        (lambda: Image(fourth_powers(), np.ones((3, 2))), "expected finite numbers"),
-        (lambda: fourth_powers().value([1.0, 2.0]), "vectors of shape"),
-    ],
-)
-def test_what_is_no_surface_is_refused(make, message):
-    with pytest.raises(ValueError, match=message):
-        make()
+def test_vectors_of_another_dimension_are_refused():
+    with pytest.raises(ValueError, match="vectors of shape"):
+        fourth_powers().value([1.0, 2.0])
 
 
 def test_flags_closing_with_the_surface():
@@ -276,11 +240,7 @@ def test_only_what_is_claimed_too_much_is_an_overclaim():
     assert overclaim(longer, [[0, 0, AXES[2]], [AXES[0], 0, 0]]) == pytest.approx(0.2)
 
 
-def test_rank_of_samples_and_bad_scales():
+def test_rank_of_samples():
     assert sample_rank(on_the_ellipsoid()[0]) == 3
     assert sample_rank(on_the_ellipsoid()[0] * [1, 0, 1]) == 2
     assert sample_rank(np.zeros((4, 3))) == 0
-    with pytest.raises(ValueError, match="length"):
-        normalised_samples(np.eye(3), np.eye(3), 0.0, 1.0)
-    with pytest.raises(ValueError, match=r"twist\[1\]"):
-        normalised_samples(np.eye(3)[:2], [[1, 0, 0], [0, 0, 0]], 1.0, 1.0)

@@ -150,11 +150,3 @@ def test_no_direction_of_many_is_worse(seed, directions):
     assert found.upper >= found.force * (1 - 1e-9)
     assert least <= found.upper * (1 + 60 / np.sqrt(directions) / 10)
     assert held(contacts, com, found.direction).force == pytest.approx(found.upper, rel=1e-3)
-
-
-@pytest.mark.parametrize(
-    ("body", "kind", "text"), [(CORNERS, "linf", "kind is 'linf'"), (object(), "shared", "polytopes")]
-)
-def test_what_cannot_be_computed_is_refused(body, kind, text):
-    with pytest.raises(ValueError, match=text):
-        held(pair(body=body), kind=kind)

@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from softjaw.scoring.closed_form import epsilon_l1, epsilon_linf, volume_l1, volume_linf
-from softjaw.scoring.contact import fibonacci_vertices, polytope_volume
+from softjaw.scoring.contact import PolytopeBody, fibonacci_vertices
 from softjaw.scoring.quality import ScoreFlag, score
 from tests.scoring.grasps import A, B, unit
 
@@ -25,6 +25,11 @@ def wrenches(contact_wrench, side, d, rho):
     return np.hstack([f, (np.cross([side * d / 2, 0, 0], f) + np.outer(tau, N)) / rho])
 
 
+def sizes_of(vertices):
+    hull = PolytopeBody(vertices)
+    return hull.volume, hull.shadow_area
+
+
 @pytest.mark.parametrize("d", [0.4, 1.3])
 @pytest.mark.parametrize(
     "vertices", [lambda axes: fibonacci_vertices(axes, 8), lambda axes: fibonacci_vertices(axes, 11)]
@@ -34,7 +39,7 @@ def test_the_volume_of_polytopes_is_that_of_their_hull_in_six_dimensions(vertice
     P, Q = vertices(A), vertices(B)
     K1, K2 = (np.vstack([np.zeros(6), wrenches(v, side, d, rho)]) for v, side in ((P, -1), (Q, 1)))
     linf = np.array([a + b for a, b in itertools.product(K1, K2)])
-    (V1, A1), (V2, A2) = polytope_volume(P), polytope_volume(Q)
+    (V1, A1), (V2, A2) = sizes_of(P), sizes_of(Q)
     sizes = V1 / rho, A1, V2 / rho, A2, d / rho
     assert volume_linf(*sizes) == pytest.approx(ConvexHull(linf).volume, rel=1e-9)
     assert volume_l1(*sizes) == pytest.approx(ConvexHull(np.vstack([K1, K2])).volume, rel=1e-9)
@@ -119,9 +124,9 @@ def test_the_score_has_no_unit():
 
 def test_linearised_surfaces_are_inscribed_and_flat_ones_have_no_volume():
     np.testing.assert_allclose(((fibonacci_vertices(A, 20) / A) ** 2).sum(axis=1), 1, rtol=1e-14)
-    volumes = [polytope_volume(fibonacci_vertices(A, m)) for m in (100, 400, 1600)]
+    volumes = [sizes_of(fibonacci_vertices(A, m)) for m in (100, 400, 1600)]
     exact = np.array([4 / 3 * math.pi * np.prod(A), math.pi * A[0] * A[1]])
     missing = 1 - np.array(volumes) / exact
     np.testing.assert_allclose(np.log2(missing[:-1, 0] / missing[1:, 0]), 2, atol=0.1)
-    assert polytope_volume(fibonacci_vertices(A, 20) * [1, 1, 0])[0] == 0
-    assert polytope_volume(fibonacci_vertices(A, 20) * [1, 0, 1]) == (0, 0)
+    assert sizes_of(fibonacci_vertices(A, 20) * [1, 1, 0])[0] == 0
+    assert sizes_of(fibonacci_vertices(A, 20) * [1, 0, 1]) == (0, 0)
