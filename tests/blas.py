@@ -4,8 +4,6 @@ OpenBLAS chooses its kernel by the CPU, and sums then end in other bits. The env
 asks for another kernel; it reaches every copy: numpy's, scipy's and the system's that PETSc and MUMPS call.
 """
 
-from __future__ import annotations
-
 import ctypes
 import importlib
 from pathlib import Path

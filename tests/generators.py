@@ -4,8 +4,6 @@ Faces sit at the midpoints of a regular grid of parameters; the pressure is take
 a generator of `PATCHES` with its arguments and a pressure of `PRESSURES`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 

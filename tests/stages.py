@@ -4,8 +4,6 @@ The last lines report what passed, the time of each stage, what was left out, an
 all stages passed, 1 when one failed, 2 when a tool was missing for one.
 """
 
-from __future__ import annotations
-
 import importlib.util
 import os
 import shutil

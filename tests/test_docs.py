@@ -1,7 +1,5 @@
 """The site of docs/: generated pages hold everything that they are made from, and every link leads somewhere."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import tomllib

@@ -53,9 +53,6 @@ MODEL = {"ccm": "ccm", "pcm_flat": "pcm", "pcm_projected": "pcm_projected"}
 X_HINT = np.array([0.0, 0.0, 1.0])  # of the contacts of a grasp, to be projected on their tangent planes
 
 
-# Maxima and wrenches -------------------------------------------------------------------------------------------------
-
-
 def maxima(inputs, names, patch=None):
     patch, mu = build(inputs["patch"]) if patch is None else patch, inputs["mu"]
     found = {}
@@ -79,8 +76,6 @@ def wrenches(inputs, _):
     patch = replace(patch, centroid=patch.centroid - np.array(inputs["reference_point"], float))
     return {"W": friction_wrench(patch, twists, mu), "H": friction_support(patch, twists, mu)}
 
-
-# Contact frames ------------------------------------------------------------------------------------------------------
 
 FIELDS = {
     None: None,
@@ -113,9 +108,6 @@ def frames(inputs, _):
     limits = friction_limits(in_frame(patch, frame), inputs["mu"])
     places = {"COP": frame.centre_of_pressure, "O": frame.origin, "N": frame.axes[2], "x": frame.axes[0]}
     return places | {"fx": limits.f_x, "fy": limits.f_y, "tau": limits.tau_z}
-
-
-# Limit surfaces ------------------------------------------------------------------------------------------------------
 
 
 def samples(inputs):
@@ -180,9 +172,6 @@ def fits_in_six_dimensions(inputs, _):
         "W_absmax": np.abs(W).max(axis=0), "W_first3": W[:3], "ell_full.A": full.A,
         **errors_of("ell_full", full, W, T), **errors_of("quartic_ls_reg1e-6", quartic, W, T),
     }  # fmt: skip
-
-
-# Grasps --------------------------------------------------------------------------------------------------------------
 
 
 def bodies(inputs):
@@ -252,9 +241,6 @@ def end_to_end(inputs, _):
     return found | {"score_ccm_exact_LS": volume_linf(V, A, V, A, inputs["d"] / inputs["object_length"])}
 
 
-# Hard cases: the behaviour that their descriptions ask for, then their maxima ----------------------------------------
-
-
 def hard(inputs, names, description):
     if "raises" in names:
         return {"raises": refused(build(inputs["patch"]), inputs["corruption"])}
@@ -320,8 +306,6 @@ def units_change_no_sample(metre):
     quartics = [least_squares_quartic(*pair).coefficients for pair in ((W, T), (W_milli, T_milli))]
     np.testing.assert_allclose(quartics[1], quartics[0], rtol=1e-9, atol=1e-9)
 
-
-# The table -----------------------------------------------------------------------------------------------------------
 
 SOLVERS = {
     "maxima": maxima,

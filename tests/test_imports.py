@@ -4,8 +4,6 @@ each foreign library.
 Everything is imported as ``softjaw.*``: under a second name a module would be loaded, and compiled, twice.
 """
 
-from __future__ import annotations
-
 import ast
 import sys
 from functools import cache

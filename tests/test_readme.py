@@ -1,7 +1,5 @@
 """Every command of the README and of docs/ does what it says."""
 
-from __future__ import annotations
-
 import os
 import re
 import shlex

@@ -1,7 +1,5 @@
 """Time of friction, limit surfaces and scores on patches of known size; tests hold their accuracy."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """The same contact problem by GetFEM, a general finite element library: time on one mesh, and at equal accuracy."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import time

@@ -1,7 +1,5 @@
 """Print what the program costs where (``make bench``): figures of one run on one machine, not timed tests."""
 
-from __future__ import annotations
-
 import os
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")

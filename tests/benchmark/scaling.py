@@ -3,8 +3,6 @@
 The measured times of a finished file are replayed by the rules that hand out the work.
 """
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

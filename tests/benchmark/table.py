@@ -1,7 +1,5 @@
 """Lines of the benchmark's table, and times of repeated work."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """A dozen meshes of the kinds that users bring (``make bench PARTS=users``): CPU seconds per case on two meshes."""
 
-from __future__ import annotations
-
 import resource
 import subprocess
 import sys

@@ -4,8 +4,6 @@ Nothing here uses the code under test, but for ``placed``, which puts an object 
 pad with two objects.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,8 +17,6 @@ from softjaw.fem.objects.gap import Pose
 from softjaw.fem.objects.shapes import EllipticCylinder, Sphere
 from softjaw.friction.frame import contact_frame, in_frame
 from softjaw.friction.wrench import friction_limits
-
-# -- energies per reference volume [Pa] of one deformation gradient (3, 3) --------------------------------------------
 
 
 def blatz_ko_energy(F, G):
@@ -70,17 +66,11 @@ def differences(function, F, h=1e-5):
     return out
 
 
-# -- homogeneous states -----------------------------------------------------------------------------------------------
-
-
 def uniaxial_hyperfoam(stretch, nu, mu, alpha):
     """Lateral stretch ``l^-nu`` and Cauchy stress [Pa] of a one-term hyperfoam pulled or pressed to ``stretch``."""
     lateral = stretch**-nu
     nominal = 2 * mu / (alpha * stretch) * (stretch**alpha - stretch ** (-alpha * nu))
     return lateral, nominal / lateral**2
-
-
-# -- Hertz ------------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -102,9 +92,6 @@ def hertz_cylinder(line_force, R, E_star):
     """Rigid cylinder on a half space, force per length: ``a^2 = 4 F R / (pi E*)``, ``p = 2 F / (pi a)``."""
     a = np.sqrt(4 * line_force * R / (np.pi * E_star))
     return Hertz(a, 2 * line_force / (np.pi * a))
-
-
-# -- rigid objects in the pad's frame, touching the centre of the undeformed contact face ------------------------------
 
 
 def plane(x):
@@ -155,9 +142,6 @@ def e_n(state):
     """Eccentricity parameter of a pressed pad, curved model [m]."""
     patch = extract(state.pad, state)
     return friction_limits(in_frame(patch, contact_frame(patch, np.array([1.0, 0.0, 0.0]))), 1.0, "ccm").e_n
-
-
-# -- what tests ask of a solver ----------------------------------------------------------------------------------------
 
 
 def tangent_error(problem, x, d, h):

@@ -4,8 +4,6 @@ Sources: integrals of ``p |P v|`` over the surface, for ``v = x, y`` (forces) an
 and a cap the speeds are ``sqrt(sin^2 + cos^2 (..))``, whence the elliptic integrals.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Every reader of files from elsewhere: a valid file, how it is read, and the errors by which it may refuse one."""
 
-from __future__ import annotations
-
 import base64
 import io
 import json

@@ -44,9 +44,6 @@ def told(capsys):
     return ask
 
 
-# --- meshes ---
-
-
 @pytest.mark.parametrize(
     ("name", "content"),
     [
@@ -100,9 +97,6 @@ def test_a_mesh_elsewhere_is_read_and_its_place_is_shown_and_kept(tmp_path, told
     assert f'mesh = "{tmp_path / "body.stl"}"' in load_scene(inner / "scene.toml").effective_toml()
 
 
-# --- scenes ---
-
-
 @pytest.mark.parametrize("name", ["\\u001b[2J", "\\u009b2J", "a\\nb", "\\u202e", "\\u2028"])
 def test_names_hold_no_orders_for_a_terminal(name):
     with pytest.raises(SceneError, match="name"):
@@ -116,8 +110,6 @@ def test_nothing_of_a_scene_is_run():
     with pytest.raises(SceneError, match="found"):
         parse_scene(BALL.replace("30", "__import__('os')"))
 
-
-# --- patches ---
 
 TABLE = QUICK["table"].content
 
@@ -161,9 +153,6 @@ def test_a_trial_survives_what_it_tries():
     assert trouble(lambda: 1 / 0) == ""
     assert "crashes" in trouble(lambda: os.kill(os.getpid(), signal.SIGSEGV))
     assert "GiB" in trouble(lambda: np.ones(2**31))
-
-
-# --- result files ---
 
 
 def commands(path, other, page):

@@ -1,7 +1,5 @@
 """Numbers of hard cases in closed form, from the scene alone; nothing of the solver is used."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The table of the hard cases: a line for each, collected from all processes of the tests, written where asked."""
 
-from __future__ import annotations
-
 from collections import Counter
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The hard cases of ``cases.toml``, their scenes, and what each comes to."""
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """The second number of a hard case: another model, a scaled scene, a formula, another code's file, a bound."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from functools import cache, partial

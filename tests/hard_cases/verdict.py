@@ -1,7 +1,5 @@
 """Whether a case came to what is right for it, as sentences about what is wrong."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass

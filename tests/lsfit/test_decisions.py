@@ -64,8 +64,6 @@ def powers(**coefficients):
 BALL = powers(xxxx=1, yyyy=1, zzzz=1, xxyy=2, xxzz=2, yyzz=2)
 
 
-# Ranks and flags of fits --------------------------------------------------------------------------------------------
-
 LCG, DISC = samples(lcg_patch(3, 50), 100), samples(disc_polar(1, 20, 48), 100)
 ONE, TWO = (samples(points_patch(*points), 100) for points in (([[0, 0]], [2.0]), ([[-1, 0], [1, 0]], [1, 1])))
 FIVE, TEN = ((x[:: 100 // n][:n] for x in LCG) for n in (5, 10))
@@ -153,9 +151,6 @@ def test_a_quartic_of_fewer_samples_than_coefficients_is_one_and_flagged(K):
     assert outcomes(decide, 20) == {first.flag: 20}
     size = np.abs(first.coefficients).max()
     assert max(np.abs(s.coefficients - first.coefficients).max() for s in fits) < 1e-7 * size
-
-
-# Bodies -------------------------------------------------------------------------------------------------------------
 
 
 def test_loads_in_the_plane_of_a_flat_body_are_in_it():

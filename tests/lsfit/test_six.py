@@ -36,9 +36,6 @@ def convex(cylinder):
     return span_quartic(*cylinder)
 
 
-# Gram matrices and the programme ------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(("d", "unknowns"), [(2, 6), (3, 24), (6, 351)])
 def test_a_gram_matrix_gives_the_second_derivatives_whatever_its_free_numbers(d, unknowns):
     rng, E = np.random.default_rng(d), exponents(d, 4)
@@ -93,9 +90,6 @@ def test_a_quartic_that_is_not_convex_becomes_one_that_hardly_is():
     assert least_curvature(surface, W) > 0
     assert smallest_curvature(surface.coefficients, 2) == pytest.approx(0, abs=0.05)
     assert fit_error(surface, W, T).E1 > 1e-2
-
-
-# Motions, samples and spans ------------------------------------------------------------------------------------------
 
 
 def test_motions_cover_the_sphere_evenly():
@@ -162,9 +156,6 @@ def test_motions_without_friction_are_left_out():
     V, S = np.vstack([W, 0 * W[:1]]), np.vstack([T, np.eye(6)[2]])
     # one row more: the same numbers, but the sums of a singular value decomposition may end in other bits
     np.testing.assert_allclose(np.abs(span_samples(V, S).Y), np.abs(span_samples(W, T).Y), atol=1e-12)
-
-
-# Fits ----------------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

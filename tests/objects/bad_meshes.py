@@ -3,8 +3,6 @@
 Each kind is made of several shapes. All are in metres, of sizes that a common gripper holds.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 

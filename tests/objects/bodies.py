@@ -1,7 +1,5 @@
 """Meshes that users bring, by script: hollow bottles and bowls, a mug with a handle, scans with defects."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path

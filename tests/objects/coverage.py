@@ -7,8 +7,6 @@ A row is a quantity of a case: family, friction acting back or not, true relativ
 twice the elements in each direction, those of a thin wall included, and its own load path.
 """
 
-from __future__ import annotations
-
 import csv
 import sys
 from collections import defaultdict

@@ -1,7 +1,5 @@
 """Random scenes of rigid objects: shapes, pads, foams, forces and poses as a user could write them, from a seed."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

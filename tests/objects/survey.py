@@ -4,8 +4,6 @@ Every mesh goes through `softjaw init`, the sampler and all solves; so do random
 kept one by one beside the results, so that a part can be run again: ``--only banana``.
 """
 
-from __future__ import annotations
-
 import re
 import signal
 import subprocess

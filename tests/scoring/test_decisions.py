@@ -49,9 +49,6 @@ def outcomes(decide, contacts, times=TURNS):
     return collections.Counter(decide(*moved(rng, contacts)) for _ in range(times))
 
 
-# Volumes and flags --------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(("contacts", "method", "flag", "volume"), [
     (pair(A, A), "antipodal", CLEAN, True), (pair(A, A, 0.3), "pose", CLEAN, True),
     (pair(BOX, BOX), "antipodal", CLEAN, True), (pair(BOX, BOX, 0.2), "pose", CLEAN, True),
@@ -106,9 +103,6 @@ def test_hulls_are_flat_or_not():
         assert hull_volume(shaken(rng, BOX * [1, 1, 0] @ R.T)) == 0
         assert hull_volume(shaken(rng, BOX @ R.T)) == pytest.approx(8 * 0.8 * 0.6 * 0.015, rel=1e-12)
     assert hull_volume(BOX * [1, 1, 1e-6]) == pytest.approx(8e-6 * 0.8 * 0.6 * 0.015, rel=1e-12)
-
-
-# Epsilon ------------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("contacts", "closed"), [

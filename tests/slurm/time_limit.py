@@ -7,8 +7,6 @@ so that it stops in order and goes back into the queue; and with a limit that Sl
 after which the same command is given once more.
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

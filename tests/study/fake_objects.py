@@ -4,8 +4,6 @@ An object called ``none`` has no grasp, one called ``bug`` fails while it is pla
 ``grows`` gets further stations.
 """
 
-from __future__ import annotations
-
 import os
 
 os.environ.update(H5PY_ALWAYS_USE_MPI="1", OMP_NUM_THREADS="1")

@@ -1,7 +1,5 @@
 """Result files whose maps are formulas of station, angle and force; nothing is solved."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import h5py

@@ -3,8 +3,6 @@
 Files that share a fixture of the session run its lines together, though the fixture is set up in one of them only.
 """
 
-from __future__ import annotations
-
 import json
 import os
 from collections import defaultdict

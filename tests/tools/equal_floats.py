@@ -4,8 +4,6 @@ Counted are comparisons of arrays, bytes and files bit by bit, and each ``==`` i
 literal or arithmetic, or which is true for ``all``; codes, words and counts are none.
 """
 
-from __future__ import annotations
-
 import ast
 import sys
 from collections import Counter

@@ -8,8 +8,6 @@ work is done in a copy. Each slice of a mutant's tests adds one line of JSON to 
 resumes. A test that fails without a change is left out.
 """
 
-from __future__ import annotations
-
 import argparse
 import ast
 import json

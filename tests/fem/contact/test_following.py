@@ -81,9 +81,6 @@ def test_tangent_of_the_path_by_finite_differences(symmetry, control):
     np.testing.assert_allclose(tangent, (high.unknowns - low.unknowns) / 0.4, atol=2e-3 * np.abs(tangent).max())
 
 
-# -- jumps of an artificial pad whose force falls while it is pressed on ----------------------------------------------
-
-
 class StrainedCurve(Curve):
     """Strained by ``strain(x)``."""
 

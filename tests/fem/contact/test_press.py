@@ -95,9 +95,6 @@ def test_units_do_not_matter():
         assert other.iterations == si.iterations
 
 
-# -- states that must be refused --------------------------------------------------------------------------------------
-
-
 def pulls(press, x):
     """A node pulls, its neighbours press more: the forces still balance."""
     p, area = x[press.pad.closing_dof + 1 :], press.pad.node_area

@@ -1,7 +1,5 @@
 """A shell under given loads, for the published tables: Newton's method by load steps, and along the path."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 

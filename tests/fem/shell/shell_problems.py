@@ -4,8 +4,6 @@ Nonlinear: Sze, Liu and Lo, Finite Elements in Analysis and Design 40, 2004; lin
 in Analysis and Design 1, 1985. Lengths, forces and moduli as printed there.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

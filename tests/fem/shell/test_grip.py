@@ -80,9 +80,6 @@ def test_a_very_stiff_wall_is_a_rigid_object():
     press.destroy()
 
 
-# -- with friction that acts back ------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("allowed", "level", "control"),
     [

@@ -77,8 +77,6 @@ def test_mixed_tangent_uses_the_stress_that_the_last_linear_step_predicted():
     assert np.abs(dense(shell, step, step) - dense(shell, step)).max() == 0
 
 
-# -- MacNeal and Harder's patch of five elements, 0.24 x 0.12, t = 0.001, E = 1e6, nu = 0.25
-
 INNER = [[0.04, 0.02], [0.18, 0.03], [0.16, 0.08], [0.08, 0.08]]
 CORNERS = [[0, 0], [0.24, 0], [0.24, 0.12], [0, 0.12]]
 RING = [[0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7], [4, 5, 6, 7]]

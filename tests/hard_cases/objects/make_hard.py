@@ -3,8 +3,6 @@
 Run from the repository's root: ``python -m tests.hard_cases.objects.make_hard``.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

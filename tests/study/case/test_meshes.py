@@ -1,7 +1,5 @@
 """Whole cases of meshes: poses in the frame of the file, mirror images, facets, triangles as users have them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import trimesh

@@ -1,7 +1,5 @@
 """A result file of five grasps at three forces whose frictions are formulas: nothing is solved."""
 
-from __future__ import annotations
-
 import importlib.util
 from functools import lru_cache
 from pathlib import Path

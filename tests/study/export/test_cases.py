@@ -1,7 +1,5 @@
 """Cases as CSV and JSON: what stands in files whose values are known."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json

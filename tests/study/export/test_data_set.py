@@ -1,7 +1,5 @@
 """A folder's grasps as a data set: the fields of each format, labels, poses, splits, and the loader of the examples."""
 
-from __future__ import annotations
-
 import json
 import runpy
 import tarfile

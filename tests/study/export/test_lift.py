@@ -1,7 +1,5 @@
 """Exported scenes, opened in MuJoCo and run as they are: what the grasp holds stays, what it does not hold falls."""
 
-from __future__ import annotations
-
 import itertools
 from copy import copy
 from functools import lru_cache

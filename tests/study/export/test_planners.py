@@ -1,7 +1,5 @@
 """Files for planners: every field of their documentation with its type, and poses that put the pads where they were."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json

@@ -1,7 +1,5 @@
 """From where the hand comes: on an elliptic cylinder of 50 x 40 x 100 mm, whose clearances are known."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

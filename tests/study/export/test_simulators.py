@@ -1,7 +1,5 @@
 """What simulators are given, against their own formulas; MuJoCo itself slips where the result file says."""
 
-from __future__ import annotations
-
 import math
 from copy import deepcopy
 from xml.etree import ElementTree

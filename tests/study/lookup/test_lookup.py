@@ -1,7 +1,5 @@
 """Lookup between candidates and forces: values, honest errors, symmetry, and points that have no value."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation

@@ -1,7 +1,5 @@
 """``softjaw patch --deformed``: the pad of a scene from points of its face, and what is refused."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

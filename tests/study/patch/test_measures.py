@@ -1,7 +1,5 @@
 """Functions of patches: the numbers of ``softjaw patch``, in any coordinates, and what they refuse."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

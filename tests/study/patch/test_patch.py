@@ -1,7 +1,5 @@
 """Pressure fields from elsewhere: closed forms, the same answer from every kind of file, units, scores."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """What ``softjaw patch`` refuses: each refusal names the file, the place, and the key or option that it is about."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -4,8 +4,6 @@ They live in an environment of their own (``tests/browse``), made once in the us
 first time. Where it cannot be had the tests that need it are skipped and say what was missing.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

@@ -1,7 +1,5 @@
 """Damaged result files: every reader gives the right numbers or refuses in a sentence, never a wrong number."""
 
-from __future__ import annotations
-
 import shutil
 
 import h5py

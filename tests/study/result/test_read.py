@@ -1,7 +1,5 @@
 """A result file as a dataset: dimensions, coordinates and attributes; no value where a case has none."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 
@@ -109,9 +107,6 @@ def test_status_and_the_import_of_softjaw_do_not_wait_for_xarray(half):
         "sys.exit(bool({'xarray', 'pandas', 'mpi4py', 'petsc4py'} & set(sys.modules)))"
     )
     assert subprocess.run([sys.executable, "-c", code, half], check=False, capture_output=True).returncode == 0
-
-
-# --- safe force range -------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

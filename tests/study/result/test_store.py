@@ -1,7 +1,5 @@
 """The result file: what it holds, what viewers see, and what is refused when it comes from elsewhere."""
 
-from __future__ import annotations
-
 import re
 import shutil
 from collections import namedtuple

@@ -1,7 +1,5 @@
 """The best grasps: which force, which order, which errors; the same numbers in text, CSV and JSON."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Two maps side by side, and cases for planners: what is told of files whose differences are known."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json

@@ -1,7 +1,5 @@
 """The report as text in the file itself: what somebody learns who has nothing but the file."""
 
-from __future__ import annotations
-
 import h5py
 
 from softjaw.study.result.layout import REPORT_BYTES

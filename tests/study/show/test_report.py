@@ -1,7 +1,5 @@
 """The report: the numbers it gives for synthetic studies, that it needs nothing from outside, and odd files."""
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import itertools

@@ -1,7 +1,5 @@
 """The report in a browser: opens without a complaint, draws, keeps scripts from elsewhere out, fits a phone, prints."""
 
-from __future__ import annotations
-
 import re
 
 import h5py

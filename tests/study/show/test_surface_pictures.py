@@ -1,7 +1,5 @@
 """Limit surfaces in a report: rebuilt from what a file holds, shown as shadows and in space."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The three-dimensional views: which triangle belongs to which candidate, where pads stand, and what a reader sees."""
 
-from __future__ import annotations
-
 import base64
 import json
 import math
@@ -43,9 +41,6 @@ def corners_on(body):
     """Triangles ``(m, 3, 3)`` of a body."""
     points, triangles = body.surface()
     return np.asarray(points, float)[triangles]
-
-
-# --- the surface -----------------------------------------------------------------------------------------------------
 
 
 def test_cutting_keeps_the_area_and_leaves_no_triangle_on_both_sides():
@@ -102,9 +97,6 @@ def test_a_lone_angle_claims_what_its_pads_cover_unless_all_angles_are_alike():
     assert (Cells(np.array([0.0]), np.array([0.0]), 0, 0.05, 0.02).at(x) == 0).all()
 
 
-# --- the wall --------------------------------------------------------------------------------------------------------
-
-
 def test_values_between_the_places_of_a_wall_are_bilinear_and_close_round_the_axis():
     i, j = np.meshgrid(np.arange(AROUND), np.arange(ALONG), indexing="ij")
     grid = np.stack([np.cos(2 * np.pi * i / AROUND), 1.0 * j, 0.0 * j], axis=-1)
@@ -119,9 +111,6 @@ def test_a_wall_moves_with_the_grid_that_begins_at_finger_one():
     shifts = moved(np.array([[12.0, 5.0], [0.0, 5.0], [np.nan, 5.0]]), u, angle=math.pi / 2)
     assert shifts[0] == pytest.approx([-1e-3, 0, 0])  # a quarter of the way round
     assert not shifts[1:].any()
-
-
-# --- pads ------------------------------------------------------------------------------------------------------------
 
 
 def test_pads_stand_where_the_file_says(shown):
@@ -168,9 +157,6 @@ def test_no_pads_are_invented(file, tmp_path, shown):
         assert len(one.friction("x")[0]) == 0
 
 
-# --- choosing a case -------------------------------------------------------------------------------------------------
-
-
 def test_a_case_is_chosen_by_number_place_or_score(shown):
     data = shown[0].ds
     chosen = {
@@ -187,9 +173,6 @@ def test_a_case_is_chosen_by_number_place_or_score(shown):
     assert refused.value.code == USAGE
     with pytest.raises(StudyError, match="quality, e_n"):
         quantity_of(data, "beauty")
-
-
-# --- the page --------------------------------------------------------------------------------------------------------
 
 
 def unpacked(packed, kind="<f4"):
@@ -252,9 +235,6 @@ def test_a_page_that_would_grow_too_large_says_what_it_leaves_out(shown, monkeyp
     assert "10" in object_block(view, index, "quality", "x", [index, *every(view)])["caption"]
 
 
-# --- the command -----------------------------------------------------------------------------------------------------
-
-
 def test_the_command_refuses_names_that_nothing_would_open(file, tmp_path, capsys):
     for words, code in (
         (["--screenshot", tmp_path / "a.jpg"], USAGE),
@@ -281,9 +261,6 @@ def test_the_command_writes_the_page(file, tmp_path, capsys):
     shutil.copy(file, tmp_path / "b.hdf")
     assert main(["view", str(tmp_path / "b.hdf")]) == 0
     assert (tmp_path / "b-3d.html").exists()
-
-
-# --- what is seen -----------------------------------------------------------------------------------------------------
 
 
 def reddest(image):

@@ -1,7 +1,5 @@
 """What ParaView reads: the object with its maps, and all pads with their pressure."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import pyvista as pv

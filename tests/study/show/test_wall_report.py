@@ -1,7 +1,5 @@
 """What check, plan, show and the report say of a thin wall: a can that was pressed, and files made up from it."""
 
-from __future__ import annotations
-
 import shutil
 
 import h5py

@@ -1,7 +1,5 @@
 """The live view: what it shows of a file that grows between its looks, when it ends, and with which exit code."""
 
-from __future__ import annotations
-
 import io
 
 import h5py
