@@ -25,7 +25,6 @@ def body_volume(coarse, fine):
 
 
 def some_motions(W):
-    """Motions that do not count, for fits of wrenches alone."""
     W = np.asarray(W, float)
     return W / np.maximum(np.linalg.norm(W, axis=1, keepdims=True), 1e-300)
 

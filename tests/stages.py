@@ -54,7 +54,6 @@ def workers() -> tuple[str, ...]:
 
 
 def tests(mark: str, *words: str) -> tuple[str, ...]:
-    """Command of the tests with such marks."""
     return (sys.executable, "-m", "pytest", "-q", "-m", mark, *words)
 
 
@@ -85,7 +84,6 @@ def thorough() -> list[Stage]:
 
 
 def counted(report: Path) -> str:
-    """How many tests passed and were skipped, from a report of pytest."""
     if not report.exists():
         return ""
     suite = next(ElementTree.parse(report).iter("testsuite"))
@@ -95,7 +93,6 @@ def counted(report: Path) -> str:
 
 
 def run(stage: Stage) -> Outcome:
-    """Run a stage to its end or to its limit."""
     if missing := [name for name in stage.needs if shutil.which(name) is None]:
         return Outcome(stage, None, f"not installed: {', '.join(missing)}")
     settings = [f"{name}={value}" for name, value in stage.variables.items()]
@@ -140,7 +137,6 @@ def report(command: str, outcomes: list[Outcome]) -> int:
 
 
 def main(command: str, *names: str) -> int:
-    """Run all stages of a command, or those with these names."""
     stages = {"test": fast, "test-long": thorough}[command]()
     if unknown := set(names) - {stage.name for stage in stages}:
         print(f"unknown stages: {', '.join(sorted(unknown))}; there are {', '.join(s.name for s in stages)}")

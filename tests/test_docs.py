@@ -52,7 +52,6 @@ def test_every_command_and_option_is_shown():
 
 
 def anchors(text: str) -> set[str]:
-    """Anchors of the headings of a page."""
     heads = re.findall(r"^#+ (.+)$", text, re.M)
     return {"#" + re.sub(r"[\s-]+", "-", re.sub(r"[^\w\s-]", "", head.lower()).strip()) for head in heads}
 

@@ -74,7 +74,6 @@ def test_scripts_that_solve(name, tmp_path):
 
 
 def blocks(page):
-    """The Python blocks of a page as one script."""
     return "\n".join(re.findall(r"^```python\n(.*?)^```$", (ROOT / page).read_text(), re.M | re.S))
 
 

@@ -70,7 +70,6 @@ def scores() -> dict[str, tuple[Work, str]]:
 
 
 def every_kernel(seconds: float = 0.3) -> None:
-    """A line for each kernel."""
     for part in (friction, limit_surfaces, scores):
         title(part.__name__.replace("_", " ").capitalize())
         for name, (work, goal) in part().items():

@@ -55,7 +55,6 @@ def by_getfem(closings, elements):
 
 
 def compare() -> None:
-    """Print both times, and ours on the cheapest mesh that is as good."""
     title("The same contact problem by GetFEM")
     pressed(*CHEAPER[0])  # what is compiled at first use is not counted
     closings, arms, iterations, size, seconds = pressed(SAME, "hex8")

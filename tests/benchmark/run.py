@@ -38,7 +38,6 @@ FOAMS = (
 
 
 def element_routine() -> None:
-    """Residual and tangent of one hexahedron."""
     title("Finite elements")
     for element, elements in (("hex8", (24, 12, 6)), ("hex27", (12, 6, 3))):
         pad = Pad(PadShape(SIZE, elements, element=element), FOAMS[0])
@@ -77,7 +76,6 @@ def contact_solve() -> None:
 
 
 def whole_map(scene: Path) -> None:
-    """A whole map on one rank and on two."""
     title(f"Map of {scene.stem}")
     folder = Path(tempfile.mkdtemp())
     try:
@@ -105,7 +103,6 @@ def _whole_map(scene: Path, folder: Path) -> None:
 
 
 def main() -> None:
-    """Run all, or the parts named on the command line."""
     parts = {
         "kernels": kernels.every_kernel,
         "element": element_routine,

@@ -17,7 +17,6 @@ CASES = (10**3, 10**4, 10**5, 10**6)
 
 
 def main(result: Path, figure: Path) -> None:
-    """Print the table of hours, and draw it."""
     mpl.use("Agg")
     from matplotlib import pyplot as plt
 

@@ -21,7 +21,6 @@ def line(what: str, figure: str, goal: str = "") -> None:
 
 
 def title(text: str) -> None:
-    """Heading of a part."""
     print(f"\n{text}", flush=True)
     line("what", "figure", "goal")
 

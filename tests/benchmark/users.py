@@ -22,25 +22,21 @@ def _at(mesh: trimesh.Trimesh, *place: float) -> trimesh.Trimesh:
 
 
 def bracket() -> trimesh.Trimesh:
-    """An angle of two plates."""
     return trimesh.util.concatenate([box((0.06, 0.03, 0.012)), _at(box((0.012, 0.03, 0.07)), -0.024, 0.0, 0.03)])
 
 
 def hammer() -> trimesh.Trimesh:
-    """A round handle of 24 sides with a block across it."""
     handle = cylinder(0.014, 0.22, sections=24)
     return trimesh.util.concatenate([handle, _at(box((0.09, 0.028, 0.028)), 0.0, 0.0, 0.11)])
 
 
 def screwdriver() -> trimesh.Trimesh:
-    """A bulged handle with a shaft."""
     z = np.linspace(0.0, 0.1, 15)
     handle = [(0.013 + 0.003 * np.sin(4 * np.pi * h / 0.1), h) for h in z]
     return revolved([(0.0, 0.0), *handle, (0.003, 0.104), (0.003, 0.2), (0.0, 0.2)], 32)
 
 
 def rock() -> trimesh.Trimesh:
-    """A lumpy stone."""
     ball = icosphere(3, 0.032)
     x, y, z = ball.vertices.T / 0.032
     ball.vertices *= (1.0 + 0.06 * np.sin(3 * x + 1) * np.cos(2 * y) + 0.05 * np.sin(4 * z + y))[:, None]

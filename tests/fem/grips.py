@@ -33,7 +33,6 @@ def can() -> Revolution:
 
 
 def thin(thickness: float = 4e-4, law: WallMaterial | None = None, support: str = "standing") -> ThinWalled:
-    """The can with a wall of PET."""
     return ThinWalled(of_revolution(can()), thickness, law or wall_material("pet"), support)
 
 
@@ -66,8 +65,6 @@ def grip(
 
 
 def gap_at(at: Pose):
-    """Gap of the can in the frame of a pad."""
-
     def gap(x):
         g, normal, hessian = can().gap(at.to_object(x))
         return g, normal @ at.rotation, at.rotation.T @ hessian @ at.rotation

@@ -95,7 +95,6 @@ def hertz_cylinder(line_force, R, E_star):
 
 
 def plane(x):
-    """Gap to the plane z = 0, normal and Hessian."""
     return -x[:, 2], np.tile([0.0, 0.0, -1.0], (len(x), 1)), np.zeros((len(x), 3, 3))
 
 
@@ -113,12 +112,10 @@ def round_gap(R, axes):
 
 
 def sphere(R):
-    """Gap function of a sphere."""
     return round_gap(R, (0, 1, 2))
 
 
 def cylinder(R):
-    """Gap function of a cylinder along the pad's long side."""
     return round_gap(R, (1, 2))
 
 
@@ -139,7 +136,6 @@ def facing(a):
 
 
 def e_n(state):
-    """Eccentricity parameter of a pressed pad, curved model [m]."""
     patch = extract(state.pad, state)
     return friction_limits(in_frame(patch, contact_frame(patch, np.array([1.0, 0.0, 0.0]))), 1.0, "ccm").e_n
 

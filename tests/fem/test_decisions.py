@@ -58,12 +58,10 @@ def outcome(function, *arguments):
 
 
 def body(mesh):
-    """Corners and triangles."""
     return np.array(mesh.vertices), np.array(mesh.faces)
 
 
 def union(*bodies):
-    """Several meshes as one."""
     return body(trimesh.util.concatenate([trimesh.Trimesh(*mesh, process=False) for mesh in bodies]))
 
 

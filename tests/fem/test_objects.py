@@ -32,7 +32,6 @@ def shape(request):
 
 
 def around(shape, n=300, low=-3e-3, high=20e-3):
-    """Points in a layer about the surface."""
     rng = np.random.default_rng(5)
     lower, upper = shape.bounds
     x = rng.uniform(lower - high, upper + high, (20 * n, 3))

@@ -45,7 +45,6 @@ def grid_mesh(points):
 
 
 def revolved(body, facet, start=0.0):
-    """Mesh of a body of revolution with triangles of about one size."""
     s = np.linspace(0, body.curve.breaks[-1], int(body.curve.breaks[-1] / facet))[1:-1]
     z, r = body.curve.derivative(s).T
     theta = start + np.linspace(0, 2 * np.pi, 4 * int(np.pi * r.max() / (2 * facet)), endpoint=False)
@@ -54,7 +53,6 @@ def revolved(body, facet, start=0.0):
 
 
 def sampled(surface, facet):
-    """Mesh of an outer surface."""
     s = np.linspace(0, surface.end, int(surface.end / facet))[1:-1]
     theta = np.linspace(0, 2 * np.pi, 4 * int(0.05 / facet), endpoint=False)
     S, T = np.meshgrid(s, theta, indexing="ij")
@@ -201,14 +199,12 @@ def test_a_traced_can_between_two_fingers_is_the_can():
 
 
 def rings(radius, z, n=48):
-    """Mesh from ``radius(theta, z)``."""
     Z, T = np.meshgrid(z, np.linspace(0, 2 * np.pi, n, endpoint=False), indexing="ij")
     r = radius(T, Z)
     return grid_mesh(np.stack([r * np.cos(T), r * np.sin(T), Z], axis=-1))
 
 
 def cup_with_handle(top=0.07):
-    """A cup, and a bar beside it as a handle would be cut."""
     cup = rings(lambda t, z: 0.03 + 0 * t, np.linspace(0, 0.1, 30))
     bar = rings(lambda t, z: 0.004 + 0 * t, np.linspace(0.03, top, 12), 12)
     points = np.concatenate([cup.points, bar.points + np.array([0.0, 0.05, 0.0])])

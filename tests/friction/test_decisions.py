@@ -37,7 +37,6 @@ def shaken(patch, seed):
 
 
 def joined(*patches):
-    """One patch of several."""
     names = ("centroid", "area", "normal", "pressure", "corners")
     return ContactPatch(*(np.concatenate([getattr(p, name) for p in patches]) for name in names))
 
@@ -67,7 +66,6 @@ def wound_the_other_way():
 
 
 def flipped():
-    """A cylinder with every fifth normal turned."""
     patch = mesh_patch(cyl_mesh(1, 0.6, 2, 12, 12))
     return replace(patch, normal=np.where(np.arange(len(patch.load)) % 5 == 0, -1, 1)[:, None] * patch.normal)
 

@@ -14,7 +14,6 @@ TRIANGLE = [[1, 0], [-0.5, math.sqrt(0.75)], [-0.5, -math.sqrt(0.75)]]
 
 
 def centred(patch):
-    """Patch about its centre of pressure."""
     return moved(patch, np.eye(3), -(patch.load @ patch.centroid) / patch.load.sum())
 
 

@@ -16,24 +16,20 @@ SIZES = (0, 1, 0x7F, 0xFF, 0xFFFF, 0x7FFFFFFF, 0xFFFFFFFF, 0x7FFFFFFFFFFFFFFF, 0
 
 
 def flip(data, where, what):
-    """One byte is another one."""
     at = int(where * (len(data) - 1))
     return data[:at] + bytes([data[at] ^ (1 + what % 255)]) + data[at + 1 :]
 
 
 def cut(data, where, what):
-    """The file ends early."""
     return data[: int(where * len(data))]
 
 
 def leave_out(data, where, what):
-    """Some bytes are missing."""
     at = int(where * len(data))
     return data[:at] + data[at + 1 + what % 64 :]
 
 
 def insert(data, where, what):
-    """Foreign bytes stand in the middle."""
     at = int(where * len(data))
     return data[:at] + TEXTS[what % len(TEXTS)] + data[at:]
 
@@ -45,7 +41,6 @@ def lie(data, where, what):
 
 
 def renumber(data, where, what):
-    """A written number is another one."""
     found = list(NUMBER.finditer(data))
     if not found:
         return flip(data, where, what)
@@ -54,21 +49,18 @@ def renumber(data, where, what):
 
 
 def repeat_line(data, where, what):
-    """A line stands there again, once or many times."""
     lines = data.split(b"\n")
     at = int(where * (len(lines) - 1))
     return b"\n".join(lines[:at] + lines[at : at + 1] * (2 + what % 2 * 500) + lines[at + 1 :])
 
 
 def drop_line(data, where, what):
-    """A line is missing."""
     lines = data.split(b"\n")
     at = int(where * (len(lines) - 1))
     return b"\n".join(lines[:at] + lines[at + 1 :])
 
 
 def swap_lines(data, where, what):
-    """Two lines have changed places."""
     lines = data.split(b"\n")
     at, other = int(where * (len(lines) - 1)), what % len(lines)
     lines[at], lines[other] = lines[other], lines[at]
@@ -88,5 +80,4 @@ def edited(data, edits):
 
 
 def edits(kinds):
-    """Strategy of one to four edits."""
     return st.lists(st.tuples(st.sampled_from(kinds), st.floats(0, 1), st.integers(0, 2**16)), min_size=1, max_size=4)

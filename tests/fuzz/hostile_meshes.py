@@ -9,7 +9,6 @@ DEEP = 40  # doublings: 2^40 bodies
 
 
 def accessors(**changes):
-    """The accessors of the scene, each with these changes."""
     return [accessor | changes for accessor in gltf_tree()["accessors"]]
 
 

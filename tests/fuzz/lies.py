@@ -9,7 +9,6 @@ EVIL = "\x1b]0;owned\x07</script><script>alert(1)</script>\u2028=1+1"
 
 
 def put(file, path, data):
-    """Other data in the place of a dataset."""
     attributes = dict(file[path].attrs) if path in file else {}
     del file[path]
     made = file.create_dataset(path, data=data)
@@ -19,8 +18,6 @@ def put(file, path, data):
 
 
 def options(**changed):
-    """The layout's options with some of them changed."""
-
     def spoil(file):
         told = json.loads(file["study"].attrs["options"])
         file["study"].attrs["options"] = json.dumps(told | changed)
@@ -40,8 +37,6 @@ def data(path, value):
 
 
 def values(path, value):
-    """Other values in the same dataset."""
-
     def spoil(file):
         file[path][...] = value
 
@@ -57,7 +52,6 @@ def linked(path, link):
 
 
 def external(file):
-    """Data that stand in another file."""
     shape = file["study/e_n/ccm"].shape
     del file["study/e_n/ccm"]
     file["study/e_n"].create_dataset("ccm", shape, "<f8", external=[("/etc/passwd", 0, 8 * int(np.prod(shape)))])
@@ -92,7 +86,6 @@ def all_maps(value):
 
 
 def loop(file):
-    """A group that holds itself."""
     file["study/e_n/again"] = file["study"]
 
 
@@ -105,7 +98,6 @@ def text(name, content):
 
 
 def words(file):
-    """What is printed and shown, with a terminal's orders and a page's scripts."""
     file["study"].attrs["title"] = EVIL
     file["study/candidates/label"][...] = EVIL.encode()[:80]
     file["study/status/message"][...] = EVIL.encode()[:200]

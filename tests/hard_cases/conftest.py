@@ -25,7 +25,6 @@ _rows: dict[str, list[str]] = {}
 
 
 def row(case: HardCase, outcome: Outcome, verdict: Verdict) -> list[str]:
-    """Cells of one case."""
     difference = "" if verdict.difference is None else f"{verdict.difference:.0e}"
     word = outcome.text if verdict.word == OK else f"{outcome.text}; {verdict.word}"
     return [case.name, case.hard, word, difference]
@@ -56,7 +55,6 @@ def pytest_runtest_logreport(report):
 
 
 def rows_of(text: str) -> dict[str, list[str]]:
-    """Rows of the cases in a table that was written before."""
     cells = [line.strip("|").split("|") for line in text.splitlines() if line.startswith("| ")]
     rows = [[cell.strip() for cell in row] for row in cells if len(row) == len(HEAD)]
     return {row[0]: row for row in rows if row[0] in CASES}

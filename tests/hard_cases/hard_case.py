@@ -84,13 +84,11 @@ class Source:
     force: float = 1.0
 
     def __post_init__(self) -> None:
-        """Refuse kinds and tolerances that are not listed."""
         if self.kind not in KINDS or self.within not in TOLERANCES:
             raise ValueError(f"source: found kind '{self.kind}' and tolerance '{self.within}', expected listed ones")
 
     @property
     def tolerance(self) -> float:
-        """Largest relative difference."""
         return TOLERANCES[self.within][0]
 
     def factor(self, name: str) -> float:
@@ -152,12 +150,10 @@ class Outcome:
 
     @property
     def found(self) -> str:
-        """Word for the outcome."""
         return "refused" if self.refused else "solved" if self.done.all() else "failed"
 
     @property
     def text(self) -> str:
-        """The outcome in a column of a table."""
         some = self.found == "failed" and self.done.any()
         return f"failed, {self.done.sum()} of {self.done.size} solved" if some else self.found
 
@@ -202,13 +198,11 @@ def tables_of(case: HardCase, change: Mapping[str, Any] | None = None) -> dict[s
 
 
 def scene_of(case: HardCase, change: Mapping[str, Any] | None = None) -> Scene:
-    """Scene of a case, with further sections changed."""
     return parse_scene(toml_text(tables_of(case, change)), FOLDER / f"{case.name}.toml")
 
 
 @cache
 def outcome(name: str) -> Outcome:
-    """Solve a case, once in a process."""
     return outcome_of(lambda: scene_of(CASES[name]))
 
 
@@ -231,7 +225,6 @@ def outcome_of(made_scene: Callable[[], Scene], begin_only: bool = False) -> Out
 
 
 def _rows(unit: Any) -> list[tuple[float, CaseResult | CaseFailure]]:
-    """Force and result of every case of a unit."""
     forces, found = unit.scene.load.normal_force, []
     try:
         found += [result for _, result in pipeline.solve_unit(unit)]
@@ -241,7 +234,6 @@ def _rows(unit: Any) -> list[tuple[float, CaseResult | CaseFailure]]:
 
 
 def _outcome(forces: tuple[float, ...], results: tuple[CaseResult | CaseFailure, ...]) -> Outcome:
-    """Outcome of all rows."""
     good = [r.values for r in results if isinstance(r, CaseResult)]
 
     def maps(suffix: str) -> dict[str, np.ndarray]:

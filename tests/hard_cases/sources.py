@@ -40,7 +40,6 @@ def second(name: str) -> Outcome | None:
 
 
 def accepts(case: HardCase, value: Any) -> bool:
-    """Whether the scene is begun with a value of the key of its bound."""
     data = tables_of(case)
     *way, last = (int(key) if key.isdigit() else key for key in case.source.bound.key.split("."))
     table: Any = data
@@ -53,7 +52,6 @@ def accepts(case: HardCase, value: Any) -> bool:
 
 
 def _stated(case: HardCase, maps: Mapping[str, Any]) -> Outcome:
-    """Outcome of numbers that are stated for the last of the forces."""
     forces = np.array(scene_of(case).load.normal_force)
     values = {name: np.atleast_1d(np.asarray(value, float)) for name, value in maps.items()}
     n = len(next(iter(values.values())))

@@ -33,7 +33,6 @@ class Verdict:
 
     @property
     def word(self) -> str:
-        """The verdict in a column of a table."""
         if self.gap:
             return "gap"
         return "WRONG" if self.wrong else "ok" if self.difference is not None else "no number"
@@ -78,7 +77,6 @@ def _bound(case: HardCase) -> tuple[float, float, str]:
 
 
 def _outcome(case: HardCase, found: Outcome) -> Iterator[str]:
-    """Compare the outcome and its reasons with what is right."""
     reasons = [found.refused] if found.refused else [
         m for m, good in zip(found.messages, found.done, strict=True) if not good
     ]  # fmt: skip
@@ -95,7 +93,6 @@ def _outcome(case: HardCase, found: Outcome) -> Iterator[str]:
 
 
 def _solved(case: HardCase, found: Outcome) -> Iterator[str]:
-    """Judge the forces that were solved: laws, numbers, notes."""
     if not found.done.any():
         return
     told = [m for m, good in zip(found.messages, found.done, strict=True) if good]

@@ -138,8 +138,6 @@ def coarse(tmp_path_factory):
 
 @pytest.fixture
 def data(coarse):
-    """Opens a result."""
-
     def of(name):
         found = judge(open(coarse[name]))
         assert (found.status == DONE).all()

@@ -69,7 +69,6 @@ def noisy(patch, K, amplitude, seed):
 
 
 def objective(surface, W, T=None, gamma=0.0):
-    """What the fits of quartics minimise."""
     value = ((surface.value(W) - 1) ** 2).mean()
     if T is None or gamma == 0:
         return value

@@ -23,7 +23,6 @@ def unit(x):
 
 
 def as_they_are(W, T):
-    """Samples in their own coordinates."""
     return SpanSamples(W, T, np.eye(W.shape[1]), FitFlag.CLEAN)
 
 

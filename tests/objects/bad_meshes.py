@@ -19,12 +19,10 @@ LETTER = [(0, 0), (0.06, 0), (0.06, 0.025), (0.025, 0.025), (0.025, 0.08), (0, 0
 
 
 def raw(points: np.ndarray, faces: np.ndarray) -> Mesh:
-    """Triangles as they are."""
     return Mesh(points, faces, process=False)
 
 
 def joined(*parts: Mesh) -> Mesh:
-    """Several bodies in one file."""
     return trimesh.util.concatenate(list(parts))
 
 
@@ -44,12 +42,10 @@ def letter() -> Mesh:
 
 
 def hammer(sections: int = 24) -> Mesh:
-    """A round handle that goes through a head."""
     return joined(moved(cylinder(0.012, 0.16, sections=sections), z=0.08), moved(box((0.09, 0.028, 0.03)), z=0.145))
 
 
 def handle(sections: int = 24) -> Mesh:
-    """A drawer's handle: a bar on two feet."""
     feet = (moved(cylinder(0.007, 0.04, sections=sections), x=x, z=0.02) for x in (-0.05, 0.05))
     bar = cylinder(0.008, 0.13, sections=sections)
     bar.apply_transform(rotation_matrix(np.pi / 2, [0, 1, 0]))
@@ -57,7 +53,6 @@ def handle(sections: int = 24) -> Mesh:
 
 
 def bottle(around: int = 32) -> Mesh:
-    """A full bottle."""
     return revolved(
         [(0, 0), (0.03, 0), (0.03, 0.1), (0.026, 0.12), (0.013, 0.14), (0.013, 0.15), (0.013, 0.17), (0, 0.17)],
         around,
@@ -85,7 +80,6 @@ def soup(mesh: Mesh, seed: int = 0) -> Mesh:
 
 
 def turned(mesh: Mesh, seed: int = 0, share: float = 0.3) -> Mesh:
-    """Some triangles are wound the other way."""
     faces = mesh.faces.copy()
     chosen = np.random.default_rng(seed).random(len(faces)) < share
     faces[chosen] = faces[chosen, ::-1]
@@ -93,12 +87,10 @@ def turned(mesh: Mesh, seed: int = 0, share: float = 0.3) -> Mesh:
 
 
 def doubled(mesh: Mesh) -> Mesh:
-    """Every triangle twice, with its back."""
     return raw(np.vstack([mesh.vertices] * 2), np.vstack([mesh.faces, mesh.faces[:, ::-1] + len(mesh.vertices)]))
 
 
 def lined(mesh: Mesh, wall: float = 0.0015) -> Mesh:
-    """With an inner wall under the outer one."""
     inner = raw(mesh.vertices - wall * mesh.vertex_normals, mesh.faces[:, ::-1])
     return joined(mesh, inner)
 
@@ -118,13 +110,11 @@ def capped(around: int = 32) -> Mesh:
 
 
 def merged(mesh: Mesh) -> Mesh:
-    """With equal points as one."""
     mesh.merge_vertices()
     return mesh
 
 
 def bricks() -> Mesh:
-    """Two bricks that have an edge in common."""
     return merged(joined(moved(box((0.04, 0.03, 0.05)), z=0.025), moved(box((0.04, 0.03, 0.05)), y=0.03, z=0.075)))
 
 
@@ -163,24 +153,20 @@ def pierced(mesh: Mesh, seed: int, rings: int = 1) -> Mesh:
 
 
 def fine(mesh: Mesh, faces: int = 520_000) -> Mesh:
-    """Cut into so many triangles."""
     while len(mesh.faces) < faces:
         mesh = mesh.subdivide()
     return mesh
 
 
 def spoilt(mesh: Mesh, seed: int) -> Mesh:
-    """With flipped, doubled and degenerate triangles."""
     return spoiled(mesh, 0.05, seed)
 
 
 def of(change: Callable[..., Mesh], names: str, **options) -> dict[str, Maker]:
-    """A change of some shapes."""
     return {name: lambda name=name: change(SHAPES[name](), **options) for name in names.split()}
 
 
 def crossing() -> dict[str, Maker]:
-    """Bodies that go through each other."""
     return {
         "hammer": hammer,
         "mug": mug,
@@ -206,7 +192,6 @@ def convex_parts() -> dict[str, Maker]:
 
 
 def non_manifold() -> dict[str, Maker]:
-    """Edges at which more than two triangles meet."""
     return {
         "bottle with a cap": capped,
         "bricks": bricks,

@@ -76,7 +76,6 @@ def finer(tables: dict) -> dict:
 
 
 def solved(tables: dict, coupling: str) -> CaseResult | CaseFailure:
-    """Result of the scene's one case."""
     scene = Scene.of_tables(tables | {"effects": {"friction_pressure_coupling": coupling}})
     unit = units(scene, lambda point: build_object(point.object).axis_symmetry)[0]
     return dict(pipeline.solve_unit(unit))[0]
@@ -118,7 +117,6 @@ def table(lines: list[dict[str, str]], by: str = "friction") -> str:
 
 
 def main(arguments: list[str]) -> None:
-    """See the module."""
     if arguments[0] == "--table":
         lines = [line for path in arguments[1:] for line in csv.DictReader(Path(path).open())]
         print(table(lines), table(lines, "family"), sep="\n\n")

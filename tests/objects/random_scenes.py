@@ -14,7 +14,6 @@ OFF = 0.3  # of the pads' width: how far a pose may be off the middle
 
 
 def number(x: float) -> float:
-    """A number as it is written in a scene."""
     return round(float(x), 3)
 
 
@@ -31,13 +30,11 @@ def outline(rng: np.random.Generator) -> Table:
 
 
 def cone(rng: np.random.Generator) -> Table:
-    """A frustum, its outline in four points on a line."""
     z, ends = np.linspace(0, rng.uniform(60, 200), 4), rng.uniform(8, 45, 2)
     return {"shape": "revolution", "profile_mm": _pairs(z, np.linspace(*ends, 4))}
 
 
 def ellipse(rng: np.random.Generator) -> Table:
-    """An elliptic cylinder."""
     a = rng.uniform(8, 45)
     b, length = np.clip(a * rng.uniform(0.4, 2.5), 5, 60), rng.uniform(40, 200)
     return {"shape": "elliptic_cylinder", "semi_axis_a_mm": number(a), "semi_axis_b_mm": number(b),
@@ -45,18 +42,15 @@ def ellipse(rng: np.random.Generator) -> Table:
 
 
 def ball(rng: np.random.Generator) -> Table:
-    """A ball."""
     return {"shape": "sphere", "radius_mm": number(rng.uniform(6, 60))}
 
 
 def box(rng: np.random.Generator) -> Table:
-    """A box with rounded edges."""
     return {"shape": "box", "size_mm": [number(s) for s in rng.uniform(20, 100, 3)],
             "edge_radius_mm": number(rng.uniform(0.5, 9))}  # fmt: skip
 
 
 def superellipse(rng: np.random.Generator) -> Table:
-    """A straight body whose section is a rounded rectangle."""
     a, b = rng.uniform(12, 45, 2)
     same = {"a_mm": number(a), "b_mm": number(b), "exponent": number(rng.uniform(2, 8))}
     return {"shape": "sections", "sections": [{"z_mm": number(z), **same} for z in np.linspace(0, 150, 4)]}

@@ -77,17 +77,14 @@ class Outcome:
     notes: list[str] = field(default_factory=list)
 
     def save(self, folder: Path) -> None:
-        """Write as JSON."""
         (folder / f"{file_name(self.name)}.json").write_text(json.dumps(asdict(self), indent=1))
 
     @staticmethod
     def load(file: Path) -> Outcome:
-        """Read what `save` wrote."""
         return Outcome(**json.loads(file.read_text()))
 
 
 def file_name(name: str) -> str:
-    """Name of an object's files."""
     return re.sub(r"[^\w.]+", "-", name)
 
 
@@ -123,7 +120,6 @@ def start_inside(mesh: MeshObject, pose: Pose, size: tuple[float, float, float])
 
 
 def solve(outcome: Outcome, seed: int, folder: Path) -> None:
-    """Solve all cases of an object."""
     scene = with_sampled_grasps(scene_of(outcome.name, seed, folder))
     check_object(scene)
     obj: Any = build_object(scene.object)
@@ -151,7 +147,6 @@ def solve(outcome: Outcome, seed: int, folder: Path) -> None:
 
 
 def solved(name: str, seed: int, folder: Path) -> Outcome:
-    """What became of one object."""
     start, outcome = time.process_time(), Outcome(name, objects(seed)[name])
     try:
         solve(outcome, seed, folder)
@@ -164,7 +159,6 @@ def solved(name: str, seed: int, folder: Path) -> Outcome:
 
 
 def main(words: list[str]) -> None:
-    """Solve the objects with these names."""
     seed, folder = int(words[0]), Path(words[1])
     for name in words[2:]:
         # the default action of both signals ends the process, also in the middle of compiled code

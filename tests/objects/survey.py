@@ -57,7 +57,6 @@ def survey(names: Sequence[str], options: Namespace) -> None:
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
-    """A table as Markdown."""
     lines = [head, ["---"] * len(head), *rows]
     return "\n".join(f"| {' | '.join(str(cell).replace('|', '/') for cell in cells)} |" for cells in lines)
 
@@ -68,7 +67,6 @@ def by_physics(message: str) -> bool:
 
 
 def kind_row(kind: str, outcomes: Sequence[Outcome]) -> list[object]:
-    """Cells of a kind."""
     flags: Counter[str] = sum((Counter(o.flags) for o in outcomes), Counter())
     solved, seconds = sum(o.solved for o in outcomes), sorted(o.seconds for o in outcomes)
     shares = ", ".join(f"{word} {n / solved:.0%}" for word, n in flags.most_common())
@@ -80,7 +78,6 @@ def kind_row(kind: str, outcomes: Sequence[Outcome]) -> list[object]:
 
 
 def page(outcomes: Sequence[Outcome]) -> str:
-    """The whole page as Markdown."""
     kinds = list(dict.fromkeys(o.kind for o in outcomes))
     rows = [kind_row(kind, [o for o in outcomes if o.kind == kind]) for kind in kinds]
     failures = [(o.name, *failure) for o in outcomes for failure in o.failures]
@@ -96,7 +93,6 @@ def page(outcomes: Sequence[Outcome]) -> str:
 
 
 def main() -> None:
-    """Read the command line, run, and write the page."""
     parser = ArgumentParser(description=__doc__)
     parser.add_argument("--seed", type=int, default=0, help="of holes, spoiled triangles and random scenes")
     parser.add_argument("--only", default="", help="regular expression of the objects to be run again")

@@ -24,7 +24,6 @@ ENDED = ("COMPLETED", "FAILED", "TIMEOUT", "CANCELLED", "NODE_FAIL", "OUT_OF_MEM
 
 
 def slurm(*words: str) -> str:
-    """What a command of Slurm prints."""
     return subprocess.run(words, capture_output=True, text=True, check=True, timeout=60).stdout.strip()
 
 
@@ -58,13 +57,11 @@ def ended(job: str) -> str:
 
 
 def report(name: str, job: str) -> None:
-    """Print how a job ended."""
     state, starts, code = job_field(job, "JobState"), int(job_field(job, "Restarts")) + 1, job_field(job, "ExitCode")
     print(f"{name:<10} job {job}: {state}, {starts} start(s), exit code {code}", flush=True)
 
 
 def main() -> int:
-    """Run the jobs and compare their files."""
     top = ROOT / "results" / "slurm"
     os.environ["SOFTJAW"] = str(ROOT / ".venv" / "bin" / "softjaw")
     os.environ["MOST_RESTARTS"] = "100"  # on a busy machine a start may end before it has solved much

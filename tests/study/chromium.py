@@ -54,7 +54,6 @@ class Browser:
         os.close(self._read)
 
     def do(self, method: str, **values: Any) -> dict[str, Any]:
-        """Send a command and wait for its answer."""
         self._number += 1
         message = {"id": self._number, "method": method, "params": values}
         if self._session:
@@ -88,7 +87,6 @@ class Browser:
             self.told.append(("loaded", ""))
 
     def open(self, path: Path, width: int = 1100, height: int = 800, *, phone: bool = False) -> None:
-        """Load a page into a window of this size."""
         self.do("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=phone)
         self.do("Emulation.setTouchEmulationEnabled", enabled=phone)
         self.do("Emulation.setFocusEmulationEnabled", enabled=True)
@@ -99,7 +97,6 @@ class Browser:
         self.told.remove(("loaded", ""))
 
     def ask(self, expression: str) -> Any:
-        """Value of an expression in the page."""
         answer = self.do("Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True)
         assert "exceptionDetails" not in answer, answer["exceptionDetails"]
         return answer["result"].get("value")
@@ -113,5 +110,4 @@ class Browser:
         return found
 
     def printed(self) -> bytes:
-        """The page as it would be printed, as PDF."""
         return base64.b64decode(self.do("Page.printToPDF", preferCSSPageSize=True)["data"])

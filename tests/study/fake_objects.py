@@ -24,8 +24,6 @@ from tests.study import fake_run
 
 @dataclass(frozen=True)
 class FakeUnit:
-    """A unit of the fake study, as ranks send it to each other."""
-
     index: int
     rows: Any
     cost: float
@@ -44,7 +42,6 @@ def plan_of(name, rounds=()):
 
 
 def study(scene, _overrides):
-    """Plan and work of an object."""
     from softjaw.study.messages import USAGE, NoGraspError
     from softjaw.study.run.session import Work
 
@@ -58,7 +55,6 @@ def study(scene, _overrides):
 
 
 def main(arguments=None):
-    """Run it; its exit code."""
     parser = argparse.ArgumentParser()
     parser.add_argument("scene")
     parser.add_argument("out", type=Path)

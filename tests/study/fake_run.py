@@ -73,7 +73,6 @@ def fake_growth(digest, stations, work):
 
 
 def fake_result(row):
-    """Every value from the row alone."""
     from softjaw.study.case.result import CaseResult
 
     random = np.random.default_rng(row)
@@ -113,13 +112,11 @@ def fake_path(options):
 
 
 def finalise(writer):
-    """Fill the derived dataset."""
     e_n = writer.read("e_n/ccm")
     writer.write_derived("slope", (e_n[:, 0, -1] - e_n[:, 0, 0]) / 4.0)
 
 
 def main(arguments=None):
-    """Run it; its exit code."""
     parser = argparse.ArgumentParser()
     parser.add_argument("file", type=Path)
     parser.add_argument("--digest", default="scene")

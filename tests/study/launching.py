@@ -28,7 +28,6 @@ def command(ranks, *words):
 
 
 def launch(ranks, *words):
-    """Run to the end; exit code, output and errors."""
     done = subprocess.run(
         command(ranks, *words), env=launch_environment(), cwd=ROOT, capture_output=True, text=True,
         timeout=130, stdin=subprocess.DEVNULL,
@@ -49,7 +48,6 @@ def softjaw(ranks, *words):
 
 
 def here(program, *words):
-    """Call a program in this process; exit code, output and errors."""
     output, errors = io.StringIO(), io.StringIO()
     with redirect_stdout(output), redirect_stderr(errors):
         code = program([str(word) for word in words])
@@ -57,7 +55,6 @@ def here(program, *words):
 
 
 def start(ranks, *words):
-    """Start the fake study and come back at once."""
     return begin(ranks, SCRIPT, *words)
 
 
@@ -72,7 +69,6 @@ def begin(ranks, *words):
 
 
 def wait_for(condition, limit=60.0):
-    """Wait until ``condition()`` holds."""
     deadline = time.monotonic() + limit
     while not condition():
         assert time.monotonic() < deadline, "it took too long"

@@ -15,7 +15,6 @@ def cylinder_mesh(R=0.03, alpha=np.pi / 3, L=0.04, n=15, m=9, triangles=False):
 
 
 def table(path, headers, columns):
-    """A CSV file that keeps every digit."""
     lines = [",".join(headers), *(",".join(map(repr, row)) for row in np.column_stack(columns).tolist())]
     path.write_text("\n".join(lines) + "\n")
     return path
@@ -29,7 +28,6 @@ def centres(path, patch, length="m", pressure="pa"):
 
 
 def corners(path, points, cells, pressure):
-    """Corners of every face."""
     headers = [f"{c}{k + 1}_m" for k in range(cells.shape[1]) for c in "xyz"]
     return table(path, [*headers, "pressure_pa"], [points[cells].reshape(len(cells), -1), pressure])
 

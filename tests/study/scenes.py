@@ -14,12 +14,10 @@ QUICK = (ONE_MESH, NO_COUPLING)  # friction that acts back is left to tests of i
 
 
 def mesh_of(file, unit="mm"):
-    """The keys of a mesh."""
     return f'shape = "mesh"\nmesh = "{file}"\nunit = "{unit}"'
 
 
 def pose_of(point=(0, 0, 0), approach=(1, 0, 0), long_side=(0, 0, 1), label=""):
-    """The keys of a candidate that is a pose."""
     named = f'label = "{label}"\n' if label else ""
     keys = {"point_mm": point, "approach": approach, "long_side": long_side}
     lines = "".join(f"{key} = {[float(x) for x in value]}\n" for key, value in keys.items())

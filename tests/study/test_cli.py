@@ -107,7 +107,6 @@ def test_status_tells_programs_the_state_of_every_case(finished, capsys):
 
 
 def loaded(*words):
-    """Modules that a command imports, and its exit code."""
     command = [sys.executable, "-X", "importtime", "-m", "softjaw", *map(str, words)]
     told = subprocess.run(command, capture_output=True, text=True, cwd=ROOT)
     lines = [line.rpartition("|")[2].strip() for line in told.stderr.splitlines() if line.startswith("import time:")]

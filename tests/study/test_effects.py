@@ -109,7 +109,6 @@ def choice(monkeypatch):
 
 
 def levels_of(choice):
-    """Level of friction acting back at every force."""
     return [choice.level(COUPLING, k) for k in range(choice.count)]
 
 
@@ -228,7 +227,6 @@ RIGID = 'effects.sheet="rigid"'
 
 
 def sheet_level(*overrides):
-    """Level, indicator and reason, alike in every case."""
     (found,) = {result.effects["sheet"][:3] for _, path in solved(OVAL, *overrides) for result in path}
     return found[0], found[1], REASONS[found[2]]
 
@@ -291,7 +289,6 @@ AUTO = 'effects.friction_pressure_coupling="auto"'
 
 
 def coupling_levels(*overrides):
-    """Level and reason in every case."""
     found = [result.effects[COUPLING] for _, path in solved(OVAL, *overrides) for result in path]
     return [(own.level, own.reason) for own in found]
 

@@ -27,7 +27,6 @@ OPTIONS = ("--stations", 14, "--retry-failed")  # two kills in one case would ma
 
 
 def ranks_of(process):
-    """Processes that an mpirun has started."""
     return [int(pid) for pid in Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()]
 
 
@@ -127,7 +126,6 @@ def states(path):
 
 
 def whole(folder, *words):
-    """What an undisturbed run writes."""
     assert study(0, folder / "whole.hdf", *words)[0] == 0
     return contents(folder / "whole.hdf")
 
@@ -191,7 +189,6 @@ def small_disk(tmp_path):
 
 
 def fill(folder):
-    """Take all space that is left."""
     with contextlib.suppress(OSError), (folder / "filler").open("wb", buffering=0) as file:
         while file.write(b"x" * 4096):
             pass

@@ -37,7 +37,6 @@ def unit_of(*overrides):
 
 @lru_cache
 def whole(overrides):
-    """All forces in one go."""
     return dict(pipeline.solve_unit(unit_of(*overrides)))
 
 

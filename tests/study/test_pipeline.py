@@ -37,7 +37,6 @@ def solved(shape, *overrides, stations="[0]", angles="[0]", forces="[2, 5]", ele
 
 
 def cases(*arguments, **choices):
-    """Values of every case, in order."""
     return [result.values for _, path in solved(*arguments, **choices) for result in path]
 
 
@@ -258,7 +257,6 @@ def test_a_load_path_that_ends_names_the_last_good_force_and_what_was_not_tried(
 
 
 def numbers_of(text, unit):
-    """Numbers in front of a unit."""
     return [float(number) for number in re.findall(rf"([\d.]+) {unit}\b", text)]
 
 
@@ -276,7 +274,6 @@ def test_a_solver_that_is_cut_short_takes_more_steps_to_the_same_answer():
 
 
 def bottle(*changes):
-    """Results of a place of the shipped bottle."""
     path = Path(__file__).parents[2] / "jobs" / "bottle-rigid.toml"
     return results_of(parse_scene(path.read_text(), path, ["candidates.angles_deg=[0]", *changes]))
 

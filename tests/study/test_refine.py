@@ -129,7 +129,6 @@ def filled(path, plan):
 
 
 def refined(scene, name, ranks, *words):
-    """A run of a scene into a file beside it: the file, and what was said."""
     path = scene.parent / name
     code, output, errors = launch(ranks, "-m", "softjaw", "run", scene, "-o", path, *words)
     assert code == 0, errors
@@ -177,7 +176,6 @@ def scene_with(budget, shape=BODY):
 
 
 def turned(axis, degrees):
-    """Rotation about an axis of the pad."""
     c, s, (i, j) = np.cos(np.radians(degrees)), np.sin(np.radians(degrees)), ((axis + 1) % 3, (axis + 2) % 3)
     R = np.eye(3)
     R[i, i], R[j, j], R[i, j], R[j, i] = c, c, -s, s

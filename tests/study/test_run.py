@@ -36,7 +36,6 @@ def whole(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def uninterrupted(whole):
-    """What is in that file."""
     return contents(whole)
 
 

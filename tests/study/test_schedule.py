@@ -104,7 +104,6 @@ def test_expensive_first_is_as_good_as_the_bound_of_list_scheduling():
 
 
 def units_of(costs, forces=6, apart=True):
-    """Units that serve two candidates each."""
     rows = np.arange(len(costs) * 2 * forces).reshape(len(costs), 2, forces).tolist()
     return [
         SimpleNamespace(index=i, rows=own, cost=cost, apart=apart, state=0, finest=())

@@ -27,7 +27,6 @@ WHERE = "stations_mm = [40]\nangles_deg = [0]"
 
 
 def walled(shape, *changes, where=WHERE, forces="[1, 2]", elements="[6, 4, 2]"):
-    """Units of the scene of a wall."""
     return units_of(scene_of(shape, *COARSE, *changes, where=where, forces=forces, elements=elements))
 
 

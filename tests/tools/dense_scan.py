@@ -45,7 +45,6 @@ def box(size, at=(0.0, 0.0, 0.0)):
 
 
 def joined(*parts):
-    """Bodies that cross, in one mesh."""
     return trimesh.util.concatenate(parts)
 
 
@@ -137,7 +136,6 @@ def solved_again(scene, grasp):
 
 
 def main(names):
-    """Scan the bodies that are named, or all, and put them into the table."""
     table = json.loads(TABLE.read_text()) if TABLE.exists() else {}
     for name in names or BODIES:
         with tempfile.TemporaryDirectory() as folder:

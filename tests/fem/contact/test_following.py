@@ -28,7 +28,6 @@ def press_of(law=NEO, gap=ROUND, symmetry=(True, True), elements=(12, 6, 4), **c
 
 
 def last(press, forces):
-    """Last state of a list of forces."""
     *_, state = press.load_path([float(f) for f in forces])
     return state
 

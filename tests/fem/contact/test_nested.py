@@ -31,13 +31,11 @@ def pair(element, symmetry=(True, True), grading=(1.0, 1.0, 1.0)):
 
 @cache
 def coarse_states(gap=OVAL, element="hex8", forces=tuple(FORCES)):
-    """Of the coarser pad, solved once."""
     return list(Press(pair(element)[1], gap).load_path(forces))
 
 
 @cache
 def fine_state(gap, force):
-    """Of the pad by itself, solved once."""
     [state] = Press(pair("hex8")[0], gap).load_path([force])
     return state
 

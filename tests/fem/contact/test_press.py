@@ -26,7 +26,6 @@ def pad_of(elements=(12, 6, 4), symmetry=(True, True), contact="weighted", eleme
 
 @cache
 def solved(gap=OVAL, forces=tuple(FORCES)):
-    """States of the usual pad, solved once."""
     return tuple(Press(pad_of(), gap).load_path(forces))
 
 

@@ -23,7 +23,6 @@ MU = 0.4
 
 @cache
 def states(allowed=(True, True), level="nonlinear", thickness=4e-4, z=0.075, support="standing", theta=0.0, mu=None):
-    """Load steps to FORCES."""
     body = thin(thickness, support=support)
     return tuple(grip(body, z, allowed=allowed, level=level, theta=theta, mu=mu).load_path(FORCES))
 

@@ -22,7 +22,6 @@ def pressed(coarser=False, allowed=(True, True), thickness=4e-4, z=0.142):
 
 @cache
 def starts(allowed=(True, True), **where):
-    """States of the coarser mesh."""
     return tuple(pressed(True, allowed, **where).load_path(FORCES))
 
 

@@ -54,7 +54,6 @@ def test_the_plain_tangent_finds_the_same_state():
 
 
 def path_of(case, largest_factor):
-    """Displacements and load factors along the path up to this factor."""
     path = [(0.0, 0.0)]
     for state in follow(case.loaded, 0.05, longest=10.0):
         path.append((case.read(state.q)[0], state.factor))

@@ -21,13 +21,11 @@ FORCES = [30.0, 100.0]
 
 
 def block(deck, head):
-    """Numbers of the lines after a keyword."""
     body = deck.partition(f"*{head}\n")[2].partition("*")[0]
     return [float(word) for word in re.split(r"[,\s]+", body) if word]
 
 
 def solved():
-    """The printed results of CalculiX."""
     with tempfile.TemporaryDirectory() as folder:
         shutil.copy(HERE / "plane.inp", folder)
         subprocess.run(["ccx", "-i", "plane"], cwd=folder, check=True, capture_output=True)
@@ -57,7 +55,6 @@ def numbers(steps, places, closings, forces):
 
 
 def main():
-    """Write the numbers."""
     deck = (HERE / "plane.inp").read_text()
     nodes = np.reshape(block(deck, "NODE, NSET=NPAD"), (-1, 4))
     places = {int(k): nodes[int(k) - 1, 1:] for k in block(deck, "NSET, NSET=FRONT")}

@@ -42,14 +42,12 @@ def uneven(n: int, end: float) -> np.ndarray:
 
 
 def cube(size: float, middle: tuple[float, float, float]) -> tuple[np.ndarray, np.ndarray]:
-    """Cube of twelve triangles with sharp edges."""
     corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
     quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     return corners * size / 2 + middle, np.array([t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))])
 
 
 def meshes() -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Every mesh by the name of its file."""
     around = 2 * np.pi * (np.arange(COLUMNS) + 0.5) / COLUMNS  # facets face the fingers squarely
     points, triangles = egg(even(ROWS, np.pi), around)
     noise = np.random.default_rng(1).normal(scale=NOISE_MM, size=points.shape)

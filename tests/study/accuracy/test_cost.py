@@ -21,7 +21,6 @@ SHORT = ["candidates.stations_mm=[0, 10]", "load.normal_force_n=[2]", "gripper.e
 
 @pytest.fixture(scope="module")
 def file(tmp_path_factory):
-    """Of the command itself."""
     folder = tmp_path_factory.mktemp("cost")
     (folder / "ball.toml").write_text(SCENE)
     words = [word for change in SHORT for word in ("--set", change)]

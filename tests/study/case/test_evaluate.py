@@ -65,7 +65,6 @@ def test_the_quality_of_facing_ellipsoids_is_its_closed_form_and_nearly_that_of_
 
 
 def turned(contacts, angle):
-    """The contacts with their object turned about y."""
     turn = Rotation.from_euler("y", angle).as_matrix()
     return tuple(c.at(Pose(turn @ c.pose.rotation, turn @ c.pose.origin)) for c in contacts)
 

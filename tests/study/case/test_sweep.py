@@ -18,7 +18,6 @@ CYLINDER = text_of(OVAL, stations="[-10, 0, 30]", angles="[0, 30, 90, 180, 210, 
 
 
 def posed(*given):
-    """A scene with explicit poses (point, approach, long side)."""
     return scene_of(OVAL, where="".join(pose_of(*pose) for pose in given))
 
 

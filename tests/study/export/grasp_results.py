@@ -41,7 +41,6 @@ def write(path, **more):
     two = over[..., None] * np.array([1.0, 1.0])
 
     def each(values):
-        """Over grasps and forces, per finger and friction model."""
         found = (np.asarray(values)[:, None, None] * over)[..., None, None]
         return np.broadcast_to(found, (*shape, 2, 3))
 
@@ -69,25 +68,21 @@ def write(path, **more):
 
 @lru_cache
 def opened(path):
-    """The dataset of a file, read once."""
     return open_result(path)
 
 
 @lru_cache
 def all_grasps(path, force):
-    """Its grasps at a force, in the order of the stations."""
     found = grasps(opened(path), Selection(force=force), GripperFrame(closing="x"))
     return sorted(found, key=lambda grasp: grasp.case["place"]["station"])
 
 
 @lru_cache
 def body(path):
-    """Its object."""
     return body_of(opened(path), all_grasps(path, 4.0)[0].case)
 
 
 def slipping(simulator):
-    """The script that loads a finger in this simulator."""
     spec = importlib.util.spec_from_file_location(f"{simulator}_slip", ROOT / f"jobs/{simulator}-slip.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)

@@ -42,7 +42,6 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def sets(folder, tmp_path_factory):
-    """The data set in every format."""
     out = tmp_path_factory.mktemp("sets")
     for form in FORMS:
         assert main(["export", str(folder), "--format", form, "-o", str(out / form), "--approach", "minus-x"]) == 0

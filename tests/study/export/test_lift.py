@@ -33,7 +33,6 @@ SHIPPED = {  # scenes, and what makes each a quick one with antipodal grasps
 
 @lru_cache
 def best(path):
-    """The best grasp of a file and its object."""
     ds = open_result(path)
     grasp = grasps(ds, Selection(top=1), GripperFrame(closing="x"))[0]
     return grasp, body_of(ds, grasp.case)
@@ -41,7 +40,6 @@ def best(path):
 
 @lru_cache
 def opened(grasp, body):
-    """The exported scene."""
     return mujoco.MjModel.from_xml_string(as_mjcf(grasp, body))
 
 
@@ -61,7 +59,6 @@ def motion(grasp, body, share, direction, seconds):
 
 
 def holds(grasp, body, share, seconds, directions=DIRECTIONS):
-    """Of each direction whether the object stays."""
     moves = [motion(grasp, body, share, d, seconds) for d in directions]
     return np.array([moved < MOVED and turned < TURNED for moved, turned in moves])
 

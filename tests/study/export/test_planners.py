@@ -81,7 +81,6 @@ def said(path, capsys):
 
 @pytest.fixture
 def gripper(tmp_path):
-    """A file of a gripper of our own."""
     path = tmp_path / "mine.toml"
     path.write_text('[hand]\nframe = "hand"\ndepth_mm = 103.4\njoints = { left = 0.5, right = -0.5 }\nstroke_mm = 90\n')
     return path

@@ -133,7 +133,6 @@ def test_physx_carries_what_the_file_says_and_both_at_once(path, force):
 
 
 def turned(q):
-    """The rotation of a quaternion of USD."""
     return Rotation.from_quat([*q.GetImaginary(), q.GetReal()]).as_matrix()
 
 

@@ -60,8 +60,6 @@ def answer(words, **options):
 
 @pytest.fixture(scope="module")
 def python():
-    """Python of the environment with silx, nexusformat and xarray."""
-
     def make(folder):
         or_skip([sys.executable, "-m", "venv", folder / "venv"])
         or_skip([folder / "venv/bin/pip", "install", "-q", "-r", BROWSE / "requirements.txt"])

@@ -131,7 +131,6 @@ def judge(found, expected, path):
 
 
 def flipped(path, blocks, random):
-    """A bit of the data of some dataset."""
     offset, length = blocks[random.integers(len(blocks))]
     flip(path, offset + int(random.integers(length)), int(random.integers(8)))
 
@@ -141,7 +140,6 @@ def flipped_anywhere(path, _blocks, random):
 
 
 def zeroed(path, blocks, random):
-    """A sector in which there are data."""
     length = 2 ** int(random.integers(6, 13))
     offset, size = blocks[random.integers(len(blocks))]
     zero(path, (offset + int(random.integers(size))) // length * length, length)

@@ -41,7 +41,6 @@ def study(quality, flags=0.0, labels=None, status=DONE, needs=()):
 
 
 def cells(table, name):
-    """What people read in a column."""
     column = next(c for c in table.columns if c.name == name)
     return [table.cell(row, column) for row in table.rows]
 

@@ -50,7 +50,6 @@ def axes(stations=(0, 0.01, 0.02, 0.03), angles=(0, 0.5, 1.0), forces=(1.0, 5.0)
 
 
 def patch():
-    """A grid of faces that are loaded in the middle."""
     x, y = (a.ravel() for a in np.meshgrid(*(np.linspace(-0.01, 0.01, n) for n in FACES), indexing="ij"))
     centroid = np.stack([x, y, 0.1 * y**2], axis=-1)
     pressure = np.maximum(0.0, 1e4 * (1 - (y / 0.009) ** 2))
@@ -117,7 +116,6 @@ def page_of(path):
 
 
 def figures(html):
-    """The plotly figures of a page."""
     return [json.loads(text) for text in re.findall(r'<script type="application/json">(.*?)</script>', html, re.DOTALL)]
 
 

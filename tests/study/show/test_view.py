@@ -32,7 +32,6 @@ def file(tmp_path_factory):
 
 @pytest.fixture
 def shown(file):
-    """The view of the file and its best case."""
     with open_result(file) as result:
         yield view_of(judge(dataset(result)), None, (None, None), None)
 

@@ -71,7 +71,6 @@ def can(tmp_path_factory, solved):
 
 
 def changed(path, folder, name, values, index=...):
-    """A copy of a result file with other values of one dataset."""
     other = folder / "changed.hdf"
     shutil.copy(path, other)
     with h5py.File(other, "r+") as file:
