@@ -10,8 +10,6 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from softjaw.fem.contact.extract import extract
-from softjaw.fem.contact.load_stepping import Work
-from softjaw.fem.contact.problem import Control
 from softjaw.fem.materials import material
 from softjaw.fem.objects.gap import Pose
 from softjaw.fem.objects.shapes import EllipticCylinder, Sphere
@@ -154,13 +152,6 @@ def dense(problem, x=None, values=None):
         problem.tangent(x)
         values = pattern.values
     return csr_matrix((values, pattern.column, pattern.start), shape=(problem.size,) * 2).toarray()
-
-
-def at_closing(press, closing, x=None):
-    """State at a prescribed closing displacement [m] and the normal force it takes [N], from ``x`` or from scratch."""
-    start = press.problem.guess(closing) if x is None else x
-    x = press._stepping.solve(start, Control(closing=closing), Work())
-    return x, press.problem.normal_force(x)
 
 
 SIZE, FOAM = (0.050, 0.022, 0.015), material("blatz_ko", 0.040e6)  # of the usual pad

@@ -111,15 +111,6 @@ def test_only_two_points_need_the_programme(name):
         np.testing.assert_allclose(surface.coefficients, free.coefficients, rtol=1e-10, atol=1e-10)
 
 
-def test_twenty_noisy_samples_need_the_programme():
-    """Objectives of an independent semidefinite solver."""
-    W, _ = noisy(disc_polar(1, 40, 96), 20, 0.3, 11)
-    surface, certificate = wrenches_alone(W)
-    assert certificate == "semidefinite programme"
-    assert objective(least_squares_quartic(W), W) == pytest.approx(0.021098939720272103, rel=1e-6)
-    assert objective(surface, W) == pytest.approx(0.07303011056407738, rel=1e-5)
-
-
 @settings(max_examples=25, deadline=None, derandomize=True)
 @given(
     seed=st.integers(0, 10**6), faces=st.sampled_from([2, 3, 5, 30]), K=st.sampled_from([4, 8, 20, 60, 200]),

@@ -1,7 +1,6 @@
 """What indicators measure, which reasons are given, and that no indicator lets `auto` skip an effect wrongly."""
 
 import importlib.util
-from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -10,7 +9,7 @@ import pytest
 
 from softjaw.fem.errors import ConvergenceError
 from softjaw.study.case import effects, model
-from softjaw.study.case.effects import FORCED, LITTLE, MUCH, STEPS, UNDECIDED, EffectChoice, neglected_traction
+from softjaw.study.case.effects import FORCED, LITTLE, MUCH, UNDECIDED, EffectChoice, neglected_traction
 from softjaw.study.case.effects import STIFF_PLATE as STIFF
 from softjaw.study.case.solver import COARSE, Solved
 from softjaw.study.flags import Flag
@@ -127,12 +126,6 @@ def test_what_is_measured_on_a_few_elements_is_not_known(choice):
     [level] = levels_of(choice([np.nan]))
     assert (level.reason, level.indicator) == (effects.UNDECIDED, 0.1)
     assert np.isnan(level.change)
-
-
-def test_steps_lead_from_each_level_to_the_next():
-    for name, steps in STEPS.items():
-        assert len(steps) == len(EFFECTS[name]) - 1
-        assert all(one.high == two.low for one, two in pairwise(steps))
 
 
 def test_friction_is_left_out_on_a_wall_whose_coarse_path_with_it_has_ended(choice):
@@ -340,11 +333,3 @@ def test_what_pressing_has_used_is_missing_for_holding():
     assert left["maps/f_x_max"][0] == pytest.approx(whole["maps/f_x_max"][0], rel=1e-6)
     assert left["maps/e_n"][0] == pytest.approx(whole["maps/e_n"][0], rel=1e-6)
     assert left["maps/quality"][0] < plain["maps/quality"][0]
-
-
-@pytest.mark.long
-def test_symmetry_does_not_matter_with_friction():
-    small = {"forces": "[3]", "elements": "[8, 4, 3]"}
-    np.testing.assert_allclose(
-        e_n(OVAL, COUPLED, **small), e_n(OVAL, COUPLED, 'effects.model_size="full"', **small), rtol=1e-7
-    )

@@ -41,10 +41,6 @@ def test_a_preset_sets_pad_and_opening_and_is_gone(tmp_path, name):
     assert Scene.of_tables(scene.effective()) == scene
 
 
-def test_editors_know_the_key():
-    assert set(Scene.model_json_schema()["$defs"]["Gripper"]["properties"]["preset"]["examples"]) == set(PRESETS)
-
-
 def test_keys_of_the_scene_come_first(tmp_path):
     found = loaded(tmp_path, "franka_hand", more="pad_thickness_mm = 10\npad_width_mm = 30")
     assert (found.pad_width_mm, found.pad_thickness_mm, found.max_opening_mm) == (30, 10, 60)

@@ -105,12 +105,6 @@ def test_where_the_coarse_path_ends_the_fine_mesh_is_solved_and_its_error_is_unk
         assert not found[k].values["maps/flags"] & Flag.JUMPED
 
 
-def test_forces_are_apart_on_two_meshes():
-    for overrides in ((), WALL, ("effects.friction_pressure_coupling='tangential'",)):
-        assert unit_of(*overrides).apart
-        assert not unit_of(*overrides, "accuracy.meshes=1").apart
-
-
 OWN, FINER, FINEST = (8, 4, 2), (12, 6, 3), (16, 8, 4)
 
 

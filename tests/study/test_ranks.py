@@ -165,13 +165,6 @@ def nodes():
 @pytest.mark.long
 @pytest.mark.ranks
 @pytest.mark.usefixtures("nodes")
-def test_the_nodes_have_names_of_their_own():
-    assert sorted(on_two_nodes(2, "hostname").split()) == ["nodea", "nodea", "nodeb", "nodeb"]
-
-
-@pytest.mark.long
-@pytest.mark.ranks
-@pytest.mark.usefixtures("nodes")
 def test_two_nodes_write_the_file_of_one_process(tmp_path):
     scene = ROOT / "jobs" / "smoke.toml"
     study = ("-m", "softjaw", "run", scene, "-o")

@@ -53,21 +53,6 @@ def test_the_level_follows_the_indentation_and_says_so():
 LONG = pytest.mark.long
 
 
-@pytest.mark.parametrize("angle", [0, pytest.param(90, marks=LONG)])
-def test_quarter_half_and_full_models_of_an_oval_bottle_are_one(angle):
-    where = f"stations_mm = [40]\nangles_deg = [{angle}]"
-    sizes = ("quarter", "half", "full") if angle else ("quarter", "half")
-    wanted = {size: solved(OVAL, f"effects.model_size='{size}'", where=where, forces="[1]")[-1] for size in sizes}
-    for size, result in wanted.items():
-        assert result.effects["model_size"][0] == size
-        found, expected = result.values["maps/e_n"], wanted["quarter"].values["maps/e_n"]
-        np.testing.assert_allclose(found, expected, rtol=1e-6)
-        assert result.values["maps/indentation"] == pytest.approx(
-            wanted["quarter"].values["maps/indentation"], rel=1e-5
-        )
-        np.testing.assert_allclose(result.values["wall/place"], wanted["quarter"].values["wall/place"], atol=1e-8)
-
-
 @LONG
 def test_across_an_oval_there_is_no_symmetry_and_to_force_one_is_refused():
     where = "stations_mm = [40]\nangles_deg = [45]"

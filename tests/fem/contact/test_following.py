@@ -16,7 +16,6 @@ from tests.fem.falling_force import MM, Curve, crossings, force
 
 SIZE, G = (0.050, 0.022, 0.015), 0.040e6
 NEO = material("neo_hookean", G, 0.25)
-BLATZ_KO = material("blatz_ko", G)
 ROUND = reference.placed(EllipticCylinder(0.025, 0.025, 0.2), reference.facing(0.025))
 BALL = reference.placed(Sphere(0.02), reference.facing(0.02))
 

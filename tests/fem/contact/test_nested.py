@@ -54,14 +54,6 @@ def test_every_force_by_itself_leads_to_the_state_of_the_load_path(gap, element)
         assert found.checks.max_strain == pytest.approx(expected.checks.max_strain, rel=1e-9)
 
 
-def test_not_a_bit_depends_on_what_was_solved_before():
-    (pad, _), starts = pair("hex8"), coarse_states()
-    press = Press(pad, OVAL)
-    upward = [press.at(s.force, [s]).unknowns.tobytes() for s in starts]
-    downward = [press.at(s.force, [s]).unknowns.tobytes() for s in reversed(starts)]
-    assert upward == downward[::-1] == [Press(pad, OVAL).at(s.force, [s]).unknowns.tobytes() for s in starts]
-
-
 @pytest.mark.parametrize("start", ["none", "jumped", "far off", "broken"])
 def test_a_start_that_does_not_serve_is_replaced_by_a_walk_from_first_contact(start):
     pad, coarse = pair("hex8")

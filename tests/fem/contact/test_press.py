@@ -44,46 +44,6 @@ def test_active_set_and_bounds_agree(gap, element, contact):
         assert relative(one.unknowns, other.unknowns) < 3e-9
 
 
-@pytest.mark.parametrize("gap", [OVAL, BALL], ids=["cylinder", "sphere"])
-@pytest.mark.parametrize("element", ["hex8", "hex27"])
-def test_quarter_half_and_full_pads_are_the_same(gap, element):
-    elements, forces = ((12, 6, 4), FORCES) if element == "hex8" else ((4, 4, 2), FORCES[:2])
-    full = pad_of(elements, (False, False), element=element)
-    where = {tuple(np.round(x * 1e9).astype(int)): i for i, x in enumerate(full.nodes[full.contact_nodes])}
-    whole = list(Press(full, gap).load_path(forces))
-    for symmetry in ((True, False), (False, True), (True, True)):
-        part = pad_of(elements, symmetry, element=element)
-        same = [where[tuple(np.round(x * 1e9).astype(int))] for x in part.nodes[part.contact_nodes]]
-        for one, other in zip(Press(part, gap).load_path(forces), whole, strict=True):
-            assert one.closing == pytest.approx(other.closing, rel=1e-10)
-            assert relative(one.pressure, other.pressure[same]) < 1e-10
-            assert relative(one.contact_face, other.contact_face[same]) < 1e-10
-            assert one.points.force[2] / part.share == pytest.approx(other.points.force[2], rel=1e-12)
-
-
-def test_the_path_does_not_matter():
-    """To 20 N at once, and beyond and back down."""
-    (at_once,) = solved(forces=(20.0,))
-    *_, last = Press(pad_of(), OVAL).load_path([5.0, 35.0, 20.0])
-    assert last.closing == pytest.approx(at_once.closing, rel=1e-9)
-    assert relative(last.unknowns, at_once.unknowns) < 1e-9
-
-
-def bits(pressed):
-    return [part.tobytes() for s in pressed for part in (s.unknowns, s.pressure, s.contact_face, s.points.load)]
-
-
-def test_the_same_ladder_twice_gives_the_same_bits():
-    """Also after another problem, and from the same solver a second time."""
-    first = Press(pad_of(), OVAL)
-    once = bits(first.load_path(FORCES))
-    other = Press(pad_of((8, 4, 2), (False, False), law=material("neo_hookean", G, 0.4)), BALL)
-    list(other.load_path([2.0]))
-    other.destroy()
-    assert bits(solved()) == once
-    assert bits(first.load_path(FORCES)) == once
-
-
 def test_units_do_not_matter():
     """The same pad in mm, N and MPa."""
     mm = pad_of(size=tuple(1e3 * s for s in SIZE), law=material("blatz_ko", G * 1e-6))

@@ -142,12 +142,6 @@ def test_a_wall_that_hardly_gives_way_is_a_rigid_object():
         assert e_n(one.fingers[0]) == pytest.approx(e_n(other), rel=5e-4)
 
 
-def test_a_force_has_one_state_whatever_other_forces_are_asked_for():
-    alone, both = (tuple(grip(thin(), elements=(4, 2, 2), mu=MU).load_path(forces)) for forces in ([2.0], [1.0, 2.0]))
-    assert alone[-1].unknowns.tobytes() == both[-1].unknowns.tobytes()
-    assert alone[-1].wall.q.tobytes() == both[-1].wall.q.tobytes()
-
-
 # An independent prototype with another element library: force [N] and e_n [mm] by thickness and closing [mm].
 PROTOTYPE = {
     0.3: {1: (0.860, 8.13), 2: (1.927, 8.88), 3: (2.632, 10.30), 4: (2.875, 11.45), 5: (3.263, 11.69)},

@@ -70,16 +70,6 @@ def test_every_force_by_itself_leads_to_the_state_of_the_load_path():
         assert found.wall.opening == pytest.approx(expected.wall.opening, rel=1e-8)
 
 
-def test_not_a_bit_depends_on_what_was_solved_before():
-    def bits(state):
-        return state.wall.q.tobytes(), *(f.unknowns.tobytes() for f in state.fingers)
-
-    fine = pressed()
-    low, high = starts()
-    downward = [bits(fine.at(s.force, [s])) for s in (high, low)]
-    assert downward == [bits(pressed().at(s.force, [s])) for s in (high, low)]
-
-
 @pytest.mark.parametrize(
     "start", ["none", "lower", *(pytest.param(own, marks=pytest.mark.long) for own in ("jumped", "far off"))]
 )
