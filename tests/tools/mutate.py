@@ -1,37 +1,30 @@
 """How many small random bugs the fast tests notice: ``python -m tests.tools.mutate --count 100 --out mutants.jsonl``.
 
 A mutant is the project with one change: an operator, a constant, a sign, an index or a condition of ``FOLDERS``. The
-seed fixes the sample. First the tests of ``make test`` that start no ranks run without a change, which shows the files
-of tests that run each line, and their times. Then each mutant meets the files that run its line, the fastest first,
-until a test fails. What is compiled, or outside of functions, is not seen so: there the lines count that name it. The
-work is done in a copy. Each slice of a mutant's tests adds one line of JSON to the output; the same command again
-resumes. A test that fails without a change is left out.
+seed fixes the sample. Each mutant meets the tests of ``make test`` that start no ranks and import its file, the nearest
+first, until one fails or `MOST_S` are spent: the share is a lower bound. The work is done in a copy, by children of a
+process that has imported the libraries. Each mutant adds a line of JSON to the output; the same command resumes.
 """
 
 import argparse
 import ast
+import importlib
 import json
 import os
 import random
-import re
+import resource
 import shutil
 import signal
-import subprocess
 import sys
 import tempfile
 import time
-import xml.etree.ElementTree as ElementTree
-from collections import Counter
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
-from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
 import pytest
 from scipy.stats import binomtest
-
-from softjaw.study.doctor import launch_environment
 
 ROOT = Path(__file__).parents[2]
 FOLDERS = ("fem", "friction", "lsfit", "scoring", "study/case", "study/result", "study/run")
@@ -40,10 +33,10 @@ OPERATORS = {ast.Add: "-", ast.Sub: "+", ast.Mult: "/", ast.Div: "*", ast.Pow: "
 COMPARISONS = {ast.Lt: ">", ast.LtE: ">=", ast.Gt: "<", ast.GtE: "<=", ast.Eq: "!=", ast.NotEq: "=="}
 PACKAGES = ("fem", "friction", "lsfit", "scoring", "study")
 MARKS = "not long and not ranks"
-REPORT = "report.xml"
-SLICE_S = 60  # of tests by their time without a change; a mutant that passes waits until the others had theirs
-COMPILING_S, HANGING = 120, 5  # what takes longer than the one and so many times its time hangs
-WHOLE_S = 10_000  # of all tests
+GROUP = 3  # files of tests that a child has first; then twice as many
+MOST_S, HANGING_S = 120, 100  # CPU time for a mutant, and of a single test, compiling included
+LIBRARIES = ("numpy", "scipy.optimize", "scipy.interpolate", "scipy.spatial", "numba", "skfem", "trimesh", "pyvista",
+             "xarray", "pydantic", "hypothesis", "clarabel", "rich")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -135,177 +128,123 @@ def mutated(source: str, mutation: Mutation) -> str:
 
 
 class Copy:
-    """A copy of the project in which one file at a time is changed, and what its tests run there."""
+    """A copy of the project in which one file at a time is changed, and who imports whom there."""
 
-    def __init__(self, folder: Path, kept: Path) -> None:
+    def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self.failing: list[str] = []
-        for package in (*PACKAGES, "softjaw", "tests", "jobs"):
+        for package in (*PACKAGES, "softjaw", "tests", "jobs", "docs"):
             shutil.copytree(ROOT / package, folder / package, symlinks=True)
         for file in (file for file in ROOT.iterdir() if file.is_file()):
             shutil.copy2(file, folder)
-        shutil.copytree(ROOT / "docs", folder / "docs")
         (folder / ".venv").symlink_to(sys.prefix)
-        if not kept.exists():
-            self.measure(kept)
-        found = json.loads(kept.read_text())
-        self.failing, self.durations, self.covered = (found[key] for key in ("failing", "durations", "covered"))
-        self.sources = {str(f.relative_to(ROOT)): f.read_text() for p in PACKAGES for f in (ROOT / p).rglob("*.py")}
+        sources = [f.relative_to(folder) for p in (*PACKAGES, "tests") for f in (folder / p).rglob("*.py")]
+        names = {".".join(f.with_suffix("").parts): str(f) for f in sources}
+        self.imports = {str(f): imported((folder / f).read_text(), names) for f in sources}
 
-    def measure(self, kept: Path) -> None:
-        """Run all tests without a change."""
-        covered = self.folder / "covered.json"
-        failing = self.failures(WHOLE_S, "-p", "tests.tools.covered", COVERED=str(covered))
-        kept.write_text(json.dumps(measured(failing, self.folder / REPORT, covered)))
+    def users(self, name: str) -> dict[str, int]:
+        """Files that import a file, also by others, by the number of imports in between."""
+        distance, newest = {name: 0}, {name}
+        while newest := {f for f, of in self.imports.items() if of & newest} - set(distance):
+            distance |= dict.fromkeys(newest, max(distance.values()) + 1)
+        return distance
 
-    def tests_of(self, mutation: Mutation) -> list[str]:
-        """Test files that run the line; else those that run a line with the name of what it stands in."""
-        place = (mutation.file, mutation.line)
-        seen, places = {place}, [place]
-        files: set[str] = set()
-        while places:
-            file, line = places.pop()
-            statement = enclosing(self.sources[file], line)
-            of_file = self.covered.get(file, {})
-            found = {name for k in range(statement.first, statement.last + 1) for name in of_file.get(str(k), [])}
-            files |= found
-            for name in () if found or statement.seen(of_file) else statement.names:
-                more = set(self._mentions(name, file)) - seen
-                seen |= more
-                places += more
-        return sorted(files, key=lambda name: (self.durations.get(name, 1.0), name))
+    def tests_of(self, name: str) -> list[str]:
+        """Files of tests that use a file, those that are near first: by imports, then by folder."""
+        users = {f: n for f, n in self.users(name).items() if Path(f).name.startswith("test_")}
+        beside = str(Path("tests", name).parent)
+        return sorted(users, key=lambda f: (users[f], not f.startswith(beside), f))
 
-    def _mentions(self, name: str, file: str) -> Iterator[tuple[str, int]]:
-        """Lines with a name in its file and in those that know its module."""
-        word, module = re.compile(rf"\b{name}\b"), Path(file).stem
-        for other, source in self.sources.items():
-            if other == file or (module in source and name in source):
-                for number, line in enumerate(source.splitlines(), 1):
-                    if word.search(line) and not line.startswith(("from ", "import ", "def ", "class ")):
-                        yield other, number
-
-    def failures(self, limit: float, *words: str, **variables: str) -> list[str]:
-        """The tests that fail, or why there is no answer."""
-        report = self.folder / REPORT
-        report.unlink(missing_ok=True)
-        left_out = [word for name in self.failing for word in ("--deselect", name)]
-        words = (sys.executable, "-m", "pytest", "-q", "-m", MARKS, f"--junitxml={report}", *left_out, *words)
-        environment = {**launch_environment(), "PYTHONPATH": str(self.folder), **variables}
-        with subprocess.Popen(
-            words, cwd=self.folder, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT, text=True, start_new_session=True,
-        ) as process:  # fmt: skip
-            try:
-                output, _ = process.communicate(timeout=limit)
-            except BaseException as error:
-                os.killpg(process.pid, signal.SIGKILL)
-                if not isinstance(error, subprocess.TimeoutExpired):
-                    raise
-                return [f"no answer within {limit:.0f} s"]
-        if process.returncode in (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED):
-            return []
-        return wrong(report) or [f"exit code {process.returncode}: {output[-200:]}"]
-
-    def tried(self, mutation: Mutation, after: int) -> tuple[str, int]:
-        """The test that notices a mutation, empty if none, and how many of its files are left for another time."""
-        files = self.tests_of(mutation)[after:]
-        if not files:
-            return "", 0
-        costs = list(accumulate(self.durations.get(name, 1.0) for name in files))
-        count = max(1, sum(cost <= SLICE_S for cost in costs))
-        target = self.folder / mutation.file
-        source = target.read_text()
-        stale = self._compiled_with(mutation.file)
-        kept = {file: file.read_bytes() for file in stale}
-        times = target.stat()
+    def killer(self, mutation: Mutation) -> str:
+        """The first test that notices a mutation; empty if none does in `MOST_S`."""
+        target, users = self.folder / mutation.file, self.users(mutation.file)
+        source, times = target.read_text(), target.stat()
+        # numba looks at the time of one file only: what it has compiled of this one's users goes, and comes back
+        compiled = [f for n in users for f in (self.folder / n).parent.glob(f"__pycache__/{Path(n).stem}.*.nb[ic]")]
+        kept = {file: file.read_bytes() for file in compiled}
+        target.write_text(mutated(source, mutation))
+        for file in compiled:
+            file.unlink()
+        files, spent, count = self.tests_of(mutation.file), 0.0, GROUP
         try:
-            target.write_text(mutated(source, mutation))
-            for file in stale:
-                file.unlink()
-            failures = self.failures(COMPILING_S + HANGING * costs[count - 1], "-x", *files[:count])
+            while files and spent < MOST_S:
+                failure, seconds = run_apart(self.folder, files[:count], MOST_S - spent)
+                if failure:
+                    return failure
+                files, spent, count = files[count:], spent + seconds, 2 * count
+            return ""
         finally:
             target.write_text(source)
             os.utime(target, ns=(times.st_atime_ns, times.st_mtime_ns))
-            for file in self._compiled_with(mutation.file):
-                file.unlink()
+            for n in users:
+                for file in (self.folder / n).parent.glob(f"__pycache__/{Path(n).stem}.*.nb[ic]"):
+                    file.unlink()
             for file, content in kept.items():
                 file.write_bytes(content)
-        return (failures[0], 0) if failures else ("", len(files) - count)
-
-    def _compiled_with(self, name: str) -> list[Path]:
-        """What numba has compiled of a file and of those that import it: it looks at the time of one file only."""
-        names = {name}
-        while more := {n for n, text in self.sources.items() if any(imports(text, m) for m in names)} - names:
-            names |= more
-        return [f for n in names for f in (self.folder / n).parent.glob(f"__pycache__/{Path(n).stem}.*.nb[ic]")]
 
 
-@dataclass(frozen=True)
-class Statement:
-    """Lines of a statement, and the names of the compiled function, or of the top level, in which it stands."""
-
-    first: int
-    last: int
-    names: list[str]
-    body: range
-
-    def seen(self, lines: dict[str, list[str]]) -> bool:
-        """Whether tests run other lines of the same function, so that none runs this one."""
-        return any(lines.get(str(k)) for k in self.body)
+def imported(source: str, names: dict[str, str]) -> set[str]:
+    """Files of the project that a source imports."""
+    found = set()
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.ImportFrom) and node.module:
+            module = node.module.removeprefix("softjaw.")
+            found |= {module, f"{module}.__init__", *(f"{module}.{alias.name}" for alias in node.names)}
+    return {names[name] for name in found & set(names)}
 
 
-def enclosing(source: str, line: int) -> Statement:
-    """The statement around a line of a source."""
-    tree = ast.parse(source)
-    around = [n for n in ast.walk(tree) if isinstance(n, ast.stmt) and n.lineno <= line <= (n.end_lineno or 0)]
-    if not around:
-        return Statement(line, line, [], range(0))
-    inner = max(around, key=lambda n: (n.lineno, -(n.end_lineno or 0)))
-    body = getattr(inner, "body", None)
-    last = max(line, body[0].lineno - 1) if isinstance(body, list) else inner.end_lineno
-    first = line if isinstance(inner, ast.FunctionDef | ast.ClassDef) else inner.lineno
-    functions = [n for n in around if isinstance(n, ast.FunctionDef) and n is not inner]
-    if functions:
-        function = functions[-1]
-        return Statement(first, last or line, [function.name], range(function.body[0].lineno, function.end_lineno or 0))
-    outer = around[0]
-    names = [outer.name] if isinstance(outer, ast.FunctionDef | ast.ClassDef) else []
-    if isinstance(outer, ast.Assign | ast.AnnAssign):
-        targets = outer.targets if isinstance(outer, ast.Assign) else [outer.target]
-        names = [n.id for target in targets for n in ast.walk(target) if isinstance(n, ast.Name)]
-    return Statement(first, last or line, names, range(0))
+class Watch:
+    """A plugin of pytest that tells the first failure and ends what hangs or has had its time."""
+
+    def __init__(self, pipe: int, limit: float) -> None:
+        self.pipe, self.limit = pipe, limit
+
+    def tell(self, text: str) -> None:
+        os.write(self.pipe, text.encode())
+        os._exit(0)
+
+    def pytest_runtest_protocol(self, item: pytest.Item) -> None:
+        if time.process_time() > self.limit:
+            self.tell("")
+        signal.signal(signal.SIGPROF, lambda *_: self.tell(f"{item.nodeid}: no answer within {HANGING_S} s"))
+        signal.setitimer(signal.ITIMER_PROF, HANGING_S)
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        if report.failed:
+            self.tell(report.nodeid)
+
+    def pytest_collectreport(self, report: pytest.CollectReport) -> None:
+        if report.failed:
+            self.tell(f"{report.nodeid}: not collected")
 
 
-def imports(source: str, name: str) -> bool:
-    """Whether a source imports a file of the project."""
-    folder, _, module = name.removesuffix(".py").replace("/", ".").rpartition(".")
-    of_folder = re.search(rf"^from softjaw\.{folder} import (\([^)]*\b{module}\b|.*\b{module}\b)", source, re.M)
-    return bool(of_folder) or f"from softjaw.{folder}.{module} import" in source
-
-
-def node_id(case: ElementTree.Element) -> str:
-    """How pytest names a test of its report."""
-    return f"{(case.get('classname') or '').replace('.', '/')}.py::{case.get('name')}"
-
-
-def wrong(report: Path) -> list[str]:
-    """The tests that failed, from a report of pytest."""
-    cases = ElementTree.parse(report).iter("testcase") if report.exists() else ()
-    return [node_id(case) for case in cases if case.find("failure") is not None or case.find("error") is not None]
-
-
-def measured(failing: list[str], report: Path, covered: Path) -> dict[str, Any]:
-    """What fails, the seconds of each file of tests, and the files that run each line."""
-    seconds: Counter[str] = Counter()
-    for case in ElementTree.parse(report).iter("testcase"):
-        seconds[node_id(case).partition("::")[0]] += float(case.get("time") or 0)
-    return {"failing": failing, "durations": seconds, "covered": json.loads(covered.read_text())}
+def run_apart(folder: Path, files: list[str], limit: float) -> tuple[str, float]:
+    """The first test of some files that fails, and the CPU seconds, in a child that has all libraries already."""
+    end, pipe = os.pipe()
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    if not (child := os.fork()):
+        os.close(end)
+        os.chdir(folder)
+        os.environ["PYTHONPATH"] = str(folder)
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        os.dup2(1, 2)
+        sys.path[:] = [str(folder), *(path for path in sys.path if path not in ("", str(ROOT)))]
+        for name in [name for name in sys.modules if name.partition(".")[0] in ("softjaw", "tests")]:
+            del sys.modules[name]
+        pytest.main(["-q", "-m", MARKS, "-p", "no:faulthandler", *files], plugins=[Watch(pipe, limit)])
+        os._exit(0)
+    os.close(pipe)
+    with os.fdopen(end) as answer:
+        failure = answer.read()
+    status = os.waitpid(child, 0)[1]
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    died = f"signal {os.WTERMSIG(status)}" if os.WIFSIGNALED(status) else ""
+    return failure or died, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
 def interval(hits: int, count: int) -> tuple[float, float]:
     """The 95 % interval of a share (Clopper and Pearson 1934)."""
-    found = binomtest(hits, count).proportion_ci()
-    return found.low, found.high
+    share = binomtest(hits, count).proportion_ci()
+    return share.low, share.high
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -324,19 +263,16 @@ def main(arguments: list[str] | None = None) -> int:
     options.out.parent.mkdir(parents=True, exist_ok=True)
     lines = options.out.read_text().splitlines() if options.out.exists() else []
     rows = {row["number"]: row for row in map(json.loads, lines)}
+    for name in LIBRARIES:
+        importlib.import_module(name)
     with tempfile.TemporaryDirectory() as folder:
-        copy = Copy(Path(folder), options.out.with_suffix(".tests.json"))
-        while waiting := [i for i in range(len(mutants)) if i not in rows or rows[i]["left"]]:
-            for i in waiting:
-                m, begun = mutants[i], time.monotonic()
-                done = len(copy.tests_of(m)) - rows[i]["left"] if i in rows else 0
-                killer, left = copy.tried(m, done)
-                rows[i] = {"number": i, **asdict(m), "killed_by": killer, "left": left}
-                rows[i]["seconds"] = round(time.monotonic() - begun)
-                with options.out.open("a") as file:
-                    file.write(json.dumps(rows[i]) + "\n")
-                state = killer or (f"{left} files left" if left else "SURVIVED")
-                print(f"{i} {m.file}:{m.line} {m.kind}: {state} ({rows[i]['seconds']} s)", flush=True)
+        copy = Copy(Path(folder))
+        for i in (i for i in range(len(mutants)) if i not in rows):
+            killer = copy.killer(mutants[i])
+            rows[i] = {"number": i, **asdict(mutants[i]), "killed_by": killer}
+            with options.out.open("a") as file:
+                file.write(json.dumps(rows[i]) + "\n")
+            print(f"{i} {mutants[i].file}:{mutants[i].line} {mutants[i].kind}: {killer or 'SURVIVED'}", flush=True)
     survivors = [row for row in rows.values() if not row["killed_by"]]
     for row in survivors:
         print(f"survivor {row['file']}:{row['line']}: {row['kind']}: {row['old']}  ->  {row['new']}")
