@@ -26,17 +26,13 @@ ALLOWED = {
 }
 ALLOWED["study"] |= {f"softjaw.{name}" for name in OWN}
 PICTURES = {
-    "fem/objects/triangles.py",
-    "study/show/view/solids.py",
+    "fem/objects/triangles.py", "study/show/view/solids.py",
 }
 DOORS = {
     "petsc4py": {"fem/petsc.py"},
     "(computed)": {"study/cli/__init__.py"},
     "h5py": {
-        "study/result/skeleton.py",
-        "study/result/write.py",
-        "study/result/hdf5.py",
-        "study/result/index.py",
+        "study/result/skeleton.py", "study/result/write.py", "study/result/hdf5.py", "study/result/index.py",
     },
     "pyvista": PICTURES | {"study/patch/vtk_faces.py"},
     "vtkmodules": PICTURES | {"study/patch/vtk_faces.py"},

@@ -16,16 +16,10 @@ def ends(code, **keys):
     return Stage("it", (sys.executable, "-c", f"raise SystemExit({code})"), 1, **keys)
 
 
-@pytest.mark.parametrize(
-    ("stage", "passed", "code"),
-    [
-        (ends(0), True, 0),
-        (ends(1), False, 1),
-        (ends(CANNOT_RUN), None, 2),
-        (ends(0, needs=("no-such-program",)), None, 2),
-        (Stage("it", ("sleep", "60"), 0.001), False, 1),
-    ],
-)
+@pytest.mark.parametrize(("stage", "passed", "code"), [
+    (ends(0), True, 0), (ends(1), False, 1), (ends(CANNOT_RUN), None, 2),
+    (ends(0, needs=("no-such-program",)), None, 2), (Stage("it", ("sleep", "60"), 0.001), False, 1),
+])  # fmt: skip
 def test_only_what_ran_to_its_end_has_passed(stage, passed, code):
     outcome = run(stage)
     assert outcome.passed is passed
@@ -48,13 +42,9 @@ def test_every_kind_of_mutation_changes_the_place_that_it_names(tmp_path):
     (tmp_path / "area.py").write_text(SOURCE)
     found = {(m.kind, m.old, m.new) for m in mutations(tmp_path / "area.py", tmp_path)}
     assert {
-        ("operator", "a < 0", "(a > 0)"),
-        ("condition", "a < 0 and b[1]", "((a < 0) or (b[1]))"),
-        ("condition", "a < 0 and b[1]", "(not (a < 0 and b[1]))"),
-        ("index", "1", "2"),
-        ("sign", "-a", "(+a)"),
-        ("constant", "2.5", "5.0"),
-        ("operator", "-a * 2.5", "((-a) / (2.5))"),
+        ("operator", "a < 0", "(a > 0)"), ("condition", "a < 0 and b[1]", "((a < 0) or (b[1]))"),
+        ("condition", "a < 0 and b[1]", "(not (a < 0 and b[1]))"), ("index", "1", "2"), ("sign", "-a", "(+a)"),
+        ("constant", "2.5", "5.0"), ("operator", "-a * 2.5", "((-a) / (2.5))"),
     } <= found
     change = Mutation("area.py", 3, 15, "sign", "-a", "(+a)")
     assert mutated(SOURCE, change) == SOURCE.replace("-a", "(+a)")

@@ -26,8 +26,7 @@ def solved(task):
     length, width, thickness = task["size"]
     counts = task["elements"]
     sides = (
-        np.linspace(0, length / 2, counts[0] + 1),
-        np.linspace(0, width / 2, counts[1] + 1),
+        np.linspace(0, length / 2, counts[0] + 1), np.linspace(0, width / 2, counts[1] + 1),
         np.linspace(-thickness, 0, counts[2] + 1),
     )
     gf.util_trace_level(0)

@@ -30,10 +30,8 @@ from tests.benchmark.table import fastest, line, title
 ROOT = Path(__file__).parents[2]
 SIZE = (0.060, 0.030, 0.015)  # pad [m]
 FOAMS = (
-    material("blatz_ko", 20e3),
-    material("hyperfoam", shear_moduli=[20e3], exponents=[-2.0]),
-    material("neo_hookean", 20e3, 0.4),
-    material("linear", 20e3, 0.3),
+    material("blatz_ko", 20e3), material("hyperfoam", shear_moduli=[20e3], exponents=[-2.0]),
+    material("neo_hookean", 20e3, 0.4), material("linear", 20e3, 0.3),
 )
 
 
@@ -91,10 +89,7 @@ def _whole_map(scene: Path, folder: Path) -> None:
         command = mpirun(ranks)
         start = time.perf_counter()
         subprocess.run(
-            [*command, *softjaw, str(folder / f"{ranks}.hdf")],
-            check=True,
-            cwd=ROOT,
-            env=launch_environment(),
+            [*command, *softjaw, str(folder / f"{ranks}.hdf")], check=True, cwd=ROOT, env=launch_environment(),
             stdout=subprocess.DEVNULL,
         )
         seconds[ranks] = time.perf_counter() - start

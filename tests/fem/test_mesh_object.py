@@ -228,8 +228,7 @@ def test_damaged_files_are_refused_with_their_name(tmp_path, name):
 
 
 @pytest.mark.parametrize(("path", "unit", "axis", "told"), [
-    (FLASK, "m", "z", "120 m"),
-    ("none.stl", "mm", "z", "none.stl"),
+    (FLASK, "m", "z", "120 m"), ("none.stl", "mm", "z", "none.stl"),
 ])  # fmt: skip
 def test_a_wrong_unit_or_axis_and_a_missing_file_are_refused(path, unit, axis, told):
     with pytest.raises(MeshError, match=told):

@@ -9,18 +9,13 @@ from softjaw.friction.patch import ContactPatch, NoContactError
 from tests.generators import lcg_patch
 
 
-@pytest.mark.parametrize(
-    ("name", "index", "value", "match"),
-    [
-        ("centroid", (2, 1), np.nan, r"centroid\[2, 1\] is nan.*face 2"),
-        ("area", (4,), np.inf, r"area\[4\] is inf"),
-        ("normal", (1, 0), -np.inf, r"normal\[1, 0\] is -inf"),
-        ("pressure", (3,), np.nan, r"pressure\[3\] is nan"),
-        ("pressure", (3,), -1.0, r"pressure\[3\] is -1.0: it must not be negative.*clip"),
-        ("area", (0,), -2e-4, r"area\[0\] is -0.0002: it must not be negative"),
-        ("normal", (5,), 0.0, r"normal\[5\] is zero"),
-    ],
-)
+@pytest.mark.parametrize(("name", "index", "value", "match"), [
+    ("centroid", (2, 1), np.nan, r"centroid\[2, 1\] is nan.*face 2"), ("area", (4,), np.inf, r"area\[4\] is inf"),
+    ("normal", (1, 0), -np.inf, r"normal\[1, 0\] is -inf"), ("pressure", (3,), np.nan, r"pressure\[3\] is nan"),
+    ("pressure", (3,), -1.0, r"pressure\[3\] is -1.0: it must not be negative.*clip"),
+    ("area", (0,), -2e-4, r"area\[0\] is -0.0002: it must not be negative"),
+    ("normal", (5,), 0.0, r"normal\[5\] is zero"),
+])  # fmt: skip
 def test_a_bad_value_is_named_with_its_place_and_the_remedy(name, index, value, match):
     patch = lcg_patch(1, 10)
     array = getattr(patch, name).copy()

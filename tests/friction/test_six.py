@@ -30,17 +30,10 @@ def slip_matrix(patch):
     return np.concatenate([P, P @ turn], axis=2).reshape(-1, 6)
 
 
-@pytest.mark.parametrize(
-    ("patch", "rank"),
-    [
-        (rect_grid(2, 1, 8, 4), 3),
-        (disc_polar(1, 4, 12), 3),
-        (cylinder_grid(1, 1, 2, 8, 8), 6),
-        (cap_polar(1, 1, 6, 12), 6),
-        (wedge(0.6, 1, 2, 4, 8), 5),
-    ],
-    ids=["rectangle", "disc", "cylinder", "cap", "wedge"],
-)
+@pytest.mark.parametrize(("patch", "rank"), [
+    (rect_grid(2, 1, 8, 4), 3), (disc_polar(1, 4, 12), 3), (cylinder_grid(1, 1, 2, 8, 8), 6),
+    (cap_polar(1, 1, 6, 12), 6), (wedge(0.6, 1, 2, 4, 8), 5),
+], ids=["rectangle", "disc", "cylinder", "cap", "wedge"])  # fmt: skip
 def test_how_many_motions_a_patch_feels(patch, rank):
     """Lifting and tilting rub nowhere on a plane patch; a wedge does not feel its own turn about the ridge; a smoothly
     curved patch feels all. The wrenches span as many dimensions.

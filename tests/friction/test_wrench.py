@@ -92,15 +92,11 @@ def test_planar_models_have_no_force_out_of_their_plane():
     np.testing.assert_allclose(W[:, [2, 3, 4]], 0, atol=1e-15)
 
 
-@pytest.mark.parametrize(
-    ("call", "match"),
-    [
-        (lambda p: friction_wrench(p, [[1, 0, 0, 0]], 0.5), "twist has shape"),
-        (lambda p: friction_wrench(p, [[np.inf, 0, 1]], 0.5), r"twist\[0\] is .*omega = 0"),
-        (lambda p: friction_wrench(p, SLIDE_X, -0.5), "mu is -0.5"),
-        (lambda p: friction_limits(p, np.nan), "mu is nan"),
-    ],
-)
+@pytest.mark.parametrize(("call", "match"), [
+    (lambda p: friction_wrench(p, [[1, 0, 0, 0]], 0.5), "twist has shape"),
+    (lambda p: friction_wrench(p, [[np.inf, 0, 1]], 0.5), r"twist\[0\] is .*omega = 0"),
+    (lambda p: friction_wrench(p, SLIDE_X, -0.5), "mu is -0.5"), (lambda p: friction_limits(p, np.nan), "mu is nan"),
+])  # fmt: skip
 def test_bad_arguments_are_named(call, match):
     with pytest.raises(ValueError, match=match):
         call(lcg_patch(1, 10))

@@ -44,32 +44,20 @@ def told(capsys):
     return ask
 
 
-@pytest.mark.parametrize(
-    ("name", "content"),
-    [
-        ("b.obj", obj().replace(b"f 1/1", b"f 0")),
-        ("c.obj", obj().replace(b"f 1/1 3 5", b"f 1 3")),
-        ("d.obj", obj().replace(b"f 1/1", b"f 99999999999999999999")),
-        ("e.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf -1 -2 -3\nv 0 0 1\nf -1 -2 -3\nf 1 2 4\nf 1 3 4\n"),
-        ("f.obj", obj().replace(b"f 1/1", b"f -99")),
-        ("g.obj", "".join(map(chr, range(200, 400))).encode("utf-16")),
-        ("a.ply", ply(True).replace(b"face 8", b"face 9")),
-        ("b.ply", ply(True).replace(b"vertex 6", b"vertex 99999999999")),
-        ("c.ply", ply(True).replace(b"uchar int", b"int int")),
-        ("d.ply", ply(True).replace(b"float z", b"float y")),
-        ("e.ply", ply(False).replace(b"3 0 2 4", b"2 0 2 4")),
-        ("f.ply", ply(False).replace(b"30 0 0\n", b"30\n")),
-        ("g.ply", ply(True)[:-20]),
-        ("h.ply", ply(False)[:-20]),
-        ("i.ply", b"\n\nend_header\n"),
-        ("a.stl", stl(False).replace(b"vertex", b"vertec", 1)),
-        ("b.stl", stl(False)[:-40]),
-        ("c.stl", stl(True)[:80] + b"\xff" * 4),
-        ("a.off", b"OFF\n99999999999 99999999999 0\n0 0 0\n"),
-        ("b.off", b"OFF\n3 9 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"),
-        ("c.off", b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 9\n"),
-    ],
-)
+@pytest.mark.parametrize(("name", "content"), [
+    ("b.obj", obj().replace(b"f 1/1", b"f 0")), ("c.obj", obj().replace(b"f 1/1 3 5", b"f 1 3")),
+    ("d.obj", obj().replace(b"f 1/1", b"f 99999999999999999999")),
+    ("e.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf -1 -2 -3\nv 0 0 1\nf -1 -2 -3\nf 1 2 4\nf 1 3 4\n"),
+    ("f.obj", obj().replace(b"f 1/1", b"f -99")), ("g.obj", "".join(map(chr, range(200, 400))).encode("utf-16")),
+    ("a.ply", ply(True).replace(b"face 8", b"face 9")),
+    ("b.ply", ply(True).replace(b"vertex 6", b"vertex 99999999999")),
+    ("c.ply", ply(True).replace(b"uchar int", b"int int")), ("d.ply", ply(True).replace(b"float z", b"float y")),
+    ("e.ply", ply(False).replace(b"3 0 2 4", b"2 0 2 4")), ("f.ply", ply(False).replace(b"30 0 0\n", b"30\n")),
+    ("g.ply", ply(True)[:-20]), ("h.ply", ply(False)[:-20]), ("i.ply", b"\n\nend_header\n"),
+    ("a.stl", stl(False).replace(b"vertex", b"vertec", 1)), ("b.stl", stl(False)[:-40]),
+    ("c.stl", stl(True)[:80] + b"\xff" * 4), ("a.off", b"OFF\n99999999999 99999999999 0\n0 0 0\n"),
+    ("b.off", b"OFF\n3 9 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"), ("c.off", b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 9\n"),
+])  # fmt: skip
 def test_meshes_that_ended_the_program_once_are_refused(tmp_path, name, content):
     path = tmp_path / name
     path.write_bytes(content)
@@ -114,19 +102,12 @@ def test_nothing_of_a_scene_is_run():
 TABLE = QUICK["table"].content
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "words"),
-    [
-        (b"\n1,0", b'\n"1,0', "a line that is not a table row"),
-        (b"\n1,0,0", b"\n1,0,99999999999", "at most 1000 m"),
-        (b",7\n", b",1e300\n", "at most 1e+12 Pa"),
-        (b"1.25", b"1e300", "at most 10000 m^2"),
-        (b"0.1", b"1e300", "a length of 1"),
-        (b"0,0.1,1,7", b"1e-320,0,0,7", "a length of 1"),
-        (b"1.25", b"1e308", "area"),
-        (b"x_mm", b"x_mm\x1b[2J", "x_mm"),
-    ],
-)
+@pytest.mark.parametrize(("old", "new", "words"), [
+    (b"\n1,0", b'\n"1,0', "a line that is not a table row"), (b"\n1,0,0", b"\n1,0,99999999999", "at most 1000 m"),
+    (b",7\n", b",1e300\n", "at most 1e+12 Pa"), (b"1.25", b"1e300", "at most 10000 m^2"),
+    (b"0.1", b"1e300", "a length of 1"), (b"0,0.1,1,7", b"1e-320,0,0,7", "a length of 1"), (b"1.25", b"1e308", "area"),
+    (b"x_mm", b"x_mm\x1b[2J", "x_mm"),
+])  # fmt: skip
 def test_tables_that_ended_the_program_once_are_refused(tmp_path, told, old, new, words):
     path = tmp_path / "patch.csv"
     path.write_bytes(TABLE.replace(old, new, 1))

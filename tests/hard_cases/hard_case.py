@@ -245,8 +245,7 @@ def _outcome(forces: tuple[float, ...], results: tuple[CaseResult | CaseFailure,
 
     checks = {name: worst(x for v in good for x in v[f"checks/{name}"]) for name, worst in CHECKS.items() if good}
     return Outcome(
-        "", np.array(forces), np.array([isinstance(r, CaseResult) for r in results]),
-        tuple(r.message for r in results), int(total("newton_iterations")), int(total("step_halvings")),
-        total("seconds_total"),
-        checks, maps(""), maps("_error"),
+        "", np.array(forces), np.array([isinstance(r, CaseResult) for r in results]), tuple(r.message for r in results),
+        int(total("newton_iterations")), int(total("step_halvings")), total("seconds_total"), checks, maps(""),
+        maps("_error"),
     )  # fmt: skip

@@ -72,19 +72,13 @@ def judged(found, other=None, **keys):
 
 
 @pytest.mark.parametrize(("found", "keys"), [
-    (Outcome(refused="no"), {}),
-    (solved(), {"expect": "refused", "reason": "x"}),
+    (Outcome(refused="no"), {}), (solved(), {"expect": "refused", "reason": "x"}),
     (Outcome(refused="no"), {"expect": "refused", "reason": "yes"}),
     (solved(messages=("x", "x"), done=(False, False)), {"expect": "failed", "reason": "x", "up_to_n": 1.0}),
-    (solved(messages=("coarse", "")), {}),
-    (solved(messages=("coarse; slips", "")), {"note": "coarse"}),
-    (solved(), {"note": "coarse"}),
-    (solved(checks=GOOD | {"force_balance": 1e-6}), {}),
-    (solved(checks=GOOD | {"adhesion": np.nan}), {}),
-    (solved(checks=GOOD | {"min_det_f": -0.1}), {}),
-    (solved(checks=GOOD | {"ellipticity": -0.1}), {}),
-    (solved(np.nan), {}),
-    (solved(0.011), {"source": source()}),
+    (solved(messages=("coarse", "")), {}), (solved(messages=("coarse; slips", "")), {"note": "coarse"}),
+    (solved(), {"note": "coarse"}), (solved(checks=GOOD | {"force_balance": 1e-6}), {}),
+    (solved(checks=GOOD | {"adhesion": np.nan}), {}), (solved(checks=GOOD | {"min_det_f": -0.1}), {}),
+    (solved(checks=GOOD | {"ellipticity": -0.1}), {}), (solved(np.nan), {}), (solved(0.011), {"source": source()}),
     (solved(done=(True, False)), {"source": source(), "expect": "failed", "reason": ""}),
     (Outcome(refused="of 12 m"), {"expect": "refused", "reason": "of ([0-9]+) m", "source": source(told=11.0)}),
 ])  # fmt: skip
@@ -99,15 +93,10 @@ def foam(det, strain, ellipticity):
     return SimpleNamespace(strains=lambda x, directions: (det, strain, ellipticity))
 
 
-@pytest.mark.parametrize(
-    ("state", "error", "words"),
-    [
-        ((0.5, 0.4, 0.3), STUCK, ""),
-        ((0.1, 1.2, 0.9), STUCK, "120%"),
-        ((0.4, 1.2, -0.06), STUCK, "ellipticity.* -0.06"),
-        ((0.4, 1.2, -0.06), NotReachedError("the force stays below"), ""),
-    ],
-)
+@pytest.mark.parametrize(("state", "error", "words"), [
+    ((0.5, 0.4, 0.3), STUCK, ""), ((0.1, 1.2, 0.9), STUCK, "120%"), ((0.4, 1.2, -0.06), STUCK, "ellipticity.* -0.06"),
+    ((0.4, 1.2, -0.06), NotReachedError("the force stays below"), ""),
+])  # fmt: skip
 def test_the_state_of_the_foam_is_the_reason_where_it_is(state, error, words):
     told = explained(error, foam(*state), np.zeros(1), 3.0)
     assert (told is error) == (not words)

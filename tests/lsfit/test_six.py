@@ -97,16 +97,11 @@ def test_motions_cover_the_sphere_evenly():
     np.testing.assert_allclose(u.mean(axis=0), 0, atol=5e-3)
 
 
-@pytest.mark.parametrize(
-    ("patch", "rank"),
-    [
-        (points_patch([[0, 0]], [1]), 2),
-        (rect_grid(2, 1, 6, 6), 3),
-        (points_patch([[-1, 0, 0.4], [1, 0, 0.4], [0, 1, 0.4]], [1, 2, 1]), 3),
-        (cylinder_grid(1, 1.0, 2, 6, 6), 6),
-        (cap_polar(1, 1.0, 6, 12), 6),
-    ],
-)
+@pytest.mark.parametrize(("patch", "rank"), [
+    (points_patch([[0, 0]], [1]), 2), (rect_grid(2, 1, 6, 6), 3),
+    (points_patch([[-1, 0, 0.4], [1, 0, 0.4], [0, 1, 0.4]], [1, 2, 1]), 3), (cylinder_grid(1, 1.0, 2, 6, 6), 6),
+    (cap_polar(1, 1.0, 6, 12), 6),
+])  # fmt: skip
 def test_rank_of_plane_and_curved_patches(patch, rank):
     W, T = samples(patch, 200)
     (surface, _), inside = span_ellipsoid(W, T), span_samples(W, T)
@@ -148,14 +143,11 @@ def test_motions_without_friction_are_left_out():
     np.testing.assert_allclose(np.abs(span_samples(V, S).Y), np.abs(span_samples(W, T).Y), atol=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("patch", "ellipsoid", "quartic"),
-    [
-        (cylinder_grid(1, np.pi / 3, 2, 24, 24), (0.0198, 0.0100), (0.0097, 0.0024)),
-        (cap_polar(1, np.pi / 3, 12, 24), (0.0191, 0.0097), (0.0048, 0.0012)),
-        (heightfield(1, 1, 0.8, -0.8, 20, 20), (0.0195, 0.0098), (0.0097, 0.0024)),
-    ],
-)
+@pytest.mark.parametrize(("patch", "ellipsoid", "quartic"), [
+    (cylinder_grid(1, np.pi / 3, 2, 24, 24), (0.0198, 0.0100), (0.0097, 0.0024)),
+    (cap_polar(1, np.pi / 3, 12, 24), (0.0191, 0.0097), (0.0048, 0.0012)),
+    (heightfield(1, 1, 0.8, -0.8, 20, 20), (0.0195, 0.0098), (0.0097, 0.0024)),
+])  # fmt: skip
 def test_errors_of_fits_to_curved_patches(patch, ellipsoid, quartic):
     """Figures of an independent implementation for other motions (and another saddle), hence the tolerance."""
     W, T = samples(patch, 1024)

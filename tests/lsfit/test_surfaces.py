@@ -208,10 +208,8 @@ def test_vectors_of_another_dimension_are_refused():
 
 def test_flags_closing_with_the_surface():
     for surface in (
-        Ellipsoid.of_axes(AXES, FitFlag.BOUNDED),
-        Ellipsoid(np.eye(3), FitFlag.BOUNDED),
-        Quartic(fourth_powers().coefficients, flag=FitFlag.BOUNDED),
-        Image(fourth_powers(), np.eye(3), FitFlag.BOUNDED),
+        Ellipsoid.of_axes(AXES, FitFlag.BOUNDED), Ellipsoid(np.eye(3), FitFlag.BOUNDED),
+        Quartic(fourth_powers().coefficients, flag=FitFlag.BOUNDED), Image(fourth_powers(), np.eye(3), FitFlag.BOUNDED),
     ):
         assert surface.scaled([1.0, 1.0, 2.0]).flag == FitFlag.BOUNDED
 

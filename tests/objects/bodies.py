@@ -53,10 +53,8 @@ def hollow_bottle(height: float, radius: float, neck: float, wall: float) -> tri
     body = np.linspace(0.0, 0.6, 13) * height
     outer = [(0.0, 0.0), *((radius, h) for h in body), *zip(shoulder, z, strict=True), (neck, height)]
     inner = [
-        (neck - wall, height),
-        *((r - wall, h) for r, h in zip(shoulder[::-1], z[::-1], strict=True)),
-        *((radius - wall, max(h, wall)) for h in body[::-1]),
-        (0.0, wall),
+        (neck - wall, height), *((r - wall, h) for r, h in zip(shoulder[::-1], z[::-1], strict=True)),
+        *((radius - wall, max(h, wall)) for h in body[::-1]), (0.0, wall),
     ]
     return revolved([*outer, *inner])
 

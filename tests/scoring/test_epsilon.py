@@ -111,11 +111,8 @@ def test_the_reach_of_polytopes_is_a_linear_programme():
     columns = np.hstack([Ci @ load for Ci, load in zip(C, loads, strict=True)])
     owner = np.repeat(np.eye(2), [9, 12], axis=0).T
     exact = linprog(
-        [*np.zeros(21), -1],
-        A_eq=np.hstack([columns, -w[:, None]]),
-        b_eq=np.zeros(6),
-        A_ub=np.hstack([owner, np.zeros((2, 1))]),
-        b_ub=[1, 1],
+        [*np.zeros(21), -1], A_eq=np.hstack([columns, -w[:, None]]), b_eq=np.zeros(6),
+        A_ub=np.hstack([owner, np.zeros((2, 1))]), b_ub=[1, 1],
     )
     shapes = [k.body for k in contacts]
     u = facet_of_bodies(C, shapes, w, "linf")

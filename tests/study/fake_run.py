@@ -65,8 +65,7 @@ def fake_growth(digest, stations, work):
     asked = SimpleNamespace(refine=36, station_values_mm=given)
     scene = SimpleNamespace(candidates=asked, accuracy=SimpleNamespace(refined_within=0.01))
     work = replace(
-        work,
-        more=lambda result: next_stations(result, scene, 2 * FORCES),
+        work, more=lambda result: next_stations(result, scene, 2 * FORCES),
         grown=lambda rounds: (fake_plan(digest, stations, rounds=rounds), work),
     )
     return work

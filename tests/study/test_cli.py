@@ -60,8 +60,7 @@ def test_bad_usage_is_code_2(words, capsys):
 
 def test_petsc_options_belong_to_run_and_have_a_prefix(scene, capsys):
     assert petsc_overrides(["-contact_ksp_rtol", "-1", "-contact_view"]) == [
-        "petsc.contact_ksp_rtol=-1",
-        "petsc.contact_view=true",
+        "petsc.contact_ksp_rtol=-1", "petsc.contact_view=true",
     ]
     assert main(["check", str(scene), "--", "-contact_snes_monitor"]) == 2
     for words in (["-snes_monitor"], ["1e-3"], ["-contact_snes_rtol", "1", "2"]):

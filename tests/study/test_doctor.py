@@ -24,23 +24,20 @@ def test_all_is_well_on_a_machine_that_was_set_up(capsys):
     assert all(line.startswith("fine") for line in lines)
 
 
-@pytest.mark.parametrize(
-    ("check", "answer", "found", "cure"),
-    [
-        ("numpy", (1, "", "ValueError: numpy.dtype size changed"), "dtype size", "numpy>=1.26,<2"),
-        ("packages", (1, "", "ModuleNotFoundError: No module named 'skfem'"), "'skfem'", "pip install -e ."),
-        ("petsc", (1, "", "ImportError: petsc4py is missing"), "petsc4py is missing", "python3-petsc4py"),
-        ("petsc", (1, "", "AssertionError: PETSc was built with complex scalars"), "complex", "python3-petsc4py-real"),
-        ("petsc", (1, "", "[0] Could not locate solver type mumps"), "mumps", "configured with MUMPS"),
-        ("petsc", (-11, "", ""), "exit code -11", "make setup"),
-        ("h5py", (1, "", "3.14.0 on HDF5 1.14.6 without MPI (of pip)"), "without MPI", "pip uninstall h5py"),
-        ("h5py", (1, "", "3.7.0 on HDF5 1.10.8 without MPI"), "without MPI", "python3-h5py python3-h5py-mpi"),
-        ("mpi", (1, "", "AssertionError: every rank is alone\n-----"), "alone", "MPI library first in PATH"),
-        ("mpi", (NOT_IN_TIME, "", ""), "no answer in time", "mpirun -n 2 true"),
-        ("mpi", (1, "", "AssertionError: two ranks lost data in one file"), "lost data", "MPI-IO"),
-        ("pictures", (-6, "", "bad X server connection"), "bad X server", "libosmesa6"),
-    ],
-)
+@pytest.mark.parametrize(("check", "answer", "found", "cure"), [
+    ("numpy", (1, "", "ValueError: numpy.dtype size changed"), "dtype size", "numpy>=1.26,<2"),
+    ("packages", (1, "", "ModuleNotFoundError: No module named 'skfem'"), "'skfem'", "pip install -e ."),
+    ("petsc", (1, "", "ImportError: petsc4py is missing"), "petsc4py is missing", "python3-petsc4py"),
+    ("petsc", (1, "", "AssertionError: PETSc was built with complex scalars"), "complex", "python3-petsc4py-real"),
+    ("petsc", (1, "", "[0] Could not locate solver type mumps"), "mumps", "configured with MUMPS"),
+    ("petsc", (-11, "", ""), "exit code -11", "make setup"),
+    ("h5py", (1, "", "3.14.0 on HDF5 1.14.6 without MPI (of pip)"), "without MPI", "pip uninstall h5py"),
+    ("h5py", (1, "", "3.7.0 on HDF5 1.10.8 without MPI"), "without MPI", "python3-h5py python3-h5py-mpi"),
+    ("mpi", (1, "", "AssertionError: every rank is alone\n-----"), "alone", "MPI library first in PATH"),
+    ("mpi", (NOT_IN_TIME, "", ""), "no answer in time", "mpirun -n 2 true"),
+    ("mpi", (1, "", "AssertionError: two ranks lost data in one file"), "lost data", "MPI-IO"),
+    ("pictures", (-6, "", "bad X server connection"), "bad X server", "libosmesa6"),
+])  # fmt: skip
 def test_a_trouble_comes_with_its_cure(monkeypatch, check, answer, found, cure):
     monkeypatch.setattr(doctor, "ask", answering(*answer))
     monkeypatch.setattr(doctor, "mpirun", lambda ranks: ["mpirun", "-n", str(ranks)])
@@ -129,8 +126,7 @@ def test_the_folder_goes_with_the_process_and_numba_is_not_needed():
     surroundings = {k: v for k, v in os.environ.items() if k not in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME")}
     command = [sys.executable, "-c", code]
     done = subprocess.run(
-        command, capture_output=True, text=True, env={**surroundings, "HOME": "/dev/null"}, cwd=doctor.ROOT,
-        check=True,
+        command, capture_output=True, text=True, env={**surroundings, "HOME": "/dev/null"}, cwd=doctor.ROOT, check=True,
     )  # fmt: skip
     folder, loaded = done.stdout.split()
     assert Path(folder).name.startswith(doctor.PASSING)

@@ -130,14 +130,11 @@ def whole(folder, *words):
     return contents(folder / "whole.hdf")
 
 
-@pytest.mark.parametrize(
-    ("how", "ranks", "text"),
-    [
-        ("hang", 2, "not solved within 3 s"),
-        ("stuck", 3, "did not come back to Python within 6 s, so its rank was given up"),
-        ("greedy", 2, "more memory than run.memory_gb leaves to a rank"),
-    ],
-)
+@pytest.mark.parametrize(("how", "ranks", "text"), [
+    ("hang", 2, "not solved within 3 s"),
+    ("stuck", 3, "did not come back to Python within 6 s, so its rank was given up"),
+    ("greedy", 2, "more memory than run.memory_gb leaves to a rank"),
+])  # fmt: skip
 def test_one_case_fails_with_its_reason_and_the_others_go_on(tmp_path, how, ranks, text):
     path = tmp_path / f"{how}.hdf"
     code, _, errors = study(ranks, path, f"--{how}", 13, *([] if how == "greedy" else ["--limit", 3]))

@@ -101,22 +101,18 @@ def test_the_threads_of_a_script_change_no_bit():
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(
-    ("scene", "asked", "index"),
-    [
-        (SMOKE, {"station": 0.0, "angle": 0.0, "force": 2}, (0, 0, 1)),  # one mesh: a load path
-        (BOXES, {"candidate": 1, "force": 5}, (1, 0, 1)),
-        (FLASK.with_values(**{"candidates.stations_mm": [30], "candidates.angles_deg": [0]}),
-         {"station": 0.03, "force": 5}, (0, 0, 1)),
-        (sj.Scene.from_file(JOBS / "sampled.toml", [COARSE, "candidates.sampled=2"]),
-         {"candidate": 1, "force": 2}, (1, 0, 0)),
-        (sj.Scene.from_file(JOBS / "cup.toml", [
-            COARSE, "candidates.stations_mm=[55]", "load.normal_force_n=[0.5, 2]", "accuracy.wall_element_mm=4",
-            "accuracy.meshes=1",
-        ]), {"station": 0.055, "force": 2}, (0, 0, 1)),
-    ],
-    ids=["one mesh", "poses", "mesh", "sampled", "wall"],
-)  # fmt: skip
+@pytest.mark.parametrize(("scene", "asked", "index"), [
+    (SMOKE, {"station": 0.0, "angle": 0.0, "force": 2}, (0, 0, 1)),  # one mesh: a load path
+    (BOXES, {"candidate": 1, "force": 5}, (1, 0, 1)),
+    (FLASK.with_values(**{"candidates.stations_mm": [30], "candidates.angles_deg": [0]}),
+     {"station": 0.03, "force": 5}, (0, 0, 1)),
+    (sj.Scene.from_file(JOBS / "sampled.toml", [COARSE, "candidates.sampled=2"]),
+     {"candidate": 1, "force": 2}, (1, 0, 0)),
+    (sj.Scene.from_file(JOBS / "cup.toml", [
+        COARSE, "candidates.stations_mm=[55]", "load.normal_force_n=[0.5, 2]", "accuracy.wall_element_mm=4",
+        "accuracy.meshes=1",
+    ]), {"station": 0.055, "force": 2}, (0, 0, 1)),
+], ids=["one mesh", "poses", "mesh", "sampled", "wall"])  # fmt: skip
 def test_cases_of_every_kind_of_scene_are_those_of_a_run(scene, asked, index, tmp_path):
     assert_stored(sj.press(scene, **asked), run(scene, tmp_path / "a.hdf"), index)
 

@@ -180,8 +180,7 @@ def test_the_part_of_the_pad_that_is_meshed_does_not_matter():
             assert differing(*pick, 1e-8, SCALES) == []
     [(_, path)] = solved(OVAL)
     assert [path[0].effects["model_size"][0], solved(BALL, stations="[5]")[0][1][0].effects["model_size"][0]] == [
-        "quarter",
-        "half",
+        "quarter", "half",
     ]
 
 
@@ -300,14 +299,11 @@ def test_where_weighted_gaps_have_no_solution_nodal_ones_are_taken_and_flagged(r
         assert bool(values["maps/flags"] & Flag.NODAL) == nodal
 
 
-@pytest.mark.parametrize(
-    ("choice", "element", "walled", "rules"),
-    [
-        ("auto", "hex8", False, ("blended", "nodal", "weighted")), ("auto", "hex27", False, ("weighted", "nodal")),
-        ("auto", "hex8", True, ("blended", "nodal")), ("weighted", "hex8", False, ("weighted", "nodal")),
-        ("nodal", "hex27", False, ("nodal",)), ("blended", "hex8", True, ("blended", "nodal")),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("choice", "element", "walled", "rules"), [
+    ("auto", "hex8", False, ("blended", "nodal", "weighted")), ("auto", "hex27", False, ("weighted", "nodal")),
+    ("auto", "hex8", True, ("blended", "nodal")), ("weighted", "hex8", False, ("weighted", "nodal")),
+    ("nodal", "hex27", False, ("nodal",)), ("blended", "hex8", True, ("blended", "nodal")),
+])  # fmt: skip
 def test_which_gaps_are_tried(choice, element, walled, rules):
     overrides = [f'accuracy.contact="{choice}"', f'gripper.element="{element}"']
     assert contact_rules(scene_of(OVAL, *overrides), walled) == rules

@@ -118,14 +118,10 @@ def test_any_number_of_ranks_writes_the_same_bits(tmp_path, scene, alone, ranks)
     assert differing(path, expected) == []
 
 
-@pytest.mark.parametrize(
-    ("how", "ranks"),
-    [
-        ("SIGUSR1", 0),
-        pytest.param("SIGUSR1", 2, marks=pytest.mark.long),
-        pytest.param("SIGKILL", 3, marks=pytest.mark.long),
-    ],
-)
+@pytest.mark.parametrize(("how", "ranks"), [
+    ("SIGUSR1", 0), pytest.param("SIGUSR1", 2, marks=pytest.mark.long),
+    pytest.param("SIGKILL", 3, marks=pytest.mark.long),
+])  # fmt: skip
 def test_a_run_that_is_stopped_or_killed_goes_on_with_other_ranks_to_the_same_bits(tmp_path, scene, alone, how, ranks):
     path = tmp_path / f"{how}.hdf"
     process = begin(0, "-c", SLOWLY, "run", scene, "-o", path)

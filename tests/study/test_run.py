@@ -111,14 +111,11 @@ def test_forces_that_are_apart_fail_alone(tmp_path):
     assert (states(path) == DONE).sum() == 33
 
 
-@pytest.mark.parametrize(
-    ("name", "ranks"),
-    [
-        pytest.param("SIGUSR1", 2, marks=pytest.mark.long),  # test_ranks stops a real run by it
-        ("SIGTERM", 0),
-        pytest.param("SIGINT", 0, marks=pytest.mark.long),
-    ],
-)
+@pytest.mark.parametrize(("name", "ranks"), [
+    pytest.param("SIGUSR1", 2, marks=pytest.mark.long),  # test_ranks stops a real run by it
+    ("SIGTERM", 0),
+    pytest.param("SIGINT", 0, marks=pytest.mark.long),
+])  # fmt: skip
 def test_a_signal_stops_in_order_and_the_same_command_goes_on(tmp_path, uninterrupted, name, ranks):
     path = tmp_path / f"{name}.hdf"
     process = start(ranks, path, "--delay", 0.15)
@@ -177,14 +174,10 @@ def test_a_second_run_at_the_same_time_is_refused_and_status_can_be_asked(tmp_pa
     assert first == 75
 
 
-@pytest.mark.parametrize(
-    ("place", "ranks"),
-    [
-        ("/proc/softjaw.hdf", 2),
-        pytest.param("a_file/x.hdf", 0, marks=pytest.mark.long),
-        pytest.param("", 0, marks=pytest.mark.long),
-    ],
-)
+@pytest.mark.parametrize(("place", "ranks"), [
+    ("/proc/softjaw.hdf", 2), pytest.param("a_file/x.hdf", 0, marks=pytest.mark.long),
+    pytest.param("", 0, marks=pytest.mark.long),
+])  # fmt: skip
 def test_a_place_that_cannot_be_written_is_told_once_on_all_ranks(tmp_path, place, ranks):
     (tmp_path / "a_file").write_text("")
     code, _, errors = study(ranks, tmp_path / place)

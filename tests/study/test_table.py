@@ -12,13 +12,9 @@ from softjaw.study.page import block_of
 from softjaw.study.table import MOST_NOTES, Column, Table, as_csv, as_json, as_text, with_error
 
 COLUMNS = (
-    Column("grasp"),
-    Column("e_n", "m", error="e_n_error"),
-    Column("e_n_error", people=False),
-    Column("opening", "m", "open", error="opening_error", drop=1),
-    Column("opening_error", "m", people=False),
-    Column("force", "N", digits=5, drop=2),
-    Column("range", programs=False, wrap=8),
+    Column("grasp"), Column("e_n", "m", error="e_n_error"), Column("e_n_error", people=False),
+    Column("opening", "m", "open", error="opening_error", drop=1), Column("opening_error", "m", people=False),
+    Column("force", "N", digits=5, drop=2), Column("range", programs=False, wrap=8),
 )
 ROWS = (
     {"grasp": 1, "e_n": 0.0171, "e_n_error": 0.01, "opening": 0.06, "opening_error": 2e-4, "force": 2.0,
@@ -78,14 +74,9 @@ def test_no_cell_of_a_csv_is_computed_by_a_spreadsheet():
     assert [row[0] for row in found] == ["'=1+1", "'+A1", "'-A1", "'@x", "'\tx", "-3.5", "+2e-3", "at 0 mm", ""]
 
 
-@pytest.mark.parametrize(
-    ("value", "error", "text"),
-    [
-        (-17.0812, 0.152, "-17.08 ± 0.15"),
-        (123456.0, 1234.0, "123456 ± 1234"),
-        (0.0, 0.02, "0.000 ± 0.020"),
-        (9.9996, 0.0009, "10.000 ± 0.001"),
-    ],
-)
+@pytest.mark.parametrize(("value", "error", "text"), [
+    (-17.0812, 0.152, "-17.08 ± 0.15"), (123456.0, 1234.0, "123456 ± 1234"), (0.0, 0.02, "0.000 ± 0.020"),
+    (9.9996, 0.0009, "10.000 ± 0.001"),
+])  # fmt: skip
 def test_an_error_decides_on_the_digits_of_its_value(value, error, text):
     assert with_error(value, error) == text

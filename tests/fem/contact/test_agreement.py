@@ -43,11 +43,8 @@ def figures(ratio, elements, element="hex8"):
         limits = friction_limits(in_frame(patch, contact_frame(patch, [1, 0, 0])), MU)
         rows.append(
             (
-                1e3 * pressed.closing,
-                1e3 * limits.e_n_projected,
-                limits.f_x / (MU * limits.F_N),
-                1e-6 * patch.pressure.max(),
-                (patch.load * patch.normal[:, 2]).sum() / pressed.force,
+                1e3 * pressed.closing, 1e3 * limits.e_n_projected, limits.f_x / (MU * limits.F_N),
+                1e-6 * patch.pressure.max(), (patch.load * patch.normal[:, 2]).sum() / pressed.force,
             )
         )
         assert pressed.halvings == 0

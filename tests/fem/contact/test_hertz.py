@@ -51,10 +51,8 @@ def cylinder_errors(n, factors, element="hex8", width=20.0, grade=20.0):
         patch, faces = extract(pad, pressed), shape.patch_faces
         errors.append(
             (
-                half_width / hertz.radius - 1,
-                pressed.pressure.max() / hertz.peak - 1,
-                profile_error(pad, pressed, y, hertz),
-                contact_area(patch, faces) / (2 * hertz.radius * length) - 1,
+                half_width / hertz.radius - 1, pressed.pressure.max() / hertz.peak - 1,
+                profile_error(pad, pressed, y, hertz), contact_area(patch, faces) / (2 * hertz.radius * length) - 1,
                 largest_pressure(patch, faces, shape.per_side) / hertz.peak - 1,
                 patch.area[patch.load > 0].sum() / (2 * hertz.radius * length) - 1,
             )
@@ -95,8 +93,7 @@ def sphere_errors(n, factors=(0.8, 0.88, 0.96, 1.04, 1.12, 1.2), element="hex8",
     E_star, W = E / (1 - nu**2), width * a
     pad = Pad(
         PadShape((2 * W, 2 * W, W), (2 * n, 2 * n, n), (width, width, width), element),
-        material("linear", E / 2 / (1 + nu), nu),
-        (True, True),
+        material("linear", E / 2 / (1 + nu), nu), (True, True),
     )
     errors, lacking = [], []
     for pressed in Press(pad, reference.sphere(R)).load_path([4 * E_star * (f * a) ** 3 / (3 * R) for f in factors]):
@@ -104,8 +101,7 @@ def sphere_errors(n, factors=(0.8, 0.88, 0.96, 1.04, 1.12, 1.2), element="hex8",
         r = np.linalg.norm(pressed.points.position[..., :2], axis=-1)
         errors.append(
             (
-                radius(pressed, [0, 1], 2.5) / hertz.radius - 1,
-                pressed.pressure[0] / hertz.peak - 1,
+                radius(pressed, [0, 1], 2.5) / hertz.radius - 1, pressed.pressure[0] / hertz.peak - 1,
                 profile_error(pad, pressed, r, hertz),
                 contact_area(extract(pad, pressed), pad.shape.patch_faces) / (np.pi * hertz.radius**2) - 1,
                 largest_pressure(extract(pad, pressed), pad.shape.patch_faces, pad.shape.per_side) / hertz.peak - 1,

@@ -136,16 +136,10 @@ def test_a_step_that_fails_is_cut_and_the_answer_is_the_same():
     assert first.halvings == last.halvings == 0
 
 
-@pytest.mark.parametrize(
-    ("options", "mu", "count"),
-    [
-        ({}, None, "MatCholFctrNum"),
-        ({"contact_pc_type": "lu"}, None, "MatLUFactorNum"),
-        (VI, None, "MatLUFactorNum"),
-        ({}, 0.5, "MatLUFactorNum"),
-    ],
-    ids=["symmetric", "on demand", "bounds", "friction"],
-)
+@pytest.mark.parametrize(("options", "mu", "count"), [
+    ({}, None, "MatCholFctrNum"), ({"contact_pc_type": "lu"}, None, "MatLUFactorNum"), (VI, None, "MatLUFactorNum"),
+    ({}, 0.5, "MatLUFactorNum"),
+], ids=["symmetric", "on demand", "bounds", "friction"])  # fmt: skip
 def test_symmetric_tangents_have_symmetric_factors(options, mu, count):
     press = Press(pad_of(), OVAL, options, mu=mu)
     before = factorisations()

@@ -27,15 +27,10 @@ def states(allowed=(True, True), level="nonlinear", thickness=4e-4, z=0.075, sup
     return tuple(grip(body, z, allowed=allowed, level=level, theta=theta, mu=mu).load_path(FORCES))
 
 
-@pytest.mark.parametrize(
-    ("allowed", "level", "control"),
-    [
-        ((True, True), "nonlinear", Control(force=2.0)),
-        ((True, True), "linear", Control(force=2.0)),
-        ((False, False), "nonlinear", Control(force=2.0)),
-        ((False, False), "nonlinear", Control(closing=1e-3)),
-    ],
-)
+@pytest.mark.parametrize(("allowed", "level", "control"), [
+    ((True, True), "nonlinear", Control(force=2.0)), ((True, True), "linear", Control(force=2.0)),
+    ((False, False), "nonlinear", Control(force=2.0)), ((False, False), "nonlinear", Control(closing=1e-3)),
+])  # fmt: skip
 def test_the_tangent_is_the_derivative_of_the_residual(allowed, level, control):
     problem = grip(thin(), elements=(4, 2, 2), allowed=allowed, level=level).problem
     problem.control = control
@@ -79,14 +74,10 @@ def test_a_very_stiff_wall_is_a_rigid_object():
     press.destroy()
 
 
-@pytest.mark.parametrize(
-    ("allowed", "level", "control"),
-    [
-        ((True, True), "nonlinear", Control(force=2.0)),
-        ((True, False), "linear", Control(force=2.0)),
-        ((False, False), "nonlinear", Control(closing=1.5e-3)),
-    ],
-)
+@pytest.mark.parametrize(("allowed", "level", "control"), [
+    ((True, True), "nonlinear", Control(force=2.0)), ((True, False), "linear", Control(force=2.0)),
+    ((False, False), "nonlinear", Control(closing=1.5e-3)),
+])  # fmt: skip
 def test_so_is_that_of_a_grasp_with_friction(allowed, level, control):
     """From a state with a history: some points stick, some slip, some are open."""
     problem = grip(thin(), elements=(4, 2, 2), allowed=allowed, level=level, mu=0.2).problem

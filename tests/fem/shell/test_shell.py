@@ -152,8 +152,7 @@ def test_tapered_strip():
     x, y = np.meshgrid(np.linspace(0, L, n + 1), [0, 0.01], indexing="ij")
     h = t * (1 + x / L)  # from the free end to the clamped one
     mesh = ShellMesh(
-        np.stack([x, y, 0 * x], -1).reshape(-1, 3),
-        np.stack([0 * x, 0 * x, h / 2], -1).reshape(-1, 3),
+        np.stack([x, y, 0 * x], -1).reshape(-1, 3), np.stack([0 * x, 0 * x, h / 2], -1).reshape(-1, 3),
         grid_elements(np.arange(x.size).reshape(x.shape)),
     )
     shell = Shell(mesh, E, 0.0)

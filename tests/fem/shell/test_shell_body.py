@@ -14,11 +14,8 @@ FLASK = Revolution(
     np.array([[0, 30], [30, 30], [60, 30], [75, 29], [90, 22], [105, 14], [115, 12], [125, 12], [135, 12]]) / 1e3
 )
 SQUARE = [
-    Section(0.0, 0.030, 0.020, 4.0),
-    Section(0.03, 0.030, 0.020, 4.0),
-    Section(0.07, 0.030, 0.020, 4.0),
-    Section(0.09, 0.026, 0.018, 3.0, (0.002, 0.0)),
-    Section(0.12, 0.012, shift=(0.004, 0.0)),
+    Section(0.0, 0.030, 0.020, 4.0), Section(0.03, 0.030, 0.020, 4.0), Section(0.07, 0.030, 0.020, 4.0),
+    Section(0.09, 0.026, 0.018, 3.0, (0.002, 0.0)), Section(0.12, 0.012, shift=(0.004, 0.0)),
     Section(0.14, 0.012, shift=(0.004, 0.0)),
 ]
 SURFACES = {"flask": of_revolution(FLASK), "square": of_sections(SQUARE)}
@@ -194,9 +191,7 @@ def test_a_tube_under_pressure():
 
 
 @pytest.mark.parametrize(
-    "arguments",
-    [{"thickness": 5e-3}, {"size": MeshSize(heights=(0.03, 0.5))}],
-    ids=["too thick", "too high"],
+    "arguments", [{"thickness": 5e-3}, {"size": MeshSize(heights=(0.03, 0.5))}], ids=["too thick", "too high"],
 )
 def test_bodies_that_cannot_be_meshed_are_refused(arguments):
     with pytest.raises(ValueError):  # noqa: PT011 (the arguments say which)

@@ -87,8 +87,7 @@ def test_arms_are_scaled_along_the_axes_of_the_object(angle):
 
 def test_extents_scale_arms_each_along_its_axis_or_the_longest_along_all():
     for overrides, arms, torques in (
-        ([], [0.05, 0.04, 0.12], 0.05),
-        (['score.object_length_mm="longest"'], [0.12] * 3, 0.05),
+        ([], [0.05, 0.04, 0.12], 0.05), (['score.object_length_mm="longest"'], [0.12] * 3, 0.05),
         (["score.object_length_mm=80"], [0.08] * 3, 0.05),
         (['score.contact_length_mm="object"'], [0.05, 0.04, 0.12], 0.12),
     ):
@@ -183,19 +182,16 @@ def test_the_centre_of_mass_is_that_of_the_volume_in_its_own_frame():
 RING = np.array([[0, 0, 0, 0, 0], [0, 1, 1, 1, 0], [0, 1, 0, 1, 0], [0, 1, 1, 1, 0], [0, 0, 0, 0, 0]])
 
 
-@pytest.mark.parametrize(
-    ("loaded", "pieces", "holes", "rims"),
-    [
-        (np.zeros((5, 5)), 0, 0, 0),
-        (np.ones((5, 5)), 1, 0, 15),
-        (RING, 1, 1, 0),
-        (np.eye(5), 1, 0, 15),  # faces that meet at a corner are one piece
-        (np.diag([1, 1, 0, 1, 1]), 2, 0, 15),
-        (np.diag([0, 1, 1, 1, 0]), 1, 0, 0),
-        (np.pad(RING, [(0, 0), (0, 5)]) + np.pad(RING, [(0, 0), (5, 0)]), 2, 2, 0),
-        (np.outer([1, 0, 0, 1], [0, 1, 1, 0]), 2, 0, 3),
-        (np.outer([0, 1, 1, 0], [1, 0, 0, 0]), 1, 0, 4),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("loaded", "pieces", "holes", "rims"), [
+    (np.zeros((5, 5)), 0, 0, 0),
+    (np.ones((5, 5)), 1, 0, 15),
+    (RING, 1, 1, 0),
+    (np.eye(5), 1, 0, 15),  # faces that meet at a corner are one piece
+    (np.diag([1, 1, 0, 1, 1]), 2, 0, 15),
+    (np.diag([0, 1, 1, 1, 0]), 1, 0, 0),
+    (np.pad(RING, [(0, 0), (0, 5)]) + np.pad(RING, [(0, 0), (5, 0)]), 2, 2, 0),
+    (np.outer([1, 0, 0, 1], [0, 1, 1, 0]), 2, 0, 3),
+    (np.outer([0, 1, 1, 0], [1, 0, 0, 0]), 1, 0, 4),
+])  # fmt: skip
 def test_pieces_holes_and_rims(loaded, pieces, holes, rims):
     assert topology(3e4 * loaded.ravel(), loaded.shape) == {"pieces": pieces, "holes": holes, "rims": rims}

@@ -97,8 +97,7 @@ def test_stations_of_a_straight_mesh_stay_on_the_axis(tmp_path):
 
 def test_axes_end_with_station_angle_and_force_in_si_units():
     over = [
-        "sweep.object.semi_axis_b_mm=[40, 10, 20]",
-        "sweep.gripper.material=['linear', 'blatz_ko']",
+        "sweep.object.semi_axis_b_mm=[40, 10, 20]", "sweep.gripper.material=['linear', 'blatz_ko']",
         "sweep.friction.mu=[0.5]",
     ]
     axes = candidates.axes(parse_scene(CYLINDER, overrides=over))
@@ -116,16 +115,10 @@ def test_axes_of_explicit_poses_number_the_candidates():
     assert [(a.name, a.values.tolist(), a.units) for a in axes[:2]] == [("station", [0, 1], ""), ("angle", [0], "rad")]
 
 
-@pytest.mark.parametrize(
-    ("order", "groups"),
-    [
-        (0, [[0, 1, 2, 3, 4, 5]]),
-        (2, [[0, 3, 5], [1, 4], [2]]),
-        (1, [[0, 5], [1], [2], [3], [4]]),
-        (4, [[0, 2, 3, 5], [1, 4]]),
-        (12, [[0, 1, 2, 3, 4, 5]]),
-    ],
-)
+@pytest.mark.parametrize(("order", "groups"), [
+    (0, [[0, 1, 2, 3, 4, 5]]), (2, [[0, 3, 5], [1, 4], [2]]), (1, [[0, 5], [1], [2], [3], [4]]),
+    (4, [[0, 2, 3, 5], [1, 4]]), (12, [[0, 1, 2, 3, 4, 5]]),
+])  # fmt: skip
 def test_images_under_the_symmetry_of_the_object_are_served_together(order, groups):
     """Angles 0, 30, 90, 180, 210, 360 degrees: alike when they differ by a multiple of 360 / order."""
     places = candidates.candidates(parse_scene(CYLINDER))
@@ -219,15 +212,10 @@ def test_finer_meshes_more_forces_and_better_elements_cost_more():
     assert ratios == pytest.approx([1 / 1.15, 8])
 
 
-@pytest.mark.parametrize(
-    ("overrides", "order"),
-    [
-        ((), 2),
-        (("task.weight_direction=[0, 0, -1]",), 2),
-        (("task.weight_direction=[0, 1, -1]",), 1),
-        (("task.centre_of_mass_mm=[3, 0, 0]",), 1),
-    ],
-)
+@pytest.mark.parametrize(("overrides", "order"), [
+    ((), 2), (("task.weight_direction=[0, 0, -1]",), 2), (("task.weight_direction=[0, 1, -1]",), 1),
+    (("task.centre_of_mass_mm=[3, 0, 0]",), 1),
+])  # fmt: skip
 def test_a_weight_that_does_not_point_along_the_axis_takes_the_symmetry_away(overrides, order):
     scene = parse_scene(CYLINDER, overrides=list(overrides))
     assert scene.axis_symmetry == order

@@ -235,19 +235,16 @@ def test_simulators_get_a_file_for_each_grasp(path, said, tmp_path):
     assert "<uri>model-2.stl</uri>" in (tmp_path / "model-2.sdf").read_text()
 
 
-@pytest.mark.parametrize(
-    ("words", "code"),
-    [
-        (("--format", "urdf"), USAGE),
-        (("--format", "moveit", "--force", "99"), USAGE),
-        (("--csv", "--min", "beauty=3"), USAGE),
-        (("--csv", "--min", "payload"), USAGE),
-        (("--format", "moveit", "--min", "payload=1e9"), USAGE),
-        (("--format", "moveit", "--gripper", "three_fingers"), USAGE),
-        (("--format", "moveit", "--gripper", "robotiq_2f85"), USAGE),  # presses with 20 N at least
-        (("--format", "mjcf", "-o", "/no/such/folder/x.xml"), CANNOT_WRITE),
-    ],
-)
+@pytest.mark.parametrize(("words", "code"), [
+    (("--format", "urdf"), USAGE),
+    (("--format", "moveit", "--force", "99"), USAGE),
+    (("--csv", "--min", "beauty=3"), USAGE),
+    (("--csv", "--min", "payload"), USAGE),
+    (("--format", "moveit", "--min", "payload=1e9"), USAGE),
+    (("--format", "moveit", "--gripper", "three_fingers"), USAGE),
+    (("--format", "moveit", "--gripper", "robotiq_2f85"), USAGE),  # presses with 20 N at least
+    (("--format", "mjcf", "-o", "/no/such/folder/x.xml"), CANNOT_WRITE),
+])  # fmt: skip
 def test_what_cannot_be_written_is_refused(path, words, code, capsys):
     assert main(["export", str(path), *words]) == code
     assert "error: " in capsys.readouterr().err

@@ -45,14 +45,11 @@ def test_without_a_palm_every_grasp_is_taken_from_above(path):
     assert all(grasp.rotation[2, 2] < -0.99 for grasp in taken(path, Hand()))
 
 
-@pytest.mark.parametrize(
-    ("hand", "why"),
-    [
-        (Hand(depth_mm=10, palm_mm=[[-100, -100, -20], [100, 100, 5]]), "every side"),
-        (Hand(stroke_mm=60), "30 mm"),  # pads of 15 mm leave half of it, and the object is 40 mm wide
-        (Hand(force_n=[5, 50]), "5 to 50 N"),
-    ],
-)
+@pytest.mark.parametrize(("hand", "why"), [
+    (Hand(depth_mm=10, palm_mm=[[-100, -100, -20], [100, 100, 5]]), "every side"),
+    (Hand(stroke_mm=60), "30 mm"),  # pads of 15 mm leave half of it, and the object is 40 mm wide
+    (Hand(force_n=[5, 50]), "5 to 50 N"),
+])  # fmt: skip
 def test_what_the_gripper_cannot_take_is_left_out_with_the_reason(path, hand, why):
     kept, said = usable(taken(path, hand))
     assert not kept

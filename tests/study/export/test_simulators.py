@@ -109,8 +109,7 @@ def test_physx_slips_at_the_torque_of_the_file_by_its_own_formula(path):
         mu, r_min, r = (
             float(values[name])
             for name in (
-                "physics:staticFriction",
-                "physxCollision:minTorsionalPatchRadius",
+                "physics:staticFriction", "physxCollision:minTorsionalPatchRadius",
                 "physxCollision:torsionalPatchRadius",
             )
         )

@@ -87,8 +87,7 @@ def test_units_of_people_and_missing_coordinates(straight):
     assert found == pytest.approx(straight.at(0.015, np.radians(40), 3).e_n, rel=1e-14)
     for named, given in (
         ("station", {"station": 0.01, "angle": 0.1, "force": 3, "station_mm": 10}),
-        ("angle", {"station": 0.01, "force": 3}),
-        ("force", {"station": 0.01, "angle": 0.1}),
+        ("angle", {"station": 0.01, "force": 3}), ("force", {"station": 0.01, "angle": 0.1}),
         ("station", {"candidate": 0, "force": 3}),
     ):
         with pytest.raises(ValueError, match=named):
@@ -99,16 +98,10 @@ def test_units_of_people_and_missing_coordinates(straight):
         _ = straight.at(0.01, 0.1, 3).safety_factor
 
 
-@pytest.mark.parametrize(
-    ("place", "word"),
-    [
-        ((0.05, 0.0, 2.0), "station 50 mm, solved: 0 mm to 40 mm"),
-        ((0.01, 0.0, 9.0), "force 9 N, solved: 1 N to 8 N"),
-        ((-1e-6, 0.0, 2.0), "station -0.001 mm"),
-        ((np.nan, 0.0, 2.0), "station nan"),
-        ((0.01, 0.0, 0.5), "force 0.5 N"),
-    ],
-)
+@pytest.mark.parametrize(("place", "word"), [
+    ((0.05, 0.0, 2.0), "station 50 mm, solved: 0 mm to 40 mm"), ((0.01, 0.0, 9.0), "force 9 N, solved: 1 N to 8 N"),
+    ((-1e-6, 0.0, 2.0), "station -0.001 mm"), ((np.nan, 0.0, 2.0), "station nan"), ((0.01, 0.0, 0.5), "force 0.5 N"),
+])  # fmt: skip
 def test_nothing_is_extrapolated(straight, place, word):
     point = straight.at(*place)
     assert (point.state, point.ok) == (OUTSIDE, False)

@@ -76,14 +76,10 @@ def test_a_contour_gives_what_any_patch_gives(tmp_path, told):
 
 
 @pytest.mark.parametrize(("text", "part", "code"), [
-    ("x_mm,y_mm\n0,0\n1,1", ":1", USAGE),
-    ("y,z\n0,0\n1,1", "--unit mm", USAGE),
-    ("y_mm,z_mm\n0,0\n1,one", ":3", USAGE),
-    ("y_mm,z_mm\n0,0\n30,0\n", ":3", USAGE),
-    ("y_m,z_m\n0,0\n-0.001,-0.2\n", ":3", USAGE),
+    ("x_mm,y_mm\n0,0\n1,1", ":1", USAGE), ("y,z\n0,0\n1,1", "--unit mm", USAGE), ("y_mm,z_mm\n0,0\n1,one", ":3", USAGE),
+    ("y_mm,z_mm\n0,0\n30,0\n", ":3", USAGE), ("y_m,z_m\n0,0\n-0.001,-0.2\n", ":3", USAGE),
     ("y_mm,z_mm\n" + "\n".join(f"{y},{0.05 * y * y}" for y in range(-10, 11)), "change its sign", USAGE),
-    ("y_mm,z_mm\n" + "0,0\n" * 30, "spread", USAGE),
-    ("y_mm,z_mm\n" + "0,0\n" * 20_001, "thin them", USAGE),
+    ("y_mm,z_mm\n" + "0,0\n" * 30, "spread", USAGE), ("y_mm,z_mm\n" + "0,0\n" * 20_001, "thin them", USAGE),
 ])  # fmt: skip
 def test_points_that_are_no_face_are_refused_with_their_place(tmp_path, capsys, text, part, code):
     file, scene = tmp_path / "points.csv", tmp_path / "scene.toml"
@@ -96,12 +92,10 @@ def test_points_that_are_no_face_are_refused_with_their_place(tmp_path, capsys, 
 
 
 @pytest.mark.parametrize(("words", "part", "code"), [
-    (["--deformed", "{file}"], "SCENE", USAGE),
-    (["{file}", "{scene}"], "--deformed", USAGE),
+    (["--deformed", "{file}"], "SCENE", USAGE), (["{file}", "{scene}"], "--deformed", USAGE),
     (["--deformed", "{file}", "{scene}", "--other", "{file}"], "--other", USAGE),
     (["--deformed", "{file}", "{scene}", "--pressure-name", "p"], "--pressure-name", USAGE),
-    (["--deformed", "{file}", "{file}"], "", USAGE),
-    (["--deformed", "none.csv", "{scene}"], "none.csv", OTHER_FILE),
+    (["--deformed", "{file}", "{file}"], "", USAGE), (["--deformed", "none.csv", "{scene}"], "none.csv", OTHER_FILE),
     (["--deformed", "{scene}", "{scene}"], ".csv", USAGE),
 ])  # fmt: skip
 def test_options_that_do_not_belong_together_are_refused(tmp_path, capsys, words, part, code):

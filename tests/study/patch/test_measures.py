@@ -56,25 +56,22 @@ def test_the_quality_is_that_of_the_command_with_every_surface():
 OPPOSED = replace(FLAT, normal=np.array([[0, 0, 1.0], [0, 0.3, -1.0]]), pressure=np.array([1e4, 5e3]))
 
 
-@pytest.mark.parametrize(
-    ("call", "error", "words"),
-    [
-        (lambda: sj.friction_limits([1, 2], 0.8), TypeError, "expected a ContactPatch"),
-        (lambda: sj.friction_limits(FLAT, 0.8, x_axis=[0, 0, 1]), ValueError, "x_axis"),
-        (lambda: sj.friction_limits(OPPOSED, 0.8), ValueError, "oppose their neighbours"),
-        (lambda: sj.friction_wrench(FLAT, [0, 0, 1], 0.8, "pcn"), ValueError, "model is 'pcn'"),
-        (lambda: sj.fit_ellipsoid(FLAT, 0.8, "quartic"), ValueError, "kind is 'quartic'.*three_motions"),
-        (lambda: sj.fit_quartic(FLAT, 0.8, samples=2), ValueError, "samples is 2"),
-        (lambda: sj.grasp_quality(FLAT, mu=0.8), ValueError, "neither.*second patch or a distance"),
-        (lambda: sj.grasp_quality(FLAT, FLAT, mu=0.8, distance=0.1), ValueError, "both"),
-        (lambda: sj.grasp_quality(FLAT, FLAT, mu=0.8), ValueError, "same place"),
-        (lambda: sj.grasp_quality(FLAT, mu=0.8, distance=-1), ValueError, "distance is -1"),
-        (lambda: sj.grasp_quality(FLAT, mu=0.8, distance=1, object_length=0), ValueError, "object_length is 0"),
-        (lambda: sj.grasp_quality(FLAT, mu=0.8, distance=1, surface="round"), ValueError, "surface is 'round'.*exact"),
-        (lambda: sj.grasp_quality(FLAT, mu=0.8, distance=1, model="x"), ValueError, "model is 'x'"),
-        (lambda: sj.read_pressure("none.csv"), sj.StudyError, "none.csv: cannot be read"),
-    ],
-)
+@pytest.mark.parametrize(("call", "error", "words"), [
+    (lambda: sj.friction_limits([1, 2], 0.8), TypeError, "expected a ContactPatch"),
+    (lambda: sj.friction_limits(FLAT, 0.8, x_axis=[0, 0, 1]), ValueError, "x_axis"),
+    (lambda: sj.friction_limits(OPPOSED, 0.8), ValueError, "oppose their neighbours"),
+    (lambda: sj.friction_wrench(FLAT, [0, 0, 1], 0.8, "pcn"), ValueError, "model is 'pcn'"),
+    (lambda: sj.fit_ellipsoid(FLAT, 0.8, "quartic"), ValueError, "kind is 'quartic'.*three_motions"),
+    (lambda: sj.fit_quartic(FLAT, 0.8, samples=2), ValueError, "samples is 2"),
+    (lambda: sj.grasp_quality(FLAT, mu=0.8), ValueError, "neither.*second patch or a distance"),
+    (lambda: sj.grasp_quality(FLAT, FLAT, mu=0.8, distance=0.1), ValueError, "both"),
+    (lambda: sj.grasp_quality(FLAT, FLAT, mu=0.8), ValueError, "same place"),
+    (lambda: sj.grasp_quality(FLAT, mu=0.8, distance=-1), ValueError, "distance is -1"),
+    (lambda: sj.grasp_quality(FLAT, mu=0.8, distance=1, object_length=0), ValueError, "object_length is 0"),
+    (lambda: sj.grasp_quality(FLAT, mu=0.8, distance=1, surface="round"), ValueError, "surface is 'round'.*exact"),
+    (lambda: sj.grasp_quality(FLAT, mu=0.8, distance=1, model="x"), ValueError, "model is 'x'"),
+    (lambda: sj.read_pressure("none.csv"), sj.StudyError, "none.csv: cannot be read"),
+])  # fmt: skip
 def test_what_is_no_argument_is_refused(call, error, words):
     with pytest.raises(error, match=words):
         call()

@@ -93,14 +93,11 @@ def test_triangles_among_quadrilaterals_leave_their_last_corner_empty(tmp_path, 
     assert friction(told(mixed, "--unit", "m", "--pressure-unit", "pa")) == pytest.approx(friction(answer), **SAME)
 
 
-@pytest.mark.parametrize(
-    ("head", "row"),
-    [
-        ("x_mm;y_mm;z_mm;area_mm2;nx;ny;nz;pressure_kpa", "1;2;3;100;0;0;2;5"),
-        ("x [mm],Y [mm],z (mm),area [mm^2],n_x,n_y,n_z,Pressure [kPa]", "1,2,3,100,0,0,2,5"),
-        ("normal_x\tnormal_y\tnormal_z\tx_mm\ty_mm\tz_mm\tarea_cm2\tpressure_mpa", "0\t0\t1\t1\t2\t3\t1\t.005"),
-    ],
-)
+@pytest.mark.parametrize(("head", "row"), [
+    ("x_mm;y_mm;z_mm;area_mm2;nx;ny;nz;pressure_kpa", "1;2;3;100;0;0;2;5"),
+    ("x [mm],Y [mm],z (mm),area [mm^2],n_x,n_y,n_z,Pressure [kPa]", "1,2,3,100,0,0,2,5"),
+    ("normal_x\tnormal_y\tnormal_z\tx_mm\ty_mm\tz_mm\tarea_cm2\tpressure_mpa", "0\t0\t1\t1\t2\t3\t1\t.005"),
+])  # fmt: skip
 def test_spellings_of_names_units_and_separators(tmp_path, told, head, row):
     file = tmp_path / "one.csv"
     file.write_text(f"\ufeff# a comment\n{head}\n\n{row}\n", encoding="utf-8")
@@ -208,8 +205,7 @@ def test_the_direction_of_a_patch_hangs_on_no_rounding():
     half = 0.5000000005  # two equal components at which the ninth decimal place turns
     leaning = Rotation.align_vectors([[half, half, np.sqrt(1 - 2 * half**2)]], [[0, 0, 1]])[0]
     cases = [
-        (r, leaning, [1, 0, 0]),
-        (r, Rotation.from_euler("x", 0.3), [1, 0, 0]),
+        (r, leaning, [1, 0, 0]), (r, Rotation.from_euler("x", 0.3), [1, 0, 0]),
         (r, Rotation.from_rotvec([-np.pi / 4, 0, 0]) * Rotation.from_euler("z", 0.2), [1, 0, 0]),
         (r, Rotation.align_vectors([[1, 1, 1]], [[0, 0, 1]])[0], [1, 0, 0]),
         (long, Rotation.from_euler("z", -np.pi / 4), np.array([1, -1, 0]) / np.sqrt(2)),

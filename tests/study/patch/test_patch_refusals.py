@@ -32,35 +32,32 @@ def refused(capfd):
     return ask
 
 
-@pytest.mark.parametrize(
-    ("text", "place", "key"),
-    [
-        ("", "", ""),
-        (HEAD, "", "one line"),
-        ("1,2,3\n4,5,6", ":1", "x_mm"),
-        (f"{HEAD.replace('area_mm2,', '')}\n{FACE}", ":1", "area"),
-        (f"{HEAD.replace('kpa', 'psi')}\n{FACE}", ":1", "pressure_psi"),
-        (f"{HEAD.replace('x_mm', 'x')}\n{FACE}", ":1", "--unit mm"),
-        (f"{HEAD.replace('_kpa', '')}\n{FACE}", ":1", "--pressure-unit"),
-        (f"{HEAD},x_m\n{FACE},0", ":1", "x_mm and x_m"),
-        (f"{HEAD}\n{FACE}\n0,0,0,1,0,0,1,-5", ", line 3", "pressure: found -5000 Pa"),
-        (f"{HEAD}\n{FACE}\n0,0,0,-1,0,0,1,5", ", line 3", "area: found -1e-06 m^2"),
-        (f"{HEAD}\n0,0,0,0,0,0,1,5", "", "load"),
-        (f"{HEAD}\n{FACE}\n0,0,0,0,0,0,1,5", ", line 3", "area: found 0 under 5000 Pa"),
-        (f"{HEAD}\n{FACE}\n0,0,0,1,0,0,1,nan", ":3", "pressure_kpa"),
-        (f"{HEAD}\n{FACE}\n0,0,0,1,0,,1,5", ":3", "ny"),
-        (f"{HEAD}\n{FACE}".replace(",", ";").replace("1;0;0", "1,5;0;0"), ":2", '"1,5"'),
-        (f"{HEAD}\n{FACE}\n0,0,0,1,0,0,1", ":3", "7 cells"),
-        (f"{HEAD}\n{FACE}\n0,0,0,1,0,0,0,5", ", line 3", "normal: found 0, 0, 0"),
-        (f"{HEAD}\n0,0,0,1,0,0,1,0", "", "load"),
-        (f"{HEAD}\n{FACE}\n1,0,0,1,0,0,-1,5\n2,0,0,1,0,0,1,5", "", "1 of 3"),
-        (f"{HEAD}\n{FACE}\n0,0,1,1,0,0,-1,5", "", "cancel"),
-        (f"{CORNER_HEAD.replace('z3_mm', 'c')}\n0,0,0,1,0,0,0,1,0,5", ":1", "z3"),
-        (f"{CORNER_HEAD}\n0,0,0,1,0,0,2,0,0,5\n0,0,0,1,0,0,0,1,0,5", ", line 2", "area: found 0"),
-        # on a line too, but rounding leaves an area of 2e-23 m^2
-        (f"{CORNER_HEAD}\n.1,.1,.1,.2,.2,.8,.3,.3,1.5,5\n0,0,0,1,0,0,0,1,0,5", ", line 2", "area: found 0"),
-    ],
-)
+@pytest.mark.parametrize(("text", "place", "key"), [
+    ("", "", ""),
+    (HEAD, "", "one line"),
+    ("1,2,3\n4,5,6", ":1", "x_mm"),
+    (f"{HEAD.replace('area_mm2,', '')}\n{FACE}", ":1", "area"),
+    (f"{HEAD.replace('kpa', 'psi')}\n{FACE}", ":1", "pressure_psi"),
+    (f"{HEAD.replace('x_mm', 'x')}\n{FACE}", ":1", "--unit mm"),
+    (f"{HEAD.replace('_kpa', '')}\n{FACE}", ":1", "--pressure-unit"),
+    (f"{HEAD},x_m\n{FACE},0", ":1", "x_mm and x_m"),
+    (f"{HEAD}\n{FACE}\n0,0,0,1,0,0,1,-5", ", line 3", "pressure: found -5000 Pa"),
+    (f"{HEAD}\n{FACE}\n0,0,0,-1,0,0,1,5", ", line 3", "area: found -1e-06 m^2"),
+    (f"{HEAD}\n0,0,0,0,0,0,1,5", "", "load"),
+    (f"{HEAD}\n{FACE}\n0,0,0,0,0,0,1,5", ", line 3", "area: found 0 under 5000 Pa"),
+    (f"{HEAD}\n{FACE}\n0,0,0,1,0,0,1,nan", ":3", "pressure_kpa"),
+    (f"{HEAD}\n{FACE}\n0,0,0,1,0,,1,5", ":3", "ny"),
+    (f"{HEAD}\n{FACE}".replace(",", ";").replace("1;0;0", "1,5;0;0"), ":2", '"1,5"'),
+    (f"{HEAD}\n{FACE}\n0,0,0,1,0,0,1", ":3", "7 cells"),
+    (f"{HEAD}\n{FACE}\n0,0,0,1,0,0,0,5", ", line 3", "normal: found 0, 0, 0"),
+    (f"{HEAD}\n0,0,0,1,0,0,1,0", "", "load"),
+    (f"{HEAD}\n{FACE}\n1,0,0,1,0,0,-1,5\n2,0,0,1,0,0,1,5", "", "1 of 3"),
+    (f"{HEAD}\n{FACE}\n0,0,1,1,0,0,-1,5", "", "cancel"),
+    (f"{CORNER_HEAD.replace('z3_mm', 'c')}\n0,0,0,1,0,0,0,1,0,5", ":1", "z3"),
+    (f"{CORNER_HEAD}\n0,0,0,1,0,0,2,0,0,5\n0,0,0,1,0,0,0,1,0,5", ", line 2", "area: found 0"),
+    # on a line too, but rounding leaves an area of 2e-23 m^2
+    (f"{CORNER_HEAD}\n.1,.1,.1,.2,.2,.8,.3,.3,1.5,5\n0,0,0,1,0,0,0,1,0,5", ", line 2", "area: found 0"),
+])  # fmt: skip
 def test_a_table_that_is_no_patch(tmp_path, refused, text, place, key):
     file = tmp_path / "bad.csv"
     file.write_text(text)
@@ -94,19 +91,15 @@ PRESSED = [("pressure", ONES)]
 TURNED = [c[::-1] if i % 5 == 2 else c for i, c in enumerate(CELLS.tolist())]
 
 
-@pytest.mark.parametrize(
-    ("name", "grid", "words", "code", "key"),
-    [
-        ("a.vtp", (POINTS, CELLS, PRESSED), (), USAGE, "--unit"),
-        ("a.vtp", (POINTS, CELLS, PRESSED), ("--unit", "m"), USAGE, "--pressure-unit"),
-        ("a.vtp", (POINTS, CELLS, [("CPRESS", ONES), ("n", np.ones((len(CELLS), 3)))]), ("--unit", "m"), USAGE,
-         "--pressure-name CPRESS"),
-        ("a.vtu", (POINTS, [*CELLS[:-1], CELLS[-1] + 9], PRESSED), SI, OTHER_FILE, "point"),
-        ("a.vtu", (CUBE, [[0, 1, 3, 2, 4, 5, 7, 6]], [("pressure", [1.0])], (), [12]), SI, USAGE, "cell 0"),
-        ("a.vtu", (POINTS, TURNED, PRESSED), SI, USAGE, f"27 of {len(CELLS)}"),
-    ],
-    ids=["unit", "pressure unit", "pressure", "points", "faces", "inside out"],
-)  # fmt: skip
+@pytest.mark.parametrize(("name", "grid", "words", "code", "key"), [
+    ("a.vtp", (POINTS, CELLS, PRESSED), (), USAGE, "--unit"),
+    ("a.vtp", (POINTS, CELLS, PRESSED), ("--unit", "m"), USAGE, "--pressure-unit"),
+    ("a.vtp", (POINTS, CELLS, [("CPRESS", ONES), ("n", np.ones((len(CELLS), 3)))]), ("--unit", "m"), USAGE,
+     "--pressure-name CPRESS"),
+    ("a.vtu", (POINTS, [*CELLS[:-1], CELLS[-1] + 9], PRESSED), SI, OTHER_FILE, "point"),
+    ("a.vtu", (CUBE, [[0, 1, 3, 2, 4, 5, 7, 6]], [("pressure", [1.0])], (), [12]), SI, USAGE, "cell 0"),
+    ("a.vtu", (POINTS, TURNED, PRESSED), SI, USAGE, f"27 of {len(CELLS)}"),
+], ids=["unit", "pressure unit", "pressure", "points", "faces", "inside out"])  # fmt: skip
 def test_a_grid_that_is_no_patch(tmp_path, refused, name, grid, words, code, key):
     found, errors = refused(vtk(tmp_path / name, *grid), *words)
     assert found == code

@@ -109,17 +109,14 @@ def test_status_and_the_import_of_softjaw_do_not_wait_for_xarray(half):
     assert subprocess.run([sys.executable, "-c", code, half], check=False, capture_output=True).returncode == 0
 
 
-@pytest.mark.parametrize(
-    ("values", "limit", "force"),
-    [
-        ([0.3, 0.6, 1.2, 2.4], 0.1, 1 / 3),  # proportional to the force: on a line from nothing, ...
-        ([0.3, 0.6, 1.2, 2.4], 0.45, 1.5),  # ... and between solved ones
-        ([[1.0, 2.0, 4.0, 8.0], [0.5, 1.0, 2.0, 4.0]], 2.0, [2.0, 4.0]),  # met exactly, in a whole map
-        ([0.0, 2.0, 0.5, 3.0], 1.0, 1.5),  # falls again: the first time counts
-        ([0.1, 0.2, 0.3, 0.4], 1.0, np.nan),
-        ([np.nan] * 4, 1.0, np.nan),
-        ([0.1, np.nan, 5.0, 5.0], 1.0, np.nan),
-    ],
-)
+@pytest.mark.parametrize(("values", "limit", "force"), [
+    ([0.3, 0.6, 1.2, 2.4], 0.1, 1 / 3),  # proportional to the force: on a line from nothing, ...
+    ([0.3, 0.6, 1.2, 2.4], 0.45, 1.5),  # ... and between solved ones
+    ([[1.0, 2.0, 4.0, 8.0], [0.5, 1.0, 2.0, 4.0]], 2.0, [2.0, 4.0]),  # met exactly, in a whole map
+    ([0.0, 2.0, 0.5, 3.0], 1.0, 1.5),  # falls again: the first time counts
+    ([0.1, 0.2, 0.3, 0.4], 1.0, np.nan),
+    ([np.nan] * 4, 1.0, np.nan),
+    ([0.1, np.nan, 5.0, 5.0], 1.0, np.nan),
+])  # fmt: skip
 def test_the_force_at_which_a_limit_is_crossed(values, limit, force):
     assert first_crossing([1.0, 2.0, 4.0, 8.0], values, limit) == pytest.approx(force, rel=1e-12, nan_ok=True)

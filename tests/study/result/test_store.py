@@ -178,16 +178,10 @@ def test_every_dataset_says_what_it_is(tmp_path):
             assert f"{q.key} [" in file["study/definitions"][()].decode()
 
 
-@pytest.mark.parametrize(
-    ("sizes", "expected"),
-    [
-        ({}, [".", ".", "2"]),
-        ({"angle": 1}, [".", "0", "."]),
-        ({"angle": 1, "normal_force": 1}, [".", "0", "0"]),
-        ({"station": 1, "angle": 1}, ["0", "0", "."]),
-        ({"station": 1, "angle": 1, "normal_force": 1}, ["0", "0", "."]),
-    ],
-)
+@pytest.mark.parametrize(("sizes", "expected"), [
+    ({}, [".", ".", "2"]), ({"angle": 1}, [".", "0", "."]), ({"angle": 1, "normal_force": 1}, [".", "0", "0"]),
+    ({"station": 1, "angle": 1}, ["0", "0", "."]), ({"station": 1, "angle": 1, "normal_force": 1}, ["0", "0", "."]),
+])  # fmt: skip
 def test_viewers_open_at_stations_and_angles_at_the_highest_force(sizes, expected):
     layout = small(sizes=sizes)
     assert view_slice(layout) == expected
@@ -328,8 +322,7 @@ def virtual(file, name, secret):
 
 
 @pytest.mark.parametrize("put", [
-    virtual,
-    lambda file, name, secret: file.create_dataset(name, (5, 2, 3), "<f8", external=[(str(secret), 0, 240)]),
+    virtual, lambda file, name, secret: file.create_dataset(name, (5, 2, 3), "<f8", external=[(str(secret), 0, 240)]),
     lambda file, name, secret: file.__setitem__(name, h5py.ExternalLink(str(secret), "/x")),
     lambda file, name, secret: file.__setitem__(name, h5py.SoftLink("/study/e_n/pcm")),
     lambda file, name, secret: file.create_dataset(name, (50, 2, 3), "<f8"),

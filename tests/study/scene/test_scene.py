@@ -92,19 +92,16 @@ def test_a_wrong_line_is_named_with_its_key_value_and_remedy(row):
 WRONG_VALUES = [
     ("radius_mm = 30", "", 1, "object.radius_mm", "nothing"),
     ("radius_mm = 30", "radius_mm = 0.03", 3, "object.radius_mm", "0.03"),
-    ('"sphere"', '"spher"', 2, "object.shape", '"spher"'),
-    ('shape = "sphere"', "", 1, "object.shape", "nothing"),
+    ('"sphere"', '"spher"', 2, "object.shape", '"spher"'), ('shape = "sphere"', "", 1, "object.shape", "nothing"),
     ("[0]", "[-30, 30.5]", 6, "candidates.stations_mm", "[30.5]"),
-    ("[0]", "[0, 0]", 6, "candidates.stations_mm", "[0, 0]"),
-    ("[0]", "'top'", 6, "candidates.stations_mm", '"top"'),
+    ("[0]", "[0, 0]", 6, "candidates.stations_mm", "[0, 0]"), ("[0]", "'top'", 6, "candidates.stations_mm", '"top"'),
     ("stations_mm = [0]", "", 5, "candidates", "[]"),
     ("stations_mm = [0]", "stations = [0, 1]", 6, "candidates.stations", "[0, 1]"),
     ("stations_mm = [0]", "stations = 3", 6, "candidates.stations", "3"),
     ("[0]", "[0, 5, 9]\nstations = 3", 6, "candidates.stations_mm", "[0.0, 5.0, 9.0]"),
     ("[0]", "[0]\nsampled = 3", 7, "candidates.sampled", '["stations_mm", "sampled"]'),
     ("[0]", "[0]\nangles_deg = [0, 400]", 7, "candidates.angles_deg[1]", "400"),
-    ("[1]", "[1, -2]", 9, "load.normal_force_n[1]", "-2"),
-    ("[1]", "['5 N']", 9, "load.normal_force_n[0]", '"5 N"'),
+    ("[1]", "[1, -2]", 9, "load.normal_force_n[1]", "-2"), ("[1]", "['5 N']", 9, "load.normal_force_n[0]", '"5 N"'),
 ]  # fmt: skip
 
 
@@ -125,37 +122,31 @@ def test_a_text_that_is_no_toml_is_named_by_its_line(old, new, line):
     assert (p.line, p.key) == (line, "")
 
 
-@pytest.mark.parametrize(
-    ("text", "line", "key"),
-    [
-        (BOTTLE.replace("[100, 20]", "[40, 20]"), 3, "object.profile_mm[2]"),
-        (BOTTLE.replace("[100, 20]", "[50, 30]"), 3, "object.profile_mm[2]"),
-        (BOTTLE.replace("[100, 20]", "[100, 0]"), 3, "object.profile_mm[2]"),
-        (BOTTLE.replace("[150, 12]", "[150, -1]"), 3, "object.profile_mm[3]"),
-        (BOTTLE.replace("[100, 20]", "[100, 20, 1]"), 3, "object.profile_mm[2]"),
-        (BOTTLE.replace("  [100, 20],\n", ""), 3, "object.profile_mm"),
-        (BOTTLE.replace("[150, 12],\n]", "[150, 12],\n]\nwall_mm = 9"), 8, "object.wall_mm"),
-        (BOTTLE.replace("[150, 12],\n]", "[150, 12],\n]\nbase_wall_mm = 1"), 8, "object.base_wall_mm"),
-        (BOTTLE.replace("[150, 12],\n]", "[150, 12],\n]\nwall_mm = 1\nwall_material = 'custom'"), 9,
-         "object.wall_material"),
-        (body('shape = "box"\nsize_mm = [60, 40, 120]\nedge_radius_mm = 21'), 4, "object.edge_radius_mm"),
-        (body('shape = "plane"\nthickness_mm = 20'), 5, "candidates.angles_deg"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("text", "line", "key"), [
+    (BOTTLE.replace("[100, 20]", "[40, 20]"), 3, "object.profile_mm[2]"),
+    (BOTTLE.replace("[100, 20]", "[50, 30]"), 3, "object.profile_mm[2]"),
+    (BOTTLE.replace("[100, 20]", "[100, 0]"), 3, "object.profile_mm[2]"),
+    (BOTTLE.replace("[150, 12]", "[150, -1]"), 3, "object.profile_mm[3]"),
+    (BOTTLE.replace("[100, 20]", "[100, 20, 1]"), 3, "object.profile_mm[2]"),
+    (BOTTLE.replace("  [100, 20],\n", ""), 3, "object.profile_mm"),
+    (BOTTLE.replace("[150, 12],\n]", "[150, 12],\n]\nwall_mm = 9"), 8, "object.wall_mm"),
+    (BOTTLE.replace("[150, 12],\n]", "[150, 12],\n]\nbase_wall_mm = 1"), 8, "object.base_wall_mm"),
+    (BOTTLE.replace("[150, 12],\n]", "[150, 12],\n]\nwall_mm = 1\nwall_material = 'custom'"), 9,
+     "object.wall_material"),
+    (body('shape = "box"\nsize_mm = [60, 40, 120]\nedge_radius_mm = 21'), 4, "object.edge_radius_mm"),
+    (body('shape = "plane"\nthickness_mm = 20'), 5, "candidates.angles_deg"),
+])  # fmt: skip
 def test_an_object_that_makes_no_body_is_named_by_its_key(text, line, key):
     p = problem(text)
     assert (p.key, p.line) == (key, line)
 
 
-@pytest.mark.parametrize(
-    ("pose", "key", "found"),
-    [
-        ("point_mm = [0, 0, 0]\napproach = [0, 0, 0]\nlong_side = [0, 0, 1]", "approach", "[0, 0, 0]"),
-        ("point_mm = [0, 0, 0]\napproach = [1, 0, 0]\nlong_side = [-2, 0.1, 0]", "long_side", "[-2.0, 0.1, 0.0]"),
-        ("point_mm = [0, 0, 9e3]\napproach = [1, 0, 0]\nlong_side = [0, 0, 1]", "point_mm", "[0.0, 0.0, 9000.0]"),
-        ("point_mm = [0, 0, 0]\napproach = [1, 0, 0]", "long_side", "nothing"),
-    ],
-)
+@pytest.mark.parametrize(("pose", "key", "found"), [
+    ("point_mm = [0, 0, 0]\napproach = [0, 0, 0]\nlong_side = [0, 0, 1]", "approach", "[0, 0, 0]"),
+    ("point_mm = [0, 0, 0]\napproach = [1, 0, 0]\nlong_side = [-2, 0.1, 0]", "long_side", "[-2.0, 0.1, 0.0]"),
+    ("point_mm = [0, 0, 9e3]\napproach = [1, 0, 0]\nlong_side = [0, 0, 1]", "point_mm", "[0.0, 0.0, 9000.0]"),
+    ("point_mm = [0, 0, 0]\napproach = [1, 0, 0]", "long_side", "nothing"),
+])  # fmt: skip
 def test_an_explicit_pose_must_fix_a_frame(pose, key, found):
     p = problem(BALL.replace("stations_mm = [0]", f"[[candidates.poses]]\n{pose}"))
     assert (p.key, p.found) == (f"candidates.poses[0].{key}", found)
@@ -190,21 +181,14 @@ def test_a_shape_without_dimensions_lists_all_that_it_needs(shape):
     assert sorted(p.key for p in problems(text)) == sorted(set(required) - {"object.shape"})
 
 
-@pytest.mark.parametrize(
-    ("override", "key", "found"),
-    [
-        ("radius_mm=40", "radius_mm", "an unknown key"),
-        ("gripper=1", "gripper", "1"),
-        ("friction.mu", "", '"friction.mu"'),
-        ("friction..mu=a", "", '"friction..mu=a"'),
-        ("friction.mu=[1", "", '"friction.mu=[1"'),
-        ("object.radius_m=0.04", "object.radius_m", "an unknown key"),
-        ("object.radius_mm=O.3", "object.radius_mm", '"O.3"'),
-        ("gripper.element=hex9", "gripper.element", '"hex9"'),
-        ("load.normal_force_n=[1, -1]", "load.normal_force_n[1]", "-1"),
-        ("sweep.friction.mu=[1, -1]", 'sweep."friction.mu"[1]', "-1"),
-    ],
-)
+@pytest.mark.parametrize(("override", "key", "found"), [
+    ("radius_mm=40", "radius_mm", "an unknown key"), ("gripper=1", "gripper", "1"),
+    ("friction.mu", "", '"friction.mu"'), ("friction..mu=a", "", '"friction..mu=a"'),
+    ("friction.mu=[1", "", '"friction.mu=[1"'), ("object.radius_m=0.04", "object.radius_m", "an unknown key"),
+    ("object.radius_mm=O.3", "object.radius_mm", '"O.3"'), ("gripper.element=hex9", "gripper.element", '"hex9"'),
+    ("load.normal_force_n=[1, -1]", "load.normal_force_n[1]", "-1"),
+    ("sweep.friction.mu=[1, -1]", 'sweep."friction.mu"[1]', "-1"),
+])  # fmt: skip
 def test_an_override_is_named_as_a_line_is(override, key, found):
     p = problem(BALL, override)
     assert (p.file, p.line, p.key, p.found) == (f"--set {override}", None, key, found)
@@ -271,8 +255,7 @@ def test_combinations_of_a_sweep_that_make_no_scene_are_named():
 
 def test_too_many_cases_are_refused():
     many = (
-        "candidates.stations=10000",
-        "candidates.stations_mm=[-30, 30]",
+        "candidates.stations=10000", "candidates.stations_mm=[-30, 30]",
         "load.normal_force_n=" + str(list(range(1, 60))),
     )
     assert problem(BALL, *many).found == "1180000"

@@ -139,20 +139,14 @@ def test_nothing_is_replaced_unasked(tmp_path, there, capsys):
     assert (tmp_path / there).read_text() != "mine"
 
 
-@pytest.mark.parametrize(
-    ("words", "told"),
-    [
-        ([], "{bottle,cup,cylinder,mesh}"),
-        (["botle"], "did you mean 'bottle'?"),
-        (["mesh"], "a mesh needs --mesh FILE and --unit"),
-        (["mesh", "--mesh", str(FLASK)], "a mesh needs --unit"),
-        (["mesh", "--mesh", str(FLASK), "--unit", "inch"], 'the unit should be "mm"'),
-        (["mesh", "--mesh", "no.stl", "--unit", "mm"], "no.stl"),
-        (["cup", "--mesh", str(FLASK)], "--mesh: found beside 'cup'"),
-        (["cup", "-o", "$(rm -r .)"], "expected letters"),
-        (["cup", "-o", 'a"b'], "expected letters"),
-    ],
-)
+@pytest.mark.parametrize(("words", "told"), [
+    ([], "{bottle,cup,cylinder,mesh}"), (["botle"], "did you mean 'bottle'?"),
+    (["mesh"], "a mesh needs --mesh FILE and --unit"), (["mesh", "--mesh", str(FLASK)], "a mesh needs --unit"),
+    (["mesh", "--mesh", str(FLASK), "--unit", "inch"], 'the unit should be "mm"'),
+    (["mesh", "--mesh", "no.stl", "--unit", "mm"], "no.stl"),
+    (["cup", "--mesh", str(FLASK)], "--mesh: found beside 'cup'"), (["cup", "-o", "$(rm -r .)"], "expected letters"),
+    (["cup", "-o", 'a"b'], "expected letters"),
+])  # fmt: skip
 def test_what_cannot_be_started_is_refused_and_writes_nothing(words, told, tmp_path, capsys):
     assert main(["init", *words]) == USAGE
     assert told in capsys.readouterr().err

@@ -127,15 +127,11 @@ def test_programs_get_every_common_case_in_si(pair):
         assert data["cases"][0]["a"] == result.read("quality/pcm")[1, 0, 1]  # read back, so the same bits
 
 
-@pytest.mark.parametrize(
-    ("axes", "name"),
-    [
-        (grid_axes([1.0]), "station"),
-        (grid_axes(forces=[3.0]), "normal_force"),
-        (grid_axes([0, 1], [0], poses=True), "station"),
-        (grid_axes(sweep=(Axis("mu", np.array([0.5]), "", "friction.mu"),)), "axes"),
-    ],
-)
+@pytest.mark.parametrize(("axes", "name"), [
+    (grid_axes([1.0]), "station"), (grid_axes(forces=[3.0]), "normal_force"),
+    (grid_axes([0, 1], [0], poses=True), "station"),
+    (grid_axes(sweep=(Axis("mu", np.array([0.5]), "", "friction.mu"),)), "axes"),
+])  # fmt: skip
 def test_maps_that_share_nothing_are_refused(pair, tmp_path, axes, name):
     other = make(tmp_path / "other.hdf", lambda *x: 0.01 + 0 * sum(x), axes)
     with pytest.raises(StudyError, match=name) as error:

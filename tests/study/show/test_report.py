@@ -264,32 +264,24 @@ POSES = axes(stations=(0, 1), angles=(0.0,), forces=(1.0, 2.0), station_units=""
 TEXTS = (replace(axis("material", (0, 1), "", "gripper.material"), options=("blatz_ko", "neo_hookean")),)
 
 
-@pytest.mark.parametrize(
-    ("layout", "options", "expected"),
-    [
-        (Layout(SMALL, 0, patches=False), {}, "station 10 mm"),
-        (Layout(SMALL, 24), {"state": lambda i: "it failed"}, "0 of 1"),
-        (Layout(SMALL, 24), {"state": lambda i: "missing", "scene": "a = 1"}, "0 of 1"),
-        (Layout(SMALL, 0, patches=False), {"maps/quality": None, "maps/e_n": None}, "station 10 mm"),
-        (Layout(POSES, 0, patches=False), {"labels": ("left <&>", "right")}, "right"),
-        (Layout(axes((0,), (0,), (1.0,), sweep=TEXTS), 0, patches=False), {"scene": "a = 1"}, "blatz_ko"),
-    ],
-    ids=["one case", "all failed", "nothing done", "no scores", "poses", "sweep of texts"],
-)  # fmt: skip
+@pytest.mark.parametrize(("layout", "options", "expected"), [
+    (Layout(SMALL, 0, patches=False), {}, "station 10 mm"),
+    (Layout(SMALL, 24), {"state": lambda i: "it failed"}, "0 of 1"),
+    (Layout(SMALL, 24), {"state": lambda i: "missing", "scene": "a = 1"}, "0 of 1"),
+    (Layout(SMALL, 0, patches=False), {"maps/quality": None, "maps/e_n": None}, "station 10 mm"),
+    (Layout(POSES, 0, patches=False), {"labels": ("left <&>", "right")}, "right"),
+    (Layout(axes((0,), (0,), (1.0,), sweep=TEXTS), 0, patches=False), {"scene": "a = 1"}, "blatz_ko"),
+], ids=["one case", "all failed", "nothing done", "no scores", "poses", "sweep of texts"])  # fmt: skip
 def test_odd_files_give_a_page(tmp_path, layout, options, expected):
     page = page_of(make(tmp_path / "odd.hdf", layout, **options))
     assert page.balanced
     assert expected in page.text
 
 
-@pytest.mark.parametrize(
-    ("layout", "values", "expected"),
-    [
-        (Layout(SMALL, 24), {"checks/min_det_f": [0.1, -0.1]}, "min det f -0.1"),
-        (Layout(SMALL, 0), {"maps/payload": [0.25] * 3}, "250 g"),
-    ],
-    ids=["bad check", "payload"],
-)
+@pytest.mark.parametrize(("layout", "values", "expected"), [
+    (Layout(SMALL, 24), {"checks/min_det_f": [0.1, -0.1]}, "min det f -0.1"),
+    (Layout(SMALL, 0), {"maps/payload": [0.25] * 3}, "250 g"),
+], ids=["bad check", "payload"])  # fmt: skip
 def test_the_verdict_warns_of_what_the_best_case_lacks(tmp_path, layout, values, expected):
     with open_result(make(tmp_path / "one.hdf", replace(layout, patches=False), **values)) as result:
         data = judge(dataset(result))

@@ -11,8 +11,7 @@ from tests.study.chromium import PROGRAM, Browser
 from tests.study.sealing import sealed
 
 pytestmark = [
-    pytest.mark.long,
-    pytest.mark.skipif(PROGRAM is None, reason="no Chromium on this machine"),
+    pytest.mark.long, pytest.mark.skipif(PROGRAM is None, reason="no Chromium on this machine"),
 ]
 REASON = "</script> convergence <b>lost</b>"
 

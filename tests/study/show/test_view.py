@@ -236,8 +236,7 @@ def test_a_page_that_would_grow_too_large_says_what_it_leaves_out(shown, monkeyp
 
 def test_the_command_refuses_names_that_nothing_would_open(file, tmp_path, capsys):
     for words, code in (
-        (["--screenshot", tmp_path / "a.jpg"], USAGE),
-        (["--html", tmp_path / "no" / "a.html"], CANNOT_WRITE),
+        (["--screenshot", tmp_path / "a.jpg"], USAGE), (["--html", tmp_path / "no" / "a.html"], CANNOT_WRITE),
         (["--candidate", "17", "--html", tmp_path / "a.html"], USAGE),
         (["--at", "500", "--html", tmp_path / "a.html"], USAGE),
     ):
