@@ -193,7 +193,9 @@ def ranked(ds: xr.Dataset, k: int, by: str | None = None) -> IntArray:
     places, group, head = _places(score), np.zeros(len(order), np.int64), 0
     for n, i in enumerate(order):
         first, lost = order[head], flags[[order[head], i]] & LOST > 0
-        alike = places[i] == places[first] or (errors is not None and errors.apart(first, i) is False)
+        alike = places[i] == places[first]
+        if errors is not None and not alike:  # an error of its own that is larger makes no grasp better
+            alike = errors.apart(first, i) is False and score[i] > score[first] - errors.half_width[first]
         head = head if alike and lost[0] == lost[1] else n
         group[n] = head
     width = values_of(ds, "opening")[..., k].ravel() if "opening" in ds else np.zeros(len(score))

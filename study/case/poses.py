@@ -64,10 +64,9 @@ def in_file(point: FloatArray, approach: FloatArray, long_side: FloatArray, plac
     return (*(round(float(x), 3) + 0.0 for x in mm), *(round(float(x), 6) + 0.0 for x in sides))
 
 
-def pose_of(numbers: Sequence[float], prefix: str = "") -> GraspPose:
-    """The pose of a scene that nine numbers of `in_file` give, labelled by its place."""
-    pose = GraspPose(point_mm=numbers[:3], approach=numbers[3:6], long_side=numbers[6:])  # type: ignore[arg-type]
-    return pose.model_copy(update={"label": prefix + pose.place})
+def pose_of(numbers: Sequence[float]) -> GraspPose:
+    """The pose of a scene that nine numbers of `in_file` give."""
+    return GraspPose(point_mm=numbers[:3], approach=numbers[3:6], long_side=numbers[6:])  # type: ignore[arg-type]
 
 
 def across(approach: FloatArray, along: FloatArray) -> FloatArray:

@@ -49,8 +49,8 @@ def refined(scene: Scene, rounds: Rounds) -> Scene:
 
 
 def with_places(poses: Sequence[GraspPose], rounds: Sequence[Sequence[Place]]) -> tuple[GraspPose, ...]:
-    """The poses of a scene, then those that rounds added, which are named by round and place."""
-    return (*poses, *(pose_of(x[1:], f"round {r}: ") for r, added in enumerate(rounds, start=1) for x in added))
+    """The poses of a scene, then those that rounds added."""
+    return (*poses, *(pose_of(x[1:]) for added in rounds for x in added))
 
 
 def _renumbered(

@@ -36,17 +36,6 @@ class GraspPose(SceneSection):
     label: Text = Field("", max_length=100, description="name of the grasp")
     point: ClassVar[Any] = si("point_mm")
 
-    @property
-    def place(self) -> str:
-        """Where it is and from where it comes, which tells grasps apart.
-
-        >>> GraspPose(point_mm=(0.0, 0.0, 20.0), approach=(0.0, 1.0, 0.0), long_side=(0.0, 0.0, 1.0)).place
-        '0, 0, 20 mm, from 90/0 deg'
-        """
-        x, y, z = _unit(self.approach)
-        azimuth, elevation = math.degrees(math.atan2(y, x)), math.degrees(math.asin(max(-1.0, min(1.0, z))))
-        return "{:.0f}, {:.0f}, {:.0f} mm, from {:.0f}/{:.0f} deg".format(*self.point_mm, azimuth, elevation)
-
     def rules(self) -> Errors:
         """Directions that do not fix a frame, points far from any object."""
         cosine = sum(a * b for a, b in zip(_unit(self.approach), _unit(self.long_side), strict=True))
@@ -113,7 +102,7 @@ class Candidates(SceneSection):
     def labels(self) -> tuple[str, ...]:
         """Names of the candidates: stations, then angles at each."""
         if self.poses:
-            return tuple(pose.label or f"pose {i}" for i, pose in enumerate(self.poses))
+            return tuple(pose.label or f"p{i:02d}" for i, pose in enumerate(self.poses))
         return tuple(f"{s:g} mm, {a:g} deg" for s in self.station_values_mm for a in self.angles_deg)
 
     @property

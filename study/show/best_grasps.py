@@ -13,6 +13,7 @@ from softjaw.study.case.result import TIE
 from softjaw.study.flags import LOST, OF_FILE, Flag, flags_in
 from softjaw.study.quantities import BY_KEY, FORCE_RANGE, MAIN, MODELS, STATES, map_row
 from softjaw.study.ranking import (
+    LARGEST,
     Sure,
     at_level,
     distinct,
@@ -35,7 +36,7 @@ from softjaw.study.units import GRAVITY, in_si, shown, shown_text, shown_unit
 NOTES_WIDTH, OTHERS_WIDTH, LABEL_WIDTH = 13, 16, 20  # characters
 MU_ERROR = 0.1  # of mu, by which it is off where nothing is known of it
 LEVER, LEVER_SHARE = 1e-3, 0.1  # [m] and loss of payload, below which the lever of the weight is not worth a word
-BRIEF = ("payload", "quality", "e_n", "opening")  # maps of a table in a terminal
+BRIEF = ("payload", "opening", "quality", "e_n")  # maps of a table in a terminal
 FINER = Flag.COARSE | Flag.NO_FIT | Flag.NO_CORNERS | Flag.NODAL | Flag.LEFT_OUT  # what a finer mesh or effect cures
 
 
@@ -64,7 +65,8 @@ def best(
     order, score = [int(i) for i in ranked(ds, k, by)], score_of(ds, by)
     places = distinct(ds, order, rank_values(ds, score, k), k, top) if lines else []
     listed = [place.best for place in places] or order[: top or None]
-    table = case_table(ds, [(*unravelled(i, shape), k) for i in listed], True, maps)
+    shared = common(flags[..., k].ravel()[listed]) if maps is BRIEF else 0
+    table = case_table(ds, [(*unravelled(i, shape), k) for i in listed], True, maps, shared)
     if not order:
         return Table(f"no candidate is solved at {forces(ds)[k]:g} N{why}{_solved_elsewhere(ds)}", table.columns, ())
     rows = [row | {"others": folded_text(ds, place)} for row, place in zip(table.rows, places, strict=False)]
@@ -95,16 +97,18 @@ def summary(result: Any) -> str:
     width = terminal_width()
     table = [best_text(dataset(result), width)] if np.any(result.status == DONE) else []
     again = f"; {RESUME}" if unfinished(result) else ""
-    lines = [counts(result), *reasons(result, width), *time_split(result), *table]
+    lines = [counts(result), *reasons(result, width, notes=not table), *time_split(result), *table]
     return "\n".join([*lines, f"results are in {result.path}{again}"])
 
 
-def case_table(ds: xr.Dataset, cases: Iterable[Index], rank: bool = False, maps: Collection[str] = MAIN) -> Table:
+def case_table(
+    ds: xr.Dataset, cases: Iterable[Index], rank: bool = False, maps: Collection[str] = MAIN, known: int = 0
+) -> Table:
     """Cases as rows: where they are, their maps with the errors that are known, their flags and notes.
 
     ``ds`` (xarray.Dataset): with flags as `study.ranking.judged` gives them. ``rank``: whether the cases are the best
     ones in their order, all at one force. ``maps``: which maps a table has; the first ones are the last that a narrow
-    text leaves out.
+    text leaves out. ``known``: flags that its notes do not repeat.
     """
     axes, poses = axes_of(ds), ds.attrs["poses"]
     columns = [Column("rank"), Column("name")] if rank else [Column("name"), Column("state", wrap=NOTES_WIDTH)]
@@ -112,6 +116,8 @@ def case_table(ds: xr.Dataset, cases: Iterable[Index], rank: bool = False, maps:
         title, pose = "force" if axis is axes[-1] else "", poses and axis.name in ("station", "angle")
         columns.append(Column(axis.name, axis.units, title, digits=5, people=not pose))
     columns += [Column("label", wrap=LABEL_WIDTH, people=named(ds))] if poses else []
+    middles = ds["finger_pose_origin"].values.mean(axis=-2) if poses and "finger_pose_origin" in ds else None
+    columns += [Column(axis, "m", people=False) for axis in "xyz"] * (middles is not None)
     quantities = _map_columns(ds, maps)
     values = {c.name: values_of(ds, *_of_model(ds, c.name)) for c in quantities}
     bounds = [name for name in FORCE_RANGE if name in ds]
@@ -125,9 +131,10 @@ def case_table(ds: xr.Dataset, cases: Iterable[Index], rank: bool = False, maps:
         row |= {"rank": place_, "name": short_name(ds, candidate_of(ds, index))}
         row |= {"state": STATES[int(ds.status.values[index])]}
         row |= {"label": str(ds.label.values[index[-3:-1]]), "flags": int(ds["flags"].values[index]) & OF_FILE}
+        row |= {} if middles is None else dict(zip("xyz", middles[index].tolist(), strict=True))
         row |= {name: float(found[index]) for name, found in values.items()}
         row |= {name: float(ds[name].values[index[:-1]]) for name in bounds}
-        rows.append(row | {"safe_forces": safe_range(ds, index), "notes": note(ds, index)})
+        rows.append(row | {"safe_forces": safe_range(ds, index), "notes": note(ds, index, known)})
     return Table("", columns, rows)
 
 
@@ -212,6 +219,12 @@ def _text(found: Sure, i: int, units: str) -> str:
     return f"{value} +- {shown_text(found.half_width[i], units, 2)}"
 
 
+def common(marks: np.ndarray) -> int:
+    """Flags that more than half of some grasps have: a line below says it once."""
+    share = ((flag, np.mean(marks & flag != 0)) for flag in flags_in(int(np.bitwise_or.reduce(marks, initial=0))))
+    return sum(int(flag) for flag, part in share if part > 0.5 and len(marks) > 2)
+
+
 def _legend(flags: np.ndarray, listed: Sequence[int], k: int) -> list[str]:
     """The flags in the table by what to do about them, how many grasps have each, and what the most frequent means."""
     marks, notes = flags[..., k].ravel()[list(listed)], []
@@ -242,13 +255,14 @@ def answer(ds: xr.Dataset, index: Index, why: str = "") -> dict[str, tuple[str, 
     ``index`` is its case at the force that is shown, ``why`` says why it is that force.
     """
     there = spot(ds, index)
-    name = short_name(ds, candidate_of(ds, index))
-    nameless = there.words and ds.attrs["poses"] and not named(ds)
-    lines = {"where": (name if nameless else place(ds, index) or name, there.words)}
+    name = place(ds, index)
+    nameless = there.sides and not named(ds)
+    words = ", ".join(text for text in (there.sides, there.beside) if text)
+    lines = {"where": (there.sides, f"{there.beside} ({name})") if nameless else (name, words)}
     if np.isfinite(opening := at(ds, "opening", index)):
         lines["opening"] = (shown_text(opening, "m", 3), "at first touch")
     lines |= {"force": _force(ds, index, why), "holds": _held(ds, index)}
-    lines["not more"] = ("", _limit(ds, index, there.lever))
+    lines["limit"] = ("", _limit(ds, index, there.lever))
     return {key: value for key, value in lines.items() if any(value)}
 
 
@@ -284,7 +298,8 @@ def _force(ds: xr.Dataset, index: Index, why: str) -> tuple[str, str]:
     if mass is None:
         held = [f"{shown_text(float(values), 'kg', 3)} at {forces(ds)[k]:g} N" for k in _three(len(forces(ds)))
                 if k != index[-1] and np.isfinite(values := at(ds, "payload", (*index[:-1], k)))]  # fmt: skip
-        return pressed, "; ".join([*[why.strip(", ")] * bool(why), *held, "with object.mass_g: the least force"])
+        why = why.strip(", ").replace(LARGEST, "")  # which the limit says
+        return pressed, "; ".join([*[why] * bool(why), *held, "set object.mass_g for the least force"])
     wanted, (low, error) = f"{safety:g} times its {shown_text(in_si('mass_g', mass), 'kg', 3)}", force_to_use(ds, index)
     if not np.isfinite(low):
         return pressed, f"no solved force holds {wanted}"
@@ -318,7 +333,7 @@ def _limit(ds: xr.Dataset, index: Index, lever: float) -> str:
     if high < forces(ds)[-1] * (1 - NEGLIGIBLE):
         parts.append(f"the wall bears {high:.3g} N at most")
     elif k == len(forces(ds)) - 1:
-        parts.append("no larger force was solved")
+        parts.append("no larger force is solved")
     slide = 2 * min(at(ds, "f_x_max", index), at(ds, "f_y_max", index)) / GRAVITY
     if lever > LEVER and at(ds, "payload", index) < slide * (1 - LEVER_SHARE):
         free = f"{number(shown(slide, 'kg'))} g"

@@ -113,7 +113,7 @@ def place(ds: xr.Dataset, index: Index, force: bool = False) -> str:
     status, parts = ds.variables["status"], []
     for axis, i, length in zip(map(str, status.dims[:-1]), index, status.shape, strict=False):
         if axis == "station" and ds.attrs["poses"]:
-            parts.append(str(ds.variables["label"].values[index[-3], index[-2]]) or f"pose {i}")
+            parts.append(str(ds.variables["label"].values[index[-3], index[-2]]))
         elif length > 1 or axis == "station":
             gap = " " if ds.variables[axis].attrs.get("options") else "\u00a0"
             parts.append(f"{spoken(axis)}{gap}{axis_text(ds, axis, i)}")
@@ -176,11 +176,6 @@ def flags_of(ds: xr.Dataset, index: Index) -> list[Flag]:
     return flags_in(int(ds.variables["flags"].values[index]))
 
 
-def words_of(ds: xr.Dataset, index: Index) -> str:
-    """Flags of a case in words."""
-    return flag_words(int(ds.variables["flags"].values[index]))
-
-
 def check(ds: xr.Dataset, name: str, index: Index) -> float:
     """A check of the worse finger, NaN if there is none."""
     name = f"check_{name}"
@@ -201,14 +196,15 @@ def flagged(ds: xr.Dataset, index: Index) -> list[str]:
     return [f"{spoken(n)} {number(v)}" for n, v in values.items() if np.isfinite(v) and not passes(n, v)]
 
 
-def note(ds: xr.Dataset, index: Index) -> str:
-    """Why a case has no result; the checks that a solved one misses, and its flags."""
+def note(ds: xr.Dataset, index: Index, known: int = 0) -> str:
+    """Why a case has no result; the checks that a solved one misses, and its flags but for ``known`` ones."""
     state = ds.variables["status"].values[index]
     if state == FAILED or state in NO_GRASP:
         return str(ds.variables["message"].values[index]) or "no reason was given"
     if state != DONE:
         return ""
-    return ", ".join(text for text in (*flagged(ds, index), words_of(ds, index)) if text)
+    words = flag_words(int(ds["flags"].values[index]) & ~known)
+    return ", ".join(text for text in (*flagged(ds, index), words) if text)
 
 
 def grouped(ds: xr.Dataset) -> list[Reason]:

@@ -36,20 +36,15 @@ def short_name(ds: xr.Dataset, candidate: int) -> str:
 
 
 def named(ds: xr.Dataset) -> bool:
-    """Whether somebody gave the poses names; those of the sampler have their coordinates as labels."""
-    try:
-        poses = parse_scene(ds.attrs["scene"], check_files=False).candidates.poses
-    except SceneError:
-        return True
-    # Poses of a file are rounded, so some of their coordinates are too.
-    given = [pose.label.replace("-0", "0") != pose.place.replace("-0", "0") for pose in poses if pose.label]
-    return 2 * sum(given) > len(given)
+    """Whether somebody gave poses names."""
+    return any(label != f"p{i:02d}" for i, label in enumerate(ds.label.values[..., 0].ravel()))
 
 
 class Spot(NamedTuple):
-    """A grasp on its object: in words, and how far the centre of mass lies from the middle of the pads [m]."""
+    """A grasp on its object in words, the sides of poses alone, and how far the weight is from the pads' middle [m]."""
 
-    words: str
+    sides: str
+    beside: str
     lever: float
 
 
@@ -62,21 +57,21 @@ def spot(ds: xr.Dataset, index: Index) -> Spot:
         centre = centre_of_mass(scene, build_object(scene.object))
         frame, points = own_frame(scene.object), surface_triangles(scene.object)[0]
     except (SceneError, ValueError, OSError, AttributeError):
-        return Spot("", math.nan)
+        return Spot("", "", math.nan)
     if origin is None or turn is None or not np.isfinite(turn[index]).all():
-        return Spot("", math.nan)
-    offset = frame.to_pad(origin[index].mean(axis=0)) - centre
-    closing = frame.rotation.T @ turn[index][0, :, 2]
+        return Spot("", "", math.nan)
+    offset = origin[index].mean(axis=0) - frame.to_object(centre)
+    closing = turn[index][0, :, 2]
     offset -= (offset @ closing) * closing  # both fingers bear along it
-    words = [_sides(np.ptp(points, axis=0), closing)] * bool(ds.attrs["poses"])
-    return Spot(", ".join([*words, _beside(offset)]), float(np.linalg.norm(offset)))
+    sides = _sides(np.ptp(frame.to_object(points), axis=0), closing) if ds.attrs["poses"] else ""
+    return Spot(sides, _beside(offset), float(np.linalg.norm(offset)))
 
 
 def _sides(extents: np.ndarray, closing: np.ndarray) -> str:
     """Which sides of an object the pads press on."""
     axis = int(np.abs(closing).argmax())
     if abs(closing[axis]) < math.cos(math.radians(15.0)):
-        return "across its edges"
+        return f"from the sides along ({', '.join(f'{x + 0.0:.2g}' for x in np.round(closing, 2))})"
     rank = int(np.sum(extents < extents[axis] * (1 - SAME_EXTENT)))
     alone = np.sum(np.abs(extents - extents[axis]) <= SAME_EXTENT * extents[axis]) == 1
     return f"on the {SIDES[rank] if alone else 'sides'} facing {'xyz'[axis]}"
@@ -86,12 +81,10 @@ def _beside(offset: np.ndarray) -> str:
     """Where the middle of the pads lies from the centre of mass [m].
 
     >>> _beside(np.array([0.0, -0.012, 0.003]))
-    '12 mm towards -y of and 3 mm above the centre of mass'
+    '12 mm towards -y and 3 mm towards +z of the centre of mass'
     """
-    parts = [f"{shown_text(abs(d), 'm', 2)} towards {'-' if d < 0 else '+'}{axis} of"
-             for axis, d in zip("xy", offset[:2], strict=True) if abs(d) > NEARBY]  # fmt: skip
-    if abs(offset[2]) > NEARBY:
-        parts.append(f"{shown_text(abs(offset[2]), 'm', 2)} {'below' if offset[2] < 0 else 'above'}")
-    return f"{' and '.join(parts) or 'at'} the centre of mass"
+    parts = [f"{shown_text(abs(d), 'm', 2)} towards {'-' if d < 0 else '+'}{axis}"
+             for axis, d in zip("xyz", offset, strict=True) if abs(d) > NEARBY]  # fmt: skip
+    return f"{' and '.join(parts)} of the centre of mass" if parts else "at the centre of mass"
 
 

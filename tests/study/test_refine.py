@@ -292,8 +292,8 @@ def test_a_grown_file_of_poses_keeps_rows_labels_and_places(tmp_path):
         assert after.layout.added == tuple(rounds)
         assert after.read("quality/ccm")[:2].tobytes() == quality.tobytes()
         assert (after.codes.reshape(8, 2)[2:] == MISSING).all()
-        assert after.labels.ravel()[:2].tolist() == ["wide", "pose 1"]
-        assert all(str(label).startswith("round ") for label in after.labels.ravel()[2:])
+        assert after.labels.ravel()[:2].tolist() == ["wide", "p01"]
+        assert after.labels.ravel()[2:].tolist() == [f"p{i:02d}" for i in range(2, 8)]
         text = big.layout.options().replace(str(list(rounds[0][0])), "[1.0, 2.0]")
         with pytest.raises(ValueError, match="2 numbers"):
             layout_from_options(after.axes, text)

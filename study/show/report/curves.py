@@ -214,11 +214,12 @@ def wall_section(view: View, index: Index) -> Block | None:
     displaced, origin = view.displacement(index), field(view.ds, "finger_pose_origin")
     if displaced is None or origin is None:
         return None
-    u, angle = displaced
+    (u, angle), placed = displaced, view.placed
+    u = u @ placed.rotation
     before: Any = undeformed(view.scene.object, angle)
     out = np.array([math.cos(angle), math.sin(angle), 0.0])
     beside = np.array([-out[1], out[0], 0.0])
-    j = int(np.abs(before[0, :, 2] - view.placed.to_pad(origin[index][0])[2]).argmin())
+    j = int(np.abs(before[0, :, 2] - placed.to_pad(origin[index][0])[2]).argmin())
     made = plots.figure(1, 2, ("along the axis, through both fingers", f"across it at {1e3 * before[0, j, 2]:.4g} mm"))
     half = len(before) // 2
     for points, name, dash in ((before, "undeformed", "dash"), (before + u, "deformed", "solid")):

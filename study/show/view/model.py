@@ -1,6 +1,6 @@
 """What a three-dimensional view shows of a study: object, cells, cases; the same for windows, pages, figures and files.
 
-Positions are in m in the object's frame unless a unit is named.
+Positions are in m in the frame of the object's own file unless a unit is named.
 """
 
 from __future__ import annotations
@@ -88,11 +88,11 @@ class View:
         values = np.full(self.ds.status.shape, np.nan) if found is None else found * quantity(self.ds, name)[2]
         return values, [span(values[self.point][..., k]) for k in range(values.shape[-1])]
 
-    # --- the object, drawn in the frame in which its axis is z ---
+    # --- the object ---
 
     @cached_property
     def placed(self) -> Pose:
-        """Where the frame that is drawn in lies in that of the file's poses [m]."""
+        """Where the frame in which the object's axis is z lies in that of its file [m]."""
         try:
             return own_frame(self.scene.object)
         except (AttributeError, ValueError, OSError):  # the object is not drawn either
@@ -112,7 +112,7 @@ class View:
             return nothing
         pairs = np.column_stack([corners.ravel(), np.repeat(candidate, 3)])
         found, inverse = np.unique(pairs, axis=0, return_inverse=True)
-        return Surface(points[found[:, 0]], inverse.reshape(-1, 3), candidate)
+        return Surface(self.placed.to_object(points[found[:, 0]]), inverse.reshape(-1, 3), candidate)
 
     @cached_property
     def owner(self) -> np.ndarray:
@@ -137,7 +137,7 @@ class View:
     @cached_property
     def wall(self) -> np.ndarray | None:
         """Where the surface's points lie on the wall."""
-        return on_wall(self.scene.object, self.surface.points) if self.walled else None
+        return on_wall(self.scene.object, self.placed.to_pad(self.surface.points)) if self.walled else None
 
     @cached_property
     def _places(self) -> np.ndarray:
@@ -152,7 +152,9 @@ class View:
         approach = rotation[index][0][:, 2] @ self.placed.rotation
         angle = float(np.arctan2(-approach[1], -approach[0])) if np.hypot(*approach[:2]) > 1e-6 else 0.0
         before = undeformed(self.scene.object, angle)
-        return None if before is None else (self._places[index[-3:]].reshape(AROUND, ALONG, 3) - before, angle)
+        if before is None:
+            return None
+        return (self._places[index[-3:]].reshape(AROUND, ALONG, 3) - before) @ self.placed.rotation.T, angle
 
     def moved(self, index: Index) -> np.ndarray:
         """The surface's points ``(n, 3)``, moved with the wall of a case where the file has it."""
@@ -182,7 +184,7 @@ class View:
 
     def pads(self, index: Index) -> list[Pad]:
         """Both pads of a case; empty where it is not solved."""
-        return pads_of(self.ds, getattr(self.scene, "gripper", None), index, self.faces(index), self.placed)
+        return pads_of(self.ds, getattr(self.scene, "gripper", None), index, self.faces(index))
 
     def limit(self, index: Index) -> np.ndarray | None:
         """Points ``(r, c, 3)`` of the weaker finger's limit surface (CCM) [N, N, N mm]; None where there is none."""

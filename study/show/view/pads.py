@@ -1,4 +1,4 @@
-"""Both pads of a case in the object's frame: deformed faces with their pressure, sides, and friction's directions."""
+"""Both pads of a case: deformed faces with their pressure, sides, and friction's directions."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from softjaw.fem.objects.gap import Pose
 from softjaw.friction.patch import NEGLIGIBLE
 from softjaw.study.result.layout import DONE
 from softjaw.study.show.grasps import Index, at
@@ -133,16 +132,12 @@ def corners_of(centres: np.ndarray) -> np.ndarray:
     return centres
 
 
-def pads_of(ds: xr.Dataset, gripper: Any, index: Index, faces: Faces, placed: Pose) -> list[Pad]:
-    """Both pads at a case with its stored ``faces``; empty where it is not solved or the scene cannot be read.
-
-    ``placed`` is where the frame that is drawn in lies in that of the file's poses.
-    """
+def pads_of(ds: xr.Dataset, gripper: Any, index: Index, faces: Faces) -> list[Pad]:
+    """Both pads at a case with its stored ``faces``; empty where it is not solved or the scene cannot be read."""
     names = ("pose_rotation", "pose_origin", "closing", "frame_axes", "frame_origin")
     if at(ds, "status", index) != DONE or gripper is None or any(f"finger_{name}" not in ds for name in names):
         return []
     stored = [ds.variables[f"finger_{name}"].values[index] for name in names]
-    stored[:2] = placed.rotation.T @ stored[0], placed.to_pad(stored[1])
     if not all(np.isfinite(s).all() for s in stored):
         return []
     deepest = ds.variables["check_penetration_depth"].values[index] if "check_penetration_depth" in ds else np.zeros(2)

@@ -45,10 +45,7 @@ def save_picture(view: View, index: Index, path: Path, quantity: str, motion: st
         _object(plotter, view, index, quantity)
         _pads(plotter, view, index, motion)
         look(plotter, *view.eye(index), 0.9)
-        # the object is drawn with its axis upright; its file's own axes are named
-        named = ["xyz"[abs(column).argmax()] for column in view.placed.rotation.T]
-        axes = dict(zip(("xlabel", "ylabel", "zlabel"), named, strict=True))
-        plotter.add_axes(**axes, color=INK, viewport=(0.8, 0.0, 1.0, 0.25))
+        plotter.add_axes(color=INK, viewport=(0.8, 0.0, 1.0, 0.25))
         try:
             plotter.screenshot(path)
         finally:
@@ -209,7 +206,7 @@ def write_vtk(ds: xr.Dataset, path: Path, force: float | None = None) -> Path:
 def _object_file(view: View, index: Index) -> pv.PolyData:
     """The object's surface with its maps."""
     x, corners, cell = view.surface
-    body = pv.PolyData.from_regular_faces(view.placed.to_object(x), corners)
+    body = pv.PolyData.from_regular_faces(x, corners)
     body.cell_data["candidate"] = cell
     maps = {name: field(view.ds, name) for name in maps_of(view.ds)}
     for k, force in enumerate(forces(view.ds)):
@@ -219,7 +216,7 @@ def _object_file(view: View, index: Index) -> pv.PolyData:
             body.cell_data[f"{name}, {force:g} N"] = np.where(cell == NOBODY, np.nan, found[cell])
     if view.displacement(index) is not None:
         name = f"displacement, candidate {view.candidate(index)}, {forces(view.ds)[index[-1]]:g} N"
-        body.point_data[name] = (view.moved(index) - x) @ view.placed.rotation.T
+        body.point_data[name] = view.moved(index) - x
     return body
 
 
@@ -230,14 +227,11 @@ def _pads_file(view: View, force: int) -> pv.PolyData | None:
     if not pads:
         return None
     corners = np.concatenate([pad.quads() for *_, pad in pads])
-    faces = pv.PolyData.from_regular_faces(
-        view.placed.to_object(corners.reshape(-1, 3)), np.arange(4 * len(corners)).reshape(-1, 4)
-    )
+    faces = pv.PolyData.from_regular_faces(corners.reshape(-1, 3), np.arange(4 * len(corners)).reshape(-1, 4))
     sizes = [pad.pressure.size for *_, pad in pads]
     faces.cell_data["candidate"] = np.repeat([c for c, *_ in pads], sizes)
     faces.cell_data["finger"] = np.repeat([finger for _, finger, _ in pads], sizes)
     for name in ("pressure", "area"):
         faces.cell_data[name] = np.concatenate([getattr(pad, name).ravel() for *_, pad in pads])
-    normal = np.concatenate([pad.normal.reshape(-1, 3) for *_, pad in pads])
-    faces.cell_data["normal"] = normal @ view.placed.rotation.T
+    faces.cell_data["normal"] = np.concatenate([pad.normal.reshape(-1, 3) for *_, pad in pads])
     return faces

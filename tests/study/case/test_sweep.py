@@ -59,7 +59,7 @@ def test_an_explicit_pose_equals_the_station_that_it_describes():
     for pose, same in zip(place.poses, poses.axis_poses(0.03, theta, 0.0), strict=True):
         assert pose.rotation == pytest.approx(same.rotation, abs=1e-15)
         assert pose.origin == pytest.approx(same.origin, abs=1e-14)
-    assert (place.station, place.angle, place.label) == (0.0, 0.0, "pose 0")
+    assert (place.station, place.angle, place.label) == (0.0, 0.0, "p00")
 
 
 def mesh_scene(mesh, tmp_path, stations):

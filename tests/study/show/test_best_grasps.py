@@ -146,8 +146,8 @@ def test_grasps_are_ranked_by_the_least_force_where_a_mass_is_named():
 
 
 def test_of_grasps_that_errors_cannot_tell_apart_the_simpler_comes_first():
-    """Payloads 1.00, 0.99, 0.98 with 2 % each cannot be told apart, 0.9 can."""
-    ds = study([[1.0], [0.99], [0.98], [0.9]], flags=[float(Flag.NOT_ANTIPODAL), float(Flag.COARSE), 0.0, 0.0])
+    """Payloads 1.00, 0.99, 0.985 with 2 % each cannot be told apart, 0.9 can."""
+    ds = study([[1.0], [0.99], [0.985], [0.9]], flags=[float(Flag.NOT_ANTIPODAL), float(Flag.COARSE), 0.0, 0.0])
     assert stations(best(ds)) == [0.0, 1.0, 2.0, 3.0]
     ds["payload_error"] = (ds.status.dims, np.full(ds.status.shape, 0.02), {"units": ""})
     assert stations(best(ds)) == [2.0, 1.0, 0.0, 3.0]
@@ -155,6 +155,12 @@ def test_of_grasps_that_errors_cannot_tell_apart_the_simpler_comes_first():
     assert stations(best(ds)) == [2.0, 1.0, 0.0, 3.0]  # by their opening, which is the number of the payload here
     ds["opening"] = (ds.status.dims, np.repeat([0.01, 0.02, 0.03, 0.001], 2).reshape(ds.status.shape), {"units": "m"})
     assert stations(best(ds)) == [0.0, 1.0, 2.0, 3.0]
+
+
+def test_a_large_error_of_its_own_brings_no_grasp_forward():
+    ds = study([[1.0], [0.5]], flags=[float(Flag.NOT_ANTIPODAL), 0.0])
+    ds["payload_error"] = (ds.status.dims, np.repeat([0.02, 1.2], 2).reshape(ds.status.shape), {"units": ""})
+    assert stations(best(ds)) == [0.0, 1.0]
 
 
 def test_without_a_mass_the_force_is_the_largest_that_most_share_and_with_one_the_lowest_that_holds():

@@ -293,12 +293,12 @@ def test_the_verdict_says_why_a_higher_score_is_not_the_best_grasp(tmp_path):
     with open_result(make(tmp_path / "two.hdf", Layout(axes((0, 0.02), (0.0,), (1.0,)), 0, patches=False))) as result:
         data = judge(dataset(result))
         worse, better = sorted(order(data, 0), key=lambda i: at(data, "quality", i))
-        assert Flag.TOO_STRONG.word not in best_grasps.answer(data, data.attrs["best"])["not more"][1]
+        assert Flag.TOO_STRONG.word not in best_grasps.answer(data, data.attrs["best"])["limit"][1]
         marked = dataset(result)
         marked["flags"].values[better] = Flag.TOO_STRONG
         data = judge(marked)
         assert data.attrs["best"] == worse
-        assert Flag.TOO_STRONG.word in best_grasps.answer(data, worse)["not more"][1]
+        assert Flag.TOO_STRONG.word in best_grasps.answer(data, worse)["limit"][1]
 
 
 def test_the_same_file_gives_the_same_bytes(tmp_path):

@@ -147,7 +147,7 @@ def test_no_pads_are_invented(file, tmp_path, shown):
     view, _ = shown
     assert view.pads(FAILED) == []
     assert view.pads((0, 0, 1)) == []
-    assert pads_of(view.ds, None, (1, 0, 1), {}, view.placed) == []
+    assert pads_of(view.ds, None, (1, 0, 1), {}) == []
     with open_result(make(tmp_path / "bare.hdf", patches=False)) as result:
         bare, index = view_of(judge(dataset(result)), 2, (None, None), 5)
         one = bare.pads(index)[0]
