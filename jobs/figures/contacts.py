@@ -82,7 +82,7 @@ def candidates(ds: xr.Dataset) -> tuple[Any, str]:
 
     def whole(plotter: Any) -> None:
         solids.surface(plotter, 1e3 * view.surface.points, view.surface.triangles, color=NEUTRAL)
-        solids.dots(plotter, 1e3 * marks, MARK, color=FORCE)
+        drawing.dots(plotter, 1e3 * marks, MARK, FORCE)
         for finger in both:
             solids.block(plotter, finger)
             solids.pressures(plotter, finger, top)

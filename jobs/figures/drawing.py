@@ -79,6 +79,13 @@ def rendered(draw: Callable[[Any], None], towards: Any, up: Any, size: tuple[int
             plotter.close()
 
 
+def dots(plotter: Any, places: np.ndarray, radius: float, colour: str) -> None:
+    """Balls at ``places (n, 3)``."""
+    ball = pv.Sphere(radius=radius, theta_resolution=12, phi_resolution=12)
+    balls = pv.PolyData(places).glyph(geom=ball, scale=False, orient=False)
+    plotter.add_mesh(balls, color=colour, **solids.LIGHT)
+
+
 def trimmed(image: np.ndarray) -> np.ndarray:
     """The part of an image that is not empty paper, with a small margin."""
     drawn = (image[..., :3] < PAPER).any(axis=-1)

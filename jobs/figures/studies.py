@@ -13,7 +13,7 @@ from softjaw.study import pictures
 from softjaw.study.quantities import MODELS
 from softjaw.study.ranking import largest
 from softjaw.study.show import plots
-from softjaw.study.show.grasps import WIDE, field, forces, number, place
+from softjaw.study.show.grasps import field, forces, number, place
 from softjaw.study.show.object_surface import NOBODY
 from softjaw.study.show.view import solids
 from softjaw.study.show.view.model import View, read_scene
@@ -143,4 +143,4 @@ def widest(ds: xr.Dataset) -> np.ndarray:
     """Stations ``(s,)`` where the object itself is widest, to 0.5 %."""
     shape, stations = read_scene(ds).object, ds.station.values
     half = np.max([np.interp(stations, *outline(shape, angle)) for angle in ds.angle.values], axis=0)
-    return half >= (1 - WIDE) * half.max()
+    return half >= 0.995 * half.max()

@@ -12,18 +12,15 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from softjaw.study.case.result import TIE
 from softjaw.study.flags import LOST, OF_FILE, Flag, flag_words, flags_in
 from softjaw.study.quantities import MODELS, NO_GRASP
 from softjaw.study.ranking import judged, ranked, score_of, shown_level
 from softjaw.study.result.layout import DONE, FAILED
-from softjaw.study.show.status import Reason
-from softjaw.study.show.status import grouped as kinds_of
+from softjaw.study.show.status import grouped
 from softjaw.study.table import number, with_unit
 from softjaw.study.units import shown, shown_text, shown_unit
 
 Index = tuple[int, ...]
-WIDE = 5e-3  # relative difference of widths that makes no place wider
 # What a check may be at most (or, for those of `ABOVE`, must exceed).
 LIMITS = {"force_balance": 1e-6, "adhesion": 1e-6, "penetration": 1e-6, "complementarity": 1e-6, "min_det_f": 0.0,
           "ellipticity": 0.0}  # fmt: skip
@@ -142,30 +139,6 @@ def order(ds: xr.Dataset, k: int) -> list[Index]:
     return [(*unravelled(int(c), shape), k) for c in found]
 
 
-def images(ds: xr.Dataset, index: Index) -> list[Index]:
-    """Other cases at the same force with the same score: images by symmetry, or equal within rounding."""
-    score = ds.attrs["score"]
-    best = at(ds, score, index)
-    return [i for i in order(ds, index[-1]) if i != index and abs(at(ds, score, i) - best) <= TIE * abs(best)]
-
-
-def compared(ds: xr.Dataset) -> tuple[Index | None, str]:
-    """A case to compare the best with, and why: the one asked for, the widest place, or else the worst one."""
-    best, chosen = ds.attrs["best"], ds.attrs["chosen"]
-    if chosen is not None and chosen != best and ds.status.values[chosen] == DONE:
-        return chosen, "the chosen candidate"
-    ranked = order(ds, ds.attrs["level"])
-    if best is None or len(ranked) < 2:
-        return None, ""
-    same, width = {best, *images(ds, best)}, field(ds, "contact_distance")
-    if width is not None:  # the best of the widest places, on the same object
-        here = [i for i in ranked if i[:-3] == best[:-3] and np.isfinite(width[i])]
-        widest = next(i for i in here if width[i] >= (1 - WIDE) * max(width[j] for j in here))
-        if widest not in same and width[widest] > (1 + WIDE) * width[best]:
-            return widest, "the widest place"
-    return (ranked[-1], "the last in the ranking") if ranked[-1] not in same else (None, "")
-
-
 def lost(ds: xr.Dataset, index: Index) -> bool:
     """Whether a case slips, slides out, harms the object or does not hold it."""
     return bool(ds.variables["flags"].values[index] & LOST)
@@ -207,6 +180,8 @@ def note(ds: xr.Dataset, index: Index, known: int = 0) -> str:
     return ", ".join(text for text in (*flagged(ds, index), words) if text)
 
 
-def grouped(ds: xr.Dataset) -> list[Reason]:
+def reason_lines(ds: xr.Dataset, *states: int) -> list[str]:
     """Reasons of failed cases and of what is no grasp, and notes on solved ones, alike messages together."""
-    return kinds_of(ds.status.values, ds.message.values, lambda: ds["flags"].values & OF_FILE)
+    kinds = grouped(ds.status.values, ds.message.values, lambda: ds["flags"].values & OF_FILE)
+    wanted = (kind for kind in kinds if not states or kind.state in states)
+    return [kind.text(lambda index: place(ds, index, force=True)) for kind in wanted]

@@ -244,15 +244,16 @@ def _added(result: Any) -> dict[str, Any]:
 
 def time_split(result: Any) -> list[str]:
     """Where the seconds of all cases went; nothing where no time was measured."""
-    # NaN where a case was served by symmetry: it cost nothing.
-    seconds = result.read("work/seconds_total")
-    total = float(np.nansum(seconds))
-    if not total:
-        return []
-    shares = {part: float(np.nansum(result.read(f"work/seconds_{part}"))) / total for part in PARTS}
-    shares["failed cases"] = float(np.nansum(seconds[result.status == FAILED])) / total
-    words = [f"{part} {share:.0%}" for part, share in shares.items() if share >= 0.005]
-    return [f"time in cases: {duration(total)} on all ranks" + (f" ({', '.join(words)})" if words else "")]
+    seconds = {part: result.read(f"work/seconds_{part}") for part in ("total", *PARTS)}
+    return split_of(seconds | {"failed cases": np.where(result.status == FAILED, seconds["total"], np.nan)})
+
+
+def split_of(seconds: dict[str, NDArray[np.float64]]) -> list[str]:
+    """The same of the seconds of cases by part, ``total`` first; NaN where an image by symmetry cost nothing."""
+    total, *parts = (float(np.nansum(values)) for values in seconds.values())
+    shares = {name: part / total for name, part in zip([*seconds][1:], parts, strict=True)} if total else {}
+    words = ", ".join(f"{name} {share:.0%}" for name, share in shares.items() if share >= 0.005)
+    return [f"time in cases: {duration(total)} on all ranks{f' ({words})' * bool(words)}"] * bool(total)
 
 
 def sessions(result: Any, running: bool, width: int = PAPER) -> list[str]:

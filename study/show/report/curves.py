@@ -18,14 +18,13 @@ from softjaw.study.show.grasps import (
     at,
     axis_label,
     axis_values,
-    compared,
     field,
     forces,
     number,
     place,
     spoken,
 )
-from softjaw.study.show.object_surface import scene_at, undeformed
+from softjaw.study.show.object_surface import undeformed
 from softjaw.study.show.report.maps import ticks
 from softjaw.study.show.view.model import View
 
@@ -53,11 +52,10 @@ def along(position: int, index: Index) -> tuple[Any, ...]:
     return tuple(slice(None) if i == position else k for i, k in enumerate(index))
 
 
-def models(ds: xr.Dataset, best: Index, mu: float | None) -> list[Block]:
-    """Curves over the force for the best case and one other, and over every axis that is worth it for the best."""
-    other, why = compared(ds)
-    blocks = []
-    for index, role in [(best, "Best case"), *([(other, f"For comparison, {why}")] if other else [])]:
+def models(ds: xr.Dataset, roles: dict[str, Index], mu: float | None) -> list[Block]:
+    """Curves over the force for some cases, and over every axis that is worth it for the first of them."""
+    best, blocks = next(iter(roles.values())), []
+    for role, index in roles.items():
         blocks += [heading(f"{role}, over the force: {place(ds, index)}"), _models(ds, len(best) - 1, index, mu)]
     for position in worth_a_curve(ds):
         name = spoken(str(ds.status.dims[position]))
@@ -98,23 +96,20 @@ def _models(ds: xr.Dataset, position: int, index: Index, mu: float | None) -> Bl
 # --- what curvature costs --------------------------------------------------------------------------------------------
 
 
-def differences(ds: xr.Dataset, scene: Any, index: Index) -> list[Block]:
+def differences(ds: xr.Dataset, index: Index) -> list[Block]:
     """Share of the planar models' claims that the curved contact cannot carry, along a sweep of the object's shape."""
-    position = shape_axis(ds, scene)
+    position = shape_axis(ds)
     lines = {} if position is None else overestimates(ds, position, index)
     if position is None or not lines:
         return []
-    abscissae = abscissas(ds, scene, position, index)
-    return [_differences(ds, name, x, lines, index) for name, x in abscissae.items() if np.isfinite(x).any()]
+    return [_differences(ds, name, x, lines, index) for name, x in abscissas(ds, position, index).items()]
 
 
-def shape_axis(ds: xr.Dataset, scene: Any) -> int | None:
-    """The longest axis that sweeps a number of the object; any numbered sweep where the scene cannot be read."""
-    keys = list(scene.sweep) if scene else []
-    axes, lengths = ds.status.dims, ds.status.shape
-    known = [p for p in range(len(axes) - 3) if lengths[p] > 1]
-    known = [p for p in known if p >= len(keys) or (keys[p].startswith("object.") and ds[axes[p]].units)]
-    return max(known, key=lambda p: lengths[p], default=None)
+def shape_axis(ds: xr.Dataset) -> int | None:
+    """The longest axis that sweeps a number of the object."""
+    swept = [(len(ds[name]), -p) for p, name in enumerate(ds.status.dims[:-3])
+             if ds[name].units and ds[name].long_name.startswith("object.") and len(ds[name]) > 1]  # fmt: skip
+    return -max(swept)[1] if swept else None
 
 
 def overestimates(ds: xr.Dataset, position: int, index: Index) -> dict[tuple[str, str], Any]:
@@ -128,30 +123,15 @@ def overestimates(ds: xr.Dataset, position: int, index: Index) -> dict[tuple[str
     return shares
 
 
-def abscissas(ds: xr.Dataset, scene: Any, position: int, index: Index) -> dict[str, np.ndarray]:
-    """What differences are drawn over: shape and curvature of an ellipse, or else the swept value itself."""
-    points = [(*index[:position], i, *index[position + 1 :]) for i in range(ds.status.shape[position])]
-    ellipses = [_ellipse(ds, scene, point) for point in points]
-    if all(ellipses):
-        a, b = np.array(ellipses, float).T
-        return {
-            "a / b, semi-axis along the approach over that across it [-]": a / b,
-            "curvature at the apex, a / b² [1/m]": a / b**2,
-        }
-    axis = str(ds.status.dims[position])
-    return {axis_label(ds, axis): axis_values(ds, axis)}
-
-
-def _ellipse(ds: xr.Dataset, scene: Any, index: Index) -> tuple[float, float] | None:
-    """Semi-axes along and across the approach [m] of an elliptic cylinder pressed along one of them."""
-    shape: Any = getattr(scene_at(scene, index) if scene else None, "object", None)
-    if getattr(shape, "shape", "") != "elliptic_cylinder" or ds.attrs["poses"]:
-        return None
-    turns = float(ds.angle.values[index[-2]]) / (0.5 * math.pi)
-    if abs(turns - round(turns)) > 1e-6:
-        return None
-    both = (shape.semi_axis_a, shape.semi_axis_b)
-    return both if round(turns) % 2 == 0 else both[::-1]
+def abscissas(ds: xr.Dataset, position: int, index: Index) -> dict[str, np.ndarray]:
+    """What differences are drawn over: shape and curvature of an ellipse pressed at angle 0, or the swept value."""
+    axis, cut = str(ds.status.dims[position]), along(position, index[:-3])
+    if "b_over_a" not in ds or ds.angle.values[index[-2]]:
+        return {axis_label(ds, axis): axis_values(ds, axis)}
+    return {
+        "a / b, semi-axis along the approach over that across it [-]": 1 / ds.b_over_a.values[cut],
+        "curvature at the apex, a / b² [1/m]": ds.apex_curvature.values[cut],
+    }
 
 
 def _differences(ds: xr.Dataset, name: str, x: np.ndarray, lines: dict[Any, Any], index: Index) -> Block:

@@ -14,16 +14,10 @@ import xarray as xr
 
 from softjaw.study.messages import CANNOT_WRITE, StudyError, write_file
 from softjaw.study.page import Block, Section, answer, box, heading, page, text
-from softjaw.study.quantities import FAILED, NO_GRASP
+from softjaw.study.quantities import DONE, FAILED, NO_GRASP
 from softjaw.study.result.read import open
 from softjaw.study.show.best_grasps import answer as answer_lines
-from softjaw.study.show.grasps import (
-    Index,
-    compared,
-    field,
-    forces,
-    judge,
-)
+from softjaw.study.show.grasps import Index, field, forces, judge
 from softjaw.study.show.report import contact, curves, maps, tables, verdict
 from softjaw.study.show.view.model import Place, View, read_scene, view_of
 from softjaw.study.show.view.object3d import object_block
@@ -57,11 +51,11 @@ def build(ds: xr.Dataset, candidate: int | None = None, place: Place = (None, No
         ("maps", "Maps", (maps.maps(ds, best) if ds.status.size > 1 else []) +
          tables.reasons(ds, FAILED, *NO_GRASP)),
         ("wall", "What the wall bears", wall(view, best)),
-        ("curvature", "What curvature costs", curves.differences(ds, scene, best)),
+        ("curvature", "What curvature costs", curves.differences(ds, best)),
         *(cases(view, scene) if ds.attrs["best"] is not None else []),
         ("effects", "What was simulated", [*tables.effects(ds), text(verdict.CAVEAT, "note")]),
         ("cost", "Convergence and cost",
-         [*tables.states(ds), tables.checks(ds), *tables.time_split(ds)]),
+         [*tables.reasons(ds, DONE), tables.checks(ds), *tables.time_split(ds)]),
         ("cases", "All cases", tables.every_case(ds)),
         ("definitions", "Definitions", tables.definitions(ds)),
         ("provenance", "Provenance", tables.provenance(ds)),
@@ -81,8 +75,7 @@ def the_answer(ds: xr.Dataset) -> Block | None:
 
 def best_grasps(ds: xr.Dataset) -> list[Block]:
     """How sure the best grasp is, what speaks against it, and the tables of the best grasps."""
-    chosen = [verdict.chosen(ds)] if ds.attrs["chosen"] else []
-    boxes = [(verdict.verdict(ds), "verdict"), (verdict.warnings(ds), "warn"), (chosen, "verdict")]
+    boxes = [(verdict.verdict(ds), "verdict"), (verdict.warnings(ds), "warn")]
     return [box(texts, look) for texts, look in boxes if texts] + tables.best_grasps(ds)
 
 
@@ -108,7 +101,7 @@ def cases(view: View, scene: Any) -> list[Section]:
     """Force curves, contact patch and limit surface of the best case, and of the one that was asked for."""
     ds, best, chosen = view.ds, view.ds.attrs["best"], view.ds.attrs["chosen"]
     roles = {"Best case": best}
-    if chosen is not None and compared(ds)[0] == chosen:
+    if chosen not in (None, best) and ds.status.values[chosen] == DONE:
         roles["Chosen candidate"] = chosen
     # The other case may belong to another point of the sweep, and so to another object.
     views = {index: view if index[:-3] == view.point else View(ds, index[:-3]) for index in roles.values()}
@@ -119,7 +112,7 @@ def cases(view: View, scene: Any) -> list[Section]:
         return [part for role, block in drawn.items() for part in ([heading(role)] * (len(roles) > 1) + [block])]
 
     return [
-        ("models", "Friction models compared", curves.models(ds, best, scene.friction.mu if scene else None)),
+        ("models", "Friction models compared", curves.models(ds, roles, scene.friction.mu if scene else None)),
         ("patch", f"Contact patch {which}", headed(contact.patch)),
         ("surface", f"Limit surface {which}", headed(contact.limit_surfaces)),
     ]

@@ -21,10 +21,9 @@ from softjaw.study.result.read import dataset
 from softjaw.study.result.store import open_result
 from softjaw.study.show import best_grasps
 from softjaw.study.show.best_grasps import best
-from softjaw.study.show.grasps import at, compared, judge, order
+from softjaw.study.show.grasps import at, judge, order
 from softjaw.study.show.report import curves, tables, verdict
 from softjaw.study.show.report.writing import build, write_report
-from softjaw.study.show.view.model import read_scene
 from tests.study.formula_results import OBJECT, written
 
 FACES = (6, 4)
@@ -240,21 +239,20 @@ def test_values_have_their_error_where_the_file_has_it(tmp_path):
 
 
 def test_a_chosen_candidate_stands_beside_the_best_one(tmp_path):
-    """Case (3, 0, 1) has quality 5 / 4, as two cases before it in the file; six are better."""
+    """Case (3, 0, 1) has quality 5 / 4."""
 
     def state(index):
         return "it slipped away" if index[:2] == (3, 2) else "done"
 
     path = make(tmp_path / "f.hdf", Layout(axes(), 24), state)
     with open_result(path) as result:
-        chosen, failed = judge(dataset(result), (3, 0, 1)), judge(dataset(result), (3, 2, 1))
-        said = verdict.chosen(chosen).replace("\u00a0", " ")
-        for words in ("candidate 9: station 30 mm, angle 0 deg, 5 N", "1.25", "2.5", "place 9 of 11"):
-            assert words in said
-        assert compared(chosen) == ((3, 0, 1), "the chosen candidate")
-        assert "it slipped away" in verdict.chosen(failed)
-        assert compared(failed)[0] != (3, 2, 1)
-        assert verdict.chosen(judge(dataset(result))) == ""
+        tables_of = [tables.best_grasps(judge(dataset(result), index)) for index in (None, (3, 0, 1), (3, 2, 1))]
+        plain, chosen, failed = ([b for b in blocks if b["kind"] == "table"] for blocks in tables_of)
+        assert (len(plain), len(chosen), len(failed)) == (2, 3, 3)
+        (row,) = chosen[2]["rows"]
+        cells = dict(zip(chosen[2]["head"], row, strict=True))
+        assert [cells[k] for k in ("name", "station [mm]", "force [N]", "quality")] == ["s09", "30", "5", "1.25"]
+        assert "it slipped away" in failed[2]["rows"][0]
         with pytest.raises(StudyError, match="--candidate"):
             build(dataset(result), 12)
 
@@ -313,8 +311,9 @@ def test_differences_are_drawn_over_the_ratio_of_the_axes_and_the_curvature(tmp_
     layout = Layout(axes((0.0,), (0.0,), (1.0, 5.0), sweep=sweep), 0, patches=False)
     path = make(tmp_path / "sweep.hdf", layout, scene=SWEEP, **{"maps/f_y_overestimate": 0.04})
     with open_result(path) as result:
-        data, scene = judge(dataset(result)), read_scene(dataset(result))
-        found = [block["figure"].data for block in curves.differences(data, scene, data.attrs["best"])]
+        data = judge(dataset(result)).assign(b_over_a=("semi_axis_b", [0.4, 1.0, 2.0]))
+        data = data.assign(apex_curvature=("semi_axis_b", [250.0, 40.0, 10.0]))
+        found = [block["figure"].data for block in curves.differences(data, data.attrs["best"])]
     (ratio,), (curvature,) = found
     assert ratio.x == pytest.approx([0.5, 1, 2.5])
     assert curvature.x == pytest.approx([10, 40, 250])
