@@ -12,7 +12,7 @@ import subprocess
 import sys
 import tempfile
 from argparse import Namespace
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from subprocess import CompletedProcess
@@ -48,7 +48,8 @@ def keep_compiled_loops() -> None:
     at the end of the process, so every start compiles anew: what is loaded from it is code, which nobody else may have
     put there.
     """
-    if os.environ.get("NUMBA_CACHE_DIR") or _writable(_user_cache()):
+    home = os.environ.get("XDG_CACHE_HOME") or str(Path(os.path.expanduser("~")) / ".cache")  # noqa: PTH111
+    if os.environ.get("NUMBA_CACHE_DIR") or _writable(Path(home) / "numba"):
         return
     if all(_writable(ROOT / "softjaw" / package / "__pycache__") for package in COMPILED):
         return
@@ -57,35 +58,11 @@ def keep_compiled_loops() -> None:
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
 
 
-def compiled_loops_pass() -> bool:
-    """Whether compiled loops are kept in a folder that `keep_compiled_loops` made, and no longer than the process."""
-    return Path(os.environ.get("NUMBA_CACHE_DIR", "")).name.startswith(PASSING)
-
-
-def _user_cache() -> Path | None:
-    """Where numba keeps a user's compiled loops; None where the user has no home."""
-    try:
-        return Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()) / "numba"
-    except RuntimeError:
-        return None
-
-
-def _writable(folder: Path | None) -> bool:
+def _writable(folder: Path) -> bool:
     """Whether files can be made in a folder, which itself may have to be made first; nothing is made here."""
-    if folder is None:
-        return False
     # Path.exists would raise where a folder above may not be searched
     existing = next((place for place in (folder, *folder.parents) if os.access(place, os.F_OK)), folder)
     return os.access(existing, os.W_OK | os.X_OK) and existing.is_dir()
-
-
-def outside_mpi(environment: Mapping[str, str]) -> dict[str, str]:
-    """The same variables without those that tie a process to the mpirun it was started by.
-
-    >>> outside_mpi({"HOME": "/root", "OMPI_COMM_WORLD_RANK": "1"})
-    {'HOME': '/root'}
-    """
-    return {name: value for name, value in environment.items() if not name.startswith(LAUNCHED)}
 
 
 def launch_environment() -> dict[str, str]:
@@ -94,7 +71,8 @@ def launch_environment() -> dict[str, str]:
     Open MPI refuses root unless two variables allow it; inside a container there is often no other user.
     """
     allowed = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"} if os.geteuid() == 0 else {}
-    return {**dict.fromkeys(THREADS, "1"), **outside_mpi(os.environ), **allowed}
+    outside_mpi = {name: value for name, value in os.environ.items() if not name.startswith(LAUNCHED)}
+    return {**dict.fromkeys(THREADS, "1"), **outside_mpi, **allowed}
 
 
 def mpirun(ranks: int) -> list[str]:
@@ -103,15 +81,9 @@ def mpirun(ranks: int) -> list[str]:
     Raises `FileNotFoundError`: there is no ``mpirun`` on the search path.
     """
     command = ["mpirun", "-n", str(ranks)]
-    trial = subprocess.run(
-        [*command, "true"],
-        env=launch_environment(),
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        timeout=60,
-        check=False,
-    )
-    return command if trial.returncode == 0 else f"mpirun -n {ranks} --oversubscribe".split()
+    trial = subprocess.run([*command, "true"], env=launch_environment(), stdin=subprocess.DEVNULL, capture_output=True,
+                           timeout=60, check=False)  # fmt: skip
+    return command if trial.returncode == 0 else [*command, "--oversubscribe"]
 
 
 def trouble(answer: CompletedProcess[str]) -> str:
@@ -184,8 +156,9 @@ print("pyvista", pyvista.__version__, "through", plotter.render_window.GetClassN
 """
 # What is run, and for what its errors hold the cure; the last one is for all other errors.
 PROBES: dict[str, tuple[str, dict[str, str]]] = {
-    "packages": ("import numpy, scipy, skfem, numba, clarabel, pydantic, matplotlib; print('scipy', scipy.__version__,"
-                 " 'numba', numba.__version__)", {"": "run 'make setup', or: .venv/bin/pip install -e ."}),
+    "packages": ("import sys, scipy, skfem, numba, clarabel, pydantic, matplotlib; print('python', *sys.version.split()"
+                 "[:1], 'scipy', scipy.__version__, 'numba', numba.__version__)",
+                 {"": "run 'make setup', or: .venv/bin/pip install -e ."}),
     "numpy": ("import numpy, h5py; from softjaw.fem.petsc import PETSc;"
               "print(numpy.__version__, 'fits h5py and petsc4py')",
               {"dtype size changed": "take the numpy that the system's h5py and petsc4py were built with:"
@@ -216,11 +189,6 @@ def probed(name: str) -> Finding:
     return line.strip(), cures[mark], USAGE
 
 
-def check_python() -> Finding:
-    """Which Python this is; pip has refused one that is too old."""
-    return f"{sys.version.split()[0]} at {sys.executable}", "", DONE
-
-
 def check_blas() -> Finding:
     """The BLAS beneath PETSc is an optimised one; only Debian's way of choosing it is looked at."""
     link = Path("/etc/alternatives").glob("libblas.so.3-*")
@@ -238,36 +206,25 @@ def check_threads() -> Finding:
 
 def check_cache() -> Finding:
     """Compiled loops can be kept from one start to the next."""
-    wanted = os.environ.get("NUMBA_CACHE_DIR")
-    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    for folder in [Path(wanted)] if wanted else [Path(__file__).parent.parent / "fem", home]:
-        if can_write(folder) and not compiled_loops_pass():
-            return f"compiled loops are kept in {folder}", "", DONE
-    return "every start compiles anew", "export NUMBA_CACHE_DIR=<a folder you may write to>", CANNOT_WRITE
+    folder = os.environ.get("NUMBA_CACHE_DIR", "")
+    if Path(folder).name.startswith(PASSING) or (folder and not _writable(Path(folder))):
+        return "every start compiles anew", "export NUMBA_CACHE_DIR=<a folder you may write to>", CANNOT_WRITE
+    return f"compiled loops are kept in {folder or 'the sources or your cache folder'}", "", DONE
 
 
 def check_disk() -> Finding:
     """Results can be written here, and there is room for them."""
     folder = Path.cwd()
-    if not can_write(folder):
+    try:
+        tempfile.TemporaryFile(dir=folder).close()
+    except OSError:
         return f"{folder} is not writable", "start softjaw in a folder of your own", CANNOT_WRITE
     free = shutil.disk_usage(folder).free
     cure = f"free at least {NEEDED_SPACE / 1e9:.0f} GB" if free < NEEDED_SPACE else ""
     return f"{free / 1e9:.1f} GB free in {folder}", cure, CANNOT_WRITE if cure else DONE
 
 
-def can_write(folder: Path) -> bool:
-    """Whether a file can be made in this folder, which is made if it is missing."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            return True
-    except OSError:
-        return False
-
-
 CHECKS: dict[str, Callable[[], Finding]] = {
-    "python": check_python,
     **{name: partial(probed, name) for name in PROBES},
     "blas": check_blas,
     "threads": check_threads,

@@ -20,10 +20,7 @@ from softjaw.study.result.datasets import SUMS, Column
 from softjaw.study.result.hdf5 import StoredFile
 from softjaw.study.result.layout import ROOT, Layout
 
-NARROW_BYTES = 64  # up to this width, rows are summed side by side
 OF_STATE = {state: zlib.crc32(bytes([state])) for state in range(len(STATES))}
-# What a byte does to a running CRC-32, by the byte and the last eight bits of the sum.
-STEP = ~np.array([zlib.crc32(bytes([i ^ 0xFF])) for i in range(256)], np.uint32) ^ np.uint32(0x00FFFFFF)
 ABOUT = {"axes": ("units", "long_name", "scene_key"), "scene": ("digest", "file", "overrides", "petsc_options")}
 PLACED = ("object_rotation", "object_origin", "rejected")
 
@@ -39,12 +36,7 @@ def of_lines(lines: NDArray[np.uint8]) -> NDArray[np.uint32]:
     >>> of_lines(np.frombuffer(b"123456789", np.uint8)[None]) == zlib.crc32(b"123456789")
     array([ True])
     """
-    if lines.shape[1] > NARROW_BYTES:
-        return np.array([zlib.crc32(line) for line in lines], np.uint32)
-    crc = np.full(len(lines), 0xFFFFFFFF, np.uint32)
-    for byte in lines.T:
-        crc = STEP[(crc ^ byte) & 0xFF] ^ (crc >> 8)
-    return ~crc
+    return np.array([zlib.crc32(line) for line in np.ascontiguousarray(lines)], np.uint32)
 
 
 def of_row(layout: Layout, values: Sequence[Any], state: int) -> NDArray[np.uint32]:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from softjaw.study import doctor
-from softjaw.study.doctor import COMPILED, NOT_IN_TIME, ask, launch_environment, outside_mpi, trouble
+from softjaw.study.doctor import COMPILED, NOT_IN_TIME, ask, launch_environment, trouble
 from softjaw.study.messages import CANNOT_WRITE, USAGE
 
 
@@ -97,7 +97,6 @@ def test_the_variables_of_a_surrounding_mpirun_are_left_out(monkeypatch):
     assert kept["PATH_TO_KEEP"] == "yes"
     assert kept["OMP_NUM_THREADS"] == "1"
     assert not {"OMPI_COMM_WORLD_RANK", "PMIX_RANK"} & set(kept)
-    assert outside_mpi({"PMI_RANK": "0", "HOME": "/"}) == {"HOME": "/"}
 
 
 def test_threads_are_pinned_unless_the_user_chose(monkeypatch):
