@@ -12,11 +12,12 @@ from jobs.figures.contacts import WIDTH, outline
 from softjaw.study import pictures
 from softjaw.study.quantities import MODELS
 from softjaw.study.ranking import largest
+from softjaw.study.result.read import scene_of
 from softjaw.study.show import plots
 from softjaw.study.show.grasps import field, forces, number, place
 from softjaw.study.show.object_surface import NOBODY
 from softjaw.study.show.view import solids
-from softjaw.study.show.view.model import View, read_scene
+from softjaw.study.show.view.model import View
 
 COMPONENTS = {"f_y": ("across, f_y", "-", "o"), "tau_z": ("torque, tau_z", "--", "s"), "f_x": ("along, f_x", ":", "^")}
 AGAINST = {"pcm": "against the PCM scaled by S, the paper's", "pcm_projected": "against the PCM scaled by F_N"}
@@ -87,7 +88,7 @@ def over_force(ds: xr.Dataset) -> dict[str, tuple[str, dict[str, np.ndarray]]]:
 
     Forces are over the pressure sum S, as in the paper; torques over F times the pad's length.
     """
-    length, F = read_scene(ds).gripper.pad_length, forces(ds)
+    length, F = scene_of(ds).gripper.pad_length, forces(ds)
 
     def of(name: str, factor: Any) -> dict[str, np.ndarray]:
         return {model: ds[name].sel(model=model).values[0, 0] * factor for model in MODELS}
@@ -141,6 +142,6 @@ def best_and_widest(ds: xr.Dataset) -> str:
 
 def widest(ds: xr.Dataset) -> np.ndarray:
     """Stations ``(s,)`` where the object itself is widest, to 0.5 %."""
-    shape, stations = read_scene(ds).object, ds.station.values
+    shape, stations = scene_of(ds).object, ds.station.values
     half = np.max([np.interp(stations, *outline(shape, angle)) for angle in ds.angle.values], axis=0)
     return half >= 0.995 * half.max()

@@ -14,7 +14,7 @@ from softjaw.study.export.physx import as_usd
 from softjaw.study.export.planners import CLOSING, as_graspgen, as_isaac_grasp, as_moveit
 from softjaw.study.export.rigid_body import body_of
 from softjaw.study.export.sdf import as_sdf, as_stl
-from softjaw.study.export.selection import GripperFrame, Selection, chosen, grasps, usable
+from softjaw.study.export.selection import GripperFrame, chosen, grasps, usable
 from softjaw.study.grippers import Hand, gripper_file
 from softjaw.study.messages import USAGE, StudyError, write_file
 from softjaw.study.result.index import index_path
@@ -45,12 +45,13 @@ def export(options: Namespace) -> str:
 
         return f"written: {write_vtk(ds, Path(options.output), options.force)}"
     few = options.top if options.top is not None else 1 if options.form in SIMULATORS else 0
-    choice = Selection(options.model, options.force, options.by, few, dict(options.least))
+    choice = {name: getattr(options, name) for name in ("model", "force", "by")}
+    choice |= {"top": few, "least": dict(options.least)}
     if options.form in TABLES:
         asked = options.force or options.by or options.least or options.top is not None
-        return _written(options, [TABLES[options.form](ds, options.model, chosen(ds, choice)[0] if asked else None)])
+        return _written(options, [TABLES[options.form](ds, options.model, chosen(ds, **choice)[0] if asked else None)])
     gripper = gripper_of(options)
-    ranked = grasps(ds, choice, gripper)
+    ranked = grasps(ds, gripper, **choice)
     if options.form != "graspgen":  # which has a field for those that do not hold
         ranked, left = usable(ranked)
         if left:

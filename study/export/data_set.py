@@ -32,8 +32,7 @@ from softjaw.study.messages import USAGE, StudyError, beside, write_file
 from softjaw.study.quantities import DONE, NO_GRASP, STATES
 from softjaw.study.ranking import judged, task_keys
 from softjaw.study.result.index import read_index, write_arrays
-from softjaw.study.result.read import maps_in, open
-from softjaw.study.scene import parse_scene
+from softjaw.study.result.read import maps_in, open, scene_of
 from softjaw.study.scene.grasps import GraspPose
 from softjaw.study.table import plain
 from softjaw.study.units import UNITS
@@ -235,6 +234,6 @@ def _offered(like: dict[str, Any], row: np.ndarray) -> dict[str, Any]:
 
 def _poses(ds: xr.Dataset) -> list[tuple[Pose, Pose]]:
     """Poses of the scene's explicit candidates in the frame of the object's file, solved or not."""
-    where = parse_scene(ds.attrs["scene"], check_files=False).candidates
+    where = scene_of(ds).candidates
     own = Pose(np.eye(3), np.zeros(3))
     return [moved(explicit_poses(pose, own), where.shift, where.roll) for pose in where.poses or ()]

@@ -7,7 +7,6 @@ with the object's mass; of a surface that is not closed its convex hull is taken
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -18,8 +17,8 @@ from trimesh import Trimesh
 from softjaw.study.case.build import build_object, centre_of_mass, own_frame, surface_triangles
 from softjaw.study.messages import OTHER_FILE, StudyError
 from softjaw.study.result.read import axes_of
+from softjaw.study.result.read import scene_of as scene_at
 from softjaw.study.scene import Scene, SceneError
-from softjaw.study.scene.model import parse_scene
 from softjaw.study.units import GRAVITY
 
 FloatArray = NDArray[np.float64]
@@ -52,15 +51,9 @@ def scene_of(ds: xr.Dataset, case: dict[str, Any]) -> Scene:
     """
     index = [int(np.flatnonzero(axis.values == case["place"][axis.name])[0]) for axis in axes_of(ds)[:-3]]
     try:
-        return _scene_at(ds.attrs["scene"], tuple(index))
+        return scene_at(ds, index)
     except SceneError as error:
         raise StudyError(OTHER_FILE, f"{ds.attrs['file']}: {error}") from error
-
-
-@lru_cache(maxsize=64)
-def _scene_at(text: str, index: tuple[int, ...]) -> Scene:
-    scene = parse_scene(text, check_files=False)
-    return scene.with_values({key: v[i] for (key, v), i in zip(scene.sweep.items(), index, strict=False)})
 
 
 def body_of(ds: xr.Dataset, case: dict[str, Any]) -> RigidBody:

@@ -14,8 +14,9 @@ from __future__ import annotations
 
 import textwrap
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -38,21 +39,6 @@ from softjaw.study.units import shown, shown_text
 
 FloatArray = NDArray[np.float64]
 COMMENT = 100  # characters in a line of a comment
-
-
-@dataclass(frozen=True)
-class Selection:
-    """Which grasps are written: the first ``top`` (0: all), ranked ``by`` a map at a ``force`` [N].
-
-    ``least`` gives smallest values by the name of a map, in the unit in which ``softjaw show`` prints it; a grasp with
-    less is left out.
-    """
-
-    model: str = "ccm"
-    force: float | None = None
-    by: str | None = None
-    top: int = 0
-    least: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -166,34 +152,40 @@ def gripper_frame(case: dict[str, Any], approach: str, closing: str, depth: floa
     return np.column_stack(columns), middle - depth * z
 
 
-def chosen(ds: xr.Dataset, choice: Selection) -> tuple[list[dict[str, Any]], list[str], str]:
-    """Cases of the chosen grasps, the best first, the same in words, and the map that they are ranked by.
+def chosen(
+    ds: xr.Dataset, model: str = "ccm", force: float | None = None, by: str | None = None, top: int = 0,
+    least: Mapping[str, float] = MappingProxyType({}),
+) -> tuple[list[dict[str, Any]], list[str], str]:  # fmt: skip
+    """Cases of the first ``top`` grasps (0: all), the best first, the same in words, and the map that ranks them.
+
+    They are ranked ``by`` a map at a ``force`` [N]. ``least`` gives smallest values by the name of a map, in the unit
+    in which ``softjaw show`` prints it; a grasp with less is left out.
 
     Raises `StudyError`: A force outside of the solved ones, or a map that the file does not have.
     """
     try:
-        at, k, _ = at_level(ds, choice.force)
+        at, k, _ = at_level(ds, force)
     except ValueError as error:
         raise StudyError(USAGE, f"--force: {error}") from error
     units = maps_in(at)
-    if unknown := [name for name in choice.least if name not in units]:
+    if unknown := [name for name in least if name not in units]:
         raise StudyError(USAGE, f"--min: found '{unknown[0]}', expected one of {', '.join(units)}")
     at = at.assign(flags=(at.status.dims, judged(at), at["flags"].attrs))
-    shape, order = at.status.shape[:-1], ranked(at, k, choice.by)
+    shape, order = at.status.shape[:-1], ranked(at, k, by)
     which = [(*(int(i) for i in np.unravel_index(c, shape)), k) for c in order]
-    least = {name: value / shown(1.0, units[name]) for name, value in choice.least.items()}
+    bounds = {name: value / shown(1.0, units[name]) for name, value in least.items()}
     # NaN is not at least anything, so a grasp without the value is left out.
     found = [
         (case, place_text(axes_of(at), at.label.values, index))
-        for index, case in zip(which, cases(at, choice.model, which), strict=True)
-        if all(case["maps"][name] >= value for name, value in least.items())
-    ][: choice.top or None]
-    return [case for case, _ in found], [place for _, place in found], score_of(at, choice.by)
+        for index, case in zip(which, cases(at, model, which), strict=True)
+        if all(case["maps"][name] >= value for name, value in bounds.items())
+    ][: top or None]
+    return [case for case, _ in found], [place for _, place in found], score_of(at, by)
 
 
-def grasps(ds: xr.Dataset, choice: Selection, gripper: GripperFrame) -> list[RankedGrasp]:
-    """The chosen grasps with the gripper's pose, one for each direction of approach."""
-    cases, places, by = chosen(ds, choice)
+def grasps(ds: xr.Dataset, gripper: GripperFrame, **choice: Any) -> list[RankedGrasp]:
+    """The `chosen` grasps with the gripper's pose, one for each direction of approach."""
+    cases, places, by = chosen(ds, **choice)
     values = [case["maps"][by] if by != LEAST_FORCE else 1.0 / case["maps"]["force_low"] for case in cases]
     score = np.nan_to_num([max(float(value), 0.0) for value in values])
     best, units = max(score, default=0.0), maps_in(ds)

@@ -30,10 +30,10 @@ from softjaw.study.lookup.interpolation import (
 from softjaw.study.lookup.point import INSIDE, JUMP, NO_RESULT, OUTSIDE, SNAP, GraspPoint
 from softjaw.study.quantities import BY_KEY, DONE, checked_model
 from softjaw.study.ranking import judged, ranked, shown_level
-from softjaw.study.result.read import KINDS, axes_of, contact_kinds, maps_in, values_of
+from softjaw.study.result.read import KINDS, axes_of, contact_kinds, maps_in, scene_of, values_of
 from softjaw.study.result.read import open as open_dataset
 from softjaw.study.result.store import place_text
-from softjaw.study.scene import SceneError, parse_scene
+from softjaw.study.scene import SceneError
 from softjaw.study.units import UNITS, in_si
 
 
@@ -81,13 +81,13 @@ class GraspMap:
         ds = file if isinstance(file, xr.Dataset) else open_dataset(file)
         self.file_axes = axes_of(ds)
         station, angle, force = self.file_axes[-3:]
-        self.index, point = _sweep_point(self.file_axes[:-3], dict(where or {}))
+        self.index = _sweep_point(self.file_axes[:-3], dict(where or {}))
         self.data = ds.isel(dict(zip(ds.status.dims, self.index, strict=False)), drop=True)
         self.status = self.data.status.values
         #: unit and definition of everything that `value` knows
         self.quantities = {name: (unit, ds[name].definition) for name, unit in maps_in(ds).items()}
         self.by_poses = not station.units
-        period, half_turn = (2 * math.pi, False) if self.by_poses else turning(ds.scene, point)
+        period, half_turn = (2 * math.pi, False) if self.by_poses else turning(ds, self.index)
         angles = circle("angle", "rad", angle.values, 0.0 if self.by_poses else period, half_turn)
         stations = plain("candidate" if self.by_poses else "station", station.units, station.values, self.by_poses)
         self.axes: tuple[Nodes, Nodes, Nodes] = (stations, angles, plain("force", "N", force.values))
@@ -261,30 +261,31 @@ def _like(mask: np.ndarray, values: np.ndarray, lead: int = 1) -> np.ndarray:
     return mask.reshape((1,) * lead + mask.shape + (1,) * (values.ndim - mask.ndim - lead))
 
 
-def _sweep_point(axes: Any, where: Mapping[str, Any]) -> tuple[tuple[int, ...], dict[str, Any]]:
-    """Index along the swept axes, and the values of their keys as the scene writes them."""
-    index, point, left = [], {}, dict(where)
+def _sweep_point(axes: Any, where: Mapping[str, Any]) -> tuple[int, ...]:
+    """Index along the swept axes."""
+    index, left = [], dict(where)
     for axis in axes:
         key = axis.long_name
         factor = in_si(key, 1.0)
         options: list[Any] = [*axis.options] or [v / factor for v in axis.values.tolist()]
         known = f"{key} = {', '.join(map(_text, options))}"
-        if key not in left and axis.name not in left:
-            if len(options) > 1:
-                raise ValueError(f"where is missing {key}: give one of {known}")
+        if key in left:
+            given = left.pop(key)
+        elif axis.name in left:
+            given = left.pop(axis.name)
+            given = given if isinstance(given, str) else given / factor
+        elif len(options) == 1:
             given = options[0]
         else:
-            given = left.pop(key) if key in left else left.pop(axis.name)
-            given = given / factor if key not in where and not isinstance(given, str) else given
+            raise ValueError(f"where is missing {key}: give one of {known}")
         matching = [i for i, option in enumerate(options) if _same(option, given)]
         if not matching:
             raise ValueError(f"where has {key} = {_text(given)}: expected one of {known}; there is no interpolation")
         index.append(matching[0])
-        point[key] = options[matching[0]]
     if left:
         known = ", ".join(axis.long_name for axis in axes) or "nothing: the file has no sweep"
         raise ValueError(f"where has {', '.join(left)}: expected {known}")
-    return tuple(index), point
+    return tuple(index)
 
 
 def _same(option: Any, given: Any) -> bool:
@@ -297,15 +298,14 @@ def _text(value: Any) -> str:
     return value if isinstance(value, str) else f"{value:.6g}"
 
 
-def turning(text: str, point: Mapping[str, Any]) -> tuple[float, bool]:
+def turning(ds: xr.Dataset, index: tuple[int, ...]) -> tuple[float, bool]:
     """Period of the angles [rad], 0 for a body of revolution, and whether a period exchanges the fingers.
 
     Half a turn of the gripper is the same grasp with the fingers exchanged, if both stand alike (roll 0). A scene that
-    this version cannot read has a whole turn as its period. ``point``: of the scene's sweep.
+    this version cannot read has a whole turn as its period. ``index``: of the sweep's point.
     """
     try:
-        scene = parse_scene(text, check_files=False)
-        scene = scene.with_values(point) if point else scene
+        scene = scene_of(ds, index)
     except SceneError:
         return 2 * math.pi, False
     order, swap = scene.axis_symmetry, abs(math.sin(scene.candidates.roll)) < 1e-9

@@ -6,6 +6,8 @@ PETSc, and works on a file that a run is still writing.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +20,7 @@ from softjaw.study.quantities import BOTH_ENDS, BY_KEY, FINGERS, MISSING, MODELS
 from softjaw.study.result.index import index_path, open_index
 from softjaw.study.result.layout import DONE, ROOT, VERSION
 from softjaw.study.result.store import Result, open_result
+from softjaw.study.scene import Scene, parse_scene
 from softjaw.study.scene.sections import UPPER
 
 XYZ = ("x", "y", "z")
@@ -139,6 +142,21 @@ def dataset(result: Result) -> xr.Dataset:
     variables["status"] = xr.Variable(layout.names, status.astype(np.int8), _about(BY_KEY["status/code"]))
     ds = xr.Dataset(variables, _coordinates(result, variables), _attributes(result))
     return with_intervals(ds) if REALISATION in ds.dims else ds
+
+
+def scene_of(ds: xr.Dataset, index: Sequence[int] = ()) -> Scene:
+    """The scene kept in a result file, with the values of a point of its sweep.
+
+    Raises `SceneError`: this version cannot read it.
+    """
+    return _scene_at(ds.attrs["scene"], tuple(index[: len(ds.status.dims) - 3]))
+
+
+@lru_cache(maxsize=64)
+def _scene_at(text: str, point: tuple[int, ...]) -> Scene:
+    scene = parse_scene(text, check_files=False)
+    values = {key: options[i] for (key, options), i in zip(scene.sweep.items(), point, strict=False)}
+    return scene.with_values(values) if scene.sweep else scene
 
 
 def axes_of(ds: xr.Dataset) -> tuple[Axis, ...]:

@@ -16,7 +16,6 @@ from softjaw.fem.objects.gap import Pose
 from softjaw.friction.patch import NEGLIGIBLE
 from softjaw.study.case.build import build_object, has_wall, middle_of, outer_surface, surface_triangles
 from softjaw.study.quantities import ALONG, AROUND
-from softjaw.study.scene import SceneError
 
 FINER = 6  # places between those of the file among which the nearest is searched
 NOBODY = -1  # candidate of triangles that no candidate grasps
@@ -85,14 +84,6 @@ def pressed(corners: np.ndarray, feet: Iterable[Foot], size: tuple[float, float]
         corners = np.concatenate([corners[~near], pieces])
         cell = np.concatenate([cell[~near], np.where(met, foot.candidate, NOBODY)])
     return corners, cell
-
-
-def scene_at(scene: Any, index: tuple[int, ...]) -> Any:
-    """The scene with the values of one point of its sweep; None where these do not fit."""
-    try:
-        return scene.with_values({key: found[i] for (key, found), i in zip(scene.sweep.items(), index, strict=False)})
-    except (SceneError, IndexError):
-        return None
 
 
 def cells_of(scene: Any, axes: Any, symmetry: int) -> Cells:

@@ -10,7 +10,8 @@ import xarray as xr
 
 from softjaw.study.case.build import build_object, centre_of_mass, own_frame, surface_triangles
 from softjaw.study.ranking import Place
-from softjaw.study.scene import SceneError, parse_scene
+from softjaw.study.result.read import scene_of
+from softjaw.study.scene import SceneError
 from softjaw.study.show.grasps import Index, axis_text, field, unravelled
 from softjaw.study.units import shown_text
 
@@ -52,8 +53,7 @@ def spot(ds: xr.Dataset, index: Index) -> Spot:
     """Where a grasp lies on its object; without words where the file does not tell the object."""
     origin, turn = (field(ds, f"finger_pose_{name}") for name in ("origin", "rotation"))
     try:
-        scene = parse_scene(ds.attrs["scene"], check_files=False)
-        scene = scene.with_values({key: v[i] for (key, v), i in zip(scene.sweep.items(), index, strict=False)})
+        scene = scene_of(ds, index)
         centre = centre_of_mass(scene, build_object(scene.object))
         frame, points = own_frame(scene.object), surface_triangles(scene.object)[0]
     except (SceneError, ValueError, OSError, AttributeError):

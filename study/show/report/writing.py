@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import xarray as xr
 
@@ -19,7 +18,7 @@ from softjaw.study.result.read import open
 from softjaw.study.show.best_grasps import answer as answer_lines
 from softjaw.study.show.grasps import Index, field, forces, judge
 from softjaw.study.show.report import contact, curves, maps, tables, verdict
-from softjaw.study.show.view.model import Place, View, read_scene, view_of
+from softjaw.study.show.view.model import Place, View, view_of
 from softjaw.study.show.view.object3d import object_block
 
 
@@ -39,7 +38,7 @@ def write_report(file: Path, out: Path, candidate: int | None = None, place: Pla
 
 def build(ds: xr.Dataset, candidate: int | None = None, place: Place = (None, None)) -> str:
     """The page of a study, as `study.result.read.open` gives it."""
-    ds, scene = judge(ds), read_scene(ds)
+    ds = judge(ds)
     if candidate is not None or place != (None, None):
         ds = judge(ds, view_of(ds, candidate, place, None)[1])
     # A study without a solved case still gets its page, with states and scene.
@@ -52,7 +51,7 @@ def build(ds: xr.Dataset, candidate: int | None = None, place: Place = (None, No
          tables.reasons(ds, FAILED, *NO_GRASP)),
         ("wall", "What the wall bears", wall(view, best)),
         ("curvature", "What curvature costs", curves.differences(ds, best)),
-        *(cases(view, scene) if ds.attrs["best"] is not None else []),
+        *(cases(view) if ds.attrs["best"] is not None else []),
         ("effects", "What was simulated", [*tables.effects(ds), text(verdict.CAVEAT, "note")]),
         ("cost", "Convergence and cost",
          [*tables.reasons(ds, DONE), tables.checks(ds), *tables.time_split(ds)]),
@@ -97,7 +96,7 @@ def wall(view: View, best: Index) -> list[Block | None]:
     return [*tables.wall(ds, shape), maps.safe_forces(ds, best), sections, curves.wall_curves(ds, best, allowed)]
 
 
-def cases(view: View, scene: Any) -> list[Section]:
+def cases(view: View) -> list[Section]:
     """Force curves, contact patch and limit surface of the best case, and of the one that was asked for."""
     ds, best, chosen = view.ds, view.ds.attrs["best"], view.ds.attrs["chosen"]
     roles = {"Best case": best}
@@ -111,8 +110,9 @@ def cases(view: View, scene: Any) -> list[Section]:
         drawn = {role: block for role, index in roles.items() if (block := draw(views[index], index))}
         return [part for role, block in drawn.items() for part in ([heading(role)] * (len(roles) > 1) + [block])]
 
+    mu = view.scene.friction.mu if view.scene else None
     return [
-        ("models", "Friction models compared", curves.models(ds, roles, scene.friction.mu if scene else None)),
+        ("models", "Friction models compared", curves.models(ds, roles, mu)),
         ("patch", f"Contact patch {which}", headed(contact.patch)),
         ("surface", f"Limit surface {which}", headed(contact.limit_surfaces)),
     ]

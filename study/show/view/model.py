@@ -6,6 +6,7 @@ Positions are in m in the frame of the object's own file unless a unit is named.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from functools import cached_property
 from typing import Any
 
@@ -19,10 +20,10 @@ from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.pictures import span
 from softjaw.study.quantities import ALONG, AROUND, DONE, FAILED, NO_GRASP, STATES, TABLE
 from softjaw.study.ranking import nearest
-from softjaw.study.result.read import axes_of, read_field, read_patch
-from softjaw.study.scene import SceneError, parse_scene
+from softjaw.study.result.read import axes_of, read_field, read_patch, scene_of
+from softjaw.study.scene import SceneError
 from softjaw.study.show.grasps import Index, at, candidate_of, field, forces, number, order, place, quantity, unravelled
-from softjaw.study.show.object_surface import NOBODY, Foot, Surface, moved, on_wall, scene_at, surface_of, undeformed
+from softjaw.study.show.object_surface import NOBODY, Foot, Surface, moved, on_wall, surface_of, undeformed
 from softjaw.study.show.stored_surface import body, stored_surface, weaker
 from softjaw.study.show.view.pads import Faces, Pad, pads_of
 
@@ -33,14 +34,6 @@ ARROW_MM = 6.0  # the longest arrow of friction
 SLIPS = {"x": "a slip along x of the contact", "y": "a slip along y of the contact", "turn": "a turn about its normal"}
 
 
-def read_scene(ds: xr.Dataset) -> Any:
-    """The scene kept in a result file; None if this version cannot read it."""
-    try:
-        return parse_scene(ds.attrs["scene"], check_files=False)
-    except SceneError:
-        return None
-
-
 class View:
     """A study at one point of its sweep; candidates are counted over stations and angles.
 
@@ -49,8 +42,9 @@ class View:
 
     def __init__(self, ds: xr.Dataset, point: Index = ()) -> None:
         self.ds, self.point, self.note = ds, point, ""
-        scene = read_scene(ds)
-        self.scene: Any = None if scene is None else scene_at(scene, point)
+        self.scene: Any = None
+        with suppress(SceneError):
+            self.scene = scene_of(ds, point)
         self._faces: dict[int, xr.Dataset] = {}
 
     @property

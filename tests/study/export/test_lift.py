@@ -11,7 +11,7 @@ import softjaw as sj
 from softjaw.study.export.mjcf import as_mjcf
 from softjaw.study.export.point_contact import SHARE, carried
 from softjaw.study.export.rigid_body import body_of
-from softjaw.study.export.selection import GripperFrame, Selection, grasps
+from softjaw.study.export.selection import GripperFrame, grasps
 from softjaw.study.result.read import open as open_result
 from softjaw.study.units import GRAVITY
 from tests.study.launching import ROOT
@@ -34,7 +34,7 @@ SHIPPED = {  # scenes, and what makes each a quick one with antipodal grasps
 @lru_cache
 def best(path):
     ds = open_result(path)
-    grasp = grasps(ds, Selection(top=1), GripperFrame(closing="x"))[0]
+    grasp = grasps(ds, GripperFrame(closing="x"), top=1)[0]
     return grasp, body_of(ds, grasp.case)
 
 

@@ -13,7 +13,7 @@ from softjaw.study.cli import main
 from softjaw.study.cli.exporting import DATA_SETS, PLANNERS, SIMULATORS, TABLES
 from softjaw.study.cli.options import FORMATS
 from softjaw.study.export.planners import CLOSING, as_graspgen, yaml_text
-from softjaw.study.export.selection import APPROACHES, GripperFrame, Selection, grasps
+from softjaw.study.export.selection import APPROACHES, GripperFrame, grasps
 from softjaw.study.flags import Flag
 from softjaw.study.grippers import Hand
 from softjaw.study.messages import CANNOT_WRITE, USAGE
@@ -113,7 +113,7 @@ def test_every_format_of_the_command_has_a_writer_and_the_other_way_round():
 def test_the_gripper_stands_over_its_pads(path, closing):
     """Where the file's pads are, seen from the gripper: finger 1 behind, finger 2 ahead along its closing axis."""
     depth, hand = 0.1, Hand(closing=closing, depth_mm=100.0)
-    found = grasps(opened(path), Selection(force=4.0), GripperFrame(hand, tuple(APPROACHES)))
+    found = grasps(opened(path), GripperFrame(hand, tuple(APPROACHES)), force=4.0)
     for grasp, approach in zip(found, 5 * tuple(APPROACHES), strict=True):
         R, o, _ = geometry(station_of(grasp.case["fingers"][0]["pose_origin"]))
         one, two = (grasp.rotation.T @ (origin - grasp.origin) for origin in o)
@@ -201,7 +201,7 @@ def test_graspgen_names_the_mesh_from_its_own_folder(path):
 
 def test_grasps_that_hold_nothing_are_no_grasps(tmp_path):
     path = write(tmp_path / "empty.hdf", **{"payload/ccm": np.zeros((5, 1, 3))})
-    found = grasps(opened(path), Selection(force=4.0), GripperFrame(approach=("x",)))
+    found = grasps(opened(path), GripperFrame(approach=("x",)), force=4.0)
     assert {grasp.reasons for grasp in found} == {("payload 0",)}
 
 

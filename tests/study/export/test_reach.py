@@ -6,7 +6,7 @@ import pytest
 from softjaw.study.case.poses import axis_poses
 from softjaw.study.export.reach import WAY, boxes, clearance, surface_points
 from softjaw.study.export.rigid_body import scene_of
-from softjaw.study.export.selection import GripperFrame, Selection, grasps, usable
+from softjaw.study.export.selection import GripperFrame, grasps, usable
 from softjaw.study.grippers import Hand, gripper_file
 from tests.study.export.grasp_results import RADIUS, STATIONS, opened, write
 
@@ -26,7 +26,7 @@ def path(tmp_path_factory):
 
 
 def taken(path, hand, force=4.0):
-    found = grasps(opened(path), Selection(force=force), GripperFrame(hand, ()))
+    found = grasps(opened(path), GripperFrame(hand, ()), force=force)
     return sorted(found, key=lambda grasp: grasp.case["place"]["station"])
 
 
