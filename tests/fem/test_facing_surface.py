@@ -242,3 +242,4 @@ def test_wide_facets_that_stay_sharp_are_told_with_what_they_hide(sections, told
     if told:  # the arc over a chord
         np.testing.assert_allclose(off, 0.025 * (1 - np.cos(np.pi / sections)), rtol=0.02)
     assert bool(MeshObject(body.vertices, body.faces).sharp_facets(0.0055)) == told
+

@@ -149,3 +149,4 @@ def test_principal_axes(scale):
     assert np.sort(values) == pytest.approx(np.linalg.eigvalsh(M), rel=1e-13, abs=1e-14 * scale)
     assert np.abs(vectors @ np.diag(values) @ vectors.T - M).max() < 1e-14 * np.abs(M).max() * 10
     assert np.abs(vectors.T @ vectors - np.eye(3)).max() < 1e-14
+

@@ -87,3 +87,4 @@ def test_lines_of_a_wall_that_rounding_doubles_are_one():
     low, *_, high = breaks[(breaks > outer.wall[0]) & (breaks < outer.wall[1])]
     surface = wall_surface(outer, np.nextafter(low, 0.0), np.nextafter(high, 1.0))
     assert np.diff(surface.s).min() > 1e-9
+

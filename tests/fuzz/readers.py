@@ -148,7 +148,6 @@ def packed(*models, kind=zipfile.ZIP_DEFLATED):
 
 def _scene(path):
     from softjaw.study.scene import load_scene
-
     scene = load_scene(path)
     return scene.effective_toml(), scene.digest
 
@@ -156,13 +155,11 @@ def _scene(path):
 def _patch(path):
     from softjaw.study.patch.answer import read_patch
     from softjaw.study.patch.patch_reader import Reading
-
     return read_patch(str(path), Reading("mm", "kpa"))
 
 
 def _mesh(path):
     from softjaw.fem.objects.mesh_object import MeshObject
-
     return MeshObject.from_file(path, "mm")
 
 
@@ -175,7 +172,6 @@ def _model(path):
 
 def _metres(path):
     from softjaw.fem.objects.mesh_object import MeshObject
-
     return MeshObject.from_file(path, "m")
 
 
@@ -186,7 +182,6 @@ def _result(path):
     from softjaw.study.show.best_grasps import best
     from softjaw.study.show.status import status_text
     from softjaw.study.table import as_json
-
     with open_result(path) as result:
         ds = dataset(result)
         return as_csv(ds), as_json(best(ds, None, 3)), status_text(result, 80)
@@ -212,7 +207,6 @@ def slow_readers(folder: Path) -> dict[str, Reader]:
     """Readers whose libraries have to be kept apart, with files that take a while to make."""
     from tests.study.formula_results import make
     from tests.study.patch_files import cylinder_mesh, vtk
-
     points, cells = cylinder_mesh()
     grids = [vtk(folder / f"seed.{end}", points, cells, [("pressure", np.ones(len(cells)))]) for end in ("vtu", "vtp")]
     return {

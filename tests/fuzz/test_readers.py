@@ -124,7 +124,6 @@ def test_hostile_meshes_are_read_or_refused_in_time_and_in_little_memory(tmp_pat
 )
 def test_an_override_is_taken_or_refused(tmp_path, text):
     from softjaw.study.scene import SceneError, load_scene
-
     path = tmp_path / "scene.toml"
     path.write_bytes(QUICK["scene"].content)
     with pytest.raises(SceneError) as refused:

@@ -44,7 +44,6 @@ def plan_of(name, rounds=()):
 def study(scene, _overrides):
     from softjaw.study.messages import USAGE, NoGraspError
     from softjaw.study.run.session import Work
-
     name = scene.object.name
     if name == "none":
         raise NoGraspError(USAGE, "nothing fits")
@@ -69,7 +68,6 @@ def main(arguments=None):
     from softjaw.study.run.object_folder import folder_of
     from softjaw.study.run.objects import run_objects
     from softjaw.study.run.session import Work
-
     solved = 0
     nothing = SimpleNamespace(hang=-1, stuck=-1, greedy=-1, unplug=-1, remove=-1, kill=-1, raises=-1, fail=7001)
     cases = fake_run.fake_path(SimpleNamespace(**vars(nothing), delay=options.delay))

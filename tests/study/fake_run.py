@@ -30,7 +30,6 @@ def fake_plan(digest="scene", stations=6, derived=True, wide=-1, rounds=(), apar
     from softjaw.study.quantities import WIDE, Axis, Quantity
     from softjaw.study.result.layout import Header, Layout
     from softjaw.study.run.plan import Plan
-
     own = np.linspace(0, 0.1, stations).tolist()
     places = sorted([*own, *(1e-3 * mm for added in rounds for mm in added)])
     axes = (
@@ -60,7 +59,6 @@ def fake_plan(digest="scene", stations=6, derived=True, wide=-1, rounds=(), apar
 def fake_growth(digest, stations, work):
     """The work with rounds of further stations until a budget is spent, by the rule of a real study."""
     from softjaw.study.run.refine import next_stations
-
     given = (1e3 * np.linspace(0, 0.1, stations)).tolist()
     asked = SimpleNamespace(refine=36, station_values_mm=given)
     scene = SimpleNamespace(candidates=asked, accuracy=SimpleNamespace(refined_within=0.01))
@@ -73,7 +71,6 @@ def fake_growth(digest, stations, work):
 
 def fake_result(row):
     from softjaw.study.case.result import CaseResult
-
     random = np.random.default_rng(row)
     values = {f"maps/{name}": random.random(3) for name in ("payload", "e_n", "f_x_max", "tau_z_max", "quality")}
     values |= {"maps/S": random.random(), "fingers/f_x_max": random.random((2, 3)), "checks/adhesion": random.random(2)}
@@ -135,7 +132,6 @@ def main(arguments=None):
     from softjaw.study.messages import StudyError, complain
     from softjaw.study.run.session import Work, run_study
     from softjaw.study.show.best_grasps import summary
-
     comm = MPI.COMM_WORLD
     if options.file_limit:
         resource.setrlimit(resource.RLIMIT_FSIZE, (options.file_limit, options.file_limit))

@@ -48,7 +48,6 @@ def test_claims_of_the_lookup_hold(tmp_path):
     from softjaw.study.doctor import launch_environment
     from softjaw.study.lookup import GraspMap
     from softjaw.study.quantities import MAIN
-
     own = np.linspace(25, 175, 35)
     between = ((own[1:] + own[:-1]) / 2).round(6).tolist()
     text = re.sub(r"\n(stations_mm|refine|normal_force_n) .*", "", pathlib.Path(BOTTLE).read_text())

@@ -194,7 +194,6 @@ def test_too_little_space_is_noticed_before_anything_is_solved(tmp_path):
 @pytest.mark.parametrize("ranks", [0, pytest.param(2, marks=pytest.mark.long)])
 def test_a_torn_row_is_solved_again(tmp_path, whole, uninterrupted, ranks):
     import h5py
-
     path = tmp_path / "torn.hdf"
     shutil.copy(whole, path)
     with h5py.File(path, "r+") as file:

@@ -134,7 +134,6 @@ def test_a_tube_gives_way_more_than_a_cup_and_less_where_its_rims_are_held():
 
 def test_a_collapse_fails_the_case_and_those_above_with_the_reason(monkeypatch):
     from softjaw.fem.shell.opening import Opening
-
     monkeypatch.setattr(Opening, "__call__", lambda self, q: 1.0 - 1e3 * float(np.abs(q).max()))
     path = [r for _, r in pipeline.solve_unit(walled(CUP, forces="[0.2, 3, 4]")[0])]
     assert not isinstance(path[0], CaseFailure)

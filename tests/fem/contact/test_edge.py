@@ -87,3 +87,4 @@ def test_one_loaded_line_of_nodes_has_about_the_width_of_its_share(line):
     found = ContactPatch(place.reshape(-1, 3), patch.area, patch.normal, load.ravel(), patch.corners)
     assert 0.8 < contact_area(found, faces) / (LENGTH * share * (1.0 if line else 0.5)) < 1.3
     assert largest_pressure(found, faces, 2) == pytest.approx(1.0, rel=0.35)
+

@@ -122,7 +122,6 @@ def test_a_face_pressed_in_by_less_than_its_error_is_not_judged():
 
 def test_a_lifted_face_has_the_derivatives_of_what_it_adds():
     from scipy.interpolate import RectBivariateSpline
-
     x, y = np.linspace(-0.04, 0.04, 21), np.linspace(-0.02, 0.02, 21)
     lift = RectBivariateSpline(x, y, 1e-4 * np.sin(100.0 * x)[:, None] * np.cos(150.0 * y))
     face = LiftedFace(measured_face(waves()[0], 2.2e-3), lift)

@@ -18,8 +18,6 @@ from tests.fem import reference
 
 BOTTLE = Path(__file__).parents[3] / "jobs" / "bottle-rigid.toml"
 FORCES = (1.0, 2.0, 4.0, 7.0, 10.0, 13.0)
-
-
 def along_the_neck(stations, forces=FORCES):
     """Closing displacement [mm], e_n [mm] and Newton iterations ``(stations, forces)``, and what there is to know."""
     scene = parse_scene(BOTTLE.read_text(), BOTTLE, ["candidates.stations_mm=[160]"])
@@ -47,3 +45,4 @@ def test_a_station_that_moves_by_two_micrometres_changes_nothing():
     assert np.abs(closing[1] / closing[0] - 1).max() < 5e-3
     assert closing[1, 2] == pytest.approx(5.434, rel=0.01)
     assert iterations.max() <= 45
+

@@ -154,3 +154,4 @@ def test_pressures_are_never_interpolated_below_zero():
     pressure = interpolated(coarse, x, pad)[pad.closing_dof + 1 :]
     assert pressure.min() >= 0.0
     assert pressure.max() >= 1.0 - 1e-12
+

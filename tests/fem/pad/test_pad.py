@@ -101,3 +101,4 @@ def test_shape_functions_of_a_side(n):
     assert along_side(n, np.linspace(0, 1, n)) == pytest.approx(np.eye(n), abs=1e-15)
     for power in range(n):
         assert along_side(n, np.array([0.3]))[0] @ np.linspace(0, 1, n) ** power == pytest.approx(0.3**power)
+

@@ -196,3 +196,4 @@ def test_a_force_that_is_never_reached_is_an_error():
     flat.problem.normal_force = lambda x: 1.0 - np.exp(-x[0] / MM)
     with pytest.raises(ConvergenceError):
         flat.displacement_control(np.zeros(1), 2.0, Work(), 0.5 * MM)
+
