@@ -75,8 +75,8 @@ class Facing:
     """What ``n`` points face; letters as in the module's formulas.
 
     ``gap``: signed distance along the director, `FAR` where the point faces no wall [m]; ``nodes, N (n, 4)``: of the
-    shell element and their shape functions; ``A (n, 4, 3, 3)``: ``d(N_a n)/dx``, by how much the share of a node
-    changes when the point moves.
+    shell element and their shape functions; ``S (n, 4, 3)``: ``dN_a/dx``, by how much the share of a node changes when
+    the point moves.
     """
 
     gap: FloatArray
@@ -86,7 +86,7 @@ class Facing:
     N: FloatArray
     H: FloatArray
     G: FloatArray
-    A: FloatArray
+    S: FloatArray
 
 
 def face(wall: Wall, points: FloatArray, places: FloatArray, v: FloatArray, w: FloatArray) -> Facing:
@@ -127,20 +127,20 @@ def _search(wall: Wall, points: FloatArray, places: FloatArray, v: FloatArray, w
     n = len(points)
     facing = Facing(
         np.empty(n), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 4), np.int32), np.zeros((n, 4)),
-        np.zeros((n, 3, 3)), np.zeros((n, 3, 3)), np.zeros((n, 4, 3, 3)),
+        np.zeros((n, 3, 3)), np.zeros((n, 3, 3)), np.zeros((n, 4, 3)),
     )  # fmt: skip
     surface = wall.surface
     _face(
         np.ascontiguousarray(points), places, surface.theta, surface.s, surface.coefficients,
         wall.closed, *wall.ends, wall.theta, wall.s, wall.nodes, wall.half, v, w, facing.gap, facing.normal, facing.e,
-        facing.nodes, facing.N, facing.H, facing.G, facing.A,
+        facing.nodes, facing.N, facing.H, facing.G, facing.S,
     )  # fmt: skip
     return facing
 
 
 @njit(cache=True)
 def _face(points, places, lines_t, lines_s, coefficients, closed, low, high, theta, s, table, half, v, w, gap,
-          normal, e, nodes, N, H, G, A):  # fmt: skip
+          normal, e, nodes, N, H, G, S):  # fmt: skip
     """Loop of `_search`."""
     X, J, inverse = np.empty((6, 3)), np.empty((3, 3)), np.empty((3, 3))
     n, n_1, n_2, r, step = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
@@ -209,10 +209,8 @@ def _face(points, places, lines_t, lines_s, coefficients, closed, low, high, the
                 G[k, c, d] = ((1.0 if c == d else 0.0) - n[c] * n[d]) / length
         for a in range(4):
             nodes[k, a], N[k, a] = at[a], shape[a]
-            for c in range(3):
-                for d in range(3):
-                    slide = shape_1[a] * inverse[0, d] + shape_2[a] * inverse[1, d]
-                    A[k, a, c, d] = shape[a] * H[k, c, d] + n[c] * slide
+            for d in range(3):
+                S[k, a, d] = shape_1[a] * inverse[0, d] + shape_2[a] * inverse[1, d]
 
 
 @njit(cache=True)

@@ -17,6 +17,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,10 +28,14 @@ from softjaw.fem.contact.problem import ContactProblem, Control, Evaluated, Fing
 from softjaw.fem.objects.gap import FloatArray, Pose
 from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.shell.facing import FAR, Facing, Wall, face
-from softjaw.fem.shell.wall_kernel import contact_tangent, friction_tangent
+from softjaw.fem.shell.wall_kernel import contact_tangent
 from softjaw.fem.shell.wall_model import NonlinearWall
 
 IntArray = NDArray[np.int32]
+# traction of no point, its derivatives by motion, normal and pressure, and where no point stuck
+NO_FRICTION: tuple[Any, ...] = (
+    *(np.empty((0, *shape)) for shape in ((3,), (3, 3), (3, 3), (3,))), np.empty((0, 4), np.int32), np.empty((0, 4)),
+)  # fmt: skip
 ROUNDING = 1.5e-18  # norm of the residual over the wall's modulus [m^2]: its forces are differences of large numbers
 
 
@@ -204,19 +209,14 @@ class WallProblem(ContactProblem):
     def _add_contact(self, k: int, x: FloatArray, c: Evaluated) -> bool:
         """Add the contact of the ``k``-th finger to the tangent; whether the pattern has a place for all entries."""
         f, facing = self.fingers[k], c.surface
-        pad, rows = f.pad, (self.model.first, self.model.second, self.pattern.start, self.pattern.column)
-        complete = contact_tangent(
-            pad.face_N, pad.face_area, c.lam, c.active[f.nodes], f.kappa, facing.gap, facing.normal, facing.e,
-            facing.nodes, facing.N, facing.H, facing.G, facing.A, f.R, f.dofs, f.pressure_dofs, *rows,
-            self.pattern.values,
-        )  # fmt: skip
-        if self.friction is None:
-            return complete
-        anchor = self.friction.anchors[k]
-        return complete & friction_tangent(
-            pad.face_N, pad.face_area, self._dragged(k, f, c), *self.traction(k, x, c, derivatives=True), f.kappa,
-            facing.gap, facing.normal, facing.nodes, facing.N, facing.H, facing.G, facing.A, anchor.nodes, anchor.N,
-            f.R, f.dofs, f.pressure_dofs, *rows, self.pattern.values,
+        held, friction = np.zeros(len(facing.gap), dtype=bool), NO_FRICTION
+        if self.friction is not None:
+            anchor, held = self.friction.anchors[k], self._dragged(k, f, c)
+            friction = *self.traction(k, x, c, derivatives=True), anchor.nodes, anchor.N
+        return contact_tangent(
+            f.pad.face_N, f.pad.face_area, c.lam, c.active[f.nodes], f.kappa, facing.gap, facing.normal, facing.e,
+            facing.nodes, facing.N, facing.H, facing.G, facing.S, held, *friction, f.R, f.dofs, f.pressure_dofs,
+            self.model.first, self.model.second, self.pattern.start, self.pattern.column, self.pattern.values,
         )  # fmt: skip
 
     def _grow(self, contacts: list[Evaluated]) -> None:

@@ -106,5 +106,7 @@ def test_derivatives_agree_with_finite_differences(wall, points):
         found, same = difference(lambda f: f.gap, direction)
         np.testing.assert_allclose(found, (at.e * change).sum(axis=1)[same], atol=1e-5)
         found, same = difference(share, direction)
-        expected = np.einsum("naij,nj->nai", at.A, change) + at.N[:, :, None] * (own * np.ones_like(change))[:, None, :]
+        dn = np.einsum("nij,nj->ni", at.H, change) + own
+        slide = np.einsum("nai,ni->na", at.S, change)
+        expected = slide[:, :, None] * at.normal[:, None, :] + at.N[:, :, None] * dn[:, None, :]
         np.testing.assert_allclose(found, expected[same], atol=1e-4 * np.abs(expected).max())
