@@ -25,7 +25,6 @@ from softjaw.friction.wrench import friction_wrench
 from softjaw.scoring.contact import PolytopeBody
 from softjaw.study import pictures
 from softjaw.study.case import effects
-from softjaw.study.case.build import build_object
 from softjaw.study.case.candidates import units
 from softjaw.study.case.contact import Contact
 from softjaw.study.case.effects import COUPLING as COUPLED
@@ -99,10 +98,10 @@ def at_levels(scene: Scene, **levels: str) -> Scene:
 
 def choices(scene: Scene) -> Iterator[EffectChoice]:
     """Levels of the effects of a scene's candidates."""
-    for unit in units(scene, lambda point: build_object(point.object).axis_symmetry):
+    for unit in units(scene):
         solver = CandidateSolver(scene, unit.candidate.poses)
         yield EffectChoice(solver)
-        solver.destroy()
+        solver.put_away()
 
 
 def contacts_at(scene: Scene, **levels: str) -> dict[tuple[int, float], list[Contact]]:

@@ -14,7 +14,6 @@ from itertools import product
 from pathlib import Path
 
 from softjaw.study import pipeline
-from softjaw.study.case.build import build_object
 from softjaw.study.case.candidates import units
 from softjaw.study.case.result import CaseFailure
 from softjaw.study.flags import flag_words
@@ -34,7 +33,7 @@ def row(scene: str, station: float, angle: float, thickness: float, modulus: flo
     even = "wall_mm" not in Path(scene).read_text(encoding="utf-8")
     wall = f"wall_mm={thickness}" if even else f"wall_mm=[[0, {thickness}], [100, {thickness}]]"
     point = load_scene(scene, [*COARSE, *held, f"object.{wall}", f"object.young_modulus_gpa={modulus}"])
-    unit = next(iter(units(point, lambda p: build_object(p.object).axis_symmetry)))
+    unit = next(iter(units(point)))
     start, cells = time.process_time(), []
     for _, case in pipeline.solve_unit(unit):
         if isinstance(case, CaseFailure):

@@ -173,7 +173,7 @@ def solved_case(
     if scene.petsc:
         check_petsc(dict(scene.petsc))
     row = number * len(scene.load.normal_force_n) + k
-    served = ((u, c) for u in units(scene, lambda s: s.axis_symmetry) for c, rows in enumerate(u.rows) if row in rows)
+    served = ((u, c) for u in units(scene) for c, rows in enumerate(u.rows) if row in rows)
     unit, c = next(served)
     place, what = unit.served[c], f"{unit.served[c].label}, {scene.load.normal_force_n[k]:g} N"
     unit = decided([unit])[0]

@@ -32,14 +32,6 @@ class Pose:
     rotation: FloatArray
     origin: FloatArray
 
-    def __post_init__(self) -> None:
-        """Refuse anything but a right-handed rotation."""
-        # a reflection passes the first test, so the determinant is asked as well
-        if not np.allclose(self.rotation.T @ self.rotation, np.eye(3), atol=1e-9) or np.linalg.det(self.rotation) < 0:
-            raise ValueError(
-                f"rotation must be orthonormal and right-handed, found {np.asarray(self.rotation).tolist()}"
-            )
-
     def to_object(self, x: FloatArray) -> FloatArray:
         """Points of the pad's frame in the object's frame, ``(n, 3)`` [m]."""
         return x @ self.rotation.T + self.origin
@@ -75,11 +67,6 @@ class GapObject(GapFunction, Protocol):
         """Distance [m] along the approach at which the first of the pad's ``points (n, 3)`` meets the object."""
         ...
 
-    @property
-    def axis_symmetry(self) -> int:
-        """Order of the rotational symmetry about z; 0 means every angle, 1 means none."""
-        ...
-
     def surface(self) -> Surface:
         """Points ``(k, 3)`` [m] and triangles ``(m, 3)`` for drawing."""
         ...
@@ -111,13 +98,6 @@ def radial(d: FloatArray) -> Gap:
     e[r == 0, 0] = 1.0
     H = (np.eye(d.shape[1]) - e[:, :, None] * e[:, None, :]) / np.maximum(r, 1e-9)[:, None, None]
     return r, e, H
-
-
-def in_plane(x: FloatArray, n: FloatArray, H: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Put the normal ``(n, 2)`` and Hessian ``(n, 2, 2)`` of a cross-section into space; axis z."""
-    normal, hessian = np.zeros((len(x), 3)), np.zeros((len(x), 3, 3))
-    normal[:, :2], hessian[:, :2, :2] = n, H
-    return normal, hessian
 
 
 def grid_triangles(rows: int, columns: int, *, closed: bool = False) -> IntArray:

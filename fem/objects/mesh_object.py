@@ -161,11 +161,6 @@ class MeshObject:
         """Corners ``(2, 3)`` [m]."""
         return np.stack([self.points.min(axis=0), self.points.max(axis=0)])
 
-    @property
-    def axis_symmetry(self) -> int:
-        """None that could be relied on."""
-        return 1
-
     def surface(self) -> Surface:
         """Points and triangles; large meshes are decimated."""
         if len(self.triangles) <= 20_000:
@@ -220,17 +215,13 @@ class MeshRegion:
         The gradient is that of the spline, so its length is 1 up to the interpolation error.
         """
         y = self.pose.to_pad(np.asarray(x, dtype=float))
-        inside = self._covers(y)
+        inside = ((y >= self.lower) & (y <= self.upper)).all(axis=1)
         if inside.all():
             return self._spline(y)
         g, normal, hessian = np.empty(len(y)), np.empty((len(y), 3)), np.zeros((len(y), 3, 3))
         g[inside], normal[inside], hessian[inside] = self._spline(y[inside])
         g[~inside], normal[~inside] = self.sheet.signed(x[~inside])
         return g, normal, hessian
-
-    def _covers(self, y: FloatArray) -> np.ndarray:
-        """Whether points of the pad's frame lie in the box, ``(n,)``."""
-        return ((y >= self.lower) & (y <= self.upper)).all(axis=1)
 
     def _spline(self, y: FloatArray) -> Gap:
         """Interpolation at points ``y (n, 3)`` of the pad's frame, turned into the object's frame."""

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -85,6 +86,12 @@ class OuterSurface:
         """Largest s [m]; the smallest is 0."""
         return float(self.curve.breaks[-1])
 
+    @cached_property
+    def heights(self) -> tuple[float, float]:
+        """Lowest and highest place of the wall [m]."""
+        z = self.curve.derivative(np.linspace(*self.wall, 257))[:, 0]
+        return float(z.min()), float(z.max())
+
     def turned(self, angle: float) -> OuterSurface:
         """The surface seen from a frame that is turned about the axis by ``angle`` [rad]."""
         x, y = self.symmetric
@@ -131,8 +138,8 @@ class OuterSurface:
         ends = [end for end in self.wall if abs(height(end) - z) < 1e-12]
         found = [*ends, *places[(places >= low) & (places <= high)]]
         if not found:
-            z_low, *_, z_high = np.sort(height(np.linspace(low, high, 257)))
-            raise ValueError(f"the wall runs from z = {z_low:g} m to {z_high:g} m and has no point at {z:g} m")
+            lowest, highest = self.heights
+            raise ValueError(f"the wall runs from z = {lowest:g} m to {highest:g} m and has no point at {z:g} m")
         return float(min(found))
 
 

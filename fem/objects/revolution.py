@@ -7,7 +7,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softjaw.fem.objects.gap import Analytic, FloatArray, Gap, Surface, grid_triangles
 from softjaw.fem.objects.profile import Curve, through, with_lids
@@ -15,7 +14,6 @@ from softjaw.friction.patch import NEGLIGIBLE
 
 BLOCK = 8  # segments of the polyline that share one bounding circle
 TURN = np.radians(3.0)  # largest turn of the curve within one segment of the polyline
-CLOSEST_POINTS = 1e-6  # points of a profile closer than this are refused [m]
 
 
 def closest() -> Any:
@@ -48,8 +46,8 @@ class Revolution(Analytic):
     rim: float = 0.002
 
     def __post_init__(self) -> None:
-        """Refuse profiles that are no body's."""
-        object.__setattr__(self, "profile", _checked_points(self.profile))
+        """Refuse a curve that is no body's; the points rise, and lie on the axis at the ends alone."""
+        object.__setattr__(self, "profile", np.asarray(self.profile, dtype=float))
         _check_line(self._line)
 
     @cached_property
@@ -86,11 +84,6 @@ class Revolution(Analytic):
         (low, _), (high, r) = self._line.min(axis=0), self._line.max(axis=0)
         return np.array([[-r, -r, low], [r, r, high]])
 
-    @property
-    def axis_symmetry(self) -> int:
-        """Every angle."""
-        return 0
-
     def surface(self) -> Surface:
         """Points and triangles: the profile, finest where it bends, at 48 angles."""
         fine = self._places
@@ -101,35 +94,6 @@ class Revolution(Analytic):
         phi = np.linspace(0, 2 * np.pi, 48, endpoint=False)
         points = np.stack([r * np.cos(phi), r * np.sin(phi), z + 0 * phi], axis=-1).reshape(-1, 3)
         return points, grid_triangles(len(s), 48, closed=True)
-
-
-def _checked_points(profile: FloatArray) -> FloatArray:
-    """Profile as an array that runs upwards along the outside."""
-    points = np.array(profile, dtype=float)
-    ends = points[[0, -1], 1]
-    points[[0, -1], 1] = np.where(np.abs(ends) <= NEGLIGIBLE, 0.0, ends)
-    bad = points[:, 1] <= 0
-    bad[[0, -1]] = points[[0, -1], 1] < 0
-    if bad.any():
-        k = _first(bad)
-        raise ValueError(
-            f"profile point {k} has radius {points[k - 1, 1]:g} m; only the two ends may lie on the axis, "
-            "all other radii must be positive"
-        )
-    short = np.linalg.norm(np.diff(points, axis=0), axis=1) < CLOSEST_POINTS
-    if short.any():
-        k = _first(short)
-        raise ValueError(f"profile points {k} and {k + 1} are the same; leave one out")
-    area = 0.5 * np.sum((points[1:, 1] + points[:-1, 1]) * np.diff(points[:, 0]))
-    if abs(area) < CLOSEST_POINTS * np.ptp(points, axis=0).max():
-        raise ValueError("profile encloses no area; it must lead from one end of the object to the other")
-    # the normal lies to the left of the curve, so that has to run upwards to point outwards
-    return points if area > 0 else points[::-1].copy()
-
-
-def _first(flags: NDArray[np.bool_]) -> int:
-    """Number, from 1, of the first element that is set."""
-    return int(np.flatnonzero(flags)[0]) + 1
 
 
 def _places(curve: Curve) -> FloatArray:

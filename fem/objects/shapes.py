@@ -18,11 +18,9 @@ from softjaw.fem.objects.gap import (
     GapObject,
     Surface,
     grid_triangles,
-    in_plane,
     radial,
 )
 from softjaw.fem.objects.revolution import Revolution, closest
-from softjaw.friction.patch import NEGLIGIBLE
 
 __all__ = ["Box", "EllipticCylinder", "GapFunction", "GapObject", "Plane", "Revolution", "Sphere"]
 
@@ -48,11 +46,6 @@ class Plane(Analytic):
         corner = np.array([self.thickness / 2, SLAB_HALF_EXTENT, SLAB_HALF_EXTENT])
         return np.stack([-corner, corner])
 
-    @property
-    def axis_symmetry(self) -> int:
-        """Half a turn."""
-        return 2
-
     def surface(self) -> Surface:
         """Points and triangles of the part that is drawn."""
         return Box(2 * self.bounds[1], 0.0).surface()
@@ -73,11 +66,6 @@ class Sphere(Analytic):
     def bounds(self) -> FloatArray:
         """Corners ``(2, 3)`` [m]."""
         return self.radius * np.array([[-1.0] * 3, [1.0] * 3])
-
-    @property
-    def axis_symmetry(self) -> int:
-        """Every angle."""
-        return 0
 
     def surface(self) -> Surface:
         """Points and triangles of a net of latitudes and longitudes."""
@@ -121,7 +109,8 @@ class EllipticCylinder(Analytic):
         """Signed distance ``(n,)`` [m], normal ``(n, 3)`` and Hessian ``(n, 3, 3)`` [1/m]."""
         x = np.asarray(x, dtype=float)
         g, n, H = closest().ellipse_gap(x, float(self.a), float(self.b))
-        normal, hessian = in_plane(x, n, H)
+        normal, hessian = np.zeros((len(x), 3)), np.zeros((len(x), 3, 3))
+        normal[:, :2], hessian[:, :2, :2] = n, H
         beyond = np.abs(x[:, 2]) - self._wall
         wall = (beyond <= 0) & (g >= beyond - self.edge_radius)  # no farther than the cap, for points inside
         if not wall.all():
@@ -150,11 +139,6 @@ class EllipticCylinder(Analytic):
         """Corners ``(2, 3)`` [m]."""
         corner = np.array([self.a, self.b, self.length / 2])
         return np.stack([-corner, corner])
-
-    @property
-    def axis_symmetry(self) -> int:
-        """Half a turn; every angle if the cylinder is round."""
-        return 0 if abs(self.a - self.b) <= NEGLIGIBLE * self.a else 2
 
     def surface(self) -> Surface:
         """Points and triangles: ellipses along the wall, the curves parallel to them on the edges, and the caps."""
@@ -198,11 +182,6 @@ class Box(Analytic):
     def bounds(self) -> FloatArray:
         """Corners ``(2, 3)`` [m]."""
         return np.stack([-self.size / 2, self.size / 2])
-
-    @property
-    def axis_symmetry(self) -> int:
-        """Half a turn; a quarter turn if the cross-section is square."""
-        return 4 if abs(self.size[0] - self.size[1]) <= NEGLIGIBLE * self.size[0] else 2
 
     def surface(self) -> Surface:
         """Points and triangles: the sides of the sharp box, drawn towards the smaller box by the radius."""

@@ -26,13 +26,6 @@ class Stacked(Analytic):
     outer: OuterSurface
 
     @property
-    def axis_symmetry(self) -> int:
-        """Every angle if all sections are circles about the axis, half a turn without shifts, else none."""
-        if self.outer.round:
-            return 0
-        return 2 if all(self.outer.symmetric) else 1
-
-    @property
     def bounds(self) -> FloatArray:
         """Corners ``(2, 3)`` [m]."""
         return self._triangles.bounds

@@ -41,32 +41,15 @@ PER_WAVE = 16  # heights at which rays are cast
 AROUND, MOST_ALONG = 256, 800
 SYMMETRIC = 1e-6  # of the size: how exactly a symmetry has to be fulfilled ...
 OFF = 0.03  # of the mean radius: a surface further from its mesh is refused
-LID = 24  # places along a lid, and angles, at which its distance to the mesh is looked up
 
 
-@dataclass(frozen=True)
-class Radii:
-    """Smooth radii on the wall.
+def _smooth_surface(
+    mesh: MeshObject, wall: Wall, facet: float, wavelength: float, tolerance: float
+) -> tuple[OuterSurface, float]:
+    """Surface through the wall of a mesh with triangles of a size, with lids, and the waves that it may have [m].
 
-    ``s, z (k,)``: places along the outline, from 0 on, and their heights [m]; ``R (k, n)``: distance from the centre
-    line at even angles from 0 [m], rough along s; ``height``: z(s); ``wavelength``: shorter waves are taken out [m];
-    ``symmetric``, ``round``: as of `OuterSurface`, and R is so exactly.
-    """
-
-    s: FloatArray
-    z: FloatArray
-    R: FloatArray
-    height: BSpline
-    wavelength: float
-    symmetric: tuple[bool, bool]
-    round: bool
-
-
-def trace_radii(mesh: MeshObject, wall: Wall, facet: float, wavelength: float, tolerance: float) -> Radii:
-    """Radii of the wall of a mesh with triangles of a size, without waves below about ``wavelength`` [m].
-
-    ``tolerance`` is how exactly a symmetry has to be fulfilled [m]. Raises `MeshError` for sections that are not
-    star-shaped about their centres.
+    ``wavelength`` is about the shortest, ``tolerance`` how exactly a symmetry has to be fulfilled [m]. Raises
+    `MeshError` for sections that are not star-shaped about their centres.
     """
     z = np.linspace(*wall.ends, MOST_ALONG)
     outer, inner = cast(mesh.points, mesh.triangles, z, wall.centre(z), FEW)
@@ -83,7 +66,13 @@ def trace_radii(mesh: MeshObject, wall: Wall, facet: float, wavelength: float, t
     waves = np.maximum(8, 2 * np.pi * outer.mean(axis=1) / wavelength)  # waves round any section, at least
     R = smooth_rings(outer, waves, AROUND)
     R, symmetric, is_round = _symmetric(R, ~wall.centre(z).any(axis=0), tolerance)
-    return Radii(s, z, R, height, wavelength, symmetric, is_round)
+    a = smooth_spline(s, R.mean(axis=1), wavelength, (0.0, s[-1]))
+    curve, (start, stop), flat = with_lids(curve_of(height, a), Revolution.rim, wall.lids)
+    # carried on over the lids, so that they have the shape of the last section
+    q = continued(s + start, R / a(s)[:, None], wavelength, (0.0, float(curve.breaks[-1])))
+    shape = _shape(q, AROUND)
+    section = lambda theta, s, z, z_s: shape.at(theta, s)[:, :3, :2].transpose(1, 0, 2)  # noqa: E731
+    return OuterSurface(curve, (start, stop), flat, section, wall.centre, symmetric, is_round), wavelength
 
 
 def _refuse_folds(z: FloatArray, bad: NDArray[np.bool_]) -> None:
@@ -117,18 +106,13 @@ def _symmetric(R: FloatArray, on_axis: FloatArray, tolerance: float) -> tuple[Fl
 class TraceReport:
     """What was traced, and how well.
 
-    ``heights``: covered by the wall [m]; ``largest, rms``: distance of the mesh's corners and middles of triangles on
-    the wall to the traced surface [m], and the ``place`` (height [m], angle [rad]) of the largest; ``lids``: largest
-    distance of bottom and top to the mesh, NaN at an end that was asked for [m]; ``facet``: typical shortest side of
-    the triangles [m]; ``wavelength``: shorter waves are smoothed out [m].
+    ``largest, rms``: distance of the mesh's corners and middles of triangles on the wall to the traced surface [m], and
+    the ``place`` (height [m], angle [rad]) of the largest; ``wavelength``: shorter waves are smoothed out [m].
     """
 
-    heights: tuple[float, float]
     largest: float
     rms: float
     place: tuple[float, float]
-    lids: tuple[float, float]
-    facet: float
     wavelength: float
 
 
@@ -148,14 +132,12 @@ def traced(mesh: MeshObject, heights: tuple[float, float] | None = None) -> tupl
     """
     facet, size = facet_size(mesh), float(np.ptp(mesh.bounds, axis=0).max())
     wall = find_wall(mesh, facet, heights, SYMMETRIC * size)
-    # the shortest wave has three facets,
-    # or a share of the wall's height
+    # the shortest wave has three facets, or a share of the wall's height
     length = min(3.0 * facet, 0.15 * (wall.ends[1] - wall.ends[0]))
     # a share of the facets' sagitta, which says nothing about the body
     tolerance = max(SYMMETRIC * size, 0.01 * facet**2 / (8 * wall.radius))
-    radii = trace_radii(mesh, wall, facet, length, tolerance)
-    surface = _surface(wall, radii)
-    report = _report(surface, mesh, wall, facet, radii.wavelength)
+    surface, wavelength = _smooth_surface(mesh, wall, facet, length, tolerance)
+    report = _report(surface, mesh, wall, wavelength)
     if report.largest > OFF * wall.radius:
         z, angle = report.place
         raise MeshError(
@@ -176,26 +158,6 @@ def facet_size(mesh: MeshObject) -> float:
     return float(side[order][np.searchsorted(total, 0.5 * total[-1])])
 
 
-def _surface(wall: Wall, radii: Radii) -> OuterSurface:
-    """Surface through radii, with lids."""
-    s, R = radii.s, radii.R
-    a = smooth_spline(s, R.mean(axis=1), radii.wavelength, (0.0, s[-1]))
-    given = curve_of(radii.height, a)
-    curve, (start, stop), flat = with_lids(given, Revolution.rim, wall.lids)
-    end = float(curve.breaks[-1])
-    # carried on over the lids, so that they have the shape of the last section
-    shape = _shape(continued(s + start, R / a(s)[:, None], radii.wavelength, (0.0, end)), R.shape[1])
-    return OuterSurface(
-        curve,
-        (start, stop),
-        flat,
-        lambda theta, s, z, z_s: shape.at(theta, s)[:, :3, :2].transpose(1, 0, 2),
-        wall.centre,
-        radii.symmetric,
-        radii.round,
-    )
-
-
 def _shape(q: BSpline, around: int) -> SplineSurface:
     """Sections ``q (cos theta, sin theta, 0)`` in units of the mean radius, as splines round and along."""
     knots = q.t[3:-3]
@@ -208,7 +170,7 @@ def _shape(q: BSpline, around: int) -> SplineSurface:
     return spline_surface(theta, s, values[:, :, None] * e[:, None, :])
 
 
-def _report(surface: OuterSurface, mesh: MeshObject, wall: Wall, facet: float, wavelength: float) -> TraceReport:
+def _report(surface: OuterSurface, mesh: MeshObject, wall: Wall, wavelength: float) -> TraceReport:
     """Distances between mesh and surface."""
     middle, normal = mesh.points[mesh.triangles].mean(axis=1), area_vectors(mesh.points, mesh.triangles)
     away = middle[:, :2] - wall.centre(middle[:, 2])
@@ -222,12 +184,4 @@ def _report(surface: OuterSurface, mesh: MeshObject, wall: Wall, facet: float, w
     off = np.abs(np.einsum("ni,ni->n", x - surface.jets(theta, s)[:, 0], surface.normals(theta, s)))
     k = int(off.argmax())
     place = float(x[k, 2]), float(theta[k])
-    lids = []
-    for ends, height in zip(((0.0, surface.wall[0]), (surface.wall[1], surface.end)), wall.lids, strict=True):
-        theta, s = np.meshgrid(np.linspace(0, 2 * np.pi, LID, endpoint=False), np.linspace(*ends, LID))
-        off_lid = np.abs(mesh.gap(surface.jets(theta, s)[:, 0])[0]).max()
-        lids.append(np.nan if height is None else float(off_lid))
-    return TraceReport(
-        (float(z[0]), float(z[-1])), float(off[k]), float(np.sqrt((off**2).mean())), place,
-        (lids[0], lids[1]), facet, wavelength,
-    )  # fmt: skip
+    return TraceReport(float(off[k]), float(np.sqrt((off**2).mean())), place, wavelength)

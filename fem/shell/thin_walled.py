@@ -117,7 +117,7 @@ def wall_between(body: ThinWalled, held: Grasp, pad_size: Sequence[float], size:
     """Shell meshed finely where the pads of this grasp touch: the model, and what each finger can touch."""
     low, high, half = _footprint(held, pad_size)
     # a pad may reach beyond the wall, where the outline has no station
-    low, high = (float(end) for end in np.clip([low, high], *_span(body)))
+    low, high = (float(end) for end in np.clip([low, high], *body.surface.heights))
     shell, fixed = _supported(body, held, replace(size, heights=(low, high), half_width=half))
     meshed = shell.mesh
     wall = Wall(_surface(meshed), meshed.theta, meshed.s, meshed.number, 0.5 * meshed.thickness)
@@ -130,7 +130,7 @@ def object_factors(
     body: ThinWalled, angle: float, mirrors: tuple[bool, bool], size: MeshSize, half: float
 ) -> LinearShell:
     """First stiffness of the object, meshed alike along its whole wall; made once per rank."""
-    whole = replace(size, heights=_span(body), half_width=half)
+    whole = replace(size, heights=body.surface.heights, half_width=half)
     return LinearShell(*_supported(body, Grasp(angle, (), (), mirrors), whole))
 
 
@@ -146,12 +146,6 @@ def _surface(mesh: BodyMesh):
     """Splines through the meshed part of the wall and the rims of its flat ends."""
     low, high = mesh.surface.flat
     return wall_surface(mesh.surface, max(mesh.s[0], low), min(mesh.s[-1], high))
-
-
-def _span(body: ThinWalled) -> tuple[float, float]:
-    """Lowest and highest place of the wall [m]."""
-    z = body.surface.curve.derivative(np.linspace(*body.surface.wall, 257))[:, 0]
-    return float(z.min()), float(z.max())
 
 
 def _footprint(held: Grasp, pad_size: Sequence[float]) -> tuple[float, float, float]:

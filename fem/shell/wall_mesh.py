@@ -194,9 +194,8 @@ def _steps(surface: OuterSurface, thickness: Thickness) -> list[float]:
     """Places on the wall where a given thickness changes its slope: the mesh needs a line there."""
     if isinstance(thickness, float):
         return []
-    z = surface.curve.derivative(np.linspace(*surface.wall, 257))[:, 0]
-    low, high = z.min() + NEGLIGIBLE, z.max() - NEGLIGIBLE
-    return [surface.station(height) for height, _ in thickness if low < height < high]
+    low, high = surface.heights
+    return [surface.station(z) for z, _ in thickness if low + NEGLIGIBLE < z < high - NEGLIGIBLE]
 
 
 def _numbers(surface: OuterSurface, theta: FloatArray, s: FloatArray, *, whole: bool) -> tuple[IntArray, IntArray]:

@@ -7,7 +7,7 @@ object's rotational symmetry are served by one unit. Cases are numbered like a C
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
@@ -229,18 +229,14 @@ def _sweep_axes(sweep: Mapping[str, Sequence[Any]]) -> list[Axis]:
     return made
 
 
-def units(scene: Scene, axis_symmetry: Callable[[Scene], int]) -> list[Unit]:
-    """All units of work of a scene, in the order of their first rows.
-
-    ``axis_symmetry``: order of the rotational symmetry about z of the object of a scene (0: every angle, 1: none). It
-    is called for every point of the sweep, because a sweep can change the shape.
-    """
+def units(scene: Scene) -> list[Unit]:
+    """All units of work of a scene, in the order of their first rows."""
     made: list[Unit] = []
     forces, count = len(scene.load.normal_force_n), scene.candidates.total
     for point, values in enumerate(scene.points):
         at_point = scene.with_values(values | {"uncertainty.spread": {}})
         places, cost = candidates(at_point), path_cost(at_point)
-        for group in groups(places, axis_symmetry(at_point)):
+        for group in groups(places, at_point.axis_symmetry):
             rows = tuple(tuple(range(r, r + forces)) for r in ((point * count + n) * forces for n, _ in group))
             served, turns = tuple(places[n] for n, _ in group), tuple(turn for _, turn in group)
             work = cost * narrowness(at_point, served[0])

@@ -76,8 +76,7 @@ def check_wall(shape: Any, surface: OuterSurface) -> None:
 
     Raises `StudyError` with the key and what is wrong with it.
     """
-    lowest = float(surface.curve.derivative(np.linspace(*surface.wall, 65))[:, 0].min())
-    size = MeshSize(heights=(lowest, lowest), around=0.01, along=0.005, coarse=0.02)
+    size = MeshSize(heights=surface.heights[:1] * 2, around=0.01, along=0.005, coarse=0.02)
     try:
         body_mesh(
             surface, shape.wall, size,

@@ -39,8 +39,6 @@ FILL_FACTOR = 20.0  # factor entries over dofs^(4/3), the growth of nested disse
 # factors, what they are made from and what is not given back take 16 kB per unknown of the wall.
 SECONDS_PER_UNKNOWN, BYTES_PER_UNKNOWN = 1e-4, 1.6e4
 SCREENED_COST = 0.25  # of a force on the coarse mesh alone, over that on the scene's
-DENSE_COPIES = 8  # copies of a linear wall's dense stiffness: compliance, inverse, assembled entries and their factors
-SECONDS_PER_CUBE = 2.1e-10  # seconds per force and cube of the unknowns of that stiffness
 
 
 @dataclass(frozen=True)
@@ -96,7 +94,7 @@ def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = (), r
     faces = math.prod(pad_shape(scene.gripper).patch_faces) if patches else 0
     axes = tuple(grasps.axes(scene))
     placed = own_frame(scene.object)
-    units: Sequence[Any] = decided(grasps.units(scene, lambda point: point.axis_symmetry))
+    units: Sequence[Any] = decided(grasps.units(scene))
     if scene.candidates.sampled and forces_apart(scene):
         units = [_with_meshes(unit, scene, rounds) for unit in units]
     header = Header(
@@ -148,9 +146,7 @@ def has(scene: Any) -> tuple[str, ...]:
 def memory(scene: Any) -> float:
     """Rough memory of one rank [bytes]: the libraries, the factors of the whole pad's stiffness, those of a wall."""
     pad = 8.0 * FILL_FACTOR * (3.0 * _pad_nodes(scene, scene.accuracy.most_meshes - 1)) ** (4.0 / 3.0)
-    size = wall_unknowns(scene) if shells(scene) else {}
-    linear = BYTES_PER_UNKNOWN * size.get("whole", 0) + 8.0 * DENSE_COPIES * float(size.get("touched", 0)) ** 2
-    return LIBRARY_BYTES + pad + max(BYTES_PER_UNKNOWN * size.get("shell", 0), linear)
+    return LIBRARY_BYTES + pad + (BYTES_PER_UNKNOWN * wall_unknowns(scene)[1] if shells(scene) else 0.0)
 
 
 def shells(scene: Any) -> bool:
@@ -230,13 +226,10 @@ def _estimated_time(plan: Plan, scene: Any, ranks: int) -> str:
 
 def _wall_seconds(plan: Plan, scene: Any) -> list[float]:
     """Seconds of a force at the levels that a wall may be solved with, rising; empty where that is not known."""
-    size = wall_unknowns(scene) if plan.tried and shells(scene) else {}
-    if not size:
+    if not (plan.tried and shells(scene)):
         return []
-    rigid = SECONDS_PER_UNKNOWN * size["pads"]
-    linear, shell = rigid + SECONDS_PER_CUBE * size["touched"] ** 3, rigid + SECONDS_PER_UNKNOWN * size["shell"]
-    level = {"linear_shell": [linear], "nonlinear_shell": [shell]}
-    return level.get(scene.effects.object, sorted([rigid, linear, shell]))
+    pads, shell = (SECONDS_PER_UNKNOWN * size for size in wall_unknowns(scene))
+    return [pads + shell] if scene.effects.object.endswith("shell") else [pads, pads + shell]
 
 
 def free_bytes(path: Path) -> int:
@@ -248,33 +241,15 @@ def free_bytes(path: Path) -> int:
     return -1
 
 
-def wall_unknowns(scene: Any) -> dict[str, int]:
-    """Unknowns of a candidate in the middle of the scene's stations; none where the wall has no outline to divide.
-
-    ``pads`` that are solved, nonlinear ``shell``, linear shell that all candidates share, ``whole`` and ``touched`` by
-    pads.
-    """
-    try:
-        surface = outer_surface(scene.object)
-    except (AttributeError, ValueError):
-        return {}
-    angle = 0.0 if scene.candidates.poses else scene.candidates.angles[0]
-    turned = surface.turned(angle)
+def wall_unknowns(scene: Any) -> tuple[int, int]:
+    """Unknowns of the pads that are solved and of the shell, of a candidate in the middle of the scene's stations."""
+    where, surface = scene.candidates, outer_surface(scene.object)
+    turned = surface.turned(0.0 if where.poses else where.angles[0])
     mirrors = _mirrors(scene, turned.symmetric)
-    low, high, half = _covered(scene, surface)
-
-    lines = geometry().wall_lines
-    theta, s = lines(scene, turned, (low, high), half, mirrors)
-    wide, tall = lines(scene, turned, _heights(surface), half, mirrors)
-    radius, z = surface.curve.derivative(tall)[:, 1], surface.curve.derivative(tall)[:, 0]
-    beside = np.abs(np.sin(theta)) * radius[(z >= low) & (z <= high)].max(initial=half) <= half
-    ends = 4 >> sum(mirrors)  # one more line beside each end of a region
-    touched = (np.count_nonzero(beside) + ends) * (np.count_nonzero((z >= low) & (z <= high)) + 2)
+    theta, s = geometry().wall_lines(scene, turned, *_covered(scene, surface), mirrors)
     # of the pads from the nodes of a whole one, of which a plane of symmetry leaves one finger, or half of both
     pads = round(3 * _pad_nodes(scene) * (1 if mirrors[0] else 2) * (0.5 if mirrors[1] else 1.0))
-    return {
-        "pads": pads, "shell": 6 * len(theta) * len(s), "whole": 6 * len(wide) * len(tall), "touched": 6 * int(touched)
-    }  # fmt: skip
+    return pads, 6 * len(theta) * len(s)
 
 
 def _mirrors(scene: Any, symmetric: tuple[bool, bool]) -> tuple[bool, bool]:
@@ -285,21 +260,15 @@ def _mirrors(scene: Any, symmetric: tuple[bool, bool]) -> tuple[bool, bool]:
     return symmetric[0] and scene.effects.model_size != "half", symmetric[1] and even
 
 
-def _covered(scene: Any, surface: Any) -> tuple[float, float, float]:
+def _covered(scene: Any, surface: Any) -> tuple[tuple[float, float], float]:
     """Heights that a pad reaches over at the middle station, and half of what it covers round the object [m]."""
     gripper, where = scene.gripper, scene.candidates
     margin = 0.1 * max(gripper.pad_size[:2])  # share of the pad's length, round what it covers
-    ends = _heights(surface)
+    ends = surface.heights
     middle = 0.5 * sum(ends) if where.poses else where.station_values[len(where.station_values) // 2]
     along = 1e-3 * where.half_extent_mm(gripper) + margin
     low, high = np.clip([middle - along, middle + along], *ends)
-    return float(low), float(high), 0.5 * gripper.pad_size[1] + margin
-
-
-def _heights(surface: Any) -> tuple[float, float]:
-    first, last = surface.wall
-    z = surface.curve.derivative(np.linspace(first, last, 257))[:, 0]
-    return float(z.min()), float(z.max())
+    return (float(low), float(high)), 0.5 * gripper.pad_size[1] + margin
 
 
 def _pad_nodes(scene: Any, mesh: int = 1) -> int:

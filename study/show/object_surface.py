@@ -14,7 +14,7 @@ import numpy as np
 
 from softjaw.fem.objects.gap import Pose
 from softjaw.friction.patch import NEGLIGIBLE
-from softjaw.study.case.build import build_object, has_wall, middle_of, outer_surface, surface_triangles
+from softjaw.study.case.build import has_wall, middle_of, outer_surface, surface_triangles
 from softjaw.study.quantities import ALONG, AROUND
 
 FINER = 6  # places between those of the file among which the nearest is searched
@@ -42,7 +42,6 @@ def surface_of(scene: Any, axes: Any, feet: Iterable[Foot] = ()) -> Surface:
 
     Raises `ValueError, OSError`: the object cannot be built, as when its mesh is not there.
     """
-    body = build_object(scene.object)
     points, triangles = surface_triangles(scene.object)
     corners = np.asarray(points, float)[triangles]
     # Triangles without area show nothing and would only be cut further.
@@ -54,7 +53,7 @@ def surface_of(scene: Any, axes: Any, feet: Iterable[Foot] = ()) -> Surface:
     else:
         middle = middle_of(scene)
         corners = middle.straightened(corners) if middle else corners
-        corners, cell = coloured(corners, cells_of(scene, axes, body.axis_symmetry))
+        corners, cell = coloured(corners, cells_of(scene, axes, scene.object.axis_symmetry))
         corners = middle.straightened(corners, -1.0) if middle else corners
         if has_wall(scene.object):
             kept = ~_lid(scene.object, corners)

@@ -173,9 +173,6 @@ def test_the_flask_of_the_examples():
     assert not surface.round
     assert report.largest < 3e-4
     assert report.rms < 6e-5
-    assert max(report.lids) < 4e-4
-    assert report.heights == pytest.approx((0.002, 0.118), abs=1e-3)
-    assert Stacked(surface).axis_symmetry == 2
     turned = surface.turned(0.5 * np.pi)
     assert turned.symmetric == (True, True)
     mesh = body_mesh(turned, 4e-4, MeshSize(heights=(0.03, 0.05), around=0.004, along=0.006), (True, True))
@@ -216,7 +213,6 @@ def test_a_handle_is_refused_with_its_place_and_can_be_left_out():
     surface, report = traced(cup_with_handle(), heights=(0.0, 0.029))
     assert report.largest < 2e-4
     assert surface.curve.derivative(np.array(surface.wall))[:, 0] == pytest.approx([0.002, 0.029], abs=1e-4)
-    assert np.isnan(report.lids[1])
 
 
 def test_what_does_not_fit_is_refused():

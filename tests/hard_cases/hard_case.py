@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from softjaw.study import pipeline
-from softjaw.study.case.build import build_object, check_object
+from softjaw.study.case.build import check_object
 from softjaw.study.case.candidates import check_poses, units
 from softjaw.study.case.result import CaseFailure, CaseResult
 from softjaw.study.messages import StudyError
@@ -211,7 +211,7 @@ def outcome_of(made_scene: Callable[[], Scene], begin_only: bool = False) -> Out
     try:
         scene = made_scene()
         check_object(scene)
-        made = units(scene, lambda point: build_object(point.object).axis_symmetry)
+        made = units(scene)
         check_poses(scene)
     except SceneError as error:
         return Outcome(

@@ -16,7 +16,6 @@ from pathlib import Path
 import numpy as np
 
 from softjaw.study import pipeline
-from softjaw.study.case.build import build_object
 from softjaw.study.case.candidates import units
 from softjaw.study.case.effects import COUPLING
 from softjaw.study.case.result import CaseFailure, CaseResult
@@ -77,7 +76,7 @@ def finer(tables: dict) -> dict:
 
 def solved(tables: dict, coupling: str) -> CaseResult | CaseFailure:
     scene = Scene.of_tables(tables | {"effects": {"friction_pressure_coupling": coupling}})
-    unit = units(scene, lambda point: build_object(point.object).axis_symmetry)[0]
+    unit = units(scene)[0]
     return dict(pipeline.solve_unit(unit))[0]
 
 

@@ -124,7 +124,7 @@ def solve(outcome: Outcome, seed: int, folder: Path) -> None:
     check_object(scene)
     obj: Any = build_object(scene.object)
     outcome.notes = list(getattr(obj, "notes", ()))
-    made = units(scene, lambda _: obj.axis_symmetry)
+    made = units(scene)
     check_poses(scene)
     for unit in made:
         forces, results = unit.scene.load.normal_force, []

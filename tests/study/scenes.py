@@ -1,7 +1,6 @@
 """Scenes of tests: an object, a place, coarse pads; and their cases, solved as a study solves them."""
 
 from softjaw.study import pipeline
-from softjaw.study.case.build import build_object
 from softjaw.study.case.candidates import units
 from softjaw.study.scene import parse_scene
 
@@ -39,7 +38,7 @@ def scene_of(shape, *changes, **choices):
 
 def units_of(scene):
     """Its candidates as a study solves them: images under the object's symmetry are one."""
-    return units(scene, lambda point: build_object(point.object).axis_symmetry)
+    return units(scene)
 
 
 def results_of(scene):
