@@ -169,7 +169,9 @@ def test_nothing_is_grouped_that_is_not_an_image_at_random():
     assert [[n for n, _ in g] for g in candidates.groups(places, 3)] == [[2 * k, 2 * k + 1] for k in range(40)]
 
 
-@pytest.mark.parametrize("swept", [[], ["object.semi_axis_b_mm=25"], ["sweep.object.semi_axis_b_mm=[10, 20]", "sweep.friction.mu=[0.2, 0.5, 0.8]"]])
+@pytest.mark.parametrize("swept", [
+    [], ["object.semi_axis_b_mm=25"], ["sweep.object.semi_axis_b_mm=[10, 20]", "sweep.friction.mu=[0.2, 0.5, 0.8]"],
+])  # fmt: skip
 def test_every_row_is_filled_exactly_once_and_stands_for_its_axis_values(swept):
     scene = parse_scene(CYLINDER, overrides=swept)
     axes, units = candidates.axes(scene), candidates.units(scene)
