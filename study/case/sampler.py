@@ -140,12 +140,15 @@ def antipodal_grasps(
     points, triangles = np.ascontiguousarray(surface[0]), np.ascontiguousarray(surface[1])
     corners = points[triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])  # twice the area long
-    axis = longest_axis(corners, np.linalg.norm(normals, axis=1))
+    axes = principal_axes(corners, np.linalg.norm(normals, axis=1))
+    axis = axes[-1]
+    # places that only a pad in their middle meets squarely, such as the bottom of a bowl, are seldom hit at random
+    through_centre = [(np.asarray(task.centre_of_mass, float), direction) for direction in axes]
     seen: list[SampledGrasp] = []
     over_holes: list[SampledGrasp] = []
     starts: list[JawsOnSurface] = []
     offered: list[SampledGrasp] = []
-    for place, normal in sampled(corners, normals, samples, seed):
+    for place, normal in [*through_centre, *sampled(corners, normals, samples, seed)]:
         try:
             aimed = JawsOnSurface((points, triangles), place, axes_of(-normal, axis), jaws)
             if state := state_of(aimed):
@@ -155,8 +158,7 @@ def antipodal_grasps(
                 continue
             starts.append(start)
             for along in long_sides(start, axis):
-                axes = axes_of(start.axes[:, 2], along)
-                grip = straightened((points, triangles), start.point, axes, jaws)
+                grip = straightened((points, triangles), start.point, axes_of(start.axes[:, 2], along), jaws)
                 over = lids is not None and grip.over(lids)
                 (over_holes if over else seen).append(judged(grip, task))
         except NoContactError:
@@ -205,12 +207,14 @@ def sampled(corners: FloatArray, normals: FloatArray, count: int, seed: int) -> 
     return list(zip(place, normals[chosen] / area[chosen, None], strict=True))
 
 
-def longest_axis(corners: FloatArray, area: FloatArray) -> FloatArray:
-    """Direction in which triangles ``corners (m, 3, 3)`` extend furthest: the first principal axis of their area."""
+def principal_axes(corners: FloatArray, area: FloatArray) -> FloatArray:
+    """Principal axes ``(3, 3)`` of the area of triangles ``corners (m, 3, 3)``, the last the one of largest extent."""
     middle = corners.mean(axis=1)
     off = middle - area @ middle / area.sum()
-    axis = np.linalg.eigh((off * area[:, None]).T @ off)[1][:, -1]
-    return axis * (1.0 if axis[np.argmax(np.abs(axis))] > 0 else -1.0)
+    moments = (off * area[:, None]).T @ off
+    # rounded, so that those of a round body are the same on every machine
+    axes = np.linalg.eigh(np.round(moments / np.trace(moments), 6))[1].T
+    return axes * np.sign(np.take_along_axis(axes, np.abs(axes).argmax(axis=1)[:, None], axis=1))
 
 
 def state_of(grip: JawsOnSurface) -> int:

@@ -12,7 +12,7 @@ from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.quantities import COLLIDES, MISSING, WIDE
 from softjaw.study.scene import SceneError, parse_scene
 from softjaw.study.units import GRAVITY
-from tests.objects.bodies import hollow_bowl
+from tests.objects.bodies import hollow_bowl, revolved
 from tests.study.scenes import BOX, text_of
 
 PAD = (0.05, 0.022, 0.015)
@@ -117,6 +117,14 @@ def test_a_pad_inside_a_bowl_bears_on_its_ends_and_comes_after_one_outside():
     task = Task(np.array([0.0, 0.0, 0.02]))
     grasps = antipodal_grasps(bowl, NARROW, task, 6, samples=80)
     assert max((g for g in grasps if not g.state), key=lambda g: g.payload).opening > 0.07
+
+
+def test_a_bowl_is_held_by_the_middle_of_its_bottom_which_is_as_wide_as_the_pad_is_long():
+    """[mm]; a few millimetres off the middle a pad bears on the wall and holds a third."""
+    bowl = revolved(1e-3 * np.array([(0, 0), (25, 0), (45, 12), (68, 52), (64.5, 52), (42.5, 15.5), (24, 4), (0, 4)]))
+    best = antipodal_grasps(surface(bowl), NARROW, Task(np.array([0, 0, 0.02])), 4)[0]
+    assert np.abs(best.point[:2]).max() < 1e-3
+    assert abs(best.approach[2]) > 0.999
 
 
 def test_on_a_flat_face_the_springs_hold_what_the_planar_contact_holds():
