@@ -18,7 +18,6 @@ from softjaw.fem.objects.gap import FloatArray, IntArray, edges_of, solid_centro
 
 SMALL_HOLE = 0.02  # of the object's diagonal: smaller holes are filled, others stay open
 FEW_SIDES, LARGEST_GAP = 4, 0.1  # a triangle or two that are missing are filled up to this share of the diagonal
-MOST_PLACES = 3  # of defects that one note names
 
 
 def with_holes_filled(points: FloatArray, triangles: IntArray) -> tuple[IntArray, list[str]]:
@@ -46,8 +45,8 @@ def with_holes_filled(points: FloatArray, triangles: IntArray) -> tuple[IntArray
         # the filling of the next hole must not use an edge of this one a third time
         taken.update(map(tuple, np.sort(edges_of(new), axis=1).tolist()))
         parts.append(new)
-    more = "; ..." if len(places) > MOST_PLACES else ""
-    notes = [f"small holes filled: {len(places)} ({'; '.join(places[:MOST_PLACES])}{more})"] if places else []
+    more = "; ..." if len(places) > 3 else ""
+    notes = [f"small holes filled: {len(places)} ({'; '.join(places[:3])}{more})"] if places else []
     return np.concatenate(parts), notes
 
 

@@ -31,7 +31,7 @@ from softjaw.fem.objects.triangles import cleaned, decimated, pieces_of
 __all__ = ["MeshError", "MeshObject", "MeshRegion"]
 MARGIN_CELLS = 3  # least number of cells sampled beyond the box
 MOST_SAMPLES = 4_000_000
-TURNS = {"x": [1, 2, 0], "y": [2, 0, 1], "z": [0, 1, 2]}  # cyclic, so that no mesh is mirrored
+CYCLES = {"x": [1, 2, 0], "y": [2, 0, 1], "z": [0, 1, 2]}  # cyclic, so that no mesh is mirrored
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +69,7 @@ class MeshObject:
             clean = cleaned(corners, triangles, unit)
         except MeshError as problem:
             raise MeshError(f"{path}: {problem}") from problem
-        turn = np.eye(3)[:, TURNS[axis]]
+        turn = np.eye(3)[:, CYCLES[axis]]
         points = clean.points @ turn
         low, high = points.min(axis=0), points.max(axis=0)
         origin = np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]])

@@ -123,24 +123,14 @@ class OuterSurface:
         return X, around, along, a
 
     def station(self, z: float) -> float:
-        """Place s on the wall at the height z [m]; the lowest if there are several.
-
-        Raises
-        ------
-        ValueError
-            If the wall has no point at this height.
-        """
+        """Place s on the wall at a height within `heights` [m]; the lowest if there are several."""
         from scipy.interpolate import PPoly
 
         height = PPoly(self.curve.coefficients[:, 0, ::-1].T, self.curve.breaks)
         places, (low, high) = height.solve(z, extrapolate=False), self.wall
         # an end of the wall is at its height, whatever rounding makes of it [m]
         ends = [end for end in self.wall if abs(height(end) - z) < 1e-12]
-        found = [*ends, *places[(places >= low) & (places <= high)]]
-        if not found:
-            lowest, highest = self.heights
-            raise ValueError(f"the wall runs from z = {lowest:g} m to {highest:g} m and has no point at {z:g} m")
-        return float(min(found))
+        return float(min([*ends, *places[(places >= low) & (places <= high)]]))
 
 
 def of_revolution(body: Revolution) -> OuterSurface:

@@ -22,7 +22,7 @@ from softjaw.fem.objects.triangle_tree import corner_angles
 from softjaw.fem.objects.triangles import area_vectors, neighbours
 
 CREASE_ANGLE = 30.0  # [deg]: edges that turn by less are taken for facets of a smooth surface
-STEEP = 0.7  # an edge that leaves its tangent plane by more (sine) is kept straight: its normal is no use
+STEEPEST_EDGE = 0.7  # an edge that leaves its tangent plane by more (sine) is kept straight: its normal is no use
 SHARP = 60.0  # [deg]: edges that turn by less may still be facets of something round
 
 
@@ -175,7 +175,7 @@ def _tangent(chord: FloatArray, first: FloatArray, second: FloatArray) -> FloatA
     """Part of the ``chord (e, 3)`` that lies in the tangent planes with the normals of both sides of an edge."""
     length = np.linalg.norm(chord, axis=1)[:, None]
     off = np.abs(np.stack([np.einsum("ed,ed->e", chord, n) for n in (first, second)])).max(axis=0)
-    steep = off > STEEP * length[:, 0]
+    steep = off > STEEPEST_EDGE * length[:, 0]
     line = np.cross(first, second)
     sine = np.linalg.norm(line, axis=1)
     line /= np.maximum(sine, 1e-300)[:, None]
@@ -183,5 +183,5 @@ def _tangent(chord: FloatArray, first: FloatArray, second: FloatArray) -> FloatA
     common = np.einsum("ed,ed->e", chord, line)[:, None] * line
     # sine of the angle below which two normals at a crease have no line in common
     tangent = np.where((sine > 0.02)[:, None], common, plane)
-    flat = steep | (np.linalg.norm(tangent, axis=1)[:, None] < (1 - STEEP) * length)[:, 0]
+    flat = steep | (np.linalg.norm(tangent, axis=1)[:, None] < (1 - STEEPEST_EDGE) * length)[:, 0]
     return np.where(flat[:, None], chord, tangent)

@@ -88,11 +88,7 @@ def cleaned(points: FloatArray, triangles: IntArray, unit: str = "m") -> Triangl
 
 
 def _finite(points: FloatArray, triangles: IntArray) -> tuple[IntArray, list[str]]:
-    """Triangles whose corners exist and are finite."""
-    if points.ndim != 2 or points.shape[1:] != (3,) or not len(points) or not len(triangles):
-        raise MeshError("the mesh is empty: it holds no triangles; export it as a surface mesh")
-    if ((triangles < 0) | (triangles >= len(points))).any():
-        raise MeshError(f"a triangle refers to a point beyond the {len(points)} there are; export the file again")
+    """Triangles whose corners are finite."""
     # what lies beyond is no coordinate in any unit, and its square overflows
     good = (np.abs(points) < HUGE_COORDINATE).all(axis=1)[triangles].all(axis=1)
     if not good.any():

@@ -119,11 +119,6 @@ def _plate(x: tuple[float, ...], y: tuple[float, ...], symmetry: tuple[bool, boo
     # nodes on the rim count as held, whatever rounding makes of their place
     rim = 0.5 * np.array(plate.support) + NEGLIGIBLE * (np.ptp(x) + np.ptp(y))
     held = (np.abs(X[..., :2]) <= rim).all(axis=-1)
-    if not held.any():
-        raise ValueError(
-            f"no node of the pad's mesh lies on the {1e3 * plate.support[0]:g} x {1e3 * plate.support[1]:g} mm in the "
-            "middle of the backing plate that the finger holds: use an even number of elements, or a larger support"
-        )
     fixed = np.repeat(held[..., None], 6, axis=-1)
     for axis in range(2):
         if symmetry[axis]:

@@ -14,6 +14,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.interpolate import make_interp_spline
 from scipy.sparse import csr_matrix
 
 from softjaw.fem.assembly import Pattern, add_up
@@ -196,15 +197,9 @@ def _at_crossings(mesh: BodyMesh, values: FloatArray) -> FloatArray:
         before, behind, (first, last) = grid[-1:], grid[:1], middles[[-1, 0]] + [-2 * np.pi, 2 * np.pi]
     else:
         before, behind, (first, last) = image * grid[:1], image * grid[-1:], 2 * lines[[0, -1]] - middles[[0, -1]]
-    grid = _linear(lines, np.concatenate([[first], middles, [last]]), np.concatenate([before, grid, behind]))
-    middles = 0.5 * (mesh.s[1:] + mesh.s[:-1])
-    return np.swapaxes(_linear(mesh.s, middles, np.swapaxes(grid, 0, 1)), 0, 1)
+    around = np.concatenate([[first], middles, [last]]), np.concatenate([before, grid, behind])
+    grid = make_interp_spline(*around, k=1)(lines)
+    # beyond the ends as between the last
+    return make_interp_spline(0.5 * (mesh.s[1:] + mesh.s[:-1]), grid, k=1, axis=1)(mesh.s)
 
 
-def _linear(lines: FloatArray, middles: FloatArray, values: FloatArray) -> FloatArray:
-    """Values at ``lines (k,)`` from those at ``middles``, along the first axis; beyond the ends as between the last."""
-    if len(middles) == 1:
-        return np.repeat(values, len(lines), axis=0)
-    i = np.clip(np.searchsorted(middles, lines) - 1, 0, len(middles) - 2)
-    part = ((lines - middles[i]) / (middles[i + 1] - middles[i]))[:, None, None]
-    return (1.0 - part) * values[i] + part * values[i + 1]

@@ -224,8 +224,7 @@ class WallProblem(ContactProblem):
         each = [self._couplings(k, f, c) for k, (f, c) in enumerate(zip(self.fingers, contacts, strict=True))]
         rows, columns = zip(*(part for couplings in each for part in couplings), strict=True)
         moved = self.pattern.grow(np.concatenate(rows), np.concatenate(columns))
-        if moved is None:
-            raise AssertionError("the contact has entries that its pattern cannot hold; this is a bug")
+        assert moved is not None
 
         def move(slots: IntArray) -> IntArray:
             return np.where(slots >= 0, moved[slots], -1).astype(np.int32)

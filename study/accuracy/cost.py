@@ -20,7 +20,7 @@ from softjaw.study.table import aligned
 FloatArray = NDArray[np.float64]
 FINENESS = (0.5, 0.7, 1.0, 1.4)  # elements per direction over those of the scene
 WALL_SIZES = (2.0, 1.0, 0.7)  # of a wall's elements, over those of the scene
-FEW = 3  # candidates, and forces, that stand for all
+REPRESENTATIVE = 3  # candidates, and forces, that stand for all
 SMALLEST = ("accuracy.wall_element_mm",)  # keys whose smallest value is the most accurate one; of others it is the last
 JUDGED = ("payload", "quality", "e_n")
 LOOKS = (("#12436d", "o"), ("#c05a00", "s"), ("#2a8c82", "^"), ("#801650", "D"))
@@ -46,7 +46,7 @@ def _few_candidates(scene: Scene) -> dict[str, Any]:
     where = scene.candidates
     poses = scene.effective()["candidates"].get("poses", ())
     places = list(poses or where.station_values_mm)
-    count = min(FEW, len(places))
+    count = min(REPRESENTATIVE, len(places))
     chosen = [places[int((i + 0.5) / count * len(places))] for i in range(count)]
     if poses:
         return {"candidates.poses": chosen}

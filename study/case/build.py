@@ -47,9 +47,8 @@ def build_object(shape: Any) -> GapObject:
             return objects.Sphere(shape.radius)
         case "box":
             return objects.Box(np.array(shape.size), shape.edge_radius)
-        case "plane":
+        case _:
             return objects.Plane(shape.thickness)
-    raise ValueError(f"no object is built from the shape '{shape.shape}'")
 
 
 @lru_cache(maxsize=8)

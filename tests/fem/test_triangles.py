@@ -26,9 +26,8 @@ def with_point(value):
 
 
 @pytest.mark.parametrize("mesh", [
-    (BALL.vertices, BALL.faces[:0]), (np.full((3, 3), np.nan), [[0, 1, 2]]), (BALL.vertices, BALL.faces + 1),
-    (BALL.vertices, BALL.faces - 1), (BALL.vertices * 1e3, BALL.faces), (BALL.vertices * 1e-3, BALL.faces),
-    (BALL.vertices * 0, BALL.faces),
+    (BALL.vertices, BALL.faces[:0]), (np.full((3, 3), np.nan), [[0, 1, 2]]), (BALL.vertices * 1e3, BALL.faces),
+    (BALL.vertices * 1e-3, BALL.faces), (BALL.vertices * 0, BALL.faces),
 ])  # fmt: skip
 def test_only_what_makes_no_object_is_refused(mesh):
     with pytest.raises(MeshError):

@@ -4,14 +4,13 @@ import contextlib
 
 import pytest
 
-from softjaw.study.case.build import build_object, check_object, shapes_of, warnings
+from softjaw.study.case.build import check_object, shapes_of, warnings
 from softjaw.study.case.candidates import check_poses
 from softjaw.study.cli import main
 from softjaw.study.cli.quick import petsc_overrides
 from softjaw.study.launch import prepare
 from softjaw.study.messages import StudyError
 from softjaw.study.scene import load_scene
-from softjaw.study.scene.objects import SphereShape
 from tests.study.launching import ROOT, launch
 from tests.study.scenes import BALL, mesh_of, pose_of, scene_of, text_of
 
@@ -40,11 +39,6 @@ def test_every_object_of_a_sweep_is_judged():
     with pytest.raises(StudyError, match=r"object.mesh: .* an object of 120 m"):
         check_object(swept)
     check_object(at([60], FLASK))
-
-
-def test_a_shape_that_nothing_builds_is_refused():
-    with pytest.raises(ValueError, match="'cone'"):
-        build_object(SphereShape.model_construct(shape="cone", radius_mm=30.0))
 
 
 @pytest.mark.parametrize("body", [BALL, CYLINDER, BOX])
