@@ -65,7 +65,7 @@ def solve_scene(
 def solve_objects(folder: ObjectFolder, out: Path, comm: Any, *, retry_failed: bool = False) -> int:
     """Solve all objects of a folder into files of ``out`` and an index; collective over ``comm``.
 
-    Returns as for `solve_scene`; 0 also where an object has no grasp. Raises `StudyError, SceneError` on every rank:
+    Returns as for `solve_scene`; 0 also where an object has no grasp. Raises `StudyError` on every rank:
     what is wrong for all objects alike, or ``out`` cannot be used.
     """
 

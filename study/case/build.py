@@ -153,7 +153,7 @@ def check_object(scene: Scene) -> None:
     Outlines and meshes are built to be judged, at the price of importing numpy, scipy and numba; of the other shapes
     the scene itself has checked every number, and whatever passes there can be built.
 
-    Raises `StudyError, SceneError` with the key and what is wrong with it.
+    Raises `StudyError` with the key and what is wrong with it.
     """
     for inputs in scene.realisations[1:]:
         scene.with_values(inputs)  # a sample that cannot be, such as a friction coefficient below 0

@@ -87,7 +87,7 @@ def _unforeseen(options: Namespace, error: Exception) -> int:
         print(f"error: {no_room(str(error) or type(error).__name__)}", file=sys.stderr, flush=True)
         return _ended(STOPPED if options.command == "run" else USAGE)
     # Damage is asked last, because the answer means reading every file again.
-    if options.command != "run" and (damage := _module("cli.results").damage(options, error)):
+    if options.command != "run" and (damage := _module("cli.results").damage(options)):
         return complain(damage)
     traceback.print_exc()
     # Abort does not flush what still waits.

@@ -5,8 +5,7 @@ from __future__ import annotations
 import json
 import time
 from argparse import Namespace
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +17,7 @@ from softjaw.study.run.object_folder import Listed, ObjectFolder, folder_of
 from softjaw.study.run.plan import free_bytes, make_plan, memory, plan_text
 from softjaw.study.run.progress import duration
 from softjaw.study.run.shares import makespan
-from softjaw.study.scene import Scene, SceneError, load_scene, start
+from softjaw.study.scene import Scene, load_scene, start
 from softjaw.study.scene.objects import Mesh
 from softjaw.study.show.overview import aligned, scene_text
 from softjaw.study.table import hanging, terminal_width
@@ -61,7 +60,7 @@ def _measured(options: Namespace) -> start.Measured:
 def check(options: Namespace) -> str:
     """Find every error of a scene, or say what would be run."""
     if options.folder:
-        text, listed = scene_text(checked(options.folder), options.scene), options.folder.objects
+        text, listed = scene_text(options.folder.check(), options.scene), options.folder.objects
         names = ", ".join(one.name for one in listed[:5]) + ", ..." * (len(listed) > 5)
         text += f"\n  objects     {len(listed)}: {names}; the mesh above stands for all of them"
         return hanging(text, terminal_width())
@@ -74,7 +73,7 @@ def check(options: Namespace) -> str:
 def plan(options: Namespace) -> str:
     """Say what a run will take."""
     if options.folder:
-        checked(options.folder)
+        options.folder.check()
         return hanging(objects_text(options.folder, results_folder(options), options.ranks[0]), terminal_width())
     scene = with_sampled_grasps(scene_of(options))
     path = target(options)
@@ -117,7 +116,7 @@ def _planned(folder: ObjectFolder, listed: Listed) -> tuple[int, int, float, flo
     try:
         scene = with_sampled_grasps(folder.scene(listed))
         made = make_plan(scene, folder.scene_file, folder.overrides_of(listed))
-    except (StudyError, SceneError):
+    except StudyError:
         return None
     spent = time.perf_counter() - begin
     return made.layout.rows, made.layout.nbytes, spent, memory(scene), estimated(made.tried)
@@ -128,19 +127,9 @@ def schema(_options: Namespace) -> str:
     return json.dumps(Scene.model_json_schema(), indent=2)
 
 
-@contextmanager
-def wrong_scenes_are_bad_usage() -> Iterator[None]:
-    """Around what reads a scene."""
-    try:
-        yield
-    except SceneError as error:
-        raise StudyError(USAGE, str(error)) from error
-
-
 def scene_of(options: Namespace) -> Scene:
     """The scene that the command line names, with what it changes."""
-    with wrong_scenes_are_bad_usage():
-        return load_scene(Path(options.scene), [*options.overrides, *petsc_overrides(options.petsc)])
+    return load_scene(Path(options.scene), [*options.overrides, *petsc_overrides(options.petsc)])
 
 
 def objects_of(options: Namespace) -> ObjectFolder | None:
@@ -149,14 +138,7 @@ def objects_of(options: Namespace) -> ObjectFolder | None:
         meshes = Path(options.objects).absolute()
         pattern = meshes / "*" if meshes.is_dir() else meshes
         options.overrides = [*options.overrides, f"object.mesh={json.dumps(str(pattern))}"]
-    with wrong_scenes_are_bad_usage():
-        return folder_of(options.scene, [*options.overrides, *petsc_overrides(options.petsc)])
-
-
-def checked(folder: ObjectFolder) -> Scene:
-    """The scene of the first of many objects, which stands for all; its errors are bad usage."""
-    with wrong_scenes_are_bad_usage():
-        return folder.check()
+    return folder_of(options.scene, [*options.overrides, *petsc_overrides(options.petsc)])
 
 
 def target(options: Namespace, ending: str = "") -> Path:

@@ -10,7 +10,6 @@ from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, USAGE, StudyError, 
 from softjaw.study.result.index import index_path
 from softjaw.study.result.read import open
 from softjaw.study.result.store import open_result, torn_rows
-from softjaw.study.scene import SceneError
 from softjaw.study.show import objects
 from softjaw.study.show.best_grasps import best, best_text
 from softjaw.study.show.compare import compare as compared
@@ -96,8 +95,8 @@ def _target(options: Namespace, name: str) -> Path:
     return path
 
 
-def damage(options: Namespace, error: Exception) -> StudyError | None:
-    """What is wrong with the result files that an unforeseen error came from: their values are not those written."""
+def damage(options: Namespace) -> StudyError | None:
+    """What is wrong with the result files of a command that ended in a bug: their values are not those written."""
     files = [*getattr(options, "files", []), getattr(options, "file", "")]
     for file in (Path(name) for name in files if str(name).endswith(".hdf")):
         try:
@@ -109,8 +108,4 @@ def damage(options: Namespace, error: Exception) -> StudyError | None:
         if torn:
             text = f"{file}: damaged ({len(torn)} cases do not match their checksums)"
             return StudyError(OTHER_FILE, f"{text}; 'softjaw run' solves them again, or restore it from a copy")
-        # A scene that was valid when it was stored is not the user's mistake.
-        if isinstance(error, SceneError):
-            text = f"{file}: the scene in it cannot be used ({error.problems[0]})"
-            return StudyError(OTHER_FILE, f"{text}; restore the file from a copy")
     return None

@@ -8,7 +8,7 @@ from argparse import Namespace
 from mpi4py import MPI
 
 from softjaw.study.case.candidates import with_sampled_grasps
-from softjaw.study.cli.quick import petsc_overrides, results_folder, target, wrong_scenes_are_bad_usage
+from softjaw.study.cli.quick import petsc_overrides, results_folder, target
 from softjaw.study.launch import solve_objects, solve_scene
 from softjaw.study.messages import DONE, SOME_FAILED, write_file
 from softjaw.study.result.read import open as open_dataset
@@ -23,8 +23,7 @@ def run(options: Namespace) -> int:
     sys.stdout = Unbreakable(sys.stdout)
     if options.folder:
         out = results_folder(options)
-        with wrong_scenes_are_bad_usage():
-            code = solve_objects(options.folder, out, MPI.COMM_WORLD, retry_failed=options.retry_failed)
+        code = solve_objects(options.folder, out, MPI.COMM_WORLD, retry_failed=options.retry_failed)
         if MPI.COMM_WORLD.rank == 0:
             print(objects.summary(out / "index.hdf", terminal_width()), flush=True)
         return code

@@ -25,7 +25,7 @@ from softjaw.study.patch.answer import (
 )
 from softjaw.study.patch.patch_reader import Reading
 from softjaw.study.quantities import MODELS
-from softjaw.study.scene import Scene, SceneError, load_scene
+from softjaw.study.scene import Scene, load_scene
 from softjaw.study.table import Column, Row, Table, as_text, number, plain, with_unit, wrapped
 from softjaw.study.units import shown, shown_unit
 
@@ -90,10 +90,7 @@ def _scene_of(options: Namespace) -> Scene:
         if getattr(options, name):
             text = f"--{name.replace('_', '-')}: found with --deformed, which solves one pad for its pressure"
             raise StudyError(USAGE, f"{text}; remove one of them")
-    try:
-        return load_scene(Path(options.scene))
-    except SceneError as error:
-        raise StudyError(USAGE, str(error)) from error
+    return load_scene(Path(options.scene))
 
 
 def record_text(record: dict[str, Any]) -> str:

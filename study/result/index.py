@@ -29,7 +29,6 @@ INDEX, INDEX_VERSION = "index", 1  # name of its file, which no object's has
 
 
 COLUMNS: dict[str, tuple[type, str, str]] = {  # type, SI unit and what it is
-    "state": (str, "", "one of: " + ", ".join(STATES)),
     "payload": (float, "kg", "mass that the best grasp holds in the worst direction, curved contact model"),
     "payload_error": (float, "1", "relative error of that payload: numerical, without uncertain inputs"),
     "opening": (float, "m", "distance of the pads' faces at first touch, best grasp"),
@@ -44,6 +43,7 @@ COLUMNS: dict[str, tuple[type, str, str]] = {  # type, SI unit and what it is
     "mass": (float, "kg", "mass of the object that its scene gives"),
     "seconds": (float, "s", "time in the object's cases, on all ranks"),
     "preparing": (float, "s", "time until its grasps were sampled and planned, on one rank"),
+    "state": (str, "", "one of: " + ", ".join(STATES)),
     "reason": (str, "", "why there is no grasp, or why cases failed"),
     "file": (str, "", "result file, relative to the index"),
     "mesh": (str, "", "mesh of the object"),

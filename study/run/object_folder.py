@@ -63,7 +63,7 @@ class ObjectFolder:
 def folder_of(scene_file: str, overrides: Sequence[str]) -> ObjectFolder | None:
     """The objects of a scene that names many; None for a scene of one.
 
-    Raises `StudyError, SceneError`: no mesh matches, the CSV file cannot be used, or the scene is no TOML.
+    Raises `StudyError`: no mesh matches, the CSV file cannot be used, or the scene is no TOML.
     """
     path = Path(scene_file)
     data = parse_toml(read_text(path), scene_file)

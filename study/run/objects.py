@@ -66,7 +66,7 @@ def run_objects(
     ``study(scene, overrides)`` plans one object on one rank, for a communicator of that rank alone; ``work`` is how
     the cases of any object are solved.
 
-    Raises `StudyError, SceneError` on every rank: what is wrong for all objects alike, ``out`` is in use, of another
+    Raises `StudyError` on every rank: what is wrong for all objects alike, ``out`` is in use, of another
     scene, or cannot be written.
     """
     with locked(out / f"{index.INDEX}.hdf", comm):

@@ -15,7 +15,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 
-from softjaw.study.messages import Problem, closest, printable, shown
+from softjaw.study.messages import USAGE, Problem, StudyError, closest, printable, shown
 from softjaw.study.units import UNITS, split_unit
 
 KeyPath = tuple[str | int, ...]
@@ -28,14 +28,19 @@ KEY = re.compile(r"""\s*([\w.\"' -]+?)\s*=""")
 NAME = re.compile(r""""[^"]*"|'[^']*'|[^.\s]+""")
 
 
-class SceneError(ValueError):
+class SceneError(StudyError, ValueError):
     """A scene that cannot be used, with every problem found in it."""
 
     def __init__(self, problems: Sequence[Problem]) -> None:
         self.problems = list(problems)
         # A file that is no scene at all must not fill the terminal.
         lines, more = [str(p) for p in self.problems[:MOST_LISTED]], len(self.problems) - MOST_LISTED
-        super().__init__("\n".join([*lines, *([f"{problems[0].file}: and {more} more problems"] if more > 0 else [])]))
+        lines += [f"{problems[0].file}: and {more} more problems"] * (more > 0)
+        super().__init__(USAGE, "\n".join(lines))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Ranks send it to each other."""
+        return SceneError, (self.problems,)
 
 
 def refusal(expected: str) -> PydanticCustomError:

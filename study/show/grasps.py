@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from softjaw.study.flags import LOST, OF_FILE, Flag, flag_words, flags_in
+from softjaw.study.flags import OF_FILE, Flag, flag_words, flags_in
 from softjaw.study.quantities import MODELS, NO_GRASP
 from softjaw.study.ranking import judged, ranked, score_of, shown_level
 from softjaw.study.result.layout import DONE, FAILED
@@ -137,11 +137,6 @@ def order(ds: xr.Dataset, k: int) -> list[Index]:
     shape = ds.status.shape[:-1]
     found = ranked(ds, k, ds.attrs["score"])
     return [(*unravelled(int(c), shape), k) for c in found]
-
-
-def lost(ds: xr.Dataset, index: Index) -> bool:
-    """Whether a case slips, slides out, harms the object or does not hold it."""
-    return bool(ds.variables["flags"].values[index] & LOST)
 
 
 def flags_of(ds: xr.Dataset, index: Index) -> list[Flag]:

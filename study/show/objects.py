@@ -17,28 +17,15 @@ from softjaw.study.result.store import open_result
 from softjaw.study.run.progress import duration
 from softjaw.study.table import Column, Row, Table, as_text, wrapped
 
-REASON_WIDTH = 34  # characters
+LOOKS: dict[str, dict[str, Any]] = {  # of the columns for people
+    "payload": {"error": "payload_error"}, "opening": {"drop": 1}, "force": {}, "e_n": {"drop": 2},
+    "grasps": {"drop": 3}, "seconds": {"drop": 4}, "state": {"wrap": 12}, "reason": {"wrap": 34, "drop": 5},
+}  # fmt: skip
 SHOWN = (
     Column("object", wrap=20),
-    Column("payload", "kg", error="payload_error"),
-    Column("payload_error", "1", people=False),
-    Column("opening", "m", drop=1),
-    Column("force", "N"),
-    Column("e_n", "m", drop=2),
-    Column("quality", "1", people=False),
-    Column("best", people=False),
-    Column("grasps", drop=3),
-    Column("cases", people=False),
-    Column("done", people=False),
-    Column("failed", people=False),
-    Column("mass", "kg", people=False),
-    Column("seconds", "s", drop=4),
-    Column("preparing", "s", people=False),
-    Column("state", wrap=12),
-    Column("reason", wrap=REASON_WIDTH, drop=5),
-    Column("file", people=False),
-    Column("mesh", people=False),
-)
+    *(Column(name, unit, people=name in LOOKS, programs=name != "key", **LOOKS.get(name, {}))
+      for name, (_, unit, _) in index.COLUMNS.items()),
+)  # fmt: skip
 
 
 def index_table(path: Path, top: int = 0) -> Table:

@@ -70,13 +70,6 @@ def lines(
         )  # fmt: skip
 
 
-def with_gaps(values: np.ndarray) -> list[Any]:
-    """Values as nested lists with None where they are not finite, as JSON has them."""
-    plain = values.astype(object)
-    plain[~np.isfinite(values)] = None
-    return list(plain.tolist())
-
-
 def triangles(quads: np.ndarray) -> np.ndarray:
     """Two triangles ``(2 k, 3)`` for each of the quadrilaterals ``(k, 4)``."""
     return quads[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)

@@ -146,6 +146,14 @@ def test_the_page_has_a_row_for_every_object_and_a_section_for_solved_ones(solve
 
 
 @pytest.mark.ranks
+def test_a_scene_that_is_wrong_for_all_objects_ends_every_rank(scene, tmp_path):
+    words = ("run", scene, "--set", "friction.mu=-1", "-o", tmp_path / "out")
+    code, _, errors = command(2, *words)
+    assert code == USAGE, errors
+    assert "friction.mu" in errors
+
+
+@pytest.mark.ranks
 def test_two_ranks_give_the_same_bits(scene, solved):
     out = scene.parent / "two"
     assert launch(2, SCRIPT, scene, out)[0] == SOME_FAILED

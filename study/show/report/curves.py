@@ -11,7 +11,6 @@ import xarray as xr
 from softjaw.study.flags import Flag
 from softjaw.study.page import Block, heading, label, plot
 from softjaw.study.quantities import MODELS
-from softjaw.study.result.layout import DONE
 from softjaw.study.show import plots
 from softjaw.study.show.grasps import (
     Index,
@@ -148,14 +147,10 @@ def _differences(ds: xr.Dataset, name: str, x: np.ndarray, lines: dict[Any, Any]
     made.update_xaxes(title_text=label(name)).update_yaxes(title_text="1 - CCM / PCM [%]")
     made.update_layout(legend={"y": -0.25})
     fine = HALF_AS_FINE if any(e is not None for _, e in lines.values()) else ""
-    missing = int(np.sum(ds.status.values[..., index[-1]] != DONE))
-    gaps = f" {missing} cases at this force have no value." if missing else ""
     share = "the share of the planar model's claim that the curved contact cannot carry."
     trend = "Only the trend can be compared with the paper, whose numbers are not published."
-    caption = f"At {number(forces(ds)[index[-1]])} N: {share}{fine}{gaps} {trend}"
-    ends = {key: [number(100 * f(v), 2) for f in (np.nanmin, np.nanmax)] for key, (v, _) in lines.items()}
-    summary = "; ".join(f"{COMPONENTS[key][0]}, {model}: {a} to {b} %" for (model, key), (a, b) in ends.items())
-    return plot(made, caption, f"Differences of PCM and CCM over {name}. {summary}.", 400)
+    caption = f"At {number(forces(ds)[index[-1]])} N: {share}{fine} {trend}"
+    return plot(made, caption, f"Differences of PCM and CCM over {name}.", 400)
 
 
 # --- a thin wall -----------------------------------------------------------------------------------------------------

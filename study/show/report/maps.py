@@ -10,7 +10,6 @@ import xarray as xr
 
 from softjaw.study.page import Block, label, plot
 from softjaw.study.quantities import DONE, FAILED, FIRST, MISSING, MODELS, NO_GRASP, STATES, TABLE
-from softjaw.study.ranking import largest
 from softjaw.study.show import plots
 from softjaw.study.show.grasps import (
     Index,
@@ -22,10 +21,8 @@ from softjaw.study.show.grasps import (
     label_of,
     note,
     number,
-    place,
     quantity,
     spoken,
-    unravelled,
 )
 from softjaw.study.units import shown_unit
 
@@ -120,7 +117,7 @@ def _maps(ds: xr.Dataset, index: Index, x: int, y: int, over: int, panels: list[
     choose = "Choose the quantity at the upper left; point at a cell for its values and notes."
     caption = f"{f'At {where}. ' if where else ''}{choose} {marks}"
     names = " and ".join(plots.MODELS[m][0] for m in models)
-    alt = f"Maps over {spoken(axes[x])} and {spoken(axes[y])}, {names}. {extremes(ds, index)}"
+    alt = f"Maps over {spoken(axes[x])} and {spoken(axes[y])}, {names}."
     return plot(made, caption, alt, total)
 
 
@@ -161,7 +158,7 @@ def _button(ds: xr.Dataset, name: str, cuts: Any, x: int, y: int) -> dict[str, A
     (xl, xu), (yl, yu) = ((spoken(axis), shown_unit(ds[axis].units)) for axis in axes)
     hover = f"{xl} %{{x}} {xu}, {yl} %{{y}} {yu}<br>{label(title)}: %{{z:.4g}}<br>%{{customdata}}<extra></extra>"
     low, high = plots.span(np.concatenate([a.ravel() for a in z]))
-    rows = [None if not np.isfinite(a).any() else plots.with_gaps(a) for a in z]
+    rows = [None if not np.isfinite(a).any() else a.tolist() for a in z]
     axis = {"colorscale": plots.colours(name), "cmin": low, "cmax": high, "colorbar": plots.bars(label(title))}
     return {"label": label(title), "method": "update",
             "args": [{"z": rows, "hovertemplate": [hover] * len(rows)}, {"coloraxis": axis}]}  # fmt: skip
@@ -181,20 +178,6 @@ def elsewhere(ds: xr.Dataset, index: Index, *drawn: int) -> str:
     axes = [str(axis) for axis in ds.status.dims]
     others = [(axis, i) for k, (axis, i) in enumerate(zip(axes, index, strict=True)) if k not in drawn]
     return ", ".join(f"{spoken(axis)} {axis_text(ds, axis, i)}" for axis, i in others if ds.sizes[axis] > 1)
-
-
-def extremes(ds: xr.Dataset, index: Index) -> str:
-    """Ranges of the first maps at the force shown, as text."""
-    k, ranges = index[-1], []
-    for name in FIRST:
-        found = field(ds, name)
-        if found is not None and np.isfinite(found[..., k]).any():
-            text, unit, factor = quantity(ds, name)
-            values = found[..., k] * factor
-            ends = [unravelled(largest(sign * values), values.shape) for sign in (-1, 1)]
-            (low, where), (high, there) = ((number(values[i]), place(ds, (*i, k))) for i in ends)
-            ranges.append(f"{text} from {low} ({where}) to {high} {unit} ({there})")
-    return f"At {number(forces(ds)[k])} N {'; '.join(ranges)}." if ranges else "No values."
 
 
 def safe_forces(ds: xr.Dataset, index: Index) -> Block | None:

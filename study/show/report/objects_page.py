@@ -20,7 +20,7 @@ from softjaw.study.show.view.model import View
 from softjaw.study.table import Row, with_unit
 from softjaw.study.units import shown_unit
 
-NOT_SHOWN = ("payload_error", "best", "cases", "done", "failed", "mass", "preparing", "file", "mesh", "quality")
+NOT_SHOWN = ("payload_error", "best", "cases", "done", "failed", "mass", "preparing", "file", "mesh", "quality", "key")
 BODY, PAD = np.array([0.72, 0.78, 0.83]), np.array([0.93, 0.55, 0.25])
 AMBIENT = 0.45  # share of the light that comes from everywhere
 

@@ -161,12 +161,6 @@ class View:
     def _here(self, index: Index) -> dict[str, int]:
         return {str(axis): i for axis, i in zip(self.ds.status.dims, index, strict=False)}
 
-    def load(self) -> None:
-        """Read the contact faces of all cases at once; else those of a station are read when they are needed."""
-        if self.ds.attrs["patches"]:
-            patches = read_patch(self.ds.attrs["file"], **self._here(self.point))
-            self._faces = {i: patches.isel(station=i) for i in range(self.ds.sizes["station"])}
-
     def faces(self, index: Index) -> Faces:
         """Stored contact faces of both fingers at a case, by name; empty where there are none."""
         if not self.ds.attrs["patches"]:

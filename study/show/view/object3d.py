@@ -52,7 +52,6 @@ def object_block(
 
 def view_page(view: View, index: Index, quantity: str, motion: str) -> str:
     """The page of a view, which opens at a case and a map, with all cases."""
-    view.load()
     levels = sorted(range(len(forces(view.ds))), key=lambda k: abs(k - index[-1]))
     cases = [index, *(i for k in levels for i in order(view.ds, k) if i[:-3] == view.point)]
     block = object_block(view, index, quantity, motion, list(dict.fromkeys(cases)), whole=True)

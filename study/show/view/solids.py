@@ -191,7 +191,6 @@ def write_vtk(ds: xr.Dataset, path: Path, force: float | None = None) -> Path:
     body = _object_file(view, index)
     blocks = pv.MultiBlock({"object": body})
     if path.suffix.lower() == ".vtm" and ds.attrs["patches"]:
-        view.load()
         for k, level in enumerate(forces(ds)):
             if (pads := _pads_file(view, k)) is not None:
                 blocks[f"pads, {level:g} N"] = pads
