@@ -55,19 +55,10 @@ ALTERNATIVES = {  # what an override of a way of giving candidates replaces
     "poses": ("stations", "stations_mm", "sampled"),
     "sampled": ("stations", "stations_mm", "poses"),
 }
-NOT_SWEPT = {
-    "object.shape": "write one scene per shape",
-    "object.mesh": "write one scene per mesh",
-    "object.name": "a name changes no result",
-    "candidates.stations": "stations are an axis of the maps already",
-    "accuracy.meshes": "it changes which maps there are",
-    "accuracy.target": "it changes which maps there are",
-    "effects.wrench": "it changes what is stored",
-    "object.mass_g": "it changes which maps there are; the safety factor is in proportion to 1 / mass",
-    "object.density": "it changes which maps there are; the safety factor is in proportion to 1 / density",
-    "limit_surface.samples": "it changes the size of the results",
-    "limit_surface.wrench_samples": "it changes the size of the results",
-}
+NOT_SWEPT = (  # they change which datasets a file has and how large they are, or no number of a case
+    "object.shape", "object.mesh", "object.name", "object.mass_g", "object.density", "candidates.stations",
+    "accuracy.meshes", "accuracy.target", "effects.wrench", "limit_surface.samples", "limit_surface.wrench_samples",
+)  # fmt: skip
 OF_FACES = ("gripper.element", "gripper.elements")  # keys that the number of stored faces depends on
 NO_RESULT = ("run", "uncertainty")  # sections that change no result of a case
 MOST_GRID_POINTS, MOST_CASES = 10_000, 1_000_000
@@ -306,10 +297,7 @@ class Scene(SceneSection):
     @classmethod
     def of_tables(cls, tables: Mapping[str, Any]) -> Scene:
         """The scene of tables in which everything is filled in, as `effective` gives them, and without a sweep."""
-        try:
-            return cls.model_validate(tables)
-        except ValidationError as error:
-            raise SceneError(problems_of(error, tables, tables_of(tables), lambda _: ("scene", None))) from None
+        return _scene(dict(tables), "", Path("scene"), check_files=False)
 
 
 SECTIONS: dict[str, type[SceneSection]] = {
@@ -350,15 +338,8 @@ def plain_tables(tables: Mapping[str, Any]) -> dict[str, Any]:
     """
     if not isinstance(tables, Mapping) or not all(isinstance(key, str) for key in tables):
         raise TypeError(f"tables of a scene: found {shown(tables)}, expected a mapping of sections, {{'object': ...}}")
-    return {key: _plain(value) for key, value in tables.items()}
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return plain_tables(value)
-    if isinstance(value, list | tuple):
-        return [_plain(member) for member in value]
-    return value.tolist() if hasattr(value, "tolist") else value
+    plain: dict[str, Any] = json.loads(json.dumps(dict(tables), default=lambda v: getattr(v, "tolist", v.__str__)()))
+    return plain
 
 
 @lru_cache(maxsize=16)
@@ -492,7 +473,7 @@ def axis_rules(sweep: Mapping[str, Sequence[Any]], sections: Mapping[str, Any]) 
             near = closest(key, [f"{s}.{k}" for s, m in models.items() for k in m.model_fields])
             yield wrong(key, f"a key with a single value, as `{near or 'gripper.pad_width_mm'}`", key)
         elif key in NOT_SWEPT or section in NO_RESULT:
-            yield wrong(values, f"a key that can be swept; {NOT_SWEPT.get(key, 'it changes no result')}", key)
+            yield wrong(values, "a key that changes the numbers of cases alone; write a scene for each value", key)
         elif key in OF_FACES and "run" in sections and sections["run"].patches == "all":
             yield wrong(values, 'run.patches = "none" beside it, for faces that differ from case to case', key)
         elif len(set(values)) < len(values) or len({_kind(v) for v in values}) > 1:
@@ -510,15 +491,12 @@ def _point_rules(sweep: Mapping[str, Sequence[Any]], sections: Mapping[str, Any]
     if points > MOST_GRID_POINTS:  # trying too many would take minutes
         yield wrong(points, f"at most {MOST_GRID_POINTS:,} combinations; sweep fewer keys or values")
         return
-    good: dict[str, list[Any]] = {key: [] for key in sweep}
-    for key, values in sweep.items():
-        for i, value in enumerate(values):
-            if trouble := _trouble(data, {key: value}):
-                yield wrong(value, trouble, key, i)
-            else:
-                good[key].append(value)
-    for point in product(*good.values()) if len(sweep) > 1 else ():
-        at = dict(zip(good, point, strict=True))
+    alone = [(key, i, value) for key, values in sweep.items() for i, value in enumerate(values)]
+    if errors := [wrong(v, trouble, key, i) for key, i, v in alone if (trouble := _trouble(data, {key: v}))]:
+        yield from errors
+        return
+    for point in product(*sweep.values()) if len(sweep) > 1 else ():
+        at = dict(zip(sweep, point, strict=True))
         if trouble := _trouble(data, at):
             yield wrong(", ".join(f"{key} = {shown(value)}" for key, value in at.items()), trouble)
             return
@@ -527,8 +505,8 @@ def _point_rules(sweep: Mapping[str, Sequence[Any]], sections: Mapping[str, Any]
 def _trouble(data: Mapping[str, Any], values: Mapping[str, Any]) -> str:
     """What is wrong with a scene with values put in; empty where nothing is."""
     try:
-        Scene.model_validate(put(data, values))
-    except ValidationError as error:
-        first = problems_of(error, data, tables_of(data), lambda _: ("", None))[0]
+        Scene.of_tables(put(data, values))
+    except SceneError as error:
+        first = error.problems[0]
         return first.expected if first.key in values else f"{first.expected} in {first.key}"
     return ""
