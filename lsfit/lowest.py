@@ -12,9 +12,10 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull, cKDTree
+from scipy.optimize import minimize
+from scipy.spatial import ConvexHull
 
-from softjaw.lsfit.form import derivative, directions, exponents, half_sphere_monomials, hessian_tensor, monomials
+from softjaw.lsfit.form import derivative, directions, exponents, half_sphere_monomials, monomials
 from softjaw.lsfit.surface import ZERO_SHARE
 
 FloatArray = NDArray[np.float64]
@@ -50,64 +51,28 @@ def _bound(v: FloatArray, dimension: int) -> float:
 
 def smallest_value(v: FloatArray, dimension: int) -> tuple[float, FloatArray]:
     """Smallest value on the unit sphere of the quartic form with coefficients ``v (k,)``, and where, ``(d,)``."""
-    n = _count(dimension)
-    P = half_sphere_monomials(dimension, n) @ v
-    u = directions(dimension, n)[
-        _lowest(P, dimension) | (P <= np.partition(P, 40)[40])
-    ]  # and the 40 lowest, or a narrow valley is missed
-    D, E, third = derivative(dimension, 4), exponents(dimension, 4), exponents(dimension, 3)
-    Q = hessian_tensor(v, dimension).reshape(dimension**2, dimension**2)
-    value, size, trust = monomials(u, E) @ v, np.abs(P).max(), np.full(len(u), 0.3)
-    for _ in range(60):
-        g = monomials(u, third) @ (D @ v).T
-        # only the slope along the sphere counts; across it Euler's identity fixes it to 4 P
-        slope = g - (g * u).sum(axis=1, keepdims=True) * u
-        if ((np.abs(slope).max(axis=1) <= ZERO_SHARE * size) | (trust < 1e-9)).all():
-            break
-        new = _descended(u, slope, value, Q, trust)
-        reached = monomials(new, E) @ v
-        # steps that do not descend are not taken, so no search ends above its start
-        lower = reached < value
-        u, value = np.where(lower[:, None], new, u), np.where(lower, reached, value)
-        # a step that rises is cut hard, one that falls may grow: as trust regions do
-        trust = np.where(lower, np.minimum(2 * trust, 0.3), 0.2 * trust)
-    best = int(np.argmin(value))
-    return float(value[best]), u[best]
+    n, E, third = _count(dimension), exponents(dimension, 4), exponents(dimension, 3)
+    D, P = derivative(dimension, 4) @ v, half_sphere_monomials(dimension, n) @ v
+    size = np.abs(P).max()
 
+    def along(w: FloatArray) -> tuple[float, FloatArray]:
+        """Value in the direction of ``w``, of any length, and its gradient."""
+        u, length = w / np.linalg.norm(w), np.linalg.norm(w)
+        value = float(monomials(u, E)[0] @ v) / size
+        return value, (D @ monomials(u, third)[0] / size - 4 * value * u) / length
 
-def _descended(u: FloatArray, slope: FloatArray, value: FloatArray, Q: FloatArray, longest: FloatArray) -> FloatArray:
-    """Newton step ``(m, d)`` on the sphere, against the slope where the curvature has the wrong sign."""
-    d = u.shape[1]
-    H = ((u[:, :, None] * u[:, None, :]).reshape(-1, d * d) @ Q).reshape(-1, d, d)
-    across = np.eye(d) - u[:, :, None] * u[:, None, :]
-    # curvature along the sphere: that of P less its slope across, 4 P
-    curvature, axes = np.linalg.eigh(across @ (H - 4 * value[:, None, None] * np.eye(d)) @ across)
-    # magnitudes make the step descend at saddles too; the floor bounds it where the form is flat
-    size = np.maximum(np.abs(curvature), 1e-8 * np.abs(Q).max() + 1e-300)
-    step = np.einsum("mij,mj,mkj,mk->mi", axes, 1 / size, axes, -slope)
-    # without curvature across the sphere the rounding of that part is blown up, and has to go
-    step -= (step * u).sum(axis=1, keepdims=True) * u
-    length = np.linalg.norm(step, axis=1)
-    new = u + step * np.minimum(1, longest / np.maximum(length, 1e-300))[:, None]
-    return new / np.linalg.norm(new, axis=1, keepdims=True)
+    # many starts, or a narrow valley is missed
+    starts = directions(dimension, n)[np.argsort(P)[:20]]
+    ends = [minimize(along, u, jac=True, method="BFGS", options={"gtol": ZERO_SHARE}).x for u in starts]
+    at = np.array(ends) / np.linalg.norm(ends, axis=1, keepdims=True)
+    values = monomials(at, E) @ v
+    best = int(np.argmin(values))
+    return float(values[best]), at[best]
 
 
 def _count(dimension: int) -> int:
     """Number of directions in which the value is sampled."""
     return 400 if dimension <= 3 else 2000
-
-
-def _lowest(value: FloatArray, dimension: int) -> NDArray[np.bool_]:
-    """Which of the sampled directions have no lower neighbour, ``(n,)``."""
-    return value <= value[neighbours(dimension, len(value))].min(axis=1)
-
-
-@lru_cache
-def neighbours(dimension: int, count: int) -> NDArray[np.intp]:
-    """Nearest of the other `directions`, opposites being the same, ``(count, k)``."""
-    u = directions(dimension, count)
-    # the nearest point is the direction itself
-    return cKDTree(np.vstack([u, -u])).query(u, 9 if dimension <= 3 else 11)[1][:, 1:] % count
 
 
 @lru_cache

@@ -69,11 +69,12 @@ def convex_quartic(W: ArrayLike, T: ArrayLike, gamma: float = 0.01) -> tuple[Qua
         gram = gram_matrix(v, free, r)
         if smallest(gram) < MIN_EIGENVALUE:
             v, by, gram = bound, "semidefinite programme", gram_matrix(bound, free, r)
-    # P below MAX_REACH_RATIO^-4 on the unit sphere is a reach beyond MAX_REACH_RATIO, which no sample supports
-    if not lies_above(v, r, MAX_REACH_RATIO**-4):
+    # P below this on the unit sphere is a reach beyond MAX_REACH_RATIO, which no sample supports
+    least = MAX_REACH_RATIO**-4
+    # y' Hess P y = 12 P: a Gram matrix with so large an eigenvalue bounds the reach
+    if smallest(gram) < 12 * least and not lies_above(v, r, least):
         by, flag = "semidefinite programme", flag | FitFlag.BOUNDED
-        # y' Hess P y = 12 P: a Gram matrix with this least eigenvalue bounds the reach by MAX_REACH_RATIO
-        v, free = convex_least_squares(N, b, r, loose, 12 * MAX_REACH_RATIO**-4)
+        v, free = convex_least_squares(N, b, r, loose, 12 * least)
         gram = gram_matrix(v, free, r)
     surface = placed(v, samples, samples.flag | flag)
     low = smallest(gram)
