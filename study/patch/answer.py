@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,8 +18,8 @@ from softjaw.study.case.evaluate import ECCENTRICITIES, exact_score, soft
 from softjaw.study.case.limit_surface import STANDS_IN, fit_surfaces
 from softjaw.study.case.result import UNDECIDED
 from softjaw.study.flags import Flag, flags_in, raised
-from softjaw.study.messages import OTHER_FILE, USAGE, Problem, StudyError
-from softjaw.study.patch.faces import ReadPatch, refuse
+from softjaw.study.messages import OTHER_FILE, USAGE, StudyError
+from softjaw.study.patch.faces import ReadPatch
 from softjaw.study.patch.patch_reader import ENDINGS, Reading, checked_file, read_table
 from softjaw.study.quantities import MODELS
 
@@ -72,8 +72,11 @@ def read_patch(file: str, reading: Reading) -> ReadPatch:
     return read_vtk(path, reading)
 
 
-def contact_of(patch: ContactPatch, mu: float, x_axis: ArrayLike | None = None) -> Contact:
-    """A patch in its contact frame, with its friction; errors as for `friction_limits`."""
+def contact_of(
+    patch: ContactPatch, mu: float, x_axis: ArrayLike | None = None,
+    count: Callable[[NDArray[np.bool_]], str] = lambda chosen: f"{int(chosen.sum())} of {len(chosen)} faces",
+) -> Contact:  # fmt: skip
+    """A patch in its contact frame, with its friction; errors as for `friction_limits`, which ``count`` faces."""
     if not isinstance(patch, ContactPatch):
         expected = "a ContactPatch of centroid, area, normal and pressure"
         raise TypeError(f"patch is a {type(patch).__name__}: expected {expected}")
@@ -83,7 +86,9 @@ def contact_of(patch: ContactPatch, mu: float, x_axis: ArrayLike | None = None) 
     except ValueError as error:
         raise type(error)(str(error).replace("x_hint", "x_axis")) from error
     if contact.frame.flag & FrameFlag.ORIENTATION:
-        raise ValueError("patch: found normals that oppose their neighbours, expected all to one side; turn the others")
+        found = f"normals in {count(behind(patch.normal, contact.frame.axes[2]))} that oppose their neighbours"
+        remedy = "orient them before export (ParaView: Generate Surface Normals with Consistency)"
+        raise ValueError(f"normal: found {found}, expected all to one side; {remedy}")
     return contact
 
 
@@ -137,16 +142,10 @@ class EvaluatedPatch:
 
     def __init__(self, read: ReadPatch, mu: float, long_side: ArrayLike | None = None) -> None:
         self.read, self.x_given = read, long_side is not None
-        x = principal_direction(read.patch) if long_side is None else long_side
         try:
-            self.contact = Contact(read.patch, mu, x_hint=x)
+            self.contact = contact_of(read.patch, mu, long_side, self.count)
         except ValueError as error:
-            raise StudyError(USAGE, f"{read.file}: {str(error).replace('x_hint', '--long-side')}") from error
-        frame = self.contact.frame
-        if frame.flag & FrameFlag.ORIENTATION:
-            found = f"normals in {self.count(behind(read.patch.normal, frame.axes[2]))} that oppose their neighbours"
-            remedy = "orient them to one side before export (ParaView: Generate Surface Normals with Consistency)"
-            refuse([Problem(read.file, None, "normal", found, "normals that all point to the same side", remedy)])
+            raise StudyError(USAGE, f"{read.file}: {str(error).replace('x_axis', '--long-side')}") from error
         self.fits = {m: fit_surfaces(self.contact, m, list(SURFACES), "least_squares", FITTED_ON) for m in MODELS}
         self.exact = {m: exact_surface(self.contact, m) for m in MODELS}
 

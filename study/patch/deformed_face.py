@@ -66,7 +66,6 @@ def solve_deformed(file: str, unit: str | None, scene: Scene) -> ReadPatch:
 def _points(path: Path, unit: str | None, scene: Scene) -> tuple[FloatArray, tuple[str, ...]]:
     """Points ``(n, 2)`` or ``(n, 3)`` [m] of a table, and notes on it; all that is wrong with it at once."""
     numbers, (headers, *cells) = table_rows(path)
-    headers = [header.strip() for header in headers]
     given = {pair[0]: i for i, header in enumerate(headers) if (pair := split_header(header))}
     needed = [name for name in "xyz" if name in given]
     if len(cells) > MOST_MEASURED:

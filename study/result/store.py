@@ -245,16 +245,24 @@ def _texts(strings: np.ndarray) -> np.ndarray:
 
 
 def place_text(axes: Sequence[Any], labels: Any, index: Sequence[int]) -> str:
-    """A case in words: ``station 12 mm, angle 90 deg, normal_force 5 N``; an explicit pose by its label."""
+    """A case in words: ``station 12 mm, angle 90 deg, 5 N``; an explicit pose by its label.
+
+    Axes that have only one value are left out, and the force where ``index`` is that of a candidate.
+    """
     words = []
-    label = "" if axes[-3].units else f'"{labels[tuple(index[-3:-1])]}"'
-    for axis, i in zip(axes, index, strict=True):
-        if label and axis.name in ("station", "angle"):
-            words += [label] * (axis.name == "station")
-        else:
-            value = axis.options[i] if axis.options else shown_text(axis.values[i], axis.units, 5)
-            words.append(f"{axis.name} {value}")
+    for axis, i in zip(axes, index, strict=False):
+        if axis is axes[-1]:
+            words.append(value_text(axis, i))
+        elif axis.name in ("station", "angle") and not axes[-3].units:
+            words += [str(labels[tuple(index[-3:-1])])] * (axis.name == "station")
+        elif axis.name == "station" or len(axis.values) > 1:
+            words.append(f"{axis.name.replace('_', ' ')} {value_text(axis, i)}")
     return ", ".join(words)
+
+
+def value_text(axis: Any, i: int) -> str:
+    """A value of an axis with its unit, or the text that it stands for."""
+    return str(axis.options[i]) if axis.options else shown_text(axis.values[i], axis.units)
 
 
 def _other_version(path: Path, version: str) -> str:

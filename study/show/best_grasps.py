@@ -268,7 +268,7 @@ def answer(ds: xr.Dataset, index: Index, why: str = "") -> dict[str, tuple[str, 
 
 def spoken_line(main: str, more: str) -> str:
     """A line of an answer."""
-    return ", ".join(text for text in (main, more) if text).replace("\N{NO-BREAK SPACE}", " ")
+    return ", ".join(text for text in (main, more) if text)
 
 
 def value_text(ds: xr.Dataset, name: str, index: Index, digits: int = 4, unit: bool = False) -> str:

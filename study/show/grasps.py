@@ -16,9 +16,11 @@ from softjaw.study.flags import OF_FILE, Flag, flag_words, flags_in
 from softjaw.study.quantities import MODELS, NO_GRASP
 from softjaw.study.ranking import judged, ranked, score_of, shown_level
 from softjaw.study.result.layout import DONE, FAILED
+from softjaw.study.result.read import axes_of
+from softjaw.study.result.store import place_text, value_text
 from softjaw.study.show.status import grouped
 from softjaw.study.table import number, with_unit
-from softjaw.study.units import shown, shown_text, shown_unit
+from softjaw.study.units import shown, shown_unit
 
 Index = tuple[int, ...]
 # What a check may be at most (or, for those of `ABOVE`, must exceed).
@@ -98,23 +100,13 @@ def axis_values(ds: xr.Dataset, axis: str) -> np.ndarray:
 
 def axis_text(ds: xr.Dataset, axis: str, i: int) -> str:
     """One value of an axis with its unit; the text of a sweep over texts."""
-    about = ds.variables[axis].attrs
-    if options := about.get("options", ()):
-        return str(options[i])
-    # A space that does not break keeps number and unit on one line.
-    return shown_text(ds.variables[axis].values[i], about["units"]).replace(" ", "\u00a0")
+    return value_text(axes_of(ds)[ds.status.dims.index(axis)], i)
 
 
 def place(ds: xr.Dataset, index: Index, force: bool = False) -> str:
-    """A case as text, without axes that have only one value; poses by their names."""
-    status, parts = ds.variables["status"], []
-    for axis, i, length in zip(map(str, status.dims[:-1]), index, status.shape, strict=False):
-        if axis == "station" and ds.attrs["poses"]:
-            parts.append(str(ds.variables["label"].values[index[-3], index[-2]]))
-        elif length > 1 or axis == "station":
-            gap = " " if ds.variables[axis].attrs.get("options") else "\u00a0"
-            parts.append(f"{spoken(axis)}{gap}{axis_text(ds, axis, i)}")
-    return ", ".join([*parts, *[axis_text(ds, "normal_force", index[-1])] * force])
+    """A case as text, with or without its force; poses by their names."""
+    text = place_text(axes_of(ds), ds.label.values, index)
+    return text if force else text.rpartition(", ")[0]
 
 
 def forces(ds: xr.Dataset) -> np.ndarray:
@@ -179,4 +171,4 @@ def reason_lines(ds: xr.Dataset, *states: int) -> list[str]:
     """Reasons of failed cases and of what is no grasp, and notes on solved ones, alike messages together."""
     kinds = grouped(ds.status.values, ds.message.values, lambda: ds["flags"].values & OF_FILE)
     wanted = (kind for kind in kinds if not states or kind.state in states)
-    return [kind.text(lambda index: place(ds, index, force=True)) for kind in wanted]
+    return [kind.text(axes_of(ds), ds.label.values) for kind in wanted]

@@ -47,9 +47,9 @@ class Reason(NamedTuple):
     message: str
     cases: list[Index]
 
-    def text(self, place: Callable[[Index], str]) -> str:
+    def text(self, axes: Sequence[Any], labels: Any) -> str:
         """Count, state, message and some places in one line."""
-        places = "; ".join(map(place, self.cases[:MOST_PLACES]))
+        places = "; ".join(place_text(axes, labels, index) for index in self.cases[:MOST_PLACES])
         more = len(self.cases) - MOST_PLACES
         word = "note" if self.state == DONE else STATES[self.state]
         return f"{len(self.cases)} x {word}: {self.message} ({places}{f'; and {more} more' * (more > 0)})"
@@ -81,7 +81,7 @@ def status_table(result: Any) -> Table:
     facts: Row = {"file": str(result.path), "running": holder(result.path) or None, **counts}
     facts |= {"largest_error": largest_stated_error(result), "waiting": waits(result), **_added(result)}
     facts["sessions"] = list(result.sessions)
-    notes = [reason.text(lambda index: place(result, index)) for reason in reasons_in(result)]
+    notes = [reason.text(axes, result.labels) for reason in reasons_in(result)]
     return Table(result.title, columns, rows, notes, facts, "cases")
 
 
@@ -218,16 +218,11 @@ def reasons_in(result: Any, brief: bool = False) -> list[Reason]:
 def reasons(result: Any, width: int = PAPER, notes: bool = True) -> list[str]:
     """The most frequent reasons, one line each; ``notes``: also of solved cases."""
     found = [reason for reason in reasons_in(result, brief=True) if notes or reason.state != DONE]
-    lines = [reason.text(lambda index: place(result, index)) for reason in found[:MOST_NOTES]]
+    lines = [reason.text(result.axes, result.labels) for reason in found[:MOST_NOTES]]
     rest = found[MOST_NOTES:]
     cases = sum(len(reason.cases) for reason in rest)
     lines += [f"and {len(rest)} more kinds on {cases} cases: 'softjaw status --json' lists all"] * bool(rest)
     return [wrapped(line, width, "  ", "    ") for line in lines]
-
-
-def place(result: Any, index: Index) -> str:
-    """A case in words."""
-    return place_text(result.axes, result.labels, index)
 
 
 def _added(result: Any) -> dict[str, Any]:

@@ -103,7 +103,7 @@ TABLE = QUICK["table"].content
 
 
 @pytest.mark.parametrize(("old", "new", "words"), [
-    (b"\n1,0", b'\n"1,0', "a line that is not a table row"), (b"\n1,0,0", b"\n1,0,99999999999", "at most 1000 m"),
+    (b"\n1,0", b'\n"1,0', "a finite number"), (b"\n1,0,0", b"\n1,0,99999999999", "at most 1000 m"),
     (b",7\n", b",1e300\n", "at most 1e+12 Pa"), (b"1.25", b"1e300", "at most 10000 m^2"),
     (b"0.1", b"1e300", "a length of 1"), (b"0,0.1,1,7", b"1e-320,0,0,7", "a length of 1"), (b"1.25", b"1e308", "area"),
     (b"x_mm", b"x_mm\x1b[2J", "x_mm"),

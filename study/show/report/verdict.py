@@ -30,7 +30,7 @@ and /study/status/code (0 missing, 1 done, 2 failed) and /study/status/message s
 stations and angles, the angle running fastest. /study/scene is the scene with all settings, /study/provenance/sessions
 lists programs and machine. Plots: h5web, silx or NeXpy open at the map of payload; 'softjaw export
 --format vtk' writes the object with its maps and the pads with their pressure for ParaView."""
-ASCII = {"\N{NO-BREAK SPACE}": " ", "\N{MULTIPLICATION SIGN}": "x", "±": "+-"}
+ASCII = {"\N{MULTIPLICATION SIGN}": "x", "±": "+-"}
 
 
 def subtitle(ds: xr.Dataset) -> str:

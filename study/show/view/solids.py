@@ -84,7 +84,7 @@ def _pads(plotter: Any, view: View, index: Index, motion: str) -> None:
 
 def _say(plotter: Any, text: str) -> None:
     """Text in the characters that VTK's own font has."""
-    plain = text.replace("\u00a0", " ").replace("–", "-").encode("latin-1", "replace").decode("latin-1")
+    plain = text.encode("latin-1", "replace").decode("latin-1")
     plotter.add_text(plain, position="upper_left", font_size=10, color=INK)
 
 

@@ -203,7 +203,7 @@ def test_the_largest_error_is_found_with_its_place_and_how_many_have_none():
     states[1, 1, 0] = FAILED
     known["e_n_error"], known["status"] = (over, errors, {"units": ""}), (over, states)
     told = best(known).facts["largest_error"]
-    for words in ("1.8 %", "station 1000 mm, angle 0 deg, normal_force 1 N", "3 of 7"):
+    for words in ("1.8 %", "station 1000 mm, angle 0 deg, 1 N", "3 of 7"):
         assert words in told
     assert "1 of 4" not in told  # the scene names no target
     aimed = known.assign_attrs(scene=known.scene + '\n[accuracy]\ntarget = 0.01\ntarget_of = "e_n"\n')
