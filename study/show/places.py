@@ -64,14 +64,16 @@ def spot(ds: xr.Dataset, index: Index) -> Spot:
     closing = turn[index][0, :, 2]
     offset -= (offset @ closing) * closing  # both fingers bear along it
     sides = _sides(np.ptp(frame.to_object(points), axis=0), closing) if ds.attrs["poses"] else ""
-    return Spot(sides, _beside(offset), float(np.linalg.norm(offset)))
+    vector = ", ".join(f"{x + 0.0:.2g}" for x in np.round(closing, 2))
+    closes = f"closing along ({vector}), " * (sides == "on the sides")  # where no axis says it
+    return Spot(sides, closes + _beside(offset), float(np.linalg.norm(offset)))
 
 
 def _sides(extents: np.ndarray, closing: np.ndarray) -> str:
     """Which sides of an object the pads press on."""
     axis = int(np.abs(closing).argmax())
     if abs(closing[axis]) < math.cos(math.radians(15.0)):
-        return f"from the sides along ({', '.join(f'{x + 0.0:.2g}' for x in np.round(closing, 2))})"
+        return "on the sides"
     rank = int(np.sum(extents < extents[axis] * (1 - SAME_EXTENT)))
     alone = np.sum(np.abs(extents - extents[axis]) <= SAME_EXTENT * extents[axis]) == 1
     return f"on the {SIDES[rank] if alone else 'sides'} facing {'xyz'[axis]}"

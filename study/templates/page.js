@@ -67,12 +67,16 @@ function object3d(div, all) {
   }
 
   function contact(one) {
-    const [pressed, lines, arrows, tips, limit] = div.data.slice(2);
-    const steps = new Int16Array(bytes(one && one.faces || "")), a = Float32Array.from(steps, (v) => v * one.step);
-    const p = floats(one && one.pressure), i = [], j = [], k = [], value = [];
-    p.forEach((v, f) => { i.push(4 * f, 4 * f); j.push(4 * f + 1, 4 * f + 2); k.push(4 * f + 2, 4 * f + 3); value.push(v, v); });
-    Object.assign(pressed, {x: part(a, 0), y: part(a, 1), z: part(a, 2), i, j, k, intensity: value, visible: p.length > 0,
-      cmin: 0, cmax: p.reduce((m, v) => Math.max(m, v), 0)});
+    const [pressed, blocks, lines, arrows, tips, limit] = div.data.slice(2);
+    const quads = (s) => {
+      const a = Float32Array.from(new Int16Array(bytes(s || "")), (v) => v * one.step), i = [], j = [], k = [];
+      for (let f = 0; f < a.length / 3; f += 4) { i.push(f, f); j.push(f + 1, f + 2); k.push(f + 2, f + 3); }
+      return {x: part(a, 0), y: part(a, 1), z: part(a, 2), i, j, k, visible: a.length > 0};
+    };
+    const p = floats(one && one.pressure), value = [];
+    p.forEach((v) => value.push(v, v));
+    Object.assign(pressed, quads(one && one.faces), {intensity: value, cmin: 0, cmax: p.reduce((m, v) => Math.max(m, v), 0)});
+    Object.assign(blocks, quads(one && one.sides));
     Object.assign(lines, segments(one && one.lines));
     Object.assign(arrows, segments(one && one.arrows));
     const ends = (v) => v.filter((_, n) => n % 3 === 1);

@@ -180,12 +180,12 @@ class View:
         return None if known is None or known.ellipsoid.rank < 3 else body(known)
 
     def eye(self, index: Index) -> tuple[np.ndarray, np.ndarray]:
-        """Where one sees finger 1 obliquely from behind and the object upright: direction of the eye, and up."""
+        """Where one sees both pads, finger 1's from behind, and the object upright: direction of the eye, and up."""
         pads = self.pads(index)
         out = -pads[0].approach if pads else np.array([1.0, 0.0, 0.0])
         up = np.array([0.0, 0.0, 1.0]) if abs(out[2]) < 0.9 else np.array([0.0, 1.0, 0.0])
         beside = np.cross(up, out)
-        return 0.72 * out + 0.62 * beside / np.linalg.norm(beside) + 0.35 * up, up
+        return 0.5 * out + 0.8 * beside / np.linalg.norm(beside) + 0.35 * up, up
 
     def summary(self, index: Index, name: str) -> list[str]:
         """A case in lines: where it is, its main values and the map ``name``, its flags; or why it has none."""

@@ -20,7 +20,7 @@ from softjaw.study.result.layout import DONE
 from softjaw.study.show import plots
 from softjaw.study.show.grasps import Index, field, forces, label_of, note, order, place
 from softjaw.study.show.stored_surface import NAMES
-from softjaw.study.show.view.model import ARROW_MM, CROSSED, FORCE, NEUTRAL, OPEN, View
+from softjaw.study.show.view.model import ARROW_MM, CROSSED, FORCE, NEUTRAL, OPEN, PAD, View
 
 MOST = 24_000_000  # bytes of pads, walls and limit surfaces; beyond it, those of the worst grasps are left out
 CHOICES = ("quality", "quality_fitted", "e_n", "epsilon", "f_x_max", "f_y_max", "tau_z_max", "safety_factor", "F_N",
@@ -99,9 +99,11 @@ def case(view: View, index: Index, motion: str, whole: bool) -> dict[str, Any]:
     both = view.pads(index)
     pressed = [pad.pressed() for pad in both]
     corners = np.concatenate([np.empty((0, 4, 3)), *(c for c, _ in pressed)])
-    step = float(np.abs(corners).max(initial=1e-3)) / 32767
+    sides = 1e3 * np.concatenate([np.empty((0, 4, 3)), *(pad.sides() for pad in both)])
+    step = float(np.abs(np.concatenate([corners, sides])).max(initial=1e-3)) / 32767
     parts: dict[str, Any] = {
         "pads": len(both), "step": step, "faces": _packed(np.round(corners / step), "<i2"),
+        "sides": _packed(np.round(sides / step), "<i2"),
         "lines": _packed(_joined([1e3 * pad.lines() for pad in both]), "<f4"),
         "pressure": _packed(np.concatenate([np.empty(0), *(p for _, p in pressed)]), "<f4"),
         "arrows": _packed(_joined([pad.arrows(motion, ARROW_MM) for pad in both]), "<f4"),
@@ -132,7 +134,7 @@ def _choice(view: View, name: str) -> dict[str, Any]:
 
 
 def _traces(whole: bool) -> list[Any]:
-    """Empty traces in the script's order: object, rest, pressure, lines, arrows, tips, limit surface."""
+    """Empty traces in the script's order: object, rest, pressure, pads, lines, arrows, tips, limit surface."""
     soft = {"lighting": {"ambient": 0.8, "diffuse": 0.3, "specular": 0.02, "roughness": 0.9}, "flatshading": False}
     bar = plots.bars("", len=0.5, y=0.76, x=0.0)
     low = plots.bars("contact pressure [kPa]", len=0.5, y=0.24, x=0.0)
@@ -141,6 +143,7 @@ def _traces(whole: bool) -> list[Any]:
         go.Mesh3d(hoverinfo="text", **soft),
         go.Mesh3d(intensitymode="cell", hoverinfo="skip", colorbar=low, colorscale=plots.colours("pressure"),
                   **plots.FLAT),
+        go.Mesh3d(hoverinfo="skip", color=PAD, opacity=0.35, **plots.FLAT),
         go.Scatter3d(mode="lines", hoverinfo="skip", line={"color": plots.INK, "width": 5}),
         go.Scatter3d(mode="lines", hoverinfo="skip", line={"color": FORCE, "width": 4}),
         go.Scatter3d(mode="markers", hoverinfo="skip", marker={"color": FORCE, "size": 2.5}),
