@@ -54,7 +54,12 @@ def read_triangles(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """
     import numpy as np
 
-    kind, data = path.suffix.lower(), checked_bytes(path)
+    try:
+        if expected := lacking(path):
+            raise MeshError(f"{path}: expected {expected}")
+        kind, data = path.suffix.lower(), path.read_bytes()
+    except OSError as problem:
+        raise MeshError(f"{path}: cannot be read ({problem.strerror}); check the path") from problem
     if kind == ".stl" and not _is_text(data):
         data = _whole_binary_stl(path, data)
     if kind == ".obj":
@@ -83,22 +88,14 @@ def read_triangles(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     return np.array(mesh.vertices, dtype=float), np.array(mesh.faces, dtype=np.int64)
 
 
-def checked_bytes(path: Path) -> bytes:
-    """Contents of a mesh file that exists, has a known ending and a size that can be a mesh."""
+def lacking(path: Path) -> str:
+    """What is expected of a file that cannot be a mesh: a known ending, content, a size; empty of one that can be."""
+    endings = ", ".join(ENDINGS)
     if path.suffix.lower() not in ENDINGS:
-        raise MeshError(f"{path}: meshes are read from {', '.join(ENDINGS)} files; convert it to one of these")
-    try:
-        size = path.stat().st_size
-        if not path.is_file():  # a device or a pipe may have no end
-            raise MeshError(f"{path}: is not a regular file; name a mesh file")
-        if size > LARGEST_FILE:
-            raise MeshError(f"{path}: has {size >> 20} MiB, more than {LARGEST_FILE >> 20} MiB; decimate the mesh")
-        data = path.read_bytes()
-    except OSError as problem:
-        raise MeshError(f"{path}: cannot be read ({problem.strerror}); check the path") from problem
-    if not data.strip():
-        raise MeshError(f"{path}: the file is empty; export the mesh again")
-    return data
+        return f"a triangle mesh in a {endings} file; convert it to .stl"
+    if not path.is_file() or not (size := path.stat().st_size):  # a device or a pipe may have no end
+        return f"the {endings} file of a triangle mesh, not empty; the path in a scene is relative to the scene file"
+    return f"at most {LARGEST_FILE >> 20} MiB; decimate the mesh, or save it as binary .stl" * (size > LARGEST_FILE)
 
 
 def _is_text(data: bytes) -> bool:

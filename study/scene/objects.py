@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, get_args
 
 from pydantic import Field, ValidationInfo, field_validator
 
-from softjaw.fem.objects.mesh_file import ENDINGS, LARGEST_FILE
+from softjaw.fem.objects.mesh_file import ENDINGS, lacking
 from softjaw.study.scene.section import Errors, Interval, Point, SceneSection, Text, numbers_text, refusal, wrong
-from softjaw.study.units import UNITS, in_si, si
+from softjaw.study.units import in_si, si
 
 SMALLEST_MM, LARGEST_MM = 1.0, 2000.0
 WALL_KEYS = ("base_wall_mm", "young_modulus_gpa", "wall_poisson_ratio", "yield_strength_mpa", "allowed_dent_mm",
@@ -296,24 +296,12 @@ class Mesh(Walled):
     )
     grid_step, wall_heights = si("grid_step_mm"), si("wall_heights_mm")
 
-    @property
-    def unit_length(self) -> float:
-        """Length of one unit of the file [m]."""
-        return UNITS[self.unit].size
-
     @field_validator("mesh")
     @classmethod
     def _file_is_there(cls, mesh: str, info: ValidationInfo) -> str:
         """Of a scene file that is read; what is in the mesh is judged when it is read."""
-        file, endings = Path(mesh), ", ".join(ENDINGS)
-        if not info.context:
-            return mesh
-        if file.suffix.lower() not in ENDINGS:
-            raise refusal(f"a triangle mesh in a {endings} file; convert it to .stl")
-        if not file.is_file() or not (size := file.stat().st_size):
-            raise refusal(f"the {endings} file of a triangle mesh, not empty; the path is relative to the scene file")
-        if size > LARGEST_FILE:
-            raise refusal(f"at most {LARGEST_FILE >> 20} MiB; decimate the mesh, or save it as binary .stl")
+        if info.context and (expected := lacking(Path(mesh))):
+            raise refusal(expected)
         return mesh
 
 
