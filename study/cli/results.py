@@ -6,7 +6,7 @@ from argparse import Namespace
 from functools import partial
 from pathlib import Path
 
-from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, USAGE, StudyError, beside, write_file
+from softjaw.study.messages import OTHER_FILE, USAGE, StudyError, beside, write_file
 from softjaw.study.result.index import index_path
 from softjaw.study.result.read import open
 from softjaw.study.result.store import open_result, torn_rows
@@ -90,8 +90,6 @@ def _target(options: Namespace, name: str) -> Path:
         raise StudyError(USAGE, f"--{name}: found '{path}', expected a file ending in {' or '.join(endings)}")
     if path.resolve() == Path(options.file).resolve():
         raise StudyError(USAGE, f"--{name}: {path} is the result file itself; choose another name")
-    if not path.parent.is_dir():
-        raise StudyError(CANNOT_WRITE, f"{path}: no folder {path.parent}; create it first")
     return path
 
 

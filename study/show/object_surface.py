@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+from trimesh.intersections import slice_faces_plane
 
 from softjaw.fem.objects.gap import Pose
 from softjaw.friction.patch import NEGLIGIBLE
@@ -186,19 +187,12 @@ def coloured(corners: np.ndarray, cells: Cells) -> tuple[np.ndarray, np.ndarray]
 def cut(corners: np.ndarray, normal: np.ndarray, offset: float) -> np.ndarray:
     """Triangles ``(m, 3, 3)`` cut along the plane ``x . normal = offset``."""
     d = corners @ normal - offset
-    # A corner that lies on the plane but for rounding would leave a sliver.
-    d[np.abs(d) < NEGLIGIBLE] = 0.0
-    through = (d.min(axis=1) < 0) & (d.max(axis=1) > 0)
+    through = (d.min(axis=1) < -NEGLIGIBLE) & (d.max(axis=1) > NEGLIGIBLE)
     if not through.any():
         return corners
-    sign = np.sign(d[through])
-    alone = np.where(sign.sum(axis=1) > 0, sign.argmin(axis=1), sign.argmax(axis=1))
-    # A cyclic turn brings the lone corner to the front and keeps the orientation.
-    order = (alone[:, None] + np.arange(3)) % 3
-    a, b, c = np.take_along_axis(corners[through], order[..., None], axis=1).swapaxes(0, 1)
-    da, db, dc = np.take_along_axis(d[through], order, axis=1).T[..., None]
-    p, q = a + da / (da - db) * (b - a), a + da / (da - dc) * (c - a)
-    pieces = np.concatenate([np.stack(t, axis=1) for t in ((a, p, q), (p, b, c), (p, c, q))])
+    points, faces = corners[through].reshape(-1, 3), np.arange(3 * through.sum()).reshape(-1, 3)
+    halves = (slice_faces_plane(points, faces, side * normal, offset * normal) for side in (1.0, -1.0))
+    pieces = np.concatenate([half[0][half[1]] for half in halves])
     return np.concatenate([corners[~through], pieces[areas(pieces) > 0]])
 
 

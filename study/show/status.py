@@ -79,7 +79,7 @@ def status_table(result: Any) -> Table:
         rows.append(where | ({"label": str(result.labels[index[-3:-1]])} if poses else {}))
     counts = {name.replace(" ", "_"): int(np.sum(result.status == code)) for code, name in enumerate(STATES)}
     facts: Row = {"file": str(result.path), "running": holder(result.path) or None, **counts}
-    facts |= {"largest_error": largest_stated_error(result), "waiting": waits(result), **_added(result)}
+    facts |= {"largest_error": largest_stated_error(result), "waiting": waits(result)}
     facts["sessions"] = list(result.sessions)
     notes = [reason.text(axes, result.labels) for reason in reasons_in(result)]
     return Table(result.title, columns, rows, notes, facts, "cases")
@@ -223,15 +223,6 @@ def reasons(result: Any, width: int = PAPER, notes: bool = True) -> list[str]:
     cases = sum(len(reason.cases) for reason in rest)
     lines += [f"and {len(rest)} more kinds on {cases} cases: 'softjaw status --json' lists all"] * bool(rest)
     return [wrapped(line, width, "  ", "    ") for line in lines]
-
-
-def _added(result: Any) -> dict[str, Any]:
-    """What each round of a refinement added: stations, or poses in the frame of the object's own file."""
-    rounds = result.layout.added  # not those that chose cases for a finer mesh
-    if result.axes[-3].units:
-        return {"added_stations_mm": [list(some) for some in rounds]}
-    poses = [[{"step": x[0], "point_mm": x[1:4], "approach": x[4:7], "long_side": x[7:]} for x in r] for r in rounds]
-    return {"added_poses": poses}
 
 
 # --- time ------------------------------------------------------------------------------------------------------------

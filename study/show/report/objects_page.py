@@ -20,7 +20,6 @@ from softjaw.study.show.view.model import View
 from softjaw.study.table import Row, with_unit
 from softjaw.study.units import shown_unit
 
-NOT_SHOWN = ("payload_error", "best", "cases", "done", "failed", "mass", "preparing", "file", "mesh", "quality", "key")
 BODY, PAD = np.array([0.72, 0.78, 0.83]), np.array([0.93, 0.55, 0.25])
 AMBIENT = 0.45  # share of the light that comes from everywhere
 
@@ -32,7 +31,7 @@ def write_objects_page(index: Path, out: Path) -> Path:
     """
     rows, about = read_index(index)
     table = index_table(index)
-    columns = [c for c in table.columns if c.name not in NOT_SHOWN]
+    columns = [c for c in table.columns if c.people]
     heads = [(with_unit(c.label or c.name, shown_unit(c.unit)), "text" if c.wrap else "n") for c in columns]
     listed, sections = [], []
     for row in table.rows:

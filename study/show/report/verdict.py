@@ -10,11 +10,12 @@ import xarray as xr
 
 from softjaw.study.flags import BORNE
 from softjaw.study.quantities import DONE, FAILED, MISSING, MODEL_NAMES, MODELS
+from softjaw.study.result.read import axes_of
+from softjaw.study.result.store import value_text
 from softjaw.study.show.best_grasps import best_text
-from softjaw.study.show.grasps import Index, at, axis_values, flagged, flags_of, judge, reason_lines, spoken
+from softjaw.study.show.grasps import Index, at, flagged, flags_of, judge, reason_lines, spoken
 from softjaw.study.show.status import no_grasps
 from softjaw.study.table import number
-from softjaw.study.units import shown_unit
 
 CAVEAT = (
     "The paper publishes neither the pad dimensions of its gripper nor the numbers behind its figures. The dimensions "
@@ -35,17 +36,14 @@ ASCII = {"\N{MULTIPLICATION SIGN}": "x", "±": "+-"}
 
 def subtitle(ds: xr.Dataset) -> str:
     """File and axes in one line."""
-    parts, axes = [], [str(axis) for axis in ds.status.dims]
-    for axis in axes:
-        values, unit = axis_values(ds, axis), shown_unit(ds[axis].units)
-        n, low = len(values), number(values.min(), 4)
-        reach = low if n == 1 else f"{low} to {number(values.max(), 4)}"
-        plural = "s" * (n > 1)
-        name = f"{spoken(axis)}{plural}" if axis in axes[-3:] else f"value{plural} of {spoken(axis)}"
-        if axis == "station" and ds.attrs["poses"]:
-            parts.append(f"{n} candidate{plural}")
-        elif not (axis == "angle" and ds.attrs["poses"]):
-            parts.append(f"{n} {name} ({reach} {unit}".rstrip() + ")")
+    parts, poses = [], ds.attrs["poses"]
+    for axis in axes_of(ds):
+        n, ends = len(axis.values), (int(f(axis.values)) for f in (np.argmin, np.argmax))
+        if axis.name == "station" and poses:
+            parts.append(f"{n} candidate{'s' * (n > 1)}")
+        elif axis.name != "angle" or not poses:
+            reach = " to ".join(dict.fromkeys(value_text(axis, i) for i in ends))
+            parts.append(f"{n} {spoken(axis.name)}{'s' * (n > 1)} ({reach})")
     return f"{Path(ds.attrs['file']).name}: {' × '.join(parts)}"
 
 
