@@ -35,8 +35,7 @@ def test_all_are_tested():
 
 
 def test_friction_alone_falls_as_the_formula_says(here):
-    found = runpy.run_path(str(FOLDER / "friction_alone.py"))
-    across, formula, e_n = np.transpose(found["curves"])
+    across, formula, e_n = np.transpose(runpy.run_path(str(FOLDER / "friction_alone.py"))["curves"])
     assert across == pytest.approx(formula, rel=1e-3)
     assert (np.diff(e_n) < 0).all()
     assert picture(here, "friction_alone") > 10_000

@@ -258,8 +258,7 @@ def refused(patch, corruption):
     """Whether the patch with one bad value, such as "NaN pressure in element 3", is refused by the face's number."""
     bad, name, face = re.match(r"(\S+) (\w+) in element (\d+)", corruption).groups()
     array = getattr(patch, {"centre": "centroid", "position": "centroid"}.get(name, name)).copy()
-    value = {"NaN": np.nan, "Inf": np.inf, "negative": -1.0, "zero": 0.0}[bad]
-    array[int(face)] = value
+    array[int(face)] = {"NaN": np.nan, "Inf": np.inf, "negative": -1.0, "zero": 0.0}[bad]
     with pytest.raises(ValueError, match=rf"\[{face}\D.*face {face}\b"):
         replace(patch, **{name: array})
     return True

@@ -21,8 +21,7 @@ def values(limits):
 
 
 def test_pressures_over_twelve_decades():
-    patch = lcg_patch(9, 300)
-    wide = replace(patch, pressure=10 ** np.linspace(-6, 6, 300))
+    wide = replace(lcg_patch(9, 300), pressure=10 ** np.linspace(-6, 6, 300))
     exact = math.fsum(math.hypot(*np.cross(n, X)) * f for n, f in zip(wide.normal, wide.load, strict=True))
     assert friction_limits(wide, 1.0).f_x == pytest.approx(exact, rel=1e-15)
     weak = replace(wide, pressure=np.where(np.arange(300) < 150, wide.pressure, 0.0))

@@ -31,8 +31,7 @@ def hammer() -> trimesh.Trimesh:
 
 
 def screwdriver() -> trimesh.Trimesh:
-    z = np.linspace(0.0, 0.1, 15)
-    handle = [(0.013 + 0.003 * np.sin(4 * np.pi * h / 0.1), h) for h in z]
+    handle = [(0.013 + 0.003 * np.sin(4 * np.pi * h / 0.1), h) for h in np.linspace(0.0, 0.1, 15)]
     return revolved([(0.0, 0.0), *handle, (0.003, 0.104), (0.003, 0.2), (0.0, 0.2)], 32)
 
 

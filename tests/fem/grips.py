@@ -75,8 +75,7 @@ def gap_at(at: Pose):
 def e_n(finger):
     """Eccentricity parameter of one finger's patch, planar reading [m]."""
     patch = extract(finger.pad, finger)
-    local = in_frame(patch, contact_frame(patch, [1, 0, 0]))
-    return friction_limits(local, 1.0, "pcm").e_n
+    return friction_limits(in_frame(patch, contact_frame(patch, [1, 0, 0])), 1.0, "pcm").e_n
 
 
 def stirred(problem: WallProblem, rng: np.random.Generator) -> np.ndarray:

@@ -126,8 +126,7 @@ def test_corners_that_rounding_of_a_file_moved_apart_are_one(seed):
 
 def travel_past(shape, place, seed, reach=20.0):
     """Distance along y until one of three points, the first at ``place``, meets a shape; all of it turned at random."""
-    rng = np.random.default_rng(seed)
-    turn = Rotation.random(random_state=rng).as_matrix()
+    turn = Rotation.random(random_state=np.random.default_rng(seed)).as_matrix()
     body = SimpleNamespace(gap=lambda x: shape.gap(x @ turn))
     R = turn @ [[0, 1, 0], [0, 0, 1], [1, 0, 0.0]]
     row = np.array([[0.0, 0.0, 0.0], [0.0, 0.01, 0.0], [0.01, 0.01, 0.0]])

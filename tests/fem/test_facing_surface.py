@@ -177,8 +177,7 @@ def test_a_large_hole_matters_only_under_a_pad():
     sound = cleaned(*punctured(ball(), [0, 0.03, 0], 0.008))
     assert len(sound.lids) > 5
     torn = MeshObject(sound.points, sound.triangles, lids=sound.lids, closed=sound.closed)
-    y = in_box()
-    x = side(0.0).to_object(y)
+    x = side(0.0).to_object(in_box())
     assert torn.near(side(0.0), *BOX, 0.002).gap(x)[0] == pytest.approx(whole.near(side(0.0), *BOX, 0.002).gap(x)[0],
                                                                        abs=1e-12)  # fmt: skip
     face = np.column_stack([*(v.ravel() for v in np.meshgrid([-0.004, 0, 0.004], [-0.004, 0, 0.004])), np.zeros(9)])
@@ -197,8 +196,7 @@ def test_two_holes_that_share_a_point_are_two():
 def test_filling_has_the_least_area():
     """An L of six points: four triangles inside it, though the straight fan would leave it."""
     L = 0.01 * np.array([(0, 0, 0), (2, 0, 0), (2, 1, 0), (1, 1, 0), (1, 2, 0), (0, 2, 0)], float)
-    triangles = filling(L, [1, 2, 3, 4, 5, 0], set())
-    a, b, c = L[triangles].transpose(1, 0, 2)
+    a, b, c = L[filling(L, [1, 2, 3, 4, 5, 0], set())].transpose(1, 0, 2)
     area = np.cross(b - a, c - a)[:, 2] / 2
     assert (area > 0).all() or (area < 0).all()
     assert np.abs(area).sum() == pytest.approx(3e-4)
@@ -236,8 +234,7 @@ def test_the_edges_of_a_cylinder_in_single_precision_are_all_creases():
 @pytest.mark.parametrize(("sections", "told"), [(11, True), (12, True), (13, False), (48, False)])
 def test_wide_facets_that_stay_sharp_are_told_with_what_they_hide(sections, told):
     body = trimesh.creation.cylinder(radius=0.025, height=0.1, sections=sections)
-    smooth = smooth_triangles(body.vertices, body.faces)
-    edges, off = smooth.doubtful(0.0055)
+    edges, off = smooth_triangles(body.vertices, body.faces).doubtful(0.0055)
     assert len(edges) == sections * told
     if told:  # the arc over a chord
         np.testing.assert_allclose(off, 0.025 * (1 - np.cos(np.pi / sections)), rtol=0.02)

@@ -64,8 +64,7 @@ def test_normal_is_the_gradient_and_has_unit_length(shape):
 def test_hessian_is_the_derivative_of_the_normal(shape):
     x, h = around(shape), 1e-7
     _, normal, H = shape.gap(x)
-    D = differences(lambda y: shape.gap(y)[1], x, h)
-    error = np.abs(D - H).max(axis=(1, 2))
+    error = np.abs(differences(lambda y: shape.gap(y)[1], x, h) - H).max(axis=(1, 2))
     # where a flat side meets its rounding, the curvature jumps between the two points of the difference
     assert np.mean(error > 1e-5 * np.abs(H).max() + 1e-4) < 0.01
     assert np.abs(H - H.transpose(0, 2, 1)).max() < 1e-12 * max(1, np.abs(H).max())
@@ -161,8 +160,7 @@ def test_ellipse_near_its_axes_and_evolute_is_finite_and_below_every_other_dista
 
 def test_straight_runs_of_a_profile_stay_straight():
     z = MM * np.linspace(3, 80, 500)
-    x = np.column_stack([np.full(500, 33 * MM), np.zeros(500), z])
-    g, _, H = SHAPES["bottle"].gap(x)
+    g, _, H = SHAPES["bottle"].gap(np.column_stack([np.full(500, 33 * MM), np.zeros(500), z]))
     assert np.abs(g).max() < 1e-16
     assert np.abs(H[1:-1, 2, 2]).max() == 0
     assert np.abs(H[[0, -1], 2, 2]).max() < 1e-11  # these places belong to the roundings beside the run, too
@@ -185,10 +183,8 @@ def test_profile_of_a_circle_converges_to_the_sphere():
         t = np.linspace(0, np.pi, n + 1)
         profile = radius * np.stack([-np.cos(t), np.sin(t)], axis=1)
         profile[[0, -1], 1] = 0
-        body = Revolution(profile)
-        errors.append(np.abs(body.gap(x)[0] - Sphere(radius).gap(x)[0]).max())
-    orders = np.log2(np.array(errors[:-1]) / errors[1:])
-    assert orders.min() > 3.5
+        errors.append(np.abs(Revolution(profile).gap(x)[0] - Sphere(radius).gap(x)[0]).max())
+    assert np.log2(np.array(errors[:-1]) / errors[1:]).min() > 3.5
     assert errors[-1] < 1e-7
 
 

@@ -32,8 +32,7 @@ def test_two_straight_runs_of_one_direction_have_no_corner(outline):
     points = rounded_frustum(*outline)
     body = Revolution(points)
     e = (points[-1] - points[0]) / np.linalg.norm(points[-1] - points[0])
-    s = np.linspace(0.2, 0.8, 500)
-    z, r = (points[0] + s[:, None] * (points[-1] - points[0])).T
+    z, r = (points[0] + np.linspace(0.2, 0.8, 500)[:, None] * (points[-1] - points[0])).T
     g, normal, _ = body.gap(np.column_stack([r, 0 * r, z]))
     assert np.abs(g).max() < 1e-6  # the points' own rounding
     assert normal == pytest.approx(np.broadcast_to([e[0], 0, -e[1]], (500, 3)), abs=2e-3)
@@ -44,8 +43,7 @@ def test_two_straight_runs_of_one_direction_have_no_corner(outline):
 def test_every_frustum_rounded_to_a_micrometre_is_one(n, height, low, high):
     points = rounded_frustum(n, height, low, high)
     body = Revolution(points)
-    s = np.linspace(0.2, 0.8, 100)
-    z, r = (points[0] + s[:, None] * (points[-1] - points[0])).T
+    z, r = (points[0] + np.linspace(0.2, 0.8, 100)[:, None] * (points[-1] - points[0])).T
     g, _, hessian = body.gap(np.column_stack([r, 0 * r, z]))
     assert np.abs(g).max() < 1e-5
     assert np.isfinite(hessian).all()

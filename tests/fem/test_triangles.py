@@ -75,8 +75,7 @@ def test_a_surface_of_one_side_stays_as_it_is():
 def test_where_many_triangles_meet_those_that_go_on_smoothly_are_neighbours():
     """A wall of two coplanar triangles with a shelf on either side, of any winding."""
     x = np.array([[0, 0, 0], [0, 0, 1], [1, 0, 0], [-1, 0, 0], [0, 1, 0.2], [0.2, -1, 0]], float)
-    triangles = np.array([[0, 1, 2], [0, 1, 3], [1, 0, 4], [0, 1, 5]])
-    joint = neighbours(x, triangles)
+    joint = neighbours(x, np.array([[0, 1, 2], [0, 1, 3], [1, 0, 4], [0, 1, 5]]))
     edge = int(np.flatnonzero((joint.edges == [0, 1]).all(axis=1))[0])
     assert sorted(joint.sides[edge] // 3) == [0, 1]
     assert joint.at_edge[edge] == 4

@@ -68,8 +68,7 @@ def test_the_origin_lies_on_the_line_and_on_the_face():
         frame = contact_frame(patch, X, whole_face=True)
         arm = frame.axes @ (frame.centre_of_pressure - frame.origin)
         assert np.abs(arm[:2]).max() < 1e-12
-        column = int((frame.origin[0] + 1) * 12)
-        x = patch.corners.reshape(24, 6, 4, 3)[column, 0, :2]
+        x = patch.corners.reshape(24, 6, 4, 3)[int((frame.origin[0] + 1) * 12), 0, :2]
         along = (frame.origin[0] - x[0, 0]) / (x[1, 0] - x[0, 0])
         assert frame.origin[2] == pytest.approx(x[0, 2] + along * (x[1, 2] - x[0, 2]), abs=1e-12)
 
@@ -88,8 +87,7 @@ def test_the_normal_of_a_skew_cylinder_has_order_two():
 def test_faces_without_load_count_only_on_request():
     """The frame of the loaded faces does not feel the others; sums may end in other bits."""
     whole = bridge(0.3)
-    loaded = whole.loaded
-    one, two = contact_frame(whole, X), contact_frame(loaded, X)
+    one, two = contact_frame(whole, X), contact_frame(whole.loaded, X)
     np.testing.assert_allclose(one.origin, two.origin, atol=1e-14)
     np.testing.assert_allclose(one.axes, two.axes, atol=1e-12)
 
@@ -126,8 +124,7 @@ def test_of_two_crossings_the_nearer_one_counts_and_of_equal_ones_that_along_the
 
 def test_steps_that_lead_to_and_fro_are_halved():
     """Pressed far above its ridge a roof's normal leads to the other side; half steps end on the ridge."""
-    corners = grid_mesh(2, 1, 1, 1, lambda x, y: -1.5 * np.abs(x))
-    patch = mesh_patch(corners)
+    patch = mesh_patch(grid_mesh(2, 1, 1, 1, lambda x, y: -1.5 * np.abs(x)))
     high = replace(patch, centroid=np.add(patch.centroid, [0.01, 0, 2.0]))
     frame = contact_frame(high, X, whole_face=True)
     assert not frame.flag & FrameFlag.CYCLE

@@ -56,8 +56,7 @@ def test_random_bumps_always_give_a_frame():
         corners = grid_mesh(6, 6, 1, 1)
         i, j = np.moveaxis(np.rint((corners[..., :2] + 1) * 3).astype(int), -1, 0)
         corners[..., 2] = height[i, j]
-        patch = mesh_patch(corners, lambda r, pressure=pressure: pressure)
-        frame = contact_frame(patch, X)
+        frame = contact_frame(mesh_patch(corners, lambda r, pressure=pressure: pressure), X)
         arm = frame.axes @ (frame.centre_of_pressure - frame.origin)
         np.testing.assert_allclose(frame.axes @ frame.axes.T, np.eye(3), atol=1e-14)
         assert np.abs(arm[:2]).max() < 1e-12

@@ -21,8 +21,7 @@ SEEDS = range(1, 21)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_the_compiled_kernel_is_the_textbook_formula(seed):
     patch = lcg_patch(seed, 101)
-    rng = np.random.default_rng(seed)
-    twist = np.vstack([rng.normal(size=(20, 6)), np.eye(6)])
+    twist = np.vstack([np.random.default_rng(seed).normal(size=(20, 6)), np.eye(6)])
     columns = patch.centroid.T.copy(), patch.normal.T.copy(), patch.load
     out = np.empty((len(twist), 7))
     friction_sums(*columns, twist, out)
@@ -78,8 +77,7 @@ def test_the_largest_force_of_a_turned_wedge_lies_along_its_ridge():
 
 def test_on_a_cap_the_largest_force_is_that_in_every_direction():
     """Eq. (11) on a spherical cap, where it differs from Eq. (12): max f_t = 4 R^2 int E(sin^2 t) sin t dt."""
-    patch = cap_polar(0.02, 1.0, 40, 160)
-    limits = friction_limits(patch, 1.0)
+    limits = friction_limits(cap_polar(0.02, 1.0, 40, 160), 1.0)
     t = (np.arange(4000) + 0.5) / 4000
     force = 4 * 0.02**2 * np.mean(ellipe(np.sin(t) ** 2) * np.sin(t))
     torque = np.pi * 0.02**3 * (1.0 - np.sin(1.0) * np.cos(1.0))

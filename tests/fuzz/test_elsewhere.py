@@ -119,8 +119,7 @@ def test_tables_that_ended_the_program_once_are_refused(tmp_path, told, old, new
 def test_a_file_that_vtk_crashes_on_ends_a_child_process_only(tmp_path, told):
     points, cells = cylinder_mesh()
     path = vtk(tmp_path / "a.vtp", points, cells, [("pressure", np.ones(len(cells)))])
-    text = path.read_text()
-    head, _, tail = text.partition('Name="offsets"')
+    head, _, tail = path.read_text().partition('Name="offsets"')
     numbers, end, rest = tail.partition("</DataArray>")
     first = numbers.split(">", 1)
     path.write_text(head + 'Name="offsets"' + first[0] + ">" + first[1].replace("4", "900000", 3) + end + rest)

@@ -43,8 +43,7 @@ def test_there_are_cases_of_every_class_and_outcome():
     assert all(bool(c.because or c.gap) for c in CASES.values() if c.expect == "failed")
     assert all(c.source.case in CASES for c in CASES.values() if c.source and c.source.case)
     assert all(c.hard and (c.source or c.gap) for c in CASES.values())
-    used = {c.source.within for c in CASES.values() if c.source}
-    assert used == set(TOLERANCES)
+    assert {c.source.within for c in CASES.values() if c.source} == set(TOLERANCES)
 
 
 def test_a_pressed_column_is_in_balance_and_its_mean_arm_is_that_of_a_rectangle():
@@ -108,7 +107,6 @@ def test_only_nearly_incompressible_pads_start_unsqueezed():
     spread = []
     for nu in (0.25, 0.499):
         pad = Pad(PadShape((0.05, 0.022, 0.015), (4, 2, 2)), material("neo_hookean", 4e4, nu), (True, True), "weighted")
-        u = pad.displacement(SpringBed(pad, gap).guess(1e-3))[:, 2]
-        spread.append(np.ptp(u))
+        spread.append(np.ptp(pad.displacement(SpringBed(pad, gap).guess(1e-3))[:, 2]))
     assert spread[0] > 5e-4
     assert spread[1] < 1e-12  # of strokes of 1 mm; the guess is the same everywhere

@@ -180,8 +180,7 @@ def test_a_full_body_has_no_outside_across():
     rng = np.random.default_rng(0)
     for _ in range(20):
         B = turn(rng) * [1.0, 1.0, 1e-9] @ turn(rng)
-        body = Image(Quartic(BALL, 3), B)
-        assert np.isfinite(body.value(directions(3, 50) @ B.T)).all()
+        assert np.isfinite(Image(Quartic(BALL, 3), B).value(directions(3, 50) @ B.T)).all()
 
 
 def test_a_wrench_that_is_the_rounding_of_none_is_left_out():

@@ -108,14 +108,12 @@ def test_rank_of_plane_and_curved_patches(patch, rank):
     assert inside.rank == surface.rank == rank == sample_rank(W)
     assert (FitFlag.RANK_DEFICIENT in surface.flag) == (rank < 6)
     np.testing.assert_allclose(inside.Y @ inside.B.T, W, atol=1e-13)
-    missing = np.linalg.svd(W)[2][rank:]
-    np.testing.assert_allclose(surface.support(missing), 0, atol=1e-7)
+    np.testing.assert_allclose(surface.support(np.linalg.svd(W)[2][rank:]), 0, atol=1e-7)
     assert np.isfinite(surface.semi_axes).all()
 
 
 def test_a_plane_patch_has_the_ellipsoid_of_three_components():
-    patch = rect_grid(2, 1, 6, 6)
-    W, T = samples(patch, 300)
+    W, T = samples(rect_grid(2, 1, 6, 6), 300)
     three = full_ellipsoid(W[:, [0, 1, 5]])
     flat = span_ellipsoid(W, T)[0]
     np.testing.assert_allclose(flat.A[np.ix_([0, 1, 5], [0, 1, 5])], three.A, rtol=1e-9, atol=1e-9)
@@ -123,8 +121,7 @@ def test_a_plane_patch_has_the_ellipsoid_of_three_components():
 
 
 def test_quartics_of_plane_patches_are_flat():
-    patch = points_patch([[-1, 0, 0.4], [1, 0, 0.4], [0, 1, 0.4]], [1, 2, 1])
-    W, T = samples(patch, 200)
+    W, T = samples(points_patch([[-1, 0, 0.4], [1, 0, 0.4], [0, 1, 0.4]], [1, 2, 1]), 200)
     surface = span_quartic(W, T)
     missing = np.linalg.svd(W)[2][3:]
     assert (surface.rank, surface.dimension) == (3, 6)

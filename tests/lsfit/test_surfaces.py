@@ -84,8 +84,7 @@ def test_the_support_is_what_the_point_with_that_normal_gives(surface):
     # Homogeneous: w . grad P = degree at the surface, where the gradient is the outward normal.
     np.testing.assert_allclose(surface.support(t), surface.degree, rtol=1e-11)
     t = np.random.default_rng(3).normal(size=(30, 3))
-    reached = (t @ w.T).max(axis=1)
-    assert (reached <= surface.support(t) * (1 + 1e-12)).all()
+    assert ((t @ w.T).max(axis=1) <= surface.support(t) * (1 + 1e-12)).all()
     np.testing.assert_allclose(surface.support(-2 * t), 2 * surface.support(t), rtol=1e-12)
     assert surface.support([[0.0, 0.0, 0.0]])[0] == 0
 

@@ -90,15 +90,13 @@ def doubled(mesh: Mesh) -> Mesh:
 
 
 def lined(mesh: Mesh, wall: float = 0.0015) -> Mesh:
-    inner = raw(mesh.vertices - wall * mesh.vertex_normals, mesh.faces[:, ::-1])
-    return joined(mesh, inner)
+    return joined(mesh, raw(mesh.vertices - wall * mesh.vertex_normals, mesh.faces[:, ::-1]))
 
 
 def partitioned(mesh: Mesh, count: int = 4) -> Mesh:
     """With walls inside that hang on edges of the surface, so that three triangles meet there."""
     edges = mesh.edges_unique[:: max(1, len(mesh.edges_unique) // count)]
-    middle = len(mesh.vertices)
-    faces = np.column_stack([edges, np.full(len(edges), middle)])
+    faces = np.column_stack([edges, np.full(len(edges), len(mesh.vertices))])
     return raw(np.vstack([mesh.vertices, mesh.centroid]), np.vstack([mesh.faces, faces]))
 
 

@@ -123,5 +123,4 @@ def test_whether_some_wrench_is_not_resisted_at_all(contacts, closed):
 def test_epsilon_goes_to_zero_where_nothing_decides():
     """At the angle of friction 0 is on the boundary: neither side of the decision gives more than its tolerance."""
     contacts = pair((0.8, 0.6, 0.15), (0.8, 0.6, 0.15), np.arctan(0.6))
-    found = outcomes(lambda k, R, p: epsilon(k, *LENGTHS, p).upper < 1e-6, contacts, 4)
-    assert found == {True: 4}
+    assert outcomes(lambda k, R, p: epsilon(k, *LENGTHS, p).upper < 1e-6, contacts, 4) == {True: 4}

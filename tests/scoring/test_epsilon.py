@@ -148,7 +148,6 @@ def test_any_body_is_bounded_by_an_ellipsoid_inside_it():
 
 def test_epsilon_of_any_body():
     """A body inside the ellipsoid is weaker; the gap is that of the ellipsoid that fits inside it."""
-    contacts = facing(Superellipsoid(A, 2.5), Superellipsoid(B, 2.5), tilt=0.1)
-    bound = epsilon(contacts, 0.7, 0.7)
+    bound = epsilon(facing(Superellipsoid(A, 2.5), Superellipsoid(B, 2.5), tilt=0.1), 0.7, 0.7)
     assert 0.75 * bound.upper < bound.lower <= bound.upper
     assert bound.upper < epsilon(facing(A, B, tilt=0.1), 0.7, 0.7).lower

@@ -50,8 +50,7 @@ def test_tilted_contacts_go_on_from_facing_ones():
         assert found.quality_l1 == pytest.approx(exact.quality_l1, rel=2e-7)
         assert math.isnan(found.epsilon)
     far = grasp_score(facing(0.3), *LENGTHS, with_epsilon=False)
-    volume = pose_volume(*facing(0.3), *LENGTHS)
-    assert (far.quality, far.quality_l1, far.error) == volume
+    assert (far.quality, far.quality_l1, far.error) == pose_volume(*facing(0.3), *LENGTHS)
 
 
 def test_the_support_of_a_contact_is_that_of_its_wrenches():

@@ -113,8 +113,7 @@ def test_the_error_is_stated_and_kept(seed):
 
 def test_laws_of_scale_and_motion():
     rng = np.random.default_rng(7)
-    axes = rng.uniform(0.1, 1, (2, 3))
-    one, two = anywhere(rng, *map(Ellipsoid.of_axes, axes))
+    one, two = anywhere(rng, *map(Ellipsoid.of_axes, rng.uniform(0.1, 1, (2, 3))))
     exact = pose_volume(one, two, 1.0, 1.0, relative_error=1e-8)
     Q, shift = rotation(rng), rng.normal(size=3)
     moved = [SoftContact(Q @ c.position + shift, c.axes @ Q.T, c.body) for c in (one, two)]
@@ -168,8 +167,7 @@ def test_no_volume_in_fewer_than_six_dimensions():
 
 def test_mixed_areas_of_polygons():
     """V(P, P) is the area, and |P + Q| = |P| + 2 V + |Q|."""
-    rng = np.random.default_rng(2)
-    P, Q = rng.normal(size=(2, 9, 2))
+    P, Q = np.random.default_rng(2).normal(size=(2, 9, 2))
     sums = (P[:, None] + Q).reshape(-1, 2)
 
     def sides(points):

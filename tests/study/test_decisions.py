@@ -53,8 +53,7 @@ def test_a_ranking_is_one(values):
 def test_of_two_equally_near_forces_the_lower_is_taken(low, step, seed):
     from softjaw.study.ranking import nearest
     forces = low + step * np.arange(4)
-    wanted = moved([low + 1.5 * step], seed)[0]
-    assert nearest(moved(forces, seed), wanted) == 1
+    assert nearest(moved(forces, seed), moved([low + 1.5 * step], seed)[0]) == 1
     assert nearest(forces, low + 1.51 * step) == 2
 
 

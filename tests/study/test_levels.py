@@ -256,8 +256,7 @@ def test_the_steps_of_the_load_path_are_part_of_the_errors():
     """In steps of twice the length the same mesh differs by about what its own steps leave."""
     unit = unit_of(*ROUGH)
     solver = CandidateSolver(unit.scene, unit.candidate.poses)
-    levels = Levels("rigid", "rigid", "tangential")
-    solved = solver.case(1, levels)
+    solved = solver.case(1, Levels("rigid", "rigid", "tangential"))
     [(coarse, longer)] = solved.pairs
     assert coarse is solved.coarse.contacts
     assert longer[0].state.steps < coarse[0].state.steps

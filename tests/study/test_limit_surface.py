@@ -193,8 +193,7 @@ def test_a_quartic_of_six_components_predicts_all_of_the_friction():
     patch = sj.read_pressure("jobs/cylinder-pressure.csv")
     fit = sj.fit_quartic(patch, mu=0.8, samples=1000, wrench="6-D")
     twist = sphere_motions(3000)[2000:] * np.repeat([1.0, 100.0], 3)
-    wrench = sj.friction_wrench(patch, twist, 0.8)
-    power = np.einsum("md,md->m", wrench, twist)
+    power = np.einsum("md,md->m", sj.friction_wrench(patch, twist, 0.8), twist)
     off = np.abs(fit.surface.support(twist) / power - 1)
     assert off.max() < 0.2
     assert off.mean() < 0.02

@@ -124,8 +124,7 @@ def test_again_nothing_is_solved_and_another_mesh_is_refused(scene, solved):
 def test_a_signal_stops_in_order_and_the_run_resumes(scene, solved):
     out = scene.parent / "stopped"
     assert here(fake_objects.main, scene, out, "--stop-after", 40)[0] == STOPPED
-    ds = open_index(out / "index.hdf")
-    assert "not complete" in ds.state.values
+    assert "not complete" in open_index(out / "index.hdf").state.values
     assert here(fake_objects.main, scene, out)[0] == SOME_FAILED
     same(out, solved)
 

@@ -76,8 +76,7 @@ def done(path):
 
 def test_two_ranks_divide_the_forces_of_a_candidate():
     """So that what follows compares forces that were solved beside each other with forces that were solved in turn."""
-    plan = make_plan(SCENE)
-    divided = [own.unit.index for own in shares(plan.units, np.full(CASES, MISSING), 2)]
+    divided = [own.unit.index for own in shares(make_plan(SCENE).units, np.full(CASES, MISSING), 2)]
     assert len(divided) > len(set(divided)) == 4
 
 

@@ -77,8 +77,7 @@ def test_a_budget_is_kept():
 
 def test_grasps_that_cannot_be_used_are_no_best_ones():
     stations, score = np.arange(4.0), np.array([1.0, 2.0, 9.0, 1.0]).reshape(1, 4, 1, 1)
-    sound = np.array([True, True, False, False]).reshape(1, 4, 1, 1)
-    found = chances(stations, score, sound, 0.1)
+    found = chances(stations, score, np.array([True, True, False, False]).reshape(1, 4, 1, 1), 0.1)
     assert found[0] > 0  # judged against 2, not 9
     assert found[2] == 0  # both ends cannot be used
 

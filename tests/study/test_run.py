@@ -124,8 +124,7 @@ def test_a_signal_stops_in_order_and_the_same_command_goes_on(tmp_path, uninterr
     output, _ = process.communicate(timeout=60)
     code, _ = process.returncode, output
     assert code == 75
-    left = (states(path) == MISSING).sum()
-    assert left > 0
+    assert (states(path) == MISSING).sum() > 0
     with open_result(path) as result:
         assert result.sessions[0]["reason"].startswith(f"stopped by {name}")
         assert not result.read("status/attempts")[result.status == MISSING].any()

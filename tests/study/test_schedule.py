@@ -134,8 +134,7 @@ def test_one_candidate_is_divided_evenly_and_many_only_at_the_end():
     assert divided([one], 2) == [(0, (0, 2, 4)), (0, (1, 3, 5))]
     assert [len(forces) for _, forces in divided([one], 4)] == [2, 2, 1, 1]
     assert len(divided([one], 50)) == 6
-    many = divided(units_of([1.0] * 35), 2)
-    assert [len(forces) for _, forces in many] == [6] * 33 + [3] * 4
+    assert [len(forces) for _, forces in divided(units_of([1.0] * 35), 2)] == [6] * 33 + [3] * 4
     # a candidate that takes longer than all others together
     assert divided(units_of([100.0, 1.0]), 2)[:2] == [(0, (0, 2, 4)), (0, (1, 3, 5))]
 

@@ -108,8 +108,7 @@ def scanned(scene):
             c, s = math.cos(roll), math.sin(roll)
             turned = axes @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
             try:
-                grip = JawsOnSurface((points, triangles), place, turned, jaws)
-                grasp = judged(grip, task)
+                grasp = judged(JawsOnSurface((points, triangles), place, turned, jaws), task)
             except NoContactError:
                 continue
             if not grasp.state:

@@ -62,8 +62,7 @@ def test_a_rough_plane_holds_the_front():
 @pytest.mark.parametrize("mu", [0.1, 0.8])
 def test_coulombs_law_and_balance_hold(mu):
     """``|t| <= mu p``, across the normal, against the way that the pad spreads; the checks of each state passed."""
-    full = pad_of((False, False), (6, 4, 2))
-    (state,) = press(OVAL, mu, full).load_path([3.0])
+    (state,) = press(OVAL, mu, pad_of((False, False), (6, 4, 2))).load_path([3.0])
     force, normal, load = state.points.friction, state.points.normal, state.points.load
     size = np.linalg.norm(force, axis=-1)
     assert (size <= mu * load * (1 + 1e-9)).all()
@@ -71,8 +70,7 @@ def test_coulombs_law_and_balance_hold(mu):
     slipping = (size > mu * load * (1 - 1e-6)) & (load > 0)
     assert slipping.any()
     assert (np.mean(slipping[load > 0]) > 0.5) == (mu == 0.1)  # with 0.8 most of it sticks
-    outwards = state.points.position[..., 0]
-    assert (force[..., 0] * outwards)[load > 0].sum() < 0
+    assert (force[..., 0] * state.points.position[..., 0])[load > 0].sum() < 0
     assert state.checks.force_balance < 1e-8
 
 

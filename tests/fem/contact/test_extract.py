@@ -15,8 +15,7 @@ PARTS = [(True, False), (False, True), (True, True)]
 
 
 def patch_of(symmetry=(True, True), element="hex8", gap=OVAL, elements=(8, 4, 2), force=10.0, contact="weighted"):
-    shape = PadShape(SIZE, elements, (1.5, 0.7, 1.0), element)
-    pad = Pad(shape, FOAM, symmetry, contact)
+    pad = Pad(PadShape(SIZE, elements, (1.5, 0.7, 1.0), element), FOAM, symmetry, contact)
     (pressed,) = Press(pad, gap).load_path([force])
     return pad, pressed, extract(pad, pressed)
 

@@ -130,8 +130,7 @@ class Crossings:
 
 
 def following(problem):
-    solver = Crossings(problem)
-    return Following(problem, solver)
+    return Following(problem, Crossings(problem))
 
 
 @pytest.mark.parametrize("forces", [[3.0], [2.4, 3.0], [0.3, 1.1, 2.49, 2.51, 3.0]])

@@ -120,8 +120,7 @@ def test_a_step_that_fails_is_cut_and_the_answer_is_the_same():
     """Three iterations per step do not reach 20 N at once."""
     pad = pad_of()
     (free,) = solved(forces=(20.0,))
-    press = Press(pad, OVAL)
-    first, last = press.load_path([1.0, 20.0])
+    first, last = Press(pad, OVAL).load_path([1.0, 20.0])
     short = Press(pad, OVAL)
     ladder = short.load_path([1.0, 20.0])
     next(ladder)

@@ -32,8 +32,7 @@ def assembled(pad, law, u, tangent=False):
     local = np.ascontiguousarray(u[pad.element_nodes].transpose(0, 2, 1))
     n, nodes = pad.element_nodes.shape
     r, K = np.empty((n, 3, nodes)), np.empty((n, 3, nodes, 3, nodes) if tangent else (0, 0, 0, 0, 0))
-    det = kernel.elements(law.number, law.parameters, local, pad.dN, pad.volume, r, K)
-    return r, K, det
+    return r, K, kernel.elements(law.number, law.parameters, local, pad.dN, pad.volume, r, K)
 
 
 def nodal(pad, r):

@@ -52,8 +52,7 @@ class Loaded(NamedTuple):
             K = csr_matrix((shell.tangent(q, before), shell.column, shell.start), shape=(shell.size,) * 2)
             before = q if self.mixed else None
             symmetric = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 1e-3, "options": {"SymmetricMode": True}}
-            solver = splu(K[free][:, free].tocsc(), **symmetric)
-            step = -solver.solve(residual)
+            step = -splu(K[free][:, free].tocsc(), **symmetric).solve(residual)
             q = q.copy()
             q[free] += step
         raise ConvergenceError(f"no equilibrium near load factor {factor:.6g}")

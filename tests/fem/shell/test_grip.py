@@ -63,10 +63,8 @@ def test_fingers_object_and_support_are_in_balance(support):
 
 
 def test_a_very_stiff_wall_is_a_rigid_object():
-    stiff = thin(1.4e-3, WallMaterial(4e11, 0.38), "clamped")
-    soft = list(grip(stiff).load_path(FORCES))
-    pad = soft[0].fingers[0].pad
-    press = Press(pad, gap_at(pose(0.0, 0.075)))
+    soft = list(grip(thin(1.4e-3, WallMaterial(4e11, 0.38), "clamped")).load_path(FORCES))
+    press = Press(soft[0].fingers[0].pad, gap_at(pose(0.0, 0.075)))
     for a, b in zip(soft, press.load_path(FORCES), strict=True):
         assert a.fingers[0].closing == pytest.approx(b.closing, rel=1e-4)
         assert e_n(a.fingers[0]) == pytest.approx(e_n(b), rel=1e-4)
@@ -119,9 +117,7 @@ def test_coulombs_law_and_balance_hold(level):
 
 @pytest.mark.long
 def test_a_wall_that_hardly_gives_way_is_a_rigid_object():
-    problem = grip(thin(), mu=MU).problem
-    gap = gap_at(pose(0.0, 0.075))
-    press = Press(problem.fingers[0].pad, gap, mu=MU)
+    press = Press(grip(thin(), mu=MU).problem.fingers[0].pad, gap_at(pose(0.0, 0.075)), mu=MU)
     rigid = list(press.load_path(FORCES))
     stiff = thin(1e-3, replace(wall_material("pet"), young_modulus=3e10))
     for one, other, smooth in zip(

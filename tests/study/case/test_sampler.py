@@ -60,8 +60,7 @@ def test_a_bar_is_held_across_its_short_side_in_its_middle():
 def test_a_cylinder_is_held_through_its_axis_with_the_long_side_along_it():
     grasps = antipodal_grasps(surface(trimesh.creation.cylinder(0.03, 0.2, sections=96)), NARROW, TASK, 4, samples=60)
     best = grasps[0]
-    axis_distance = np.linalg.norm(np.cross(best.point - [0, 0, 0], [0, 0, 1]))
-    assert axis_distance < 5e-4
+    assert np.linalg.norm(np.cross(best.point - [0, 0, 0], [0, 0, 1])) < 5e-4
     assert abs(best.approach[2]) < 0.02
     assert abs(best.long_side[2]) > 0.99
     assert best.opening == pytest.approx(0.06, rel=5e-3)
@@ -91,8 +90,7 @@ def test_fingers_that_are_larger_than_the_pads_meet_a_step():
     plate, rim = trimesh.creation.box(extents=(0.2, 0.2, 0.01)), trimesh.creation.box(extents=(0.01, 0.2, 0.08))
     rim.apply_translation([0.035, 0, 0])
     body = surface(trimesh.util.concatenate([plate, rim]))
-    pose = axes_of(np.array([0.0, 0.0, -1.0]), np.array([1.0, 0.0, 0.0]))
-    points = body[0] @ pose
+    points = body[0] @ axes_of(np.array([0.0, 0.0, -1.0]), np.array([1.0, 0.0, 0.0]))
     assert fit_of(points, body[1], JAWS)[0] == MISSING
     assert fit_of(points, body[1], Jaws(**vars(JAWS) | {"finger": (0.08, 0.03)}))[0] == COLLIDES
 
@@ -114,8 +112,7 @@ def at_origin(body, jaws=JAWS):
 
 def test_a_pad_inside_a_bowl_bears_on_its_ends_and_comes_after_one_outside():
     bowl = surface(hollow_bowl(0.04, 0.003, 0.045))
-    task = Task(np.array([0.0, 0.0, 0.02]))
-    grasps = antipodal_grasps(bowl, NARROW, task, 6, samples=80)
+    grasps = antipodal_grasps(bowl, NARROW, Task(np.array([0.0, 0.0, 0.02])), 6, samples=80)
     assert max((g for g in grasps if not g.state), key=lambda g: g.payload).opening > 0.07
 
 

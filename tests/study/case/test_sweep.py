@@ -215,5 +215,4 @@ def test_finer_meshes_more_forces_and_better_elements_cost_more():
     (("task.centre_of_mass_mm=[3, 0, 0]",), 1),
 ])  # fmt: skip
 def test_a_weight_that_does_not_point_along_the_axis_takes_the_symmetry_away(overrides, order):
-    scene = parse_scene(CYLINDER, overrides=list(overrides))
-    assert scene.axis_symmetry == order
+    assert parse_scene(CYLINDER, overrides=list(overrides)).axis_symmetry == order

@@ -29,8 +29,7 @@ def geometry(i):
     middle = np.array([0.001, -0.002, STATIONS[i]])
     o = np.stack([middle - RADIUS * pose.rotation[:, 2] for pose in poses])
     c, s = np.cos(TILT[i]), np.sin(TILT[i])
-    frames = np.stack([[[1, 0, 0], [0, c, -s], [0, s, c]], [[1, 0, 0], [0, c, s], [0, -s, c]]])
-    return R, o, frames
+    return R, o, np.stack([[[1, 0, 0], [0, c, -s], [0, s, c]], [[1, 0, 0], [0, c, s], [0, -s, c]]])
 
 
 def write(path, **more):

@@ -104,8 +104,7 @@ def test_graspgen_has_its_fields_and_splits_with_relative_paths(sets):
 
 def test_acronym_has_its_datasets(sets):
     with h5py.File(sets / "acronym/grasps/cup_1.0.h5") as file:
-        mesh = file["object/file"][()].decode()
-        assert (sets / "acronym" / mesh).read_bytes() == b"cup"
+        assert (sets / "acronym" / file["object/file"][()].decode()).read_bytes() == b"cup"
         assert file["object/scale"][()] == 1.0
         assert file["grasps/transforms"].shape == (COUNT, 4, 4)
         assert int(file["grasps/qualities/flex/object_in_gripper"][()].sum()) == COUNT - len(FORCES)

@@ -165,8 +165,7 @@ def test_moveit_grasps_have_the_fields_of_their_messages(said, gripper):
         pose = grasp["grasp_pose"]["pose"]
         rotation = Rotation.from_quat([pose["orientation"][k] for k in "xyzw"]).as_matrix()
         ahead = np.array([pose["position"][k] for k in "xyz"]) + 0.1034 * rotation[:, 2]
-        i = station_of(ahead)
-        assert ahead == pytest.approx(geometry(i)[1].mean(axis=0))
+        assert ahead == pytest.approx(geometry(station_of(ahead))[1].mean(axis=0))
         assert grasp["pre_grasp_approach"]["direction"]["vector"] == pytest.approx({"x": 0.0, "y": 0.0, "z": 1.0})
         assert grasp["post_grasp_retreat"]["direction"]["vector"] == pytest.approx({"x": 0.0, "y": 0.0, "z": -1.0})
 

@@ -75,14 +75,12 @@ def test_clearance_of_a_sphere_from_boxes():
 
 
 def test_points_lie_on_the_surface_and_close_together(path):
-    grasp = taken(path, Hand())[0]
-    points = surface_points(scene_of(opened(path), grasp.case).object)
+    points = surface_points(scene_of(opened(path), taken(path, Hand())[0].case).object)
     inside = np.abs(points[:, 2]) < TOP - 1e-6
     assert np.hypot(points[inside, 0] / 0.025, points[inside, 1] / 0.020).max() == pytest.approx(1.0, abs=1e-5)
     assert np.abs(points[:, 2]).max() == pytest.approx(TOP)
     grid = np.array([[0.025, 0.0, z] for z in np.linspace(-TOP, TOP, 50)])
-    nearest = np.linalg.norm(points[None] - grid[:, None], axis=-1).min(axis=1)
-    assert nearest.max() < 2e-3
+    assert np.linalg.norm(points[None] - grid[:, None], axis=-1).min(axis=1).max() < 2e-3
 
 
 def test_boxes_stand_beside_the_pads_and_behind_them():

@@ -146,8 +146,7 @@ def test_usd_reads_the_stage(path):
     held, mass = carried(grasp, body(path)), UsdPhysics.MassAPI(stage.GetPrimAtPath("/grasp/object"))
     assert mass.GetMassAttr().Get() == pytest.approx(held.mass)
     assert list(mass.GetCenterOfMassAttr().Get()) == pytest.approx(held.centre.tolist(), abs=1e-7)
-    turn = mass.GetPrincipalAxesAttr().Get()
-    axes = turned(turn)
+    axes = turned(mass.GetPrincipalAxesAttr().Get())
     moments = np.array(list(mass.GetDiagonalInertiaAttr().Get()))
     assert axes * moments @ axes.T == pytest.approx(held.inertia, rel=1e-5, abs=1e-9)
     down = UsdPhysics.Scene(stage.GetPrimAtPath("/grasp/scene")).GetGravityDirectionAttr().Get()
@@ -157,8 +156,7 @@ def test_usd_reads_the_stage(path):
     for f, contact in enumerate(cell(grasp).contacts, start=1):
         joint = UsdPhysics.PrismaticJoint(stage.GetPrimAtPath(f"/grasp/close{f}"))
         for rotation, here in ((np.eye(3), joint.GetLocalRot0Attr()), (contact.rotation, joint.GetLocalRot1Attr())):
-            q = here.Get()
-            rail = rotation @ turned(q)[:, 0]
+            rail = rotation @ turned(here.Get())[:, 0]
             assert rail == pytest.approx(cell(grasp).closing * (1 if f == 1 else -1), abs=1e-6)
         pad = stage.GetPrimAtPath(f"/grasp/finger{f}/pad{f}")
         assert UsdPhysics.CollisionAPI(pad)

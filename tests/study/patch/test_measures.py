@@ -17,8 +17,7 @@ FLAT = sj.ContactPatch([[0.01, 0, 0], [-0.01, 0, 0]], [1e-4] * 2, [[0, 0, 1]] * 
 
 
 def test_they_are_the_numbers_of_the_command():
-    judged = EvaluatedPatch(read_patch(str(EXAMPLE), Reading()), 0.8)
-    [patch] = as_record([judged], None)["patches"]
+    [patch] = as_record([EvaluatedPatch(read_patch(str(EXAMPLE), Reading()), 0.8)], None)["patches"]
     for model, limits in sj.friction_limits(PATCH, mu=0.8).items():
         found = patch["friction"][model]
         assert (limits.f_x, limits.f_y, limits.tau_z) == (found["f_x_max"], found["f_y_max"], found["tau_z_max"])

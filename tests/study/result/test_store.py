@@ -183,8 +183,7 @@ def test_every_dataset_says_what_it_is(tmp_path):
     ({"station": 1, "angle": 1}, ["0", "0", "."]), ({"station": 1, "angle": 1, "normal_force": 1}, ["0", "0", "."]),
 ])  # fmt: skip
 def test_viewers_open_at_stations_and_angles_at_the_highest_force(sizes, expected):
-    layout = small(sizes=sizes)
-    assert view_slice(layout) == expected
+    assert view_slice(small(sizes=sizes)) == expected
 
 
 def test_an_axis_of_two_values_has_a_name_only_beside_an_uneven_one():

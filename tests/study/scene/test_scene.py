@@ -351,8 +351,7 @@ def test_a_scene_is_frozen_and_holds_its_rules_in_python_too():
 def test_the_schema_knows_every_key_and_its_range():
     schema = Scene.model_json_schema()
     json.dumps(schema)
-    gripper = schema["$defs"]["Gripper"]["properties"]
-    assert gripper["pad_length_mm"]["maximum"] == 500
+    assert schema["$defs"]["Gripper"]["properties"]["pad_length_mm"]["maximum"] == 500
     assert all("description" in p for d in schema["$defs"].values() for k, p in d["properties"].items() if k != "shape")
     assert set(schema["required"]) == {"object", "candidates", "load"}
 

@@ -123,8 +123,7 @@ def test_a_mesh_of_any_format_is_started_in_metres_where_its_format_says_so(endi
     unit = [] if ending in ("glb", "gltf") else ["--unit", "m"]
     assert main(["init", "mesh", "--mesh", f"open/body.{ending}", *unit]) == 0
     assert "its centroid is estimated" in capsys.readouterr().out
-    scene = load_scene("body.toml")
-    assert scene.object.unit == "m"
+    assert load_scene("body.toml").object.unit == "m"
     assert main(["check", "body.toml"]) == 0
 
 

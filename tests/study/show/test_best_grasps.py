@@ -184,8 +184,7 @@ WIDE = ("mass", "wall", "two meshes")
 
 
 def test_errors_stand_with_what_they_belong_to():
-    known = study([[0.04]], needs=WIDE)
-    table = best(known)
+    table = best(study([[0.04]], needs=WIDE))
     for name in ("quality", "e_n", "f_x_max", "f_y_max", "tau_z_max"):
         column = next(c for c in table.columns if c.name == name)
         assert column.error == f"{name}_error"

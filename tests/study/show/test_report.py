@@ -212,8 +212,7 @@ def test_maps_show_every_case_in_both_models_with_crosses_for_failed_ones(ordina
                                                              for t in f["data"])]  # fmt: skip
     over_force = maps[0]["data"]
     heat = [t for t in over_force if t["type"] == "heatmap"]
-    shape = [[len(t["z"]), len(t["z"][0])] for t in heat if t["z"]]
-    assert shape == [[2, 4]] * len(heat)
+    assert [[len(t["z"]), len(t["z"][0])] for t in heat if t["z"]] == [[2, 4]] * len(heat)
     for column, model in enumerate((1.0, 1.1)):
         assert heat[column]["z"][1][:3] == pytest.approx([model * 5 / (3 + abs(i - 2)) for i in range(3)])
         assert heat[column]["z"][0][0] is None  # missing
@@ -230,8 +229,7 @@ def test_values_have_their_error_where_the_file_has_it(tmp_path):
     layout = Layout(axes(), 0, meshes=2, patches=False)
     path = make(tmp_path / "two.hdf", layout, **{"maps/e_n_error": 0.0042, "maps/tau_z_max_error": 0.011})
     with open_result(path) as result:
-        data = judge(dataset(result))
-        (folded,) = tables.every_case(data)
+        (folded,) = tables.every_case(judge(dataset(result)))
     block = folded["blocks"][0]
     assert len(block["rows"]) == 24
     assert all("\N{NO-BREAK SPACE}±" in row[block["head"].index("e_n [mm]")] for row in block["rows"])

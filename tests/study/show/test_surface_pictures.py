@@ -89,8 +89,7 @@ def patch_S():
 
 def test_figures_show_both_models_with_their_exact_wrenches(file):
     with open_result(file) as result:
-        data = judge(dataset(result))
-        shown = limit_surfaces(View(data), (0, 0, 0))["figure"].data
+        shown = limit_surfaces(View(judge(dataset(result))), (0, 0, 0))["figure"].data
     surfaces = [trace for trace in shown if trace.type == "surface"]
     assert len(surfaces) == 2  # CCM and PCM
     reach = MU * patch_S() * SEMI * [1, 1, 1e3 * RHO]

@@ -98,8 +98,7 @@ def test_ctrl_c_ends_the_view_and_not_the_run(tmp_path, monkeypatch):
     def interrupted(_):
         raise KeyboardInterrupt
 
-    stream = io.StringIO()
-    assert watch(file_look(run.path), 1.0, stream, interrupted) == INTERRUPTED
+    assert watch(file_look(run.path), 1.0, io.StringIO(), interrupted) == INTERRUPTED
 
 
 @pytest.mark.parametrize("words", [["watch", "no.hdf"], ["watch", "a.hdf", "--every", "0"]])
