@@ -20,7 +20,6 @@ NAMES = [f"{prefix}openblas_get_corename{suffix}" for prefix in ("", "scipy_") f
 
 
 def usable() -> list[str]:
-    """Kernels of OpenBLAS that this CPU can run; none where it does not say what it can."""
     try:
         lines = Path("/proc/cpuinfo").read_text().splitlines()
     except OSError:
@@ -30,7 +29,6 @@ def usable() -> list[str]:
 
 
 def loaded() -> dict[str, str]:
-    """Kernel of every copy of OpenBLAS in this process, by its file, once all that computes is imported."""
     for name in ("numpy", "scipy.linalg", "softjaw.fem.petsc"):
         importlib.import_module(name)
     files = {line.split()[-1] for line in Path("/proc/self/maps").read_text().splitlines() if "openblas" in line}

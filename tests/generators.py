@@ -190,7 +190,6 @@ def bump(x, y):
 
 
 def moved(patch, rotation, translation):
-    """Patch after the rigid motion ``x -> rotation @ x + translation``."""
     R, t = np.asarray(rotation, float), np.asarray(translation, float)
     corners = None if patch.corners is None else patch.corners @ R.T + t
     return replace(patch, centroid=patch.centroid @ R.T + t, normal=patch.normal @ R.T, corners=corners)

@@ -48,7 +48,6 @@ class Outcome:
 
 
 def workers() -> tuple[str, ...]:
-    """Options that run two files of tests at a time, where this machine can."""
     several = len(os.sched_getaffinity(0)) > 1 and importlib.util.find_spec("xdist") is not None
     return SIDE_BY_SIDE if several else ()
 
@@ -116,7 +115,6 @@ def run(stage: Stage) -> Outcome:
 
 
 def report(command: str, outcomes: list[Outcome]) -> int:
-    """Print how each stage ended and what was left out; the exit code."""
     print()
     for outcome in outcomes:
         word = {True: "passed", False: "FAILED", None: "LEFT OUT"}[outcome.passed]

@@ -25,7 +25,6 @@ def page(name: str) -> str:
 
 
 def cells(name: str) -> set[str]:
-    """First cells of the tables of a page, without their backticks."""
     return {found.strip("`") for found in re.findall(r"^\| (.+?) \|", page(name), re.M)}
 
 

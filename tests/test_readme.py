@@ -33,12 +33,10 @@ def slow(block: list[str]) -> bool:
 
 
 def as_typed(line: str) -> str:
-    """The line with an mpirun that this machine accepts."""
     return re.sub(r"^mpirun -n (\d+)", lambda found: shlex.join(mpirun(int(found[1]))), line)
 
 
 def shell(line: str, folder: Path) -> None:
-    """Type a line into a shell, to exit code 0."""
     programs = folder / "bin"
     programs.mkdir(exist_ok=True)
     (programs / "softjaw").write_text(f'#!/bin/sh\nexec {shlex.quote(sys.executable)} -m softjaw "$@"\n')

@@ -16,7 +16,6 @@ def fastest(work: Callable[[], object], seconds: float = 1.0) -> float:
 
 
 def line(what: str, figure: str, goal: str = "") -> None:
-    """One line ``what | figure | goal``."""
     print(f"{what:<62} | {figure:>16} | {goal}".rstrip(" |"), flush=True)
 
 
@@ -26,7 +25,6 @@ def title(text: str) -> None:
 
 
 def span(seconds: float) -> str:
-    """Time in the unit that suits it."""
     for size, unit in ((1.0, "s"), (1e-3, "ms"), (1e-6, "us")):
         if seconds >= size:
             return f"{seconds / size:.3g} {unit}"

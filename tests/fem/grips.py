@@ -27,7 +27,6 @@ FOAM = 24e3  # shear modulus of the pads [Pa]
 
 @cache
 def can() -> Revolution:
-    """Straight can with a shoulder and a neck, 35 mm in radius."""
     z = [0.0, 0.003, 0.05, 0.1, 0.150, 0.180, 0.190, 0.205]
     return Revolution(np.column_stack([z, [0.033, 0.035, 0.035, 0.035, 0.035, 0.013, 0.013, 0.013]]))
 
@@ -37,7 +36,6 @@ def thin(thickness: float = 4e-4, law: WallMaterial | None = None, support: str 
 
 
 def pose(theta: float, z: float, radius: float = 0.035) -> Pose:
-    """Pad at first touch with the straight wall, its long side along the axis."""
     c, s = np.cos(theta), np.sin(theta)
     approach, long_side = np.array([-c, -s, 0.0]), np.array([0.0, 0.0, 1.0])
     rotation = np.column_stack([long_side, np.cross(approach, long_side), approach])
@@ -55,7 +53,6 @@ def grip(
     radius: float = 0.035,
     mu: float | None = None,
 ) -> Grip:
-    """Both fingers on the can at this height; friction acts back where ``mu`` is given."""
     poses = pose(theta, z, radius), pose(theta + np.pi, z, radius)
     held = grasp(body, poses, allowed)
     model, walls = wall_between(body, held, SIZE, mesh, linear=level == "linear")
@@ -73,7 +70,6 @@ def gap_at(at: Pose):
 
 
 def e_n(finger):
-    """Eccentricity parameter of one finger's patch, planar reading [m]."""
     patch = extract(finger.pad, finger)
     return friction_limits(in_frame(patch, contact_frame(patch, [1, 0, 0])), 1.0, "pcm").e_n
 

@@ -48,7 +48,6 @@ def linear_energy(F, G, nu):
 
 
 def lame(G, nu):
-    """Lame's first constant ``2 G nu / (1 - 2 nu)`` [Pa]."""
     return 2 * G * nu / (1 - 2 * nu)
 
 
@@ -118,7 +117,6 @@ def cylinder(R):
 
 
 def placed(obj, pose):
-    """Gap function of an object of ``fem.objects.shapes`` in the frame of a pad that stands at ``pose``."""
     R = pose.rotation
 
     def gap(x):
@@ -146,7 +144,6 @@ def tangent_error(problem, x, d, h):
 
 
 def dense(problem, x=None, values=None):
-    """Tangent at ``x``, or other ``values`` in its pattern, as a full matrix."""
     pattern = problem.pattern
     if x is not None:
         problem.tangent(x)

@@ -35,7 +35,6 @@ seeds = st.integers(0, 2**32 - 1)
 
 
 def moved(values, seed):
-    """The values, each off by at most eight ulp of the largest."""
     x = np.asarray(values, float)
     return x + np.abs(x).max() * np.random.default_rng(seed).choice(ULPS, x.shape)
 
@@ -49,7 +48,6 @@ def turned(points, seed):
 
 
 def outcome(function, *arguments):
-    """What a call returns, or the type of what it raises."""
     try:
         return function(*arguments)
     except (ValueError, ArithmeticError, CheckError) as error:

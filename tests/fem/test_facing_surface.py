@@ -16,7 +16,6 @@ BOX = np.array([[-0.012, -0.008, -0.005], [0.012, 0.008, 0.010]])
 
 
 def turned(profile, columns=64):
-    """Closed surface of revolution of the points ``(z, r)`` [m], which start and end on the axis."""
     z, r = np.asarray(profile, float)[1:-1].T
     phi = 2 * np.pi * np.arange(columns) / columns
     ring = np.stack([np.cos(phi), np.sin(phi)], axis=1)
@@ -29,7 +28,6 @@ def turned(profile, columns=64):
 
 
 def bottle(wall, neck=0.012, radius=0.03, height=0.15):
-    """Outline of a bottle with a neck, up to the mouth; with ``wall`` down again on the inside."""
     z = np.linspace(0.0, height, 40)
     r = neck + (radius - neck) * 0.5 * (1 - np.tanh((z - 0.7 * height) / 0.012))
     outer = [[0.0, 0.0], *np.column_stack([z, r])]
@@ -40,7 +38,6 @@ def bottle(wall, neck=0.012, radius=0.03, height=0.15):
 
 
 def side(z, angle=0.1, radius=0.03):
-    """Pose of a pad whose front stands at the given distance from the axis; its long side lies along z."""
     a = -np.array([np.cos(angle), np.sin(angle), 0.0])
     return Pose(np.column_stack([[0, 0, 1.0], np.cross(a, [0, 0, 1.0]), a]), np.array([0, 0, z]) - radius * a)
 
@@ -135,7 +132,6 @@ def test_behind_a_small_ball_the_gap_has_no_jump_and_beyond_its_sides_it_grows()
 
 
 def punctured(mesh, place, size):
-    """The mesh without the triangles whose middles lie within ``size`` of a place."""
     x, triangles = mesh
     return x, triangles[np.linalg.norm(x[triangles].mean(axis=1) - place, axis=1) > size]
 

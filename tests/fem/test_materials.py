@@ -28,7 +28,6 @@ TURN *= np.linalg.det(TURN)
 
 
 def respond(law: Material, F, tangent=True):
-    """Nominal stress (3, 3) and tangent (3, 3, 3, 3)."""
     F = np.ascontiguousarray(F, dtype=float)
     P, A = np.zeros((3, 3)), np.full((3, 3, 3, 3) if tangent else (0, 0, 0, 0), np.nan)
     stress(law.number, F, np.linalg.inv(F), np.linalg.det(F), law.parameters, P, A)
@@ -41,7 +40,6 @@ def cauchy(law, F):
 
 
 def gradients():
-    """Deformations with all stretches different, two equal, nearly equal, all equal, and squeezed hard."""
     skew = np.eye(3) + 0.25 * np.random.default_rng(7).uniform(-1, 1, (3, 3))
     return {
         "general": skew,

@@ -22,7 +22,6 @@ TILT = np.array([[0, np.sin(0.3), np.cos(0.3)], [0, np.cos(0.3), -np.sin(0.3)], 
 
 
 def ball(level, radii=(RADIUS, RADIUS, RADIUS), centre=(0, 0, 0)):
-    """Points and triangles of a refined icosahedron, scaled; its corners lie on the ellipsoid."""
     mesh = pv.Icosphere(radius=1.0, nsub=level)
     x = np.asarray(mesh.points, dtype=float)
     x /= np.linalg.norm(x, axis=1)[:, None]

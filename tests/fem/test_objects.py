@@ -40,7 +40,6 @@ def around(shape, n=300, low=-3e-3, high=20e-3):
 
 
 def differences(f, x, h):
-    """Central differences of f, last axis = direction."""
     return np.stack([(f(x + e) - f(x - e)) / (2 * h) for e in h * np.eye(3)], axis=-1)
 
 

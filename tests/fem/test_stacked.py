@@ -17,7 +17,6 @@ HERE = Pose(np.eye(3), np.zeros(3))
 
 
 def off_the_wall(body, n=400, far=0.003, heights=(0.012, 0.17)):
-    """Points up to ``far`` off a body's wall."""
     rng = np.random.default_rng(2)
     theta, z = rng.uniform(0, 2 * np.pi, n), rng.uniform(*heights, n)
     x = np.column_stack([0.03 * np.cos(theta), 0.03 * np.sin(theta), z])

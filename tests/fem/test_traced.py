@@ -33,7 +33,6 @@ LEANING = of_sections(
 
 
 def grid_mesh(points):
-    """Closed mesh of rings ``points (k, n, 3)`` from bottom to top, closed by fans about their middles."""
     k, n = points.shape[:2]
     i, last = np.arange(n), (k - 1) * n
     j = (i + 1) % n

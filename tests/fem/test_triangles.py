@@ -103,7 +103,6 @@ def with_inner_wall(points, triangles):
 
 
 def with_holes(points, triangles):
-    """A tenth of the triangles is missing, on the far side of the finger."""
     far = np.flatnonzero(points[triangles].mean(axis=1)[:, 0] < -0.01)
     return points, np.delete(triangles, np.random.default_rng(1).choice(far, len(triangles) // 10, replace=False), 0)
 

@@ -23,7 +23,6 @@ seeds = st.integers(0, 2**32 - 1)
 
 
 def ulps(values, rng, most=4):
-    """Values changed by up to a few units in the last place of the largest one."""
     return values + most * EPS * np.abs(values).max() * rng.uniform(-1, 1, values.shape)
 
 
@@ -42,7 +41,6 @@ def joined(*patches):
 
 
 def strip(x0, z0, x1, z1):
-    """A rectangle over ``-1 <= y <= 1`` between two points of the plane ``y = 0``."""
     return [[x0, -1, z0], [x1, -1, z1], [x1, 1, z1], [x0, 1, z0]]
 
 

@@ -138,7 +138,6 @@ def model_3mf(more="", built=1, head=""):
 
 
 def packed(*models, kind=zipfile.ZIP_DEFLATED):
-    """A 3MF file of these models."""
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w", kind) as archive:
         for i, model in enumerate(models):

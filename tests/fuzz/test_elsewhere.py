@@ -30,8 +30,6 @@ FAST = ("external link",)
 
 @pytest.fixture
 def told(capsys):
-    """Run a command; its exit code and all that it says, which is fit for a terminal."""
-
     def ask(*words):
         code = main([str(word) for word in words])
         said = capsys.readouterr()

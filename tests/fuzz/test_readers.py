@@ -24,7 +24,6 @@ SLOW = ("VTU", "VTP", "result")
 
 
 def complaint(reader, path):
-    """What is wrong with the way a file was read or refused; empty if nothing is."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         try:
@@ -45,7 +44,6 @@ def wrong_words(text, path):
 
 
 def complaint_apart(reader, path):
-    """As `complaint`, in a child process with limits of time and memory."""
     end, other = os.pipe()
     child = os.fork()
     if child == 0:

@@ -29,7 +29,6 @@ def uniform_pressure(scene: Scene) -> dict[str, np.ndarray]:
 
 
 def frictionless(scene: Scene) -> dict[str, np.ndarray]:
-    """Largest friction forces and torque without friction."""
     n = len(scene.load.normal_force)
     return {name: np.zeros(n) for name in ("f_x_max", "f_y_max", "tau_z_max")}
 

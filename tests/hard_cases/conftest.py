@@ -31,7 +31,6 @@ def row(case: HardCase, outcome: Outcome, verdict: Verdict) -> list[str]:
 
 
 def table_text(rows: dict[str, list[str]]) -> str:
-    """The table as Markdown, in the order of the cases; then failures and gaps with their reasons."""
     lines = [HEAD, ["---"] * len(HEAD), *(rows[name] for name in CASES if name in rows)]
     words = Counter(cells[OUTCOME].rpartition("; ")[2] if ";" in cells[OUTCOME] else OK for cells in rows.values())
     count = f"{len(rows)} cases in {len({CASES[name].kind for name in rows})} classes: " + ", ".join(

@@ -42,7 +42,6 @@ def turned(rng, W, T=None):
 
 
 def outcomes(decide, times=TURNS):
-    """How often a decision came out how, in seeded repetitions; errors are outcomes too."""
     rng, found = np.random.default_rng(0), collections.Counter()
     for _ in range(times):
         try:

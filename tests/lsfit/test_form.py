@@ -48,7 +48,6 @@ def test_substitution_is_composition(d):
 
 
 def coefficients(P, d):
-    """Coefficients of a quartic given as a function."""
     w = np.random.default_rng(0).normal(size=(4 * len(exponents(d, 4)), d))
     return np.linalg.lstsq(monomials(w, exponents(d, 4)), P(w), rcond=None)[0]
 
@@ -58,7 +57,6 @@ def unit(x):
 
 
 def random_form(rng, d, kind):
-    """Any sign; long and thin; nearly zero on a cone."""
     E = exponents(d, 4)
     if kind == 0:
         return rng.normal(size=len(E))

@@ -17,7 +17,6 @@ E = exponents(3, 4)
 
 
 def coefficients(P, d=3):
-    """Coefficients of a quartic given as a function."""
     u = np.random.default_rng(0).normal(size=(8 * len(exponents(d, 4)), d))
     return np.linalg.lstsq(monomials(u, exponents(d, 4)), P(u), rcond=None)[0]
 
@@ -28,7 +27,6 @@ def tilted_matrix(seed=1):
 
 
 def squared(A):
-    """The ellipsoid as a quartic, ``(w' A w)^2``."""
     return Quartic(coefficients(lambda w: np.einsum("mi,ij,mj->m", w, A, w) ** 2, len(A)), len(A))
 
 

@@ -27,7 +27,6 @@ def joined(*parts: Mesh) -> Mesh:
 
 
 def moved(mesh: Mesh, x: float = 0.0, y: float = 0.0, z: float = 0.0, turn: float = 0.0) -> Mesh:
-    """A mesh turned about x [deg], then shifted [m]."""
     mesh.apply_transform(rotation_matrix(np.radians(turn), [1, 0, 0]))
     mesh.apply_translation([x, y, z])
     return mesh
@@ -71,7 +70,6 @@ SHAPES: dict[str, Maker] = {
 
 
 def soup(mesh: Mesh, seed: int = 0) -> Mesh:
-    """No two triangles share a point, and half of them are turned."""
     corners = np.array(mesh.triangles)
     turned = np.random.default_rng(seed).random(len(corners)) < 0.5
     corners[turned] = corners[turned, ::-1]
@@ -116,7 +114,6 @@ def bricks() -> Mesh:
 
 
 def opened(mesh: Mesh, axis: int = 2, share: float = 0.02) -> Mesh:
-    """Without the triangles at its low end."""
     heights = mesh.triangles_center[:, axis]
     low, high = mesh.bounds[:, axis]
     return raw(mesh.vertices, mesh.faces[heights > low + share * (high - low)])
@@ -133,7 +130,6 @@ def in_wedges(radius: float, height: float, count: int = 8) -> Mesh:
 
 
 def chain(count: int = 7) -> Mesh:
-    """A bent handle of capsules that overlap."""
     parts = []
     for angle in np.linspace(0.0, np.pi, count):
         part = capsule(0.018, 0.008, count=(8, 12))
@@ -144,7 +140,6 @@ def chain(count: int = 7) -> Mesh:
 
 
 def pierced(mesh: Mesh, seed: int, rings: int = 1) -> Mesh:
-    """With three holes anywhere."""
     fine = mesh if len(mesh.faces) > 400 else merged(mesh.subdivide().subdivide().subdivide())
     return punctured(fine, 3, rings, seed)
 

@@ -33,7 +33,6 @@ def outline_body(outline: Sequence[tuple[float, float]] = OUTLINE) -> trimesh.Tr
 
 
 def slabs(count: int, overlap: float = 0.006) -> trimesh.Trimesh:
-    """The same cut across into closed parts that overlap by ``2 overlap`` [m]."""
     radius, height = np.transpose(OUTLINE)
     cuts, parts = np.linspace(0.0, height[-1], count + 1), []
     for low, high in pairwise(cuts):
@@ -81,7 +80,6 @@ def mug(radius: float = 0.04, height: float = 0.095, wall: float = 0.004) -> tri
 
 
 def punctured(mesh: trimesh.Trimesh, holes: int, rings: int = 1, seed: int = 0) -> trimesh.Trimesh:
-    """A mesh without a few patches of triangles round random vertices."""
     rng = np.random.default_rng(seed)
     gone = np.zeros(len(mesh.faces), dtype=bool)
     for vertex in rng.choice(len(mesh.vertices), holes, replace=False):
@@ -105,6 +103,5 @@ def spoiled(mesh: trimesh.Trimesh, share: float = 0.01, seed: int = 0) -> trimes
 
 
 def scan(name: str) -> trimesh.Trimesh:
-    """A scan of this folder by a part of its name, in metres."""
     (file,) = SCANS.glob(f"*{name}*.stl")
     return trimesh.load(file)

@@ -68,7 +68,6 @@ def scene_tables(seed: int, k: int) -> tuple[str, dict]:
 
 
 def finer(tables: dict) -> dict:
-    """The scene on one mesh with twice the elements in every direction, those of a wall included."""
     elements = [2 * n for n in tables["gripper"]["elements"]]
     wall = {key: value / 2 for key, value in tables["accuracy"].items() if key == "wall_element_mm"}
     return tables | {"gripper": tables["gripper"] | {"elements": elements}, "accuracy": {"meshes": 1, **wall}}
@@ -98,7 +97,6 @@ def rows(seed: int, k: int) -> Iterator[tuple]:
 
 
 def table(lines: list[dict[str, str]], by: str = "friction") -> str:
-    """Share of cases whose true error is inside the stated one, and the mean ratio, by quantity."""
     groups: dict[tuple[str, str], list[tuple[float, float]]] = defaultdict(list)
     for line in lines:
         groups[line[by], line["quantity"]].append((float(line["true"]), float(line["stated"])))

@@ -22,7 +22,6 @@ def _pairs(z: Any, r: Any) -> list[list[float]]:
 
 
 def outline(rng: np.random.Generator) -> Table:
-    """A body of revolution whose outline has corners anywhere."""
     height, inner = rng.uniform(60, 250), rng.integers(3, 8)
     z = np.sort(np.r_[0, height, rng.uniform(0.05, 0.95, inner) * height])
     r = np.clip(rng.uniform(10, 45) * np.exp(rng.normal(0, 0.25, len(z))), 6, 50)
@@ -74,7 +73,6 @@ KINDS: dict[str, Callable[[np.random.Generator], Table]] = {
 
 
 def gripper(rng: np.random.Generator) -> Table:
-    """Pads of several sizes and foams, on meshes that are solved in seconds."""
     size, foam = rng.uniform((20, 12, 6), (60, 30, 20)), str(rng.choice(FOAMS))
     elements = [int(n) for n in (2 * rng.integers(4, 8), 2 * rng.integers(3, 6), rng.integers(3, 6))]
     keys = dict(zip(("pad_length_mm", "pad_width_mm", "pad_thickness_mm"), map(number, size), strict=True))
@@ -91,7 +89,6 @@ def forces(rng: np.random.Generator, pads: Table) -> list[float]:
 
 
 def span(body: Table) -> tuple[float, float]:
-    """Ends of an object along its axis [mm]."""
     match body["shape"]:
         case "revolution":
             return body["profile_mm"][0][0], body["profile_mm"][-1][0]

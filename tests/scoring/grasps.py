@@ -17,7 +17,6 @@ def contact_axes(N, hint):
 
 
 def body_of(shape):
-    """Ellipsoid of three semi-axes, hull of an array of points, anything else as it is."""
     if hasattr(shape, "support"):
         return shape
     return Ellipsoid.of_axes(shape) if np.ndim(shape) == 1 else PolytopeBody(shape)

@@ -31,7 +31,6 @@ def pair(one, two, tilt=0.0, apart=0.06):
 
 
 def moved(rng, contacts):
-    """The grasp somewhere else, and how it got there."""
     R, p = Rotation.random(random_state=rng).as_matrix(), 0.1 * rng.normal(size=3)
     there = []
     for k in contacts:
@@ -44,7 +43,6 @@ def moved(rng, contacts):
 
 
 def outcomes(decide, contacts, times=TURNS):
-    """How often a decision ``decide(contacts, R, p)`` came out how, in seeded positions."""
     rng = np.random.default_rng(0)
     return collections.Counter(decide(*moved(rng, contacts)) for _ in range(times))
 

@@ -28,7 +28,6 @@ def slurm(*words: str) -> str:
 
 
 def job_field(job: str, name: str) -> str:
-    """A field of a job, such as ``JobState``."""
     words = dict(word.partition("=")[::2] for word in slurm("scontrol", "show", "job", job).split())
     return words[name]
 
@@ -42,7 +41,6 @@ def submitted(folder: Path, *options: str) -> str:
 
 
 def ended(job: str) -> str:
-    """Wait for the end of a job, through as many starts as it takes; its last state."""
     deadline = time.monotonic() + HOUR
     while (state := job_field(job, "JobState")) not in ENDED:
         if time.monotonic() > deadline:

@@ -102,7 +102,6 @@ class Browser:
         return answer["result"].get("value")
 
     def wait(self, expression: str, seconds: float = 30.0) -> Any:
-        """Value of an expression as soon as it can be had and is true."""
         end = time.monotonic() + seconds
         while not (found := self.ask(f"(() => {{ try {{ return {expression} }} catch (e) {{ return null }} }})()")):
             assert time.monotonic() < end, expression

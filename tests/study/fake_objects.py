@@ -35,7 +35,6 @@ class FakeUnit:
 
 
 def plan_of(name, rounds=()):
-    """The plan of an object; the length of its name makes objects differ."""
     plan = fake_run.fake_plan(name, 2 + len(name), rounds=rounds, apart=True)
     units = (FakeUnit(**{**vars(unit), "first": unit.first + 1000 * len(name)}) for unit in plan.units)
     return replace(plan, units=tuple(units))

@@ -21,7 +21,6 @@ def table(path, headers, columns):
 
 
 def centres(path, patch, length="m", pressure="pa"):
-    """Centre, area and normal of every face of a ContactPatch; ``length`` and ``pressure`` are units."""
     a, p = {"m": 1.0, "mm": 1e3}[length], {"pa": 1.0, "kpa": 1e-3}[pressure]
     headers = [*(f"{c}_{length}" for c in "xyz"), f"area_{length}2", "nx", "ny", "nz", f"pressure_{pressure}"]
     return table(path, headers, [a * patch.centroid, a**2 * patch.area, patch.normal, p * patch.pressure])
@@ -33,7 +32,6 @@ def corners(path, points, cells, pressure):
 
 
 def vtk(path, points, cells, on_cells=(), on_points=(), kinds=None):
-    """A VTU or VTP file, by the path's ending; data are pairs of name and values."""
     points, faces = np.asarray(points, float), np.concatenate([[len(c), *c] for c in cells])
     if path.suffix == ".vtu":
         grid = pv.UnstructuredGrid(faces, kinds or [{3: 5, 4: 9}[len(c)] for c in cells], points)

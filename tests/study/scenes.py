@@ -32,15 +32,12 @@ def text_of(shape, where=None, *, stations="[0]", angles="[0]", forces="[2]", el
 
 
 def scene_of(shape, *changes, **choices):
-    """The scene with changes as ``--set`` takes them."""
     return parse_scene(text_of(shape, **choices), "scene.toml", changes)
 
 
 def units_of(scene):
-    """Its candidates as a study solves them: images under the object's symmetry are one."""
     return units(scene)
 
 
 def results_of(scene):
-    """Results of all its cases, in the order of its units and forces."""
     return [result for unit in units_of(scene) for _, result in pipeline.solve_unit(unit)]

@@ -46,7 +46,6 @@ def scene(tmp_path):
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory):
-    """A result file with one failed case."""
     path = tmp_path_factory.mktemp("finished") / "done.hdf"
     assert run_fake(0, path, "--fail", 9)[0] == 6
     return path

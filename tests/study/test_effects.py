@@ -173,7 +173,6 @@ def test_six_components_change_nothing_that_is_mapped():
 
 @pytest.fixture(scope="module")
 def job():
-    """The program behind docs/effects.png."""
     spec = importlib.util.spec_from_file_location("effects_job", ROOT / "jobs" / "effects.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)

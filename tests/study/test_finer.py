@@ -23,7 +23,6 @@ SCENE = text_of(mesh_of("block.stl"), "sampled = 14\n", forces="[2, 5]", element
 
 @pytest.fixture
 def scene(tmp_path):
-    """A long block with blunt ends, whose best grasps are at its middle."""
     trimesh.creation.box(extents=(40, 60, 260)).subdivide_to_size(40).export(tmp_path / "block.stl")
     path = tmp_path / "block.toml"
     path.write_text(SCENE)

@@ -173,8 +173,6 @@ def test_a_place_that_gets_lost_ends_the_run_with_one_sentence(tmp_path, how, ra
 
 @pytest.fixture
 def small_disk(tmp_path):
-    """A file system of 3 MB."""
-
     def mount():
         words = ["mount", "-t", "tmpfs", "-o", "size=3m", "tmpfs", tmp_path]
         return subprocess.run(words, capture_output=True).returncode == 0

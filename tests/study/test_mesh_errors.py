@@ -41,7 +41,6 @@ SCENES = {
 
 
 def solved(own, *settings):
-    """Relative errors of e_n ``(forces,)`` and what is stored of each force."""
     place = [f"candidates.stations_mm=[{own['station_mm']}]", "candidates.angles_deg=[0]"]
     place.append(f"load.normal_force_n={own['force_n']}")
     place.append('effects.friction_pressure_coupling="none"')  # as the references

@@ -30,7 +30,6 @@ normal_force_n = [2]
 
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory):
-    """A scene of six meshes and one that is none."""
     folder = tmp_path_factory.mktemp("objects")
     (folder / "meshes").mkdir()
     for i, name in enumerate(NAMES):
@@ -42,7 +41,6 @@ def scene(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def solved(scene):
-    """All objects solved by one process."""
     code, _, errors = here(fake_objects.main, scene, out := scene.parent / "one")
     assert code == SOME_FAILED, errors
     return out
@@ -54,7 +52,6 @@ def rows(out):
 
 
 def same(out, expected):
-    """Whether all files of objects are alike byte for byte, and the index but for times."""
     files = sorted(path.name for path in expected.glob("*.hdf") if path.stem != "index")
     assert sorted(path.name for path in out.glob("*.hdf") if path.stem != "index") == files
     assert {name: differing(out / name, contents(expected / name)) for name in files} == {name: [] for name in files}

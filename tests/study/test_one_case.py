@@ -29,7 +29,6 @@ def run(scene, path):
 
 
 def stored(result, key, index):
-    """What a file holds of a value of a case, by friction model where it has several."""
     group, name = key.split("/")
     q = BY_KEY[key]
     if group == "maps" and q.by_model:

@@ -30,7 +30,6 @@ PLATE = 'shape = "plane"\nthickness_mm = 40'
 
 @lru_cache(maxsize=64)
 def solved(shape, *overrides, stations="[0]", angles="[0]", forces="[2, 5]", elements="[8, 4, 2]"):
-    """Units of a scene with the results of each."""
     place = {"stations": stations, "angles": angles, "forces": forces, "elements": elements}
     made = units_of(scene_of(shape, *QUICK, *overrides, **place))
     return [(unit, [result for _, result in pipeline.solve_unit(unit)]) for unit in made]
@@ -41,7 +40,6 @@ def cases(*arguments, **choices):
 
 
 def e_n(*arguments, **choices):
-    """e_n of the first finger in every case [m]."""
     return np.array([values["maps/e_n"][0] for values in cases(*arguments, **choices)])
 
 

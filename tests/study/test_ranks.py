@@ -58,7 +58,6 @@ def scene(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def alone(tmp_path_factory, scene):
-    """What one process writes without mpirun."""
     path = tmp_path_factory.mktemp("alone") / "alone.hdf"
     code, output, errors = run(0, scene, path)
     assert (code, errors) == (0, ""), output

@@ -27,7 +27,6 @@ BEST_WITHIN = 0.02
 
 
 def tent(x, peak, width):
-    """A map with one steep peak on a plateau, one force."""
     return 0.05 + 0.15 * np.maximum(1 - np.abs(x - peak) / width, 0.0)
 
 
@@ -116,8 +115,6 @@ def test_a_grown_file_keeps_every_row(tmp_path):
 
 
 def filled(path, plan):
-    """A file of this plan with numbers of a formula in every row."""
-
     def case(index):
         random = np.random.default_rng(index)
         values = {f"maps/{name}": random.random(3) for name in ("quality", "e_n")} | {"maps/flags": 0.0}
@@ -164,7 +161,6 @@ BODY = 'shape = "box"\nsize_mm = [60, 40, 120]\nedge_radius_mm = 6'
 
 
 def posed(budget, shape=BODY):
-    """The text of a scene of two poses that may be refined."""
     places = pose_of((0, 0, 8), label="wide") + pose_of((0, 0, -20), (0, 1, 0), (1, 0, 0))
     pad = "[8, 4, 2]\nmax_opening_mm = 65"
     return text_of(shape, f"refine = {budget}\n{places}", forces="[1, 2]", elements=pad) + SAMPLES + '["wide"]'

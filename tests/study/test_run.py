@@ -22,13 +22,11 @@ def states(path):
 
 
 def begun(path):
-    """Whether at least two cases are done and some are not."""
     return path.exists() and 2 <= (states(path) == DONE).sum() < states(path).size
 
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
-    """A file that one rank wrote without being disturbed; tests that spoil it work on a copy."""
     path = tmp_path_factory.mktemp("whole") / "whole.hdf"
     assert study(0, path)[0] == 0
     return path

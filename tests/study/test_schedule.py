@@ -112,7 +112,6 @@ def units_of(costs, forces=6, apart=True):
 
 
 def divided(made, ranks, codes=None):
-    """Forces of each share, by unit, in the order of work."""
     found = shares(made, np.zeros(sum(len(r) for u in made for r in u.rows)) if codes is None else codes, ranks)
     return [(own.unit.index, own.forces) for own in found]
 

@@ -21,7 +21,6 @@ PLACES = {"stations": "[0, 10]", "elements": "[8, 4, 3]"}
 
 
 def plain(*changes, **more):
-    """The scene without uncertain inputs."""
     return scene_of(BALL, *QUICK, RIGID, *changes, **{**PLACES, **more})
 
 

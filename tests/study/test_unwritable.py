@@ -35,7 +35,6 @@ def file(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def place(tmp_path_factory):
-    """A place in which nothing can be written, not by root either: below a file."""
     path = tmp_path_factory.mktemp("place") / "file"
     path.write_text("")
     return path

@@ -32,7 +32,6 @@ def walled(shape, *changes, where=WHERE, forces="[1, 2]", elements="[6, 4, 2]"):
 
 @lru_cache(maxsize=32)
 def solved(*arguments, **choices):
-    """Results of the first unit, force by force."""
     return [result for _, result in pipeline.solve_unit(walled(*arguments, **choices)[0])]
 
 

@@ -40,7 +40,6 @@ def quality(index):
 
 
 def poses(index):
-    """Rotation and origin of both pads at first touch, as for a candidate of roll 0."""
     station, angle = axes()[0].values[index[0]], axes()[1].values[index[1]]
     reach = (0.025, 0.02)[index[1]]
     found = []
@@ -52,7 +51,6 @@ def poses(index):
 
 
 def patch(force):
-    """A flat front of equal faces, of which those in the middle carry a pressure."""
     u, v = ((np.arange(n) + 0.5) / n - 0.5 for n in GRID)
     x, y = np.meshgrid(u * SIZE[0], v * SIZE[1], indexing="ij")
     centroid = np.stack([x, y, np.zeros(GRID)], axis=-1).reshape(-1, 3)

@@ -40,7 +40,6 @@ FAILURES = (ArithmeticError, ConvergenceError, CheckError, NoContactError, Runti
 
 
 def box(size, at=(0.0, 0.0, 0.0)):
-    """A box by its sides and its middle [m]."""
     return trimesh.creation.box(extents=size, transform=trimesh.transformations.translation_matrix(at))
 
 

@@ -14,7 +14,6 @@ ARITHMETIC = (ast.Sub, ast.Div, ast.Mult, ast.Pow, ast.MatMult)
 
 
 def name_of(node: ast.AST) -> str:
-    """Name of a function that is called; empty for all else."""
     if not isinstance(node, ast.Call):
         return ""
     return node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")

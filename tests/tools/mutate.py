@@ -87,7 +87,6 @@ def parts(node: ast.AST) -> Iterator[ast.AST]:
 
 
 def segment(lines: list[bytes], node: Any) -> str:
-    """Source of a node; ``ast.get_source_segment`` would split the file again for each."""
     first, last = node.lineno - 1, node.end_lineno - 1
     if first == last:
         return lines[first][node.col_offset : node.end_col_offset].decode()
@@ -96,7 +95,6 @@ def segment(lines: list[bytes], node: Any) -> str:
 
 
 def mutations(file: Path, root: Path = ROOT) -> list[Mutation]:
-    """All mutations of one file."""
     source, name = file.read_bytes(), str(file.relative_to(root))
     lines = source.splitlines(keepends=True)
     return [
@@ -118,7 +116,6 @@ def sample(count: int, seed: int, root: Path = ROOT) -> list[Mutation]:
 
 
 def mutated(source: str, mutation: Mutation) -> str:
-    """The source with the change."""
     lines = source.splitlines(keepends=True)
     start = sum(map(len, lines[: mutation.line - 1]))
     start += len(lines[mutation.line - 1].encode()[: mutation.column].decode())

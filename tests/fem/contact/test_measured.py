@@ -31,7 +31,6 @@ def pressed(gap, force, elements):
 
 
 def seen(pad, state):
-    """Points all over the deformed face, seen from the backing plate."""
     face = (state.contact_face - [0, 0, state.closing]).reshape(*pad.contact_grid, 3)
     lines = [np.arange(n) for n in face.shape[:2]]
     at = [np.linspace(0, n - 1, many) for n, many in zip(face.shape, (41, 101), strict=False)]
@@ -49,7 +48,6 @@ def of_contact(pad, state):
 
 
 def waves(n=4000, seed=0, x_too=True):
-    """Points of a known smooth face, and its height."""
     height = lambda x, y: -1e-3 + 12.0 * y**2 + (8.0 * x**2 - 60.0 * x * y**2 if x_too else 0.0)  # noqa: E731
     x, y = (np.random.default_rng(seed).random((n, 2)) - 0.5).T * np.array([[0.05], [0.022]])
     return np.column_stack([x, y, height(x, y)]), height

@@ -23,7 +23,6 @@ AFFINE = np.array([[1.1, 0.3, -0.1], [0.05, 0.9, 0.2], [0.1, -0.2, 0.7]])
 
 @pytest.fixture(params=["hex8", "hex27"])
 def pad(request):
-    """A graded mesh: hardly two elements have the same shape."""
     return Pad(PadShape(SIZE, (4, 4, 3), (0.5, 3.0, 2.5), request.param), LAWS["blatz_ko"])
 
 

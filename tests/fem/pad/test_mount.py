@@ -18,7 +18,6 @@ CYLINDER = EllipticCylinder(0.025, 0.025, 0.2)
 
 
 def beside(shift):
-    """Gap of the cylinder, its axis along the pad's x and shifted across it [m]."""
     facing = reference.facing(0.025)
     return reference.placed(CYLINDER, Pose(facing.rotation, facing.origin + shift * facing.rotation[:, 1]))
 

@@ -38,7 +38,6 @@ class Loaded(NamedTuple):
         return Equilibrium(0.0, np.zeros(self.shell.size))
 
     def newton(self, q, factor):
-        """Equilibrium near ``q`` at this load factor, and the iterations."""
         shell, free = self.shell, np.flatnonzero(~self.fixed)
         noise = ROUNDING * shell.young_modulus * np.linalg.norm(shell.node_area)
         tolerance = max(TOLERANCE * np.linalg.norm(self.load[free]), noise)
@@ -59,7 +58,6 @@ class Loaded(NamedTuple):
 
 
 def load_steps(loaded: Loaded, factors: Iterable[float]) -> Iterator[Equilibrium]:
-    """Equilibrium at each load factor in turn, from the reference on; a step that does not converge is halved."""
     here = loaded.start
     for factor in factors:
         goals, iterations, halvings = [factor], 0, 0

@@ -37,12 +37,10 @@ def case(X, normal, thickness, E, nu):
 
 
 def symmetric(fixed, nodes, axis):
-    """Plane of symmetry at right angles to the axis."""
     fixed[nodes, axis] = fixed[nodes, 3 + axis] = True
 
 
 def line_load(c, nodes, force):
-    """Force per length along a line of nodes."""
     length = np.linalg.norm(np.diff(c.shell.mesh.X[nodes], axis=0), axis=1)
     for i, part in enumerate(length):
         c.load[nodes[i : i + 2]] += 0.5 * part * np.asarray(force)

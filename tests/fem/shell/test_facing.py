@@ -11,7 +11,6 @@ R, LENGTH, STEP = 0.03, 0.1, 1e-7
 
 @pytest.fixture(scope="module")
 def wall():
-    """Cylinder about z, its mesh unrelated to the grid of its splines."""
     theta, s = np.linspace(0, 2 * np.pi, 97), np.linspace(0, LENGTH, 31)
     T, S = np.meshgrid(theta, s, indexing="ij")
     surface = spline_surface(theta, s, np.stack([R * np.cos(T), R * np.sin(T), S], axis=-1))
@@ -22,14 +21,12 @@ def wall():
 
 @pytest.fixture(scope="module")
 def points():
-    """Points up to 3 mm off the cylinder."""
     rng = np.random.default_rng(3)
     r, theta, z = R + rng.uniform(-5e-4, 3e-3, 60), rng.uniform(0, 2 * np.pi, 60), rng.uniform(0.01, 0.09, 60)
     return np.column_stack([r * np.cos(theta), r * np.sin(theta), z])
 
 
 def nodes(wall):
-    """Outer face of the mesh's nodes and the normals there."""
     T, S = np.meshgrid(wall.theta[:-1], wall.s, indexing="ij")
     X = wall.surface.at(T.ravel(), S.ravel())[:, 0]
     return X, X * [1 / R, 1 / R, 0]

@@ -93,7 +93,6 @@ def test_a_long_side_that_points_down_gives_the_same_patch_turned():
 
 @pytest.fixture(scope="module")
 def quarter():
-    """The part of the can's wall between 0 and 90 degrees."""
     return grip(thin(), elements=(4, 2, 2), mesh=ROUGH).problem.fingers[0].wall
 
 

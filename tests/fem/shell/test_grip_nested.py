@@ -15,7 +15,6 @@ SYMMETRIES = [(True, True), (True, False), (False, True), (False, False)]
 
 
 def pressed(coarser=False, allowed=(True, True), thickness=4e-4, z=0.142):
-    """Near the shoulder, where the wall leans and the two ends of a pad differ."""
     mesh, elements = (FINE.halved(), (4, 2, 1)) if coarser else (FINE, (6, 4, 2))
     return grip(thin(thickness), z, elements, allowed, mesh=mesh)
 
@@ -31,7 +30,6 @@ def ladder():
 
 
 def apart(found, expected):
-    """Largest distance of two states, relative to the closing displacement."""
     one, other = (np.concatenate([s.wall.q, *(f.unknowns for f in s.fingers)]) for s in (found, expected))
     return np.abs(one - other).max() / expected.fingers[0].closing
 

@@ -13,7 +13,6 @@ TURN *= np.linalg.det(TURN)
 
 
 def warped(n=3):
-    """Curved patch in which no two elements have the same shape."""
     x, y = np.meshgrid(np.linspace(0, 1, n + 1), np.linspace(0, 1.2, n + 1), indexing="ij")
     x[1:-1, 1:-1] += RNG.uniform(-0.08, 0.08, (n - 1, n - 1))
     y[1:-1, 1:-1] += RNG.uniform(-0.08, 0.08, (n - 1, n - 1))
@@ -23,7 +22,6 @@ def warped(n=3):
 
 
 def disc(n, radius, thickness, quarter=False):
-    """Disc whose innermost quadrilaterals have two corners in the middle."""
     turns = np.linspace(0, np.pi / 2 if quarter else 2 * np.pi, (n if quarter else 4 * n) + 1)
     r, t = np.meshgrid(np.linspace(0, radius, n + 1), turns, indexing="ij")
     number = np.arange(r.size).reshape(r.shape)

@@ -31,12 +31,10 @@ def egg(rows: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def even(n: int, end: float) -> np.ndarray:
-    """``n`` angles between 0 and ``end``, without the ends."""
     return end * (np.arange(n) + 1.0) / (n + 1.0)
 
 
 def uneven(n: int, end: float) -> np.ndarray:
-    """The same with steps that differ by a factor of about twenty: slivers and large triangles side by side."""
     t = even(n, 1.0)
     return end * (t + 0.9 * np.sin(6 * np.pi * t) / (6 * np.pi))
 

@@ -26,7 +26,6 @@ COUNT = len(STATIONS) * len(FORCES)
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """Four objects with a mesh each, and one without a file."""
     flags = np.zeros((len(STATIONS), 1, len(FORCES)))
     flags[SLIPS] = Flag.SLIPS
     out = tmp_path_factory.mktemp("folder")
@@ -49,7 +48,6 @@ def sets(folder, tmp_path_factory):
 
 
 def read_shards(out):
-    """Contents by name."""
     found = {}
     for path in sorted(out.glob("*.tar")):
         with tarfile.open(path) as shard:

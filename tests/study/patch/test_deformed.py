@@ -34,7 +34,6 @@ def face_of(text):
 
 
 def table(file, face, contour, seed=0, noise=NOISE):
-    """A file of points, of the middle line across the pad or of the whole face."""
     n, m, _ = face.shape
     rows = [(n - 1) / 2] if contour else np.linspace(0, n - 1, 41)
     at = np.stack(np.meshgrid(rows, np.linspace(0, m - 1, 101 if contour else 41), indexing="ij"), -1)
@@ -47,8 +46,6 @@ def table(file, face, contour, seed=0, noise=NOISE):
 
 @pytest.fixture
 def told(capsys):
-    """Call ``softjaw patch --deformed`` and give its JSON."""
-
     def ask(*words):
         code = main(["patch", "--deformed", *map(str, words), "--json"])
         answer = capsys.readouterr()

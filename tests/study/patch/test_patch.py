@@ -25,8 +25,6 @@ SAME = {"rel": 1e-9, "abs": 1e-12}
 
 @pytest.fixture
 def told(capsys):
-    """Call ``softjaw patch`` and give its JSON."""
-
     def ask(*words):
         code = main(["patch", *map(str, words), "--mu", str(MU), "--json"])
         answer = capsys.readouterr()
@@ -45,7 +43,6 @@ def faceted(triangles=False, **shape):
 
 
 def friction(answer):
-    """All that is told of a patch's friction as one list of numbers."""
     patch = answer["patches"][0]
     every = [value for model in patch["friction"].values() for value in model.values()]
     return [patch["S"], patch["F_N"], *every]
@@ -156,7 +153,6 @@ def test_the_grasp_of_equal_ellipsoids_has_its_closed_form(told):
 
 
 def opposite(patch, distance):
-    """The same patch half a turn about x away, facing the first."""
     turn = np.diag([1.0, -1.0, -1.0])
     return replace(patch, centroid=patch.centroid @ turn + [0, 0, distance], normal=patch.normal @ turn)
 

@@ -20,8 +20,6 @@ ONES = np.ones(len(CELLS))
 
 @pytest.fixture
 def refused(capfd):
-    """Call ``softjaw patch``; its exit code and what it says, which is errors alone, also where VTK writes."""
-
     def ask(*words):
         code = main(["patch", *map(str, words)])
         output, errors = capfd.readouterr()

@@ -41,7 +41,6 @@ def cached(name, sources, make):
 
 
 def or_skip(words, **options):
-    """Run a step of an installation; skip the test with its last line where it fails."""
     try:
         done = subprocess.run([str(w) for w in words], capture_output=True, text=True, timeout=900, **options)
     except (OSError, subprocess.TimeoutExpired) as error:
@@ -52,7 +51,6 @@ def or_skip(words, **options):
 
 
 def answer(words, **options):
-    """What a tool prints; it has to succeed."""
     done = subprocess.run([str(w) for w in words], capture_output=True, text=True, timeout=180, **options)
     assert done.returncode == 0, done.stderr[-2000:]
     return done.stdout
@@ -69,7 +67,6 @@ def python():
 
 @pytest.fixture(scope="module")
 def web():
-    """Folder with h5web, built as the one page ``dist/index.html``."""
     sources = ["package.json", "vite.config.js", "index.html", "src/main.jsx", "open.mjs"]
     npm = shutil.which("npm")
     if npm is None:
@@ -93,7 +90,6 @@ def result(tmp_path_factory):
 
 
 def colours(picture):
-    """How many colours that are no shade of grey are in a picture."""
     from matplotlib.image import imread
 
     rgb = (imread(picture)[..., :3] * 15).round().astype(int).reshape(-1, 3)

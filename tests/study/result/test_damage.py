@@ -34,7 +34,6 @@ COMMANDS = {
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
-    """A finished file of four cases, as a run on one rank writes it."""
     path = tmp_path_factory.mktemp("whole") / "a.hdf"
     scene = parse_scene(SCENE)
     plan = make_plan(scene, "cylinder.toml")
@@ -95,7 +94,6 @@ def answers(whole, tmp_path, capfd):
 
 
 def data_blocks(path):
-    """Offset and length of the data of every dataset, by its name."""
     with h5py.File(path) as file:
         names = [*(f"study/axes/{name}" for name in file["study/axes"])]
         file.visit(names.append)
@@ -118,7 +116,6 @@ def zero(path, offset, length):
 
 
 def judge(found, expected, path):
-    """Every reader's answer is that of the whole file, or a refusal; how many refused."""
     refused = 0
     for name, (code, text) in found:
         if code == OTHER_FILE:

@@ -20,7 +20,6 @@ from tests.study.formula_results import ANGLES, FORCES, STATIONS, make, written
 
 @pytest.fixture(scope="module")
 def half(tmp_path_factory):
-    """A file with patches in which rows 0 to 9 are solved, 10 failed, and the others are missing."""
     plan = fake_plan()
     cases = [*map(fake_result, range(10)), "no contact at this force"]
     rows = iter([*cases, *[None] * (plan.layout.rows - len(cases))])

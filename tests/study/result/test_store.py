@@ -41,7 +41,6 @@ def path(tmp_path):
 
 
 def put(path, layout, row, values):
-    """A done row, written without MPI."""
     writer = ResultWriter(path, layout, None)
     writer.write(row, values)
     writer.close()

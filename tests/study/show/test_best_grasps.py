@@ -20,7 +20,6 @@ FORCES = np.array([1.0, 5.0])
 
 
 def study(quality, flags=0.0, labels=None, status=DONE, needs=()):
-    """Result with this quality ``(stations, angles)`` at both forces; with ``labels`` its candidates are poses."""
     quality = np.asarray(quality, dtype=float)
     shape = (*quality.shape, len(FORCES))
     over = ("station", "angle", "normal_force")

@@ -21,7 +21,6 @@ SOFTER = SCENE + "[friction]\nmu = 0.5\n"
 
 @pytest.fixture(scope="module")
 def pair(tmp_path_factory):
-    """Maps that share three stations and two forces; the second has a larger e_n, a failed case and another mu."""
     folder = tmp_path_factory.mktemp("compare")
     a = make(folder / "a.hdf", axes=grid_axes(STATIONS[:4]), meshes=2, e_n_error__e_n_error=0.01)
 
@@ -44,7 +43,6 @@ def told(words, monkeypatch):
 
 
 def column(table, name):
-    """Values over the common cases; NaN where there is none."""
     return np.array([np.nan if row[name] is None else row[name] for row in table.rows], float)
 
 

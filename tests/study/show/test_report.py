@@ -75,8 +75,6 @@ def solved(layout, index, message="", **changes):
 
 
 def make(path, layout, state=lambda index: "done", scene=SCENE, title="thing", message="", labels=(), **changes):
-    """A result file whose cases are done, missing, or failed with the text that ``state`` gives."""
-
     def case(index):
         what = state(index)
         return {"done": solved(layout, index, message, **changes), "missing": None}.get(what, what)
@@ -85,8 +83,6 @@ def make(path, layout, state=lambda index: "done", scene=SCENE, title="thing", m
 
 
 class Page(HTMLParser):
-    """Elements of a page, whether they are closed in order, and its text."""
-
     def __init__(self, html):
         super().__init__()
         self.open, self.found, self.text, self.balanced = [], [], "", True
@@ -120,7 +116,6 @@ def figures(html):
 
 @pytest.fixture(scope="module")
 def ordinary(tmp_path_factory):
-    """Most cases done, one missing, two failed alike; its page and what was written."""
     folder = tmp_path_factory.mktemp("report")
 
     def state(index):

@@ -37,7 +37,6 @@ def shown(file):
 
 
 def corners_on(body):
-    """Triangles ``(m, 3, 3)`` of a body."""
     points, triangles = body.surface()
     return np.asarray(points, float)[triangles]
 
@@ -262,7 +261,6 @@ def test_the_command_writes_the_page(file, tmp_path, capsys):
 
 
 def reddest(image):
-    """Share of pixels in strong colours."""
     low, high = image.min(axis=-1).astype(int), image.max(axis=-1).astype(int)
     return float(((high - low) > 60).mean())
 

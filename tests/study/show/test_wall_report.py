@@ -39,7 +39,6 @@ SCENE += "[task]\nweight_direction = [0, 0, -1]\nsafety = 1\n[accuracy]\nwall_el
 
 
 def write(path, scene, results):
-    """A result file of these cases by row; the others failed."""
     plan = make_plan(scene, "can.toml")
     layout = plan.layout
     create(path, layout, plan.header)
@@ -56,7 +55,6 @@ def write(path, scene, results):
 
 @pytest.fixture(scope="module")
 def solved():
-    """Scene and cases of the can, by row."""
     scene, results = parse_scene(SCENE), {}
     for unit in make_plan(scene).units:
         for k, result in pipeline.solve_unit(unit):
