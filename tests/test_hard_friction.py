@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull, QhullError
 
-from softjaw.friction.frame import FrameFlag, contact_frame, in_frame
 from softjaw.friction.wrench import friction_limits, friction_wrench
 from softjaw.scoring.contact import fibonacci_vertices, hull_volume
-from tests.generators import cap_polar, cor_twists, lcg_patch, points_patch
+from tests.generators import cor_twists, lcg_patch, points_patch
 
 X = [1.0, 0.0, 0.0]
 
@@ -26,20 +25,6 @@ def test_pressures_over_twelve_decades():
     assert friction_limits(wide, 1.0).f_x == pytest.approx(exact, rel=1e-15)
     weak = replace(wide, pressure=np.where(np.arange(300) < 150, wide.pressure, 0.0))
     assert friction_limits(weak, 1.0).f_x > 0
-
-
-def test_overhanging_normals():
-    """A cap with the half angle 120 degrees: a third of its area looks back, and lessens F_N but no friction."""
-    patch = cap_polar(1, np.radians(120), 60, 40)
-    frame = contact_frame(patch, X)
-    assert frame.flag & FrameFlag.OVERHANG
-    assert frame.overhang_share == pytest.approx(1 / 3, rel=1e-12)
-    assert frame.overhang_count == 15 * 40
-    local = in_frame(patch, frame)
-    limits, projected = friction_limits(local, 1.0), friction_limits(local, 1.0, "pcm_projected")
-    assert limits.F_N == pytest.approx(np.pi * math.sin(np.radians(120)) ** 2, rel=1e-3)
-    assert projected.f_x == pytest.approx(local.load @ np.abs(local.normal[:, 2]), rel=1e-12)
-    assert projected.f_x > limits.F_N * 1.5
 
 
 def test_digits_next_to_an_element():

@@ -51,20 +51,6 @@ def linked(path, link):
     return spoil
 
 
-def external(file):
-    shape = file["study/e_n/ccm"].shape
-    del file["study/e_n/ccm"]
-    file["study/e_n"].create_dataset("ccm", shape, "<f8", external=[("/etc/passwd", 0, 8 * int(np.prod(shape)))])
-
-
-def virtual(file):
-    shape = file["study/e_n/ccm"].shape
-    del file["study/e_n/ccm"]
-    layout = h5py.VirtualLayout(shape, "<f8")
-    layout[...] = h5py.VirtualSource("other.h5", "d", shape=shape)
-    file["study/e_n"].create_virtual_dataset("ccm", layout)
-
-
 def enormous(path):
     """72 TiB that are only declared."""
 
@@ -116,16 +102,11 @@ SCENE = '[object]\nshape = "sphere"\nradius_mm = 30\n[candidates]\nstations_mm =
 DERIVED = {"name": "x", "units": "", "long_name": "", "definition": "", "axes": []}
 DEEP = "[" * 100_000
 LIES = {
-    "external link": linked("study/e_n/ccm", h5py.ExternalLink("/etc/hosts", "/x")),
-    "soft link": linked("study/e_n/ccm", h5py.SoftLink("/study/e_n/pcm")),
     "soft link to nothing": linked("study/e_n/ccm", h5py.SoftLink("/nowhere")),
-    "external data": external,
-    "virtual data": virtual,
     "enormous map": enormous("study/e_n/ccm"),
     "enormous scene": enormous("study/scene"),
     "recursive group": loop,
     "a map of texts": data("study/e_n/ccm", np.array(["a", "b"], object)),
-    "a map of another shape": data("study/e_n/ccm", np.zeros((5, 6, 5))),
     "a map without shape": data("study/e_n/ccm", h5py.Empty("f8")),
     "a group for a map": lambda file: (file["study/e_n"].pop("ccm"), file.create_group("study/e_n/ccm")),
     "a dataset for a group": data("study/fingers", np.zeros(3)),
@@ -143,9 +124,6 @@ LIES = {
     "axes elsewhere": attribute("study", "axes", np.array(["../../x", "..", "/"], object)),
     "units that are a list": attribute("study/axes/station", "units", [1, 2, 3]),
     "units that are words": attribute("study/axes/station", "units", "furlong"),
-    "program that is another": attribute("/", "program", EVIL),
-    "version of the future": attribute("/", "layout_version", EVIL),
-    "options that are no JSON": attribute("study", "options", "{"),
     "options that are deep": attribute("study", "options", "[" * 60_000),
     "infinite faces": attribute("study", "options", '{"derived": [], "faces": 1e999, "meshes": 1}'),
     "many faces": options(faces=10**9),

@@ -43,31 +43,10 @@ class Bound:
 
 @dataclass(frozen=True)
 class Source:
-    """Where the second number of a case comes from.
+    """Where the second number of a case comes from: another case, this one changed or scaled, a formula, a file.
 
-    Parameters
-    ----------
-    kind : str
-        One of `KINDS`.
-    what : str
-        What is compared with, in the words of the table.
-    within : str
-        The tolerance, by its name in ``[tolerance]``.
-    quantities : tuple of str
-        Maps that are compared.
-    case : str
-        Another case of the table, or
-    change : dict
-        sections to change in the case itself, or
-    formula, stored : str
-        a function of `closed_forms`, or a file of an independent code's numbers, or
-    told : float
-        the number that the first group of ``reason`` finds in a refusal, or
-    bound : Bound
-        a value at which refusals begin.
-    length, force : float
-        Lengths and forces of the other over those of this case. Without another case this one is scaled itself, its
-        moduli by force / length^2.
+    ``quantities`` are compared within the tolerance of that name; without another case and a change, ``length`` and
+    ``force`` scale the case itself, its moduli by force / length^2.
     """
 
     kind: str
@@ -119,23 +98,7 @@ class HardCase:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a case came to.
-
-    Parameters
-    ----------
-    refused : str
-        Why it was not begun, or nothing.
-    forces, done : (n,) arrays
-        Force of every row [N], and whether it was solved.
-    messages : tuple of str
-        Note or reason of every row.
-    iterations, halvings, seconds : numbers
-        Newton iterations, step halvings and time of the solved rows, both fingers.
-    checks : dict
-        The worst value of every check over rows and fingers.
-    maps, errors : dict
-        Values of the solved rows by quantity; their mesh errors, where two meshes were solved.
-    """
+    """What a case came to: by row force [N] and message, worst checks and work over all, maps and their mesh errors."""
 
     refused: str = ""
     forces: np.ndarray = field(default_factory=lambda: np.zeros(0))

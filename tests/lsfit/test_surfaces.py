@@ -7,18 +7,14 @@ import pytest
 
 from softjaw.friction.motion import fibonacci_twists
 from softjaw.lsfit.ellipsoid import Ellipsoid
-from softjaw.lsfit.form import exponents, monomials, quartic_volume
+from softjaw.lsfit.form import exponents, quartic_volume
 from softjaw.lsfit.quartic import Quartic
-from softjaw.lsfit.samples import fit_error, overclaim, sample_rank
+from softjaw.lsfit.samples import fit_error, overclaim
 from softjaw.lsfit.surface import FitFlag, Image, supported_shadow
+from tests.lsfit.test_form import coefficients
 
 AXES = np.array([1.0, 0.7, 0.1])
 E = exponents(3, 4)
-
-
-def coefficients(P, d=3):
-    u = np.random.default_rng(0).normal(size=(8 * len(exponents(d, 4)), d))
-    return np.linalg.lstsq(monomials(u, exponents(d, 4)), P(u), rcond=None)[0]
 
 
 def tilted_matrix(seed=1):
@@ -88,13 +84,6 @@ def test_the_support_is_what_the_point_with_that_normal_gives(surface):
 
 
 @every
-def test_chords_stay_inside(surface):
-    u, v = np.random.default_rng(4).normal(size=(2, 200, 3))
-    a, b = u * surface.radius(u)[:, None], v * surface.radius(v)[:, None]
-    assert surface.holds(0.3 * a + 0.7 * b).all()
-
-
-@every
 def test_another_unit_changes_nothing_but_the_numbers(surface):
     factors = np.array([3.0, 3.0, 0.02])
     t = np.random.default_rng(6).normal(size=(10, 3))
@@ -110,16 +99,6 @@ def test_another_unit_changes_nothing_but_the_numbers(surface):
 def test_the_shadow_from_supports_is_the_same(surface):
     if surface is not SURFACES["fourth powers"]:  # its support has kinks in the curvature
         assert supported_shadow(surface.support, 3) == pytest.approx(surface.shadow_area, rel=1e-8)
-
-
-@every
-def test_the_volume_from_random_points(surface):
-    """A box around the body holds a share of points in it; 3 standard deviations."""
-    box, n = surface.semi_axes, 40_000
-    w = np.random.default_rng(7).uniform(-1, 1, size=(n, 3)) * box
-    share = surface.holds(w).mean()
-    error = 3 * math.sqrt(share * (1 - share) / n)
-    assert surface.volume / (8 * box.prod()) == pytest.approx(share, abs=error)
 
 
 def test_an_ellipsoid_is_the_same_in_every_form():
@@ -211,9 +190,6 @@ def test_flags_closing_with_the_surface():
         assert surface.scaled([1.0, 1.0, 2.0]).flag == FitFlag.BOUNDED
 
 
-# Errors of fits, and samples
-
-
 def on_the_ellipsoid(K=200):
     """Wrenches of the ellipsoid with the semi-axes `AXES` and the unit normals there."""
     t = fibonacci_twists(K, 1.0)
@@ -233,9 +209,3 @@ def test_only_what_is_claimed_too_much_is_an_overclaim():
     assert overclaim(Ellipsoid.of_axes(1.1 * AXES), W) == pytest.approx(0.1, rel=1e-9)
     assert overclaim(Ellipsoid.of_axes(0.9 * AXES), W) == pytest.approx(0.0, abs=1e-12)
     assert overclaim(longer, [[0, 0, AXES[2]], [AXES[0], 0, 0]]) == pytest.approx(0.2)
-
-
-def test_rank_of_samples():
-    assert sample_rank(on_the_ellipsoid()[0]) == 3
-    assert sample_rank(on_the_ellipsoid()[0] * [1, 0, 1]) == 2
-    assert sample_rank(np.zeros((4, 3))) == 0

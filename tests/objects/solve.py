@@ -47,23 +47,7 @@ RANDOM = 50  # scenes of shapes without a mesh
 
 @dataclass
 class Outcome:
-    """What became of an object.
-
-    Attributes
-    ----------
-    cases, solved : int
-        How many were asked for, and how many have values.
-    flags : dict
-        Number of solved cases with each flag, by its word.
-    failures : list
-        Where, and the message, of each case that failed.
-    refused : str
-        Why there are no cases.
-    inside : float
-        How deep a pad starts inside the triangles, at most [m].
-    notes : list of str
-        What reading the mesh mended or left open.
-    """
+    """What became of an object; ``inside`` is how deep a pad starts inside the triangles, at most [m]."""
 
     name: str
     kind: str

@@ -7,12 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from softjaw.lsfit.ellipsoid import Ellipsoid
-from softjaw.scoring.contact import (
-    PolytopeBody,
-    SoftContact,
-    fibonacci_vertices,
-    hull_volume,
-)
+from softjaw.scoring.contact import PolytopeBody, SoftContact, fibonacci_vertices, hull_volume
 from softjaw.scoring.epsilon import epsilon, separating_wrench
 from softjaw.scoring.pose import pose_volume
 from softjaw.scoring.quality import ScoreFlag, contact_flag, grasp_score, score

@@ -9,12 +9,7 @@ from scipy.spatial import ConvexHull
 from jobs.graspit import graspit_vertices
 from softjaw.lsfit.ellipsoid import Ellipsoid
 from softjaw.scoring.closed_form import volume_l1, volume_linf
-from softjaw.scoring.contact import (
-    PolytopeBody,
-    SoftContact,
-    ellipsoid_matrix,
-    fibonacci_vertices,
-)
+from softjaw.scoring.contact import PolytopeBody, SoftContact, ellipsoid_matrix, fibonacci_vertices
 from softjaw.scoring.fibre import fan_area, sphere_mesh, surface_mesh
 from softjaw.scoring.pose import joint_pairs, mixed_area, pose_volume
 from tests.scoring.grasps import A, B, facing

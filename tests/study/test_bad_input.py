@@ -85,19 +85,11 @@ def every_rank(folder, *words):
 
 
 @pytest.mark.ranks
-def test_all_ranks_leave_a_wrong_scene_with_the_same_code(folder):
-    codes, errors = every_rank(folder, "--set", "friction.mu=-1")
-    assert codes == [2, 2]
-    assert errors.count("error: ") == 1
-    assert "friction.mu" in errors
-    assert not list(folder.glob("out.hdf*"))
-
-
-@pytest.mark.ranks
-def test_all_ranks_leave_a_file_of_others_with_the_same_code(folder):
+@pytest.mark.parametrize(("words", "code"), [(("--set", "friction.mu=-1"), 2), ((), 3)], ids=["scene", "file"])
+def test_all_ranks_leave_a_wrong_scene_or_a_file_of_others_with_the_same_code(folder, words, code):
     (folder / "out.hdf").write_text("my notes")
-    codes, errors = every_rank(folder)
-    assert codes == [3, 3]
+    codes, errors = every_rank(folder, *words)
+    assert codes == [code, code]
     assert errors.count("error: ") == 1
     assert (folder / "out.hdf").read_text() == "my notes"
 

@@ -127,17 +127,13 @@ def test_bad_usage_is_told_by_the_first_rank_only(monkeypatch, capsys):
 
 @pytest.mark.long
 def test_a_run_outlives_the_reader_of_its_output(tmp_path):
-    def piped():
-        small = "--set gripper.elements=[4,4,2] --set candidates.angles_deg=[0] --set accuracy.meshes=1"
-        run = f"{sys.executable} -m softjaw run {ROOT}/jobs/smoke.toml -o smoke.hdf {small}"
-        done = subprocess.run(
-            ["bash", "-c", f"{run} | head -n 1; exit ${{PIPESTATUS[0]}}"], cwd=tmp_path,
-            env={**launch_environment(), "PYTHONPATH": str(ROOT)}, capture_output=True, text=True, timeout=120,
-            check=False,
-        )  # fmt: skip
-        return done.returncode, done.stderr
-
-    assert piped() == (0, "")
+    small = "--set gripper.elements=[4,4,2] --set candidates.angles_deg=[0] --set accuracy.meshes=1"
+    run = f"{sys.executable} -m softjaw run {ROOT}/jobs/smoke.toml -o smoke.hdf {small}"
+    done = subprocess.run(
+        ["bash", "-c", f"{run} | head -n 1; exit ${{PIPESTATUS[0]}}"], cwd=tmp_path, timeout=120, check=False,
+        env={**launch_environment(), "PYTHONPATH": str(ROOT)}, capture_output=True, text=True,
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 RUNNABLE = [  # all but those that take minutes and are tested elsewhere

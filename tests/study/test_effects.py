@@ -13,8 +13,7 @@ from softjaw.study.case.effects import FORCED, LITTLE, MUCH, UNDECIDED, EffectCh
 from softjaw.study.case.effects import STIFF_PLATE as STIFF
 from softjaw.study.case.solver import COARSE, Solved
 from softjaw.study.flags import Flag
-from softjaw.study.quantities import EFFECTS, REASONS
-from softjaw.study.scene import SceneError
+from softjaw.study.quantities import REASONS
 from tests.study.scenes import CONE, OVAL, scene_of
 from tests.study.test_pipeline import PLATE, cases, e_n, solved
 from tests.study.test_walls import CUP
@@ -151,19 +150,6 @@ def test_friction_that_cannot_be_solved_on_the_scenes_mesh_is_left_out(choice, m
     assert found.flags_at(0) == Flag.LEFT_OUT
 
 
-def test_reasons_of_levels_that_no_target_chooses():
-    effects = [result.effects for _, path in solved(OVAL) for result in path]
-    for name, level, reason in (
-        ("friction", "ccm", "never skipped, because it costs next to nothing"),
-        ("limit_surface", "convex quartic", "never skipped, because it costs next to nothing"),
-        ("wrench", "3-D", "e_n and quality do not depend on it"),
-    ):
-        assert {(own[name][0], REASONS[own[name][2]]) for own in effects} == {(level, reason)}
-    for own in effects:
-        assert own.keys() == EFFECTS.keys()
-        assert all(own[name][0] in levels for name, levels in EFFECTS.items())
-
-
 def test_six_components_change_nothing_that_is_mapped():
     for one, six in zip(cases(OVAL), cases(OVAL, 'effects.wrench="6-D"'), strict=True):
         for name, value in one.items():
@@ -267,12 +253,6 @@ def test_a_mount_that_tilts_spreads_the_contact_on_a_slope_and_a_stiff_one_chang
     # turned to the slope the pad bears on more of its length
     assert soft["maps/contact_area"] > 1.05 * rigid["maps/contact_area"]
     assert soft["maps/e_n"][0] > 1.02 * rigid["maps/e_n"][0]
-
-
-def test_a_plate_that_tilts_cannot_be_elastic():
-    assert scene_of(OVAL, "gripper.tilt_stiffness_nm_per_rad=1")
-    with pytest.raises(SceneError, match="tilt_stiffness_nm_per_rad"):
-        scene_of(OVAL, "gripper.tilt_stiffness_nm_per_rad=1", 'effects.sheet="elastic"')
 
 
 UNCOUPLED = 'effects.friction_pressure_coupling="none"'

@@ -13,7 +13,6 @@ from softjaw.study.quantities import map_row
 from softjaw.study.result.datasets import MESSAGE_BYTES
 from softjaw.study.show.best_grasps import LABEL_WIDTH
 from softjaw.study.units import SHOWN, UNITS, in_si, shown, shown_text, shown_unit
-from tests.study.scenes import OVAL, results_of, scene_of
 
 ROOT = Path(__file__).parents[2]
 TABLE = sum(Flag)  # all bits that have a row
@@ -53,13 +52,6 @@ def test_a_value_is_told_bit_by_bit(value):
     assert sum(flags_in(value)) == value
     assert flag_words(value) == ", ".join(flag.word for flag in flags_in(value))
     assert [part for part in flag_sentences(value).split("; ") if part] == [flag.sentence for flag in flags_in(value)]
-
-
-def test_the_message_of_a_case_tells_its_flags():
-    round_one = OVAL.replace("semi_axis_b_mm = 20", "semi_axis_b_mm = 25")
-    [case] = results_of(scene_of(round_one, forces="[1]", elements="[4, 4, 2]"))
-    assert case.values["maps/flags"] & Flag.COARSE
-    assert case.message == flag_sentences(case.values["maps/flags"])
 
 
 @pytest.mark.parametrize(

@@ -180,13 +180,6 @@ def test_faces_are_joined_by_load_else_by_area():
     assert found["normal"].tolist() == [[0.0, 0.0, 1.0]] * 2
 
 
-def test_not_a_bit_depends_on_which_forces_are_asked_for(split):
-    _, target, found = split
-    again = refined(*aim(target), wanted=[2])
-    assert list(again) == [2]
-    assert bits(again[2]) == bits(found[2])
-
-
 def test_a_finer_mesh_without_a_state_loses_nothing(monkeypatch, split):
     at = Press.at
 

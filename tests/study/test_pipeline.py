@@ -238,13 +238,8 @@ def test_the_pad_stands_at_first_touch_and_lies_on_the_object_under_load(shape, 
             assert along == pytest.approx(unit.scene.load.normal_force[path.index(result)], rel=1e-8)
 
 
-@pytest.mark.parametrize("radius", [5, 30])
-def test_a_load_path_that_ends_names_the_last_good_force_and_what_was_not_tried(radius):
-    [(_, path)] = solved(f'shape = "sphere"\nradius_mm = {radius}', forces="[2, 20, 30]")
-    if radius == 30:
-        assert not any(isinstance(result, CaseFailure) for result in path)
-        return
-    good, ended, above = path
+def test_a_load_path_that_ends_names_the_last_good_force_and_what_was_not_tried():
+    [(_, [good, ended, above])] = solved('shape = "sphere"\nradius_mm = 5', forces="[2, 20, 30]")
     assert good.values["maps/closing"] > 0
     assert isinstance(ended, CaseFailure)
     *met, last_good = numbers_of(ended.message, "N")

@@ -29,7 +29,7 @@ def states(allowed=(True, True), level="nonlinear", thickness=4e-4, z=0.075, sup
 
 @pytest.mark.parametrize(("allowed", "level", "control"), [
     ((True, True), "nonlinear", Control(force=2.0)), ((True, True), "linear", Control(force=2.0)),
-    ((False, False), "nonlinear", Control(force=2.0)), ((False, False), "nonlinear", Control(closing=1e-3)),
+    ((False, False), "nonlinear", Control(force=2.0)), ((True, True), "nonlinear", Control(closing=1e-3)),
 ])  # fmt: skip
 def test_the_tangent_is_the_derivative_of_the_residual(allowed, level, control):
     problem = grip(thin(), elements=(4, 2, 2), allowed=allowed, level=level).problem

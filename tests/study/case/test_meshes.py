@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 import trimesh
 
-import softjaw as sj
 from softjaw.study import pipeline
 from softjaw.study.case.build import build_object
 from softjaw.study.case.candidates import candidates
@@ -13,8 +12,6 @@ from softjaw.study.case.pressing import OnRigid
 from softjaw.study.result.read import open as open_dataset
 from softjaw.study.result.skeleton import create
 from softjaw.study.run.plan import make_plan
-from tests.fem.test_triangles import KINDS
-from tests.objects.bodies import outline_body, slabs
 from tests.study.scenes import BALL, NO_COUPLING, mesh_of, pose_of, results_of, scene_of, units_of
 
 TURN = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])  # the object's z is the file's x
@@ -141,24 +138,3 @@ def test_the_other_finger_is_the_mirror_image(lopsided):
     np.testing.assert_allclose(other.origin, solved.origin, atol=1e-6)
     np.testing.assert_allclose(other.normal, solved.normal, atol=1e-4)
     np.testing.assert_allclose(other.pressure_wrench, solved.pressure_wrench, atol=1e-4)
-
-
-def values(folder, name: str, mesh: trimesh.Trimesh) -> np.ndarray:
-    """e_n [m], quality and payload [kg] of one grasp."""
-    mesh.export(folder / f"{name}.stl")
-    shape, where = mesh_of(folder / f"{name}.stl", "m"), pose_of((0, 0, 55), (-1, 0, 0))
-    case = sj.press(scene_of(shape, where=where, forces="[5]", elements="[16, 8, 5]"), candidate=0, force=5.0)
-    return np.array([case.e_n, case.quality, case.payload])
-
-
-@pytest.fixture(scope="module")
-def sound(tmp_path_factory):
-    return values(tmp_path_factory.mktemp("sound"), "closed", outline_body())
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("kind", [*KINDS, "slabs"])
-def test_the_map_does_not_depend_on_how_the_triangles_are_given(kind, sound, tmp_path):
-    body = outline_body()
-    mesh = slabs(5) if kind == "slabs" else trimesh.Trimesh(*KINDS[kind](body.vertices, body.faces), process=False)
-    np.testing.assert_allclose(values(tmp_path, "other", mesh), sound, rtol=5e-3)

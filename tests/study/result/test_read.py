@@ -93,9 +93,6 @@ def test_patches_are_read_on_demand_at_positions(half):
     assert np.array_equal(some.normal.values[1, 0], one.normal.values)
     assert np.isnan(some.pressure.values[3:]).all()
     assert some.pressure.units == "Pa"
-
-
-def test_a_field_that_the_file_has_not_is_refused(half):
     with pytest.raises(KeyError):
         read_field(half, "wall/place")
 

@@ -61,6 +61,8 @@ WRONG_LINES = [
     ("[friction]\nmu = -0.1", 12, "friction.mu", "-0.1", "`mu = 0.8`"),
     ("[friction]\nused_by_pressing = true", 12, "friction.used_by_pressing", "true", ""),
     ("[effects]\nobject = 'linear_shell'", 12, "effects.object", '"linear_shell"', ""),
+    ("[gripper]\ntilt_stiffness_nm_per_rad = 1\n[effects]\nsheet = 'elastic'", 12, "gripper.tilt_stiffness_nm_per_rad",
+     "1.0", ""),
     ("[limit_surface]\nwrench_samples = 'some'", 12, "limit_surface.wrench_samples", '"some"', ""),
     ("[limit_surface]\nwrench_samples = [0, 2]", 12, "limit_surface.wrench_samples[1]", "2", ""),
     ("[limit_surface]\nwrench_samples = ['0 mm, 9 deg']", 12, "limit_surface.wrench_samples[0]", '"0 mm, 9 deg"', ""),

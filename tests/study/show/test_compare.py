@@ -54,6 +54,7 @@ def test_common_places_are_found_by_value_and_the_others_named(pair):
     assert [station[key].tolist() for key in ("only_a", "only_b")] == [[0.0], [0.1]]
     assert [*found.facts["states"].values()] == [35, 1, 0, 0]
     assert found.facts["axes"]["normal_force"]["only_a"].tolist() == [1.0, 8.0]
+    assert found.facts["settings"] == [{"key": "friction.mu", "a": None, "b": 0.5}]
 
 
 def test_differences_are_judged_by_the_errors_of_both_files(pair):
@@ -91,10 +92,6 @@ def test_errors_of_one_file_alone_are_unknown(pair, tmp_path):
     assert {row["beyond_error"] for row in found.rows} == {None}
     assert not any(c.people for c in found.columns if c.name in ("error", "beyond_error"))
     assert found.facts["settings"] == []
-
-
-def test_settings_that_differ_are_listed(pair):
-    assert compared(*pair).facts["settings"] == [{"key": "friction.mu", "a": None, "b": 0.5}]
 
 
 def test_the_text_fits_a_terminal_and_lists_the_largest_first(pair):
