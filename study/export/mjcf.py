@@ -12,9 +12,9 @@ says, at its F_N, and scale with the normal force beside it. What the fitted qua
 Four things belong to it.
 
 * The pad is a ball, which touches at one point. A box would touch at several, and each would add its own torque.
-* ``cone="elliptic"``: the default is a pyramid. ``impratio="100"`` makes friction as stiff as normal contact, and
-  ``noslip_iterations="50"`` stops the creep that MuJoCo's soft friction has below slip; without it a grasp turns slowly
-  under any torque.
+* ``cone="elliptic"``: the default is a pyramid. ``impratio="10000"`` makes friction stiff, and
+  ``noslip_iterations="200"`` stops the creep that MuJoCo's soft friction has below slip; without it a grasp turns
+  slowly under any torque, and most where a thin plate bears a weight beside it.
 * A ``<pair>``: it alone takes two slides, and nobody's other friction is mixed in.
 * The tangents. MuJoCo does not turn them with the pad: the first is the world's y axis laid into the contact plane, or
   the z axis where the normal is within 60 degrees of y (``mju_makeFrame`` of its sources). The file therefore stands in

@@ -62,7 +62,8 @@ def spot(ds: xr.Dataset, index: Index) -> Spot:
         return Spot("", "", math.nan)
     offset = origin[index].mean(axis=0) - frame.to_object(centre)
     closing = turn[index][0, :, 2]
-    offset -= (offset @ closing) * closing  # both fingers bear along it
+    half = 0.5 * abs(np.diff(origin[index], axis=0)[0] @ closing)
+    offset -= np.clip(offset @ closing, -half, half) * closing  # between the fingers both bear along it
     sides = _sides(np.ptp(frame.to_object(points), axis=0), closing) if ds.attrs["poses"] else ""
     vector = ", ".join(f"{x + 0.0:.2g}" for x in np.round(closing, 2))
     closes = f"closing along ({vector}), " * (sides == "on the sides")  # where no axis says it

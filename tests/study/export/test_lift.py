@@ -15,6 +15,7 @@ from softjaw.study.export.selection import GripperFrame, grasps
 from softjaw.study.result.read import open as open_result
 from softjaw.study.units import GRAVITY
 from tests.study.launching import ROOT
+from tests.study.scenes import ONE_MESH, pose_of, scene_of
 
 mujoco = pytest.importorskip("mujoco", reason="MuJoCo is not installed: pip install mujoco")
 DIRECTIONS = np.array([d for d in itertools.product((-1, 0, 1), repeat=3) if any(d)], float)
@@ -75,6 +76,17 @@ def test_it_holds_nine_tenths_of_the_payload_and_lets_go_at_twelve_tenths(cylind
     """The long test has more objects and more time."""
     assert holds(*best(cylinder), 0.9, 0.5).all()
     assert not holds(*best(cylinder), 1.2, 1.0).all()
+
+
+def test_a_thin_plate_below_the_centre_of_mass_does_not_creep(tmp_path):
+    """Both fingers bear its weight by a couple of frictions 6 mm apart, as at the bottom of a bowl."""
+    plate = 'shape = "box"\nsize_mm = [60, 60, 6]\nedge_radius_mm = 1\nmass_g = 80'
+    off = "task.centre_of_mass_mm=[0, 0, 20]"
+    scene = scene_of(plate, ONE_MESH, off, where=pose_of((0, 0, 0), (0, 0, -1), (1, 0, 0)), forces="[10]")
+    sj.run(scene, tmp_path / "map.hdf")
+    grasp, body = best(tmp_path / "map.hdf")
+    assert holds(grasp, body, 0.9, 5.0, DIRECTIONS[:6]).all()
+    assert not holds(grasp, body, 1.2, 2.0, DIRECTIONS[:6]).all()
 
 
 def test_opened_and_run_untouched_it_holds(cylinder):

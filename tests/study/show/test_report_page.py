@@ -55,7 +55,7 @@ def test_a_script_from_elsewhere_is_not_run(browser, page, tmp_path):
 def test_reasons_and_titles_are_text_everywhere(browser, page):
     browser.open(page)
     browser.wait("document.querySelector('.controls p').textContent")
-    assert browser.ask("document.querySelector('#maps table').textContent").count(REASON) == 1  # why cases failed
+    assert browser.ask("document.querySelector('#maps').textContent").count(REASON) == 1  # why cases failed
     assert REASON in browser.ask("document.querySelector('#cases table').textContent")
     assert browser.ask("document.querySelector('h1').textContent").startswith("<b>thing</b>")
     assert browser.ask("document.querySelectorAll('b').length") == 0
