@@ -58,7 +58,8 @@ class Linkage(BaseModel):
 class Hand(BaseModel):
     """A parallel gripper as planners need it; a gripper of which nothing is known by default.
 
-    ``stroke_mm`` is the largest gap. ``joints`` have a value per gap [m/m], or per angle of the ``linkage_mm``
+    ``stroke_mm`` is the largest gap, ``force_n`` the least and the largest force of one finger; makers often state the
+    sum of both. ``joints`` have a value per gap [m/m], or per angle of the ``linkage_mm``
     [rad/rad], which then has a ``largest_angle``. ``palm_mm`` are two corners of a box, ``finger_mm`` the width of a
     finger and its thickness from the face outwards. ``approaches`` are those that the mounted pads allow.
     """

@@ -50,7 +50,7 @@ def test_keys_of_the_scene_come_first(tmp_path):
 @pytest.mark.parametrize(
     ("name", "force", "key"),
     [("four_fingers", 5, "gripper.preset"), ("robotiq_2f85", 5, "load.normal_force_n"),
-     ("wsg50", 81, "load.normal_force_n")],
+     ("wsg50", 41, "load.normal_force_n")],
 )  # fmt: skip
 def test_what_a_gripper_cannot_do_is_refused_with_its_key_and_line(tmp_path, name, force, key):
     with pytest.raises(SceneError) as error:
