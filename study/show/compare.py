@@ -21,7 +21,7 @@ from softjaw.study.units import shown, shown_unit
 
 FloatArray = NDArray[np.float64]
 MOST_SETTINGS, MOST_VALUES = 12, 8  # that a text lists
-Block = tuple[NDArray[np.int64], ...]  # of a file: where its common cases lie, as `numpy.ix_` gives it
+Pair = tuple[xr.Dataset, xr.Dataset]
 
 
 def compare(one: xr.Dataset, other: xr.Dataset, quantity: str = "e_n", model: str = "ccm") -> Table:
@@ -34,9 +34,8 @@ def compare(one: xr.Dataset, other: xr.Dataset, quantity: str = "e_n", model: st
     case. ``model``: friction model of all quantities. Raises `StudyError`: different kinds of axes, nothing in common,
     or an unknown quantity.
     """
-    pair = (one, other)
-    axes, blocks = _matched(*pair)
-    in_a, in_b = (ds.status.values[block] == DONE for ds, block in zip(pair, blocks, strict=True))
+    axes, pair = _matched(one, other)
+    in_a, in_b = (ds.status.values == DONE for ds in pair)
     states = {"solved in both": in_a & in_b, "only in a": in_a & ~in_b, "only in b": ~in_a & in_b,
               "in neither": ~in_a & ~in_b}  # fmt: skip
     names = [q.name for q in TABLE if q.group == "maps" and q.name != "flags" and q.name in one and q.name in other]
@@ -44,9 +43,9 @@ def compare(one: xr.Dataset, other: xr.Dataset, quantity: str = "e_n", model: st
         text = f"--quantity: found '{quantity}', expected one that both files have: {', '.join(names)}"
         raise StudyError(USAGE, text)
     units = map_row(quantity).unit
-    values = _values(pair, blocks, quantity, model)
+    values = _values(pair, quantity, model)
     *few, station, angle, _ = axes
-    labels = None if axes[station]["units"] else one.label.values[blocks[0][-3].ravel(), 0]
+    labels = None if axes[station]["units"] else pair[0].label.values[:, 0]
     rows: list[Row] = []
     for index in np.ndindex(in_a.shape):
         place: Row = {name: float(axis["common"][i]) for (name, axis), i in zip(axes.items(), index, strict=True)}
@@ -62,7 +61,7 @@ def compare(one: xr.Dataset, other: xr.Dataset, quantity: str = "e_n", model: st
                 Column("beyond_error", "", "exceeds\nerrors", people=judged)]  # fmt: skip
     facts = {"files": {"a": str(one.file), "b": str(other.file)}, "settings": _settings(*pair), "axes": axes,
              "states": {words: int(cases.sum()) for words, cases in states.items()}, "quantity": quantity,
-             "summary": [_summary(name, _values(pair, blocks, name, model)) for name in names
+             "summary": [_summary(name, _values(pair, name, model)) for name in names
                          if map_row(name).rank or name == quantity]}  # fmt: skip
     return Table("", columns, rows, _verdict(pair, quantity, model, values), facts, "cases")
 
@@ -108,8 +107,8 @@ def _setting_lines(settings: list[Row] | None, width: int) -> list[str]:
 # --- axes ------------------------------------------------------------------------------------------------------------
 
 
-def _matched(one: xr.Dataset, other: xr.Dataset) -> tuple[dict[str, Row], list[Block]]:
-    """Values of every axis that both files have, and that only one has; which cases of each file are common."""
+def _matched(one: xr.Dataset, other: xr.Dataset) -> tuple[dict[str, Row], Pair]:
+    """Values of every axis that both files have, and that only one has; the common cases of both."""
     both = axes_of(one), axes_of(other)
     kinds = [[(axis.name, axis.units) for axis in axes] for axes in both]
     if kinds[0] != kinds[1]:
@@ -117,7 +116,7 @@ def _matched(one: xr.Dataset, other: xr.Dataset) -> tuple[dict[str, Row], list[B
         text = f"the maps have different axes: {words[0]} in {one.file}, {words[1]} in {other.file}"
         raise StudyError(USAGE, f"{text}; compare files with the same kind of candidates and the same swept keys")
     axes: dict[str, Row] = {}
-    at = []
+    pair = one, other
     for a, b in zip(*both, strict=True):
         scale = max(np.abs(a.values).max(), np.abs(b.values).max(), 1e-300)
         # relative difference of coordinates that is only rounding
@@ -129,9 +128,10 @@ def _matched(one: xr.Dataset, other: xr.Dataset) -> tuple[dict[str, Row], list[B
             lists = (", ".join(f"{v:.6g}" for v in values[:5]) for values in only)
             text = " and ".join(f"{values} in {ds.file}" for values, ds in zip(lists, (one, other), strict=True))
             raise StudyError(USAGE, f"no common {a.name} [{a.units or '-'}]: {text}; there is nothing to compare")
-        at.append(np.nonzero(same))
-        axes[a.name] = {"units": a.units, "common": a.values[at[-1][0]], "only_a": only[0], "only_b": only[1]}
-    return axes, [np.ix_(*(pair[i] for pair in at)) for i in (0, 1)]
+        at = np.nonzero(same)
+        pair = pair[0].isel({a.name: at[0]}), pair[1].isel({a.name: at[1]})
+        axes[a.name] = {"units": a.units, "common": a.values[at[0]], "only_a": only[0], "only_b": only[1]}
+    return axes, pair
 
 
 def _left_out(name: str, axis: dict[str, Any]) -> list[str]:
@@ -147,13 +147,10 @@ def _left_out(name: str, axis: dict[str, Any]) -> list[str]:
 # --- differences -----------------------------------------------------------------------------------------------------
 
 
-def _values(
-    pair: tuple[xr.Dataset, xr.Dataset], blocks: list[Block], name: str, model: str
-) -> dict[str, NDArray[Any]]:
+def _values(pair: Pair, name: str, model: str) -> dict[str, NDArray[Any]]:
     """Columns of a map over the common cases; NaN where a file has no result, None where an error is unknown."""
-    a, b = (values_of(ds, name, model)[block] for ds, block in zip(pair, blocks, strict=True))
-    errors = zip((_error(ds, name, model) for ds in pair), blocks, strict=True)
-    error = sum(np.full(a.shape, np.nan) if e is None else e[block] for e, block in errors)
+    a, b = (values_of(ds, name, model) for ds in pair)
+    error = sum(np.full(a.shape, np.nan) if e is None else e for e in (_error(ds, name, model) for ds in pair))
     change, size = b - a, np.abs(a)
     beyond = (np.abs(change) > error + TIE * size).astype(object)
     beyond[~(np.isfinite(change) & np.isfinite(error))] = None
@@ -189,7 +186,7 @@ def _shown_summary(row: Row) -> Row:
     return means | shares | {"quantity": with_unit(row["quantity"], shown_unit(row["units"])), "exceed": exceed}
 
 
-def _verdict(pair: tuple[xr.Dataset, xr.Dataset], name: str, model: str, values: dict[str, Any]) -> list[str]:
+def _verdict(pair: Pair, name: str, model: str, values: dict[str, Any]) -> list[str]:
     """How many differences of the quantity that was asked for exceed the errors; or which file states none."""
     row = _summary(name, values)
     silent = " and ".join(x for x, ds in zip("ab", pair, strict=True) if _error(ds, name, model) is None)

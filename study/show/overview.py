@@ -34,7 +34,6 @@ def scene_text(scene: Any, file: str) -> str:
         "accuracy": _meshes(scene.accuracy),
         "intervals": _intervals(scene),
         "effects": ", ".join(levels),
-        "compliance": compliance_text(scene) if has_wall(o) else "",
         "petsc": " ".join(f"-{key} {value}" for key, value in scene.petsc.items()),
         "each case": limits_text(scene.run),
     }
@@ -88,21 +87,6 @@ def wall_text(shape: Any) -> str:
         f"indentation up to {shape.allowed_dent_mm:g} mm allowed" if shape.allowed_dent_mm else "any indentation",
     ]
     return ", ".join(words)
-
-
-RULE = (  # as study.case.effects has it for a target of 1 %
-    "by the indentation that a linear wall would get at the largest force: rigid below 2 % of the pads' closing"
-    " displacement, linear shell up to 0.6 of the wall's thickness, nonlinear shell beyond"
-)
-
-
-def compliance_text(scene: Any) -> str:
-    """How an object's wall will be simulated."""
-    level = scene.effects.object
-    if level == "auto":
-        return f"chosen for each candidate: {RULE}"
-    note = "indentation and stress are not computed" if level == "rigid" else "as the scene says"
-    return f"{level.replace('_', ' ')} for every candidate, {note}"
 
 
 def _extent(shape: Any) -> str:
