@@ -13,7 +13,7 @@ import math
 import shutil
 import textwrap
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 from rich.cells import cell_len
@@ -77,10 +77,6 @@ class Table:
     notes: Sequence[str] = ()
     facts: dict[str, Any] = field(default_factory=dict)
     name: str = "rows"
-
-    def first(self, count: int) -> Table:
-        """The first rows (0: all of them)."""
-        return replace(self, rows=self.rows[: count or None])
 
     def cell(self, row: Row, column: Column) -> str:
         """A value as people read it, with its error where that is known."""

@@ -18,7 +18,7 @@ from softjaw.study.case.evaluate import ECCENTRICITIES, exact_score, soft
 from softjaw.study.case.limit_surface import STANDS_IN, fit_surfaces
 from softjaw.study.case.result import UNDECIDED
 from softjaw.study.flags import Flag, flags_in, raised
-from softjaw.study.messages import OTHER_FILE, USAGE, StudyError
+from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.patch.faces import ReadPatch
 from softjaw.study.patch.patch_reader import ENDINGS, Reading, checked_file, read_table
 from softjaw.study.quantities import MODELS
@@ -62,13 +62,10 @@ OF_FRAME = Flag.CYCLE | Flag.HOLE | Flag.NO_CORNERS | Flag.OVERHANG
 def read_patch(file: str, reading: Reading) -> ReadPatch:
     """The patch in a file, in the file's coordinates; `StudyError` for what cannot be read (3) or is no patch (2)."""
     path = checked_file(file, ENDINGS)
-    ending = path.suffix.lower()
-    if ending == ".csv":
+    if path.suffix.lower() == ".csv":
         return read_table(path, reading)
-    from softjaw.study.patch.vtk_faces import read_vtk, trouble  # VTK, which tables do not need
+    from softjaw.study.patch.vtk_faces import read_vtk  # VTK, which tables do not need
 
-    if why := trouble(lambda: read_vtk(path, reading)):  # VTK may not survive the file
-        raise StudyError(OTHER_FILE, f"{path}: damaged ({why}); write it again")
     return read_vtk(path, reading)
 
 

@@ -1,14 +1,7 @@
-"""Faces of a contact patch from a VTK file (VTU, VTP), as ParaView exports them, tried in a child process first."""
+"""Faces of a contact patch from a VTK file (VTU, VTP), as ParaView exports them."""
 
 from __future__ import annotations
 
-import faulthandler
-import multiprocessing
-import os
-import resource
-import signal
-import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -23,9 +16,6 @@ from softjaw.study.patch.faces import ReadPatch, checked, corner_geometry
 from softjaw.study.patch.patch_reader import FACTORS, Reading, check_count, refused, split_header
 
 TRIANGLE, POLYGON, PIXEL, QUAD = 5, 7, 8, 9  # VTK's cell types
-TRIAL_CPU_S = 20
-TRIAL_BYTES = 2**30  # beyond what this process has already
-NO_MEMORY = 3  # exit code of a trial
 
 
 def read_vtk(path: Path, reading: Reading) -> ReadPatch:
@@ -123,44 +113,3 @@ def _pressure_array(path: Path, grid: Any, reading: Reading) -> tuple[str, NDArr
     remedy = f"give its name with --pressure-name {closest(wanted, names) or (names[0] if names else 'NAME')}"
     found = f"the arrays {', '.join(names)}" if names else "no array of scalars"
     raise refused(path, None, wanted, found, "the pressure", remedy)
-
-
-# --- trial -----------------------------------------------------------------------------------------------------------
-
-
-def trouble(attempt: Callable[[], object]) -> str:
-    """How an attempt ended that must not be repeated here, in words; empty if it came to an end, even by an exception.
-
-    It costs a few milliseconds, and as much again as the attempt itself.
-    """
-    child = multiprocessing.get_context("fork").Process(target=_try, args=(attempt,))
-    child.start()
-    child.join()
-    # At a hard limit the kernel kills instead of sending SIGXCPU.
-    if child.exitcode in (-signal.SIGXCPU, -signal.SIGKILL):
-        return f"reading it does not end within {TRIAL_CPU_S} s"
-    if child.exitcode == NO_MEMORY:
-        return f"reading it takes more than {TRIAL_BYTES >> 30} GiB"
-    return "the library that reads it crashes on it" if child.exitcode else ""
-
-
-def _try(attempt: Callable[[], object]) -> None:
-    """Attempt something in a process that is quiet, short and small."""
-    # A crash is expected here: its traceback belongs on no terminal.
-    faulthandler.disable()
-    silent = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(silent, 1)
-    os.dup2(silent, 2)
-    limits = {resource.RLIMIT_CORE: 0, resource.RLIMIT_CPU: TRIAL_CPU_S}
-    # Elsewhere there is no /proc that gives the present size, which a bound has to be added to.
-    if sys.platform == "linux":
-        pages = int(Path("/proc/self/statm").read_text().split()[0])
-        limits[resource.RLIMIT_AS] = pages * resource.getpagesize() + TRIAL_BYTES
-    for kind, value in limits.items():
-        hard = resource.getrlimit(kind)[1]
-        resource.setrlimit(kind, (value if hard == resource.RLIM_INFINITY else min(value, hard), hard))
-    try:
-        attempt()
-    except Exception as error:  # reported by the parent, which meets it too
-        # Missing memory also comes as other errors, whose text alone says so.
-        sys.exit(NO_MEMORY if isinstance(error, MemoryError) or "alloc" in str(error).lower() else 0)

@@ -205,11 +205,4 @@ QUICK = {
 def slow_readers(folder: Path) -> dict[str, Reader]:
     """Readers whose libraries have to be kept apart, with files that take a while to make."""
     from tests.study.formula_results import make
-    from tests.study.patch_files import cylinder_mesh, vtk
-    points, cells = cylinder_mesh()
-    grids = [vtk(folder / f"seed.{end}", points, cells, [("pressure", np.ones(len(cells)))]) for end in ("vtu", "vtp")]
-    return {
-        "VTU": Reader("patch.vtu", grids[0].read_bytes(), TEXTUAL, _patch),
-        "VTP": Reader("patch.vtp", grids[1].read_bytes(), TEXTUAL, _patch),
-        "result": Reader("result.hdf", make(folder / "seed.hdf").read_bytes(), BINARY, _result),
-    }
+    return {"result": Reader("result.hdf", make(folder / "seed.hdf").read_bytes(), BINARY, _result)}

@@ -2,11 +2,9 @@
 
 import os
 import shutil
-import signal
 from contextlib import suppress
 
 import h5py
-import numpy as np
 import pytest
 
 from softjaw.fem.errors import MeshError
@@ -14,13 +12,11 @@ from softjaw.fem.objects.mesh_file import read_triangles
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.study.cli import main
 from softjaw.study.messages import OTHER_FILE, UNPRINTABLE, USAGE, StudyError
-from softjaw.study.patch.vtk_faces import trouble
 from softjaw.study.result.store import open_result
 from softjaw.study.scene import SceneError, load_scene, parse_scene
 from tests.fuzz.lies import LIES
 from tests.fuzz.readers import QUICK, obj, ply, stl
 from tests.study.formula_results import make
-from tests.study.patch_files import cylinder_mesh, vtk
 from tests.study.sealing import sealed
 
 BALL = '[object]\nshape = "sphere"\nradius_mm = 30\n[candidates]\nstations_mm = [0]\n[load]\nnormal_force_n = [2]\n'
@@ -111,26 +107,6 @@ def test_tables_that_ended_the_program_once_are_refused(tmp_path, told, old, new
     path.write_bytes(TABLE.replace(old, new, 1))
     code, text = told("patch", path, "--distance", "60")
     assert (code, words in text) == (USAGE, True), text
-
-
-@pytest.mark.long
-def test_a_file_that_vtk_crashes_on_ends_a_child_process_only(tmp_path, told):
-    points, cells = cylinder_mesh()
-    path = vtk(tmp_path / "a.vtp", points, cells, [("pressure", np.ones(len(cells)))])
-    head, _, tail = path.read_text().partition('Name="offsets"')
-    numbers, end, rest = tail.partition("</DataArray>")
-    first = numbers.split(">", 1)
-    path.write_text(head + 'Name="offsets"' + first[0] + ">" + first[1].replace("4", "900000", 3) + end + rest)
-    code, said = told("patch", path, "--unit", "mm", "--pressure-unit", "kpa")
-    assert code in (USAGE, OTHER_FILE)
-    assert str(path) in said
-
-
-def test_a_trial_survives_what_it_tries():
-    assert trouble(lambda: None) == ""
-    assert trouble(lambda: 1 / 0) == ""
-    assert "crashes" in trouble(lambda: os.kill(os.getpid(), signal.SIGSEGV))
-    assert "GiB" in trouble(lambda: np.ones(2**31))
 
 
 def commands(path, other, page):

@@ -20,7 +20,7 @@ from tests.study.launching import ROOT
 
 SECONDS, ROOM = 10, 2**30  # of CPU, and bytes beyond what the tests have already
 CHECKS = {"deadline": None, "database": None, "suppress_health_check": list(HealthCheck)}
-SLOW = ("VTU", "VTP", "result")
+SLOW = ("result",)
 
 
 def complaint(reader, path):

@@ -148,8 +148,7 @@ def _differences(ds: xr.Dataset, name: str, x: np.ndarray, lines: dict[Any, Any]
     made.update_layout(legend={"y": -0.25})
     fine = HALF_AS_FINE if any(e is not None for _, e in lines.values()) else ""
     share = "the share of the planar model's claim that the curved contact cannot carry."
-    trend = "Only the trend can be compared with the paper, whose numbers are not published."
-    caption = f"At {number(forces(ds)[index[-1]])} N: {share}{fine} {trend}"
+    caption = f"At {number(forces(ds)[index[-1]])} N: {share}{fine}"
     return plot(made, caption, f"Differences of PCM and CCM over {name}.", 400)
 
 
