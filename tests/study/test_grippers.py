@@ -26,7 +26,7 @@ normal_force_n = [{force}]
 """
 
 
-def loaded(tmp_path, name, force=60, more=""):
+def loaded(tmp_path, name, force=30, more=""):
     (tmp_path / "scene.toml").write_text(SCENE.format(name=name, force=force, more=more))
     return load_scene(tmp_path / "scene.toml").gripper
 
