@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,7 +12,7 @@ from scipy.optimize import nnls
 from softjaw.lsfit.form import exponents, monomials
 from softjaw.lsfit.samples import FLAT_RATIO, pressed, principal_frame
 from softjaw.lsfit.sos import least_in_cone, quadratic_parts
-from softjaw.lsfit.surface import ZERO_SHARE, FitFlag, LimitSurface, mapped_value, rows
+from softjaw.lsfit.surface import ZERO_SHARE, FitFlag, LimitSurface, rows
 
 FloatArray = NDArray[np.float64]
 
@@ -24,13 +23,13 @@ WEAK = 1e-10  # share of the largest eigenvalue of normal equations, below which
 
 @dataclass(frozen=True, eq=False)
 class Ellipsoid(LimitSurface):
-    """Ellipsoid ``{F y : |y| <= 1}`` in any number of dimensions, image of the unit ball.
+    """Ellipsoid ``{B y : |y| <= 1}`` in any number of dimensions, image of the unit ball.
 
     A contact that cannot carry some load has a flat one: a disc, a segment or a point, and `rank` tells which.
 
     Parameters
     ----------
-    F : (d, r) array
+    B : (d, r) array
         Map with independent columns; flat if ``r < d``.
     flag : FitFlag
         What the reader should know.
@@ -42,7 +41,7 @@ class Ellipsoid(LimitSurface):
     (2, 0.0, array([ True]), array([False]))
     """
 
-    F: FloatArray
+    B: FloatArray
     flag: FitFlag = FitFlag.CLEAN
     degree = 2
 
@@ -59,66 +58,41 @@ class Ellipsoid(LimitSurface):
         size = 1 / np.sqrt(np.diagonal(A))
         return cls(size[:, None] * np.linalg.inv(np.linalg.cholesky(A * np.outer(size, size))).T)
 
-    @cached_property
-    def inverse(self) -> FloatArray:
-        """Map ``(r, d)`` from the body back onto the ball."""
-        F = self.F
-        return np.linalg.inv(F) if F.shape[0] == F.shape[1] else np.linalg.pinv(F)
+    @property
+    def F(self) -> FloatArray:
+        """The map ``B``, from the unit ball; surfaces that are no ellipsoids have none."""
+        return self.B
 
     @property
     def A(self) -> FloatArray:
-        """Matrix ``(d, d)`` of ``P(w) = w' A w``; the pseudo-inverse of ``F F'`` for a flat body."""
+        """Matrix ``(d, d)`` of ``P(w) = w' A w``; the pseudo-inverse of ``B B'`` for a flat body."""
         return self.inverse.T @ self.inverse
-
-    @property
-    def dimension(self) -> int:
-        """Number of components of a wrench."""
-        return len(self.F)
-
-    @property
-    def span(self) -> FloatArray:
-        """Orthonormal directions ``(d, rank)`` in which the body extends."""
-        return np.linalg.qr(self.F)[0]
-
-    @property
-    def volume(self) -> float:
-        """Volume of the body; 0 if it is flat."""
-        if self.F.shape[1] < self.dimension:
-            return 0.0
-        ball = math.pi ** (self.dimension / 2) / math.gamma(self.dimension / 2 + 1)
-        return ball * abs(float(np.linalg.det(self.F)))
 
     @property
     def shadow_area(self) -> float:
         """Area of the shadow on the plane of the first two components."""
         # the shadow of a ball's image is an ellipse, with the singular values of two rows as axes
-        s = np.linalg.svd(self.F[:2], compute_uv=False)
+        s = np.linalg.svd(self.B[:2], compute_uv=False)
         return math.pi * float(s[0] * s[1]) if len(s) > 1 else 0.0
-
-    def value(self, w: ArrayLike) -> FloatArray:
-        """``P(w)``, ``(m, d) -> (m,)``; infinite where a flat body does not extend."""
-        W = rows(w, self.dimension)
-        # through the map and not A, as a sum of squares cannot turn negative by rounding
-        Y = W @ self.inverse.T
-        return mapped_value((Y**2).sum(axis=1), Y, self.F, W)
-
-    def gradient(self, w: ArrayLike) -> FloatArray:
-        """Gradient ``2 A w``, the direction of motion, ``(m, d) -> (m, d)``."""
-        return 2 * rows(w, self.dimension) @ self.inverse.T @ self.inverse
 
     def support(self, t: ArrayLike) -> FloatArray:
         """Largest ``w . t`` over the body, ``(m, d) -> (m,)``."""
-        return np.linalg.norm(rows(t, self.dimension) @ self.F, axis=1)
+        return np.linalg.norm(rows(t, self.dimension) @ self.B, axis=1)
 
-    def support_points(self, t: ArrayLike) -> FloatArray:
-        """Points of the surface farthest along ``t``, ``(m, d) -> (m, d)``; 0 for ``t = 0``."""
-        felt = rows(t, self.dimension) @ self.F
-        length = np.linalg.norm(felt, axis=1, keepdims=True)
-        return felt / np.where(length > 0, length, 1.0) @ self.F.T
+    @property
+    def _volume(self) -> float:
+        return math.pi ** (self.rank / 2) / math.gamma(self.rank / 2 + 1)
 
-    def scaled(self, factors: ArrayLike) -> Ellipsoid:
-        """Image of the body under ``w -> factors * w``, ``(d,)``, factors not zero."""
-        return Ellipsoid(np.asarray(factors, float)[:, None] * self.F, self.flag)
+    def _value(self, Y: FloatArray) -> FloatArray:
+        # through the map and not A, as a sum of squares cannot turn negative by rounding
+        return (Y**2).sum(axis=1)
+
+    def _gradient(self, Y: FloatArray) -> FloatArray:
+        return 2 * Y
+
+    def _farthest(self, T: FloatArray) -> FloatArray:
+        length = np.linalg.norm(T, axis=1, keepdims=True)
+        return T / np.where(length > 0, length, 1.0)
 
 
 def three_motion_ellipsoid(f_x: float, f_y: float, tau_z: float, rho: float) -> Ellipsoid:

@@ -227,9 +227,9 @@ def round_frame(value: Callable[[FloatArray], FloatArray], dimension: int, degre
         Y = u * r[:, None]
         # the second moments of a unit sphere are 1 / d: times d they are the identity
         C = np.linalg.cholesky(dimension * (Y.T @ Y) / len(u))
-        L = L @ C
         if abs(C - np.eye(dimension)).max() < 0.3:
             break
+        L = L @ C
     return L
 
 

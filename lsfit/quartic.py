@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -21,59 +21,51 @@ from softjaw.lsfit.form import (
     round_frame,
     substitute,
 )
-from softjaw.lsfit.surface import FitError, FitFlag, LimitSurface, rows, supported_shadow
+from softjaw.lsfit.surface import FitError, FitFlag, LimitSurface, supported_shadow
 
 FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
 class Quartic(LimitSurface):
-    """Level set ``P(w) = sum_k c_k w^E_k = 1`` of a homogeneous polynomial of degree 4.
+    """Image ``{B y : P(y) <= 1}`` of the level set of a homogeneous polynomial ``P(y) = sum_k c_k y^E_k`` of degree 4.
 
     Parameters
     ----------
-    coefficients : (k,) array
-        ``c``, one for each monomial, in the order of `lsfit.form.exponents`.
-    dimension : int
-        Number of components of a wrench.
+    form : (k,) array
+        ``c``, one for each monomial, in the order of `lsfit.form.exponents`; of a closed body.
+    B : (d, r) array
+        Map with independent columns; flat if ``r < d``.
     flag : FitFlag
         What the reader should know.
-    ball_map : (d, d) array, optional
-        Map from a ball onto an ellipsoid near the body, where one is known.
-    units : (d,) array, optional
-        Sizes of the components in which all coefficients are equally exact, 1 if not given.
     """
 
-    coefficients: FloatArray
-    dimension: int = 3
+    form: FloatArray
+    B: FloatArray
     flag: FitFlag = FitFlag.CLEAN
-    ball_map: FloatArray | None = field(default=None, repr=False)
-    units: FloatArray | None = field(default=None, repr=False)
     degree = 4
 
-    @property
-    def exponents(self) -> NDArray[np.int64]:
-        """Exponents of the monomials ``(k, d)``."""
-        return exponents(self.dimension, 4)
-
-    def value(self, w: ArrayLike) -> FloatArray:
-        """``P(w)``, ``(m, d) -> (m,)``."""
-        return monomials(rows(w, self.dimension), self.exponents) @ self.coefficients
-
-    def gradient(self, w: ArrayLike) -> FloatArray:
-        """Gradient of ``P``, ``(m, d) -> (m, d)``."""
-        cubic = monomials(rows(w, self.dimension), exponents(self.dimension, 3))
-        return cubic @ (derivative(self.dimension, 4) @ self.coefficients).T
+    @classmethod
+    def of_coefficients(cls, coefficients: ArrayLike, dimension: int = 3, flag: FitFlag = FitFlag.CLEAN) -> Quartic:
+        """The level set of the polynomial of a wrench's components with these `coefficients`."""
+        return cls(np.asarray(coefficients, float), np.eye(dimension), flag)
 
     @cached_property
+    def coefficients(self) -> FloatArray:
+        """Coefficients ``(k,)`` in a wrench's components; NaN for a flat body, and one that is too thin and tilted."""
+        E, reach = exponents(self.rank, 4), np.linalg.norm(self.B, axis=1)
+        # rows of one length: what is left of the condition is tilt, which no choice of units undoes
+        turn = self.B / reach[:, None]
+        # condition of a frame's directions; coefficients lose its fourth power times rounding
+        if self.rank < self.dimension or np.linalg.cond(turn) > 50.0:
+            return np.full(len(exponents(self.dimension, 4)), np.nan)
+        # turned first and stretched last, as a division by units costs a coefficient no digits
+        return substitute(self.form, E, np.linalg.inv(turn)) / np.prod(reach**E, axis=1)
+
+    @property
     def frame(self) -> FloatArray:
-        """Map ``L (d, d)`` from a body that is nearly round onto this one, which has to be closed."""
-        # a fit knows the frame in which its coefficients are exact
-        if self.ball_map is not None:
-            return self.ball_map
-        units = np.ones(self.dimension) if self.units is None else self.units
-        even = Quartic(self.coefficients * np.prod(units**self.exponents, axis=1), self.dimension)
-        return units[:, None] * round_frame(even.value, self.dimension, 4)
+        """Map ``(d, r)`` from a body that is nearly round onto this one."""
+        return self.B @ self._from_round
 
     @property
     def ellipsoid(self) -> Ellipsoid:
@@ -81,29 +73,34 @@ class Quartic(LimitSurface):
         return Ellipsoid(self.frame, self.flag)
 
     @cached_property
-    def volume(self) -> float:
-        """Volume of the body, to 1e-12 of itself in up to three dimensions and 1e-3 or better beyond."""
-        V = quartic_volume(self._round.coefficients, self.dimension)
-        return abs(float(np.linalg.det(self.frame))) * V
-
-    @cached_property
     def shadow_area(self) -> float:
         """Area of the shadow on the first two components; that of the hull in more than three dimensions."""
-        if self.dimension == 3:
+        if self.rank < 3:
+            # the shadow of a plane body is its linear image
+            return abs(float(np.linalg.det(self.B[:2]))) * self._volume if self.rank == 2 else 0.0
+        if self.dimension == 3 and np.isfinite(self.coefficients).all():
             return quartic_shadow(self.coefficients, np.linalg.norm(self.frame, axis=1))
-        if self.dimension == 2:
-            return self.volume
-        return supported_shadow(self.support, self.dimension) if self.dimension > 1 else 0.0
+        return supported_shadow(self.support, self.dimension)
 
-    def support_points(self, t: ArrayLike) -> FloatArray:
-        """Points of the surface farthest along ``t``, ``(m, d) -> (m, d)``; 0 for ``t = 0``. It has to be convex."""
-        T = rows(t, self.dimension) @ self.frame
+    @property
+    def _volume(self) -> float:
+        """To 1e-12 of itself in up to three dimensions and 1e-3 or better beyond."""
+        return abs(float(np.linalg.det(self._from_round))) * quartic_volume(self._round, self.rank)
+
+    def _value(self, Y: FloatArray) -> FloatArray:
+        return monomials(Y, exponents(self.rank, 4)) @ self.form
+
+    def _gradient(self, Y: FloatArray) -> FloatArray:
+        return monomials(Y, exponents(self.rank, 3)) @ (derivative(self.rank, 4) @ self.form).T
+
+    def _farthest(self, T: FloatArray) -> FloatArray:
+        T = T @ self._from_round
         length = np.linalg.norm(T, axis=1)
         moving = length > 0
         # unit normals: the tolerances of the search are those of a problem of size one
         T = T[moving] / length[moving, None]
-        out = np.zeros((len(moving), self.dimension))
-        out[moving] = farthest_points(self._tensor, T, self._starts(T)) @ self.frame.T
+        out = np.zeros((len(moving), self.rank))
+        out[moving] = farthest_points(self._tensor, T, self._starts(T)) @ self._from_round.T
         return out
 
     def _starts(self, T: FloatArray) -> FloatArray:
@@ -117,28 +114,25 @@ class Quartic(LimitSurface):
             starts[part : part + 10_000] = Y[column] * np.sign(along[row, column])[:, None]
         return starts
 
-    def scaled(self, factors: ArrayLike) -> Quartic:
-        """Image of the body under ``w -> factors * w``, ``(d,)``, factors not zero."""
-        f = np.asarray(factors, float)
-        ball_map = None if self.ball_map is None else f[:, None] * self.ball_map
-        units = np.abs(f) if self.units is None else np.abs(f) * self.units
-        return Quartic(
-            self.coefficients / np.prod(f**self.exponents, axis=1), self.dimension, self.flag, ball_map, units
-        )
+    @cached_property
+    def _from_round(self) -> FloatArray:
+        """Map ``(r, r)`` from a body that is nearly round, as that of a fit is in its own coordinates."""
+        return round_frame(self._value, self.rank, 4)
 
     @cached_property
-    def _round(self) -> Quartic:
-        return Quartic(substitute(self.coefficients, self.exponents, self.frame), self.dimension)
+    def _round(self) -> FloatArray:
+        """Coefficients of that body."""
+        return substitute(self.form, exponents(self.rank, 4), self._from_round)
 
     @cached_property
     def _tensor(self) -> FloatArray:
-        return hessian_tensor(self._round.coefficients, self.dimension)
+        return hessian_tensor(self._round, self.rank)
 
     @cached_property
     def _surface_points(self) -> FloatArray:
-        n = 30 * self.dimension**2
-        P = half_sphere_monomials(self.dimension, n) @ self._round.coefficients
-        return directions(self.dimension, n) * (P**-0.25)[:, None]
+        n = 30 * self.rank**2
+        P = half_sphere_monomials(self.rank, n) @ self._round
+        return directions(self.rank, n) * (P**-0.25)[:, None]
 
 
 def farthest_points(tensor: FloatArray, T: FloatArray, w: FloatArray) -> FloatArray:

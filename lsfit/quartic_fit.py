@@ -14,17 +14,17 @@ from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from softjaw.lsfit.ellipsoid import MAX_REACH_RATIO, full_ellipsoid, nearest_solution
-from softjaw.lsfit.form import exponents, powers, substitute
+from softjaw.lsfit.form import exponents, powers
 from softjaw.lsfit.lowest import lies_above
 from softjaw.lsfit.quartic import Quartic
 from softjaw.lsfit.samples import pressed, principal_frame
 from softjaw.lsfit.sos import MIN_EIGENVALUE, ball_gram, convex_least_squares, gram_matrix, smallest
-from softjaw.lsfit.surface import FitError, FitFlag, Image
+from softjaw.lsfit.surface import FitError, FitFlag
 
 FloatArray = NDArray[np.float64]
 
 
-def convex_quartic(W: ArrayLike, T: ArrayLike, gamma: float = 0.01) -> tuple[Quartic | Image, str]:
+def convex_quartic(W: ArrayLike, T: ArrayLike, gamma: float = 0.01) -> tuple[Quartic, str]:
     """Convex quartic with the least ``mean ((P - 1)^2 + gamma |(I - t t') grad P|^2)``, and what proves it convex.
 
     The quartic of the linear equations is taken if a positive definite Gram matrix proves it convex. Only otherwise
@@ -44,7 +44,7 @@ def convex_quartic(W: ArrayLike, T: ArrayLike, gamma: float = 0.01) -> tuple[Qua
 
     Returns
     -------
-    surface : Quartic or Image
+    surface : Quartic
         In the coordinates of the wrenches; flat, and flagged, if the samples are.
     certificate : str
         ``least squares`` if the best quartic is convex by itself, else ``semidefinite programme``.
@@ -76,12 +76,11 @@ def convex_quartic(W: ArrayLike, T: ArrayLike, gamma: float = 0.01) -> tuple[Qua
         by, flag = "semidefinite programme", flag | FitFlag.BOUNDED
         v, free = convex_least_squares(N, b, r, loose, 12 * least)
         gram = gram_matrix(v, free, r)
-    surface = placed(v, samples, samples.flag | flag)
     low = smallest(gram)
     # the programme promises half of the margin; the rest is room for rounding on the way
     if low < MIN_EIGENVALUE / 4:
         raise FitError(f"the Gram matrix of the convex quartic has the eigenvalue {low:.2e}: report these samples")
-    return surface, by
+    return Quartic(v, samples.B, samples.flag | flag), by
 
 
 class RoundSamples(NamedTuple):
@@ -102,7 +101,7 @@ def round_samples(W: ArrayLike, T: ArrayLike) -> RoundSamples:
     """Samples in the frame of their ellipsoid, in which forms of degree 4 have coefficients of one size."""
     W, T = (np.asarray(X, float)[pressed(W)] for X in (W, T))
     ball = full_ellipsoid(W)
-    B, inverse = ball.F, ball.inverse
+    B, inverse = ball.B, ball.inverse
     if ball.flag & FitFlag.BOUNDED:  # the samples' own lengths are a better scale than an ellipsoid far outside them
         B = principal_frame(W)[0] * np.sqrt(ball.rank)
         inverse = np.linalg.pinv(B)
@@ -129,24 +128,6 @@ def normal_equations(samples: RoundSamples, gamma: float) -> tuple[FloatArray, F
     R = out.reshape(len(E), -1)
     # only the residual of P has a target, 1; those of the slopes are to vanish
     return R @ R.T / m, R[:, :m] @ np.full(m, 1 / m)
-
-
-def placed(v: FloatArray, samples: RoundSamples, flag: FitFlag) -> Quartic | Image:
-    """Quartic with coefficients ``v`` of the round frame, in the wrench's components."""
-    d, r = samples.B.shape
-    E = exponents(r, 4)
-    # coefficients in the components do not exist for a flat body, and lose their digits in a tilted frame
-    if r < d:
-        return Image(Quartic(v, r), samples.B, flag)
-    reach = np.linalg.norm(samples.B, axis=1)
-    # rows of one length: what is left of the condition is tilt, which no choice of units undoes
-    turn = samples.B / reach[:, None]
-    # condition of a frame's directions; coefficients lose its fourth power times rounding
-    if np.linalg.cond(turn) > 50.0:
-        return Image(Quartic(v, r), samples.B, flag)
-    # turned first and stretched last, as a division by units costs a coefficient no digits
-    coefficients = substitute(v, E, np.linalg.inv(turn)) / np.prod(reach**E, axis=1)
-    return Quartic(coefficients, d, flag, samples.B if flag == FitFlag.CLEAN else None, reach)
 
 
 @njit(cache=True)

@@ -19,7 +19,6 @@ application", ICRA 2016.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import clarabel
@@ -34,7 +33,7 @@ from softjaw.lsfit.quartic import Quartic
 from softjaw.lsfit.quartic_fit import convex_quartic
 from softjaw.lsfit.samples import FLAT_RATIO, THIN_RATIO, FitErrors, fit_error
 from softjaw.lsfit.sos import conic_solution, gram_map, quadratic_map, side, upper_triangle
-from softjaw.lsfit.surface import FitError, FitFlag, Image, LimitSurface
+from softjaw.lsfit.surface import FitError, FitFlag, LimitSurface
 
 FloatArray = NDArray[np.float64]
 # lam, beta and gamma of Zhou's objective, those of the authors for six components. With all 1, as published for three,
@@ -104,7 +103,7 @@ def span_ellipsoid(W: ArrayLike, T: ArrayLike) -> tuple[LimitSurface, FitErrors]
     """
     samples = span_samples(W, T)
     surface = full_ellipsoid(samples.Y)
-    return placed(surface, samples), fit_error(surface, samples.Y, samples.T)
+    return surface.mapped(samples.B, samples.flag), fit_error(surface, samples.Y, samples.T)
 
 
 def span_quartic(W: ArrayLike, T: ArrayLike) -> LimitSurface:
@@ -113,22 +112,7 @@ def span_quartic(W: ArrayLike, T: ArrayLike) -> LimitSurface:
     Six dimensions take at least 1000 samples ``W, T (m, d)``, as 126 coefficients follow the noise of few.
     """
     samples = span_samples(W, T)
-    return placed(convex_quartic(samples.Y, samples.T)[0], samples)
-
-
-def placed(surface: LimitSurface, samples: SpanSamples) -> LimitSurface:
-    """Surface of span coordinates in the coordinates of the wrenches; flagged and flat if the samples are."""
-    d, r = samples.B.shape
-    flag = surface.flag | samples.flag
-    if isinstance(surface, Ellipsoid):
-        # maps of the ball compose; the matrix A would be formed and taken apart again
-        return Ellipsoid(samples.B @ surface.F, flag)
-    if isinstance(surface, Image):
-        return Image(surface.inner, samples.B @ surface.B, flag)
-    # a diagonal map only scales coefficients; any other mixes them, which costs digits
-    if isinstance(surface, Quartic) and r == d and np.array_equal(samples.B, np.diag(np.diag(samples.B))):
-        return replace(surface.scaled(np.diag(samples.B)), flag=flag)
-    return Image(surface, samples.B, flag)
+    return convex_quartic(samples.Y, samples.T)[0].mapped(samples.B, samples.flag)
 
 
 def zhou_quartic(samples: SpanSamples, weights: tuple[float, float, float] = ZHOU_WEIGHTS) -> LimitSurface:
@@ -138,12 +122,12 @@ def zhou_quartic(samples: SpanSamples, weights: tuple[float, float, float] = ZHO
     """
     r, E = samples.rank, exponents(samples.rank, 4)
     M, G = monomials(samples.Y, E), monomial_gradients(samples.Y, r, 4)
-    surface = Quartic(_solve(samples, M, G, gram_map(r), np.ones(len(E)), weights), r)
+    surface = Quartic(_solve(samples, M, G, gram_map(r), np.ones(len(E)), weights), np.eye(r))
     refuse_runaway(surface, samples.Y)
     # the bound from samples is cheap and settles most cases; only the others need a search
-    if not lies_above(surface.coefficients, r, _least(samples.Y, 4)):
-        refuse_endless(*smallest_value(surface.coefficients, r), samples.Y, 4)
-    return placed(surface, samples)
+    if not lies_above(surface.form, r, _least(samples.Y, 4)):
+        refuse_endless(*smallest_value(surface.form, r), samples.Y, 4)
+    return surface.mapped(samples.B, samples.flag)
 
 
 def zhou_ellipsoid(samples: SpanSamples, weights: tuple[float, float, float] = ZHOU_WEIGHTS) -> LimitSurface:
@@ -159,7 +143,7 @@ def zhou_ellipsoid(samples: SpanSamples, weights: tuple[float, float, float] = Z
     refuse_endless(float(values[0]), V[:, 0], samples.Y, 2)
     surface = Ellipsoid.of_matrix(matrix)
     refuse_runaway(surface, samples.Y)
-    return placed(surface, samples)
+    return surface.mapped(samples.B, samples.flag)
 
 
 def _solve(

@@ -1,12 +1,13 @@
-"""What every limit surface offers, surfaces placed by a linear map, and what can be wrong with a fit."""
+"""What every limit surface offers, and what can be wrong with a fit."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import replace
 from enum import IntFlag
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -33,34 +34,36 @@ OUT_OF_SPAN = 1e-9  # of a wrench: the part across a flat body from which the bo
 
 
 class LimitSurface(ABC):
-    """Level set ``P(w) = 1`` of a positive homogeneous function, symmetric about the origin, in ``d`` dimensions."""
+    """Set ``{B y : P(y) <= 1}`` of a homogeneous, even ``P``; flat where the map ``B (d, r)`` leaves out directions."""
 
+    B: FloatArray
     flag: FitFlag
+    degree: int
 
     @property
-    @abstractmethod
-    def degree(self) -> int:
-        """Degree of ``P``."""
-
-    @property
-    @abstractmethod
     def dimension(self) -> int:
         """Number of components ``d`` of a wrench."""
-
-    @property
-    def span(self) -> FloatArray:
-        """Orthonormal directions ``(d, rank)`` in which the body extends; all of them unless it is flat."""
-        return np.eye(self.dimension)
+        return len(self.B)
 
     @property
     def rank(self) -> int:
         """Dimension of the body; less than `dimension` if it is flat."""
-        return self.span.shape[1]
+        return self.B.shape[1]
 
     @property
-    @abstractmethod
+    def span(self) -> FloatArray:
+        """Orthonormal directions ``(d, rank)`` in which the body extends."""
+        return np.linalg.qr(self.B)[0]
+
+    @cached_property
+    def inverse(self) -> FloatArray:
+        """Map ``(r, d)`` from the body back onto ``P(y) <= 1``."""
+        return np.linalg.inv(self.B) if self.rank == self.dimension else np.linalg.pinv(self.B)
+
+    @cached_property
     def volume(self) -> float:
         """Volume of the body; 0 if it is flat."""
+        return abs(float(np.linalg.det(self.B))) * self._volume if self.rank == self.dimension else 0.0
 
     @property
     @abstractmethod
@@ -72,26 +75,35 @@ class LimitSurface(ABC):
         """Largest reach ``(d,)`` along each component."""
         return self.support(np.eye(self.dimension))
 
-    @abstractmethod
     def value(self, w: ArrayLike) -> FloatArray:
-        """``P(w)``, ``(m, d) -> (m,)``; infinite where a flat body does not extend."""
+        """``P``, ``(m, d) -> (m,)``; infinite where a flat body does not extend."""
+        W = rows(w, self.dimension)
+        Y = W @ self.inverse.T
+        P = self._value(Y)
+        if self.rank < self.dimension:
+            P[np.linalg.norm(W - Y @ self.B.T, axis=1) > OUT_OF_SPAN * np.linalg.norm(W, axis=1)] = np.inf
+        return P
 
-    @abstractmethod
     def gradient(self, w: ArrayLike) -> FloatArray:
         """Gradient of ``P``, the direction of motion, ``(m, d) -> (m, d)``; within the span of a flat body."""
+        return self._gradient(rows(w, self.dimension) @ self.inverse.T) @ self.inverse
 
     def support(self, t: ArrayLike) -> FloatArray:
         """Largest ``w . t`` over the body, ``(m, d) -> (m,)``."""
         T = rows(t, self.dimension)
         return (T * self.support_points(T)).sum(axis=1)
 
-    @abstractmethod
     def support_points(self, t: ArrayLike) -> FloatArray:
         """Points of the surface farthest along ``t``, ``(m, d) -> (m, d)``; 0 for ``t = 0``."""
+        return self._farthest(rows(t, self.dimension) @ self.B) @ self.B.T
 
-    @abstractmethod
-    def scaled(self, factors: ArrayLike) -> LimitSurface:
+    def scaled(self, factors: ArrayLike) -> Self:
         """Image of the body under ``w -> factors * w``, for other units, ``(d,)``, factors not zero."""
+        return self.mapped(np.diag(np.asarray(factors, float)))
+
+    def mapped(self, A: FloatArray, flag: FitFlag = FitFlag.CLEAN) -> Self:
+        """Image of the body under ``w -> A w``, with another flag added."""
+        return replace(self, B=A @ self.B, flag=self.flag | flag)  # type: ignore[type-var]
 
     def radius(self, u: ArrayLike) -> FloatArray:
         """Factor that brings ``u`` onto the surface, ``P(u)^(-1 / degree)``, ``(m, d) -> (m,)``."""
@@ -103,12 +115,20 @@ class LimitSurface(ABC):
         # a relative error of the wrench is `degree` times as large in P
         return self.value(w) <= 1 + self.degree * ZERO_SHARE
 
+    # of the body in coordinates y
 
-def mapped_value(P: FloatArray, Y: FloatArray, B: FloatArray, W: FloatArray) -> FloatArray:
-    """Values ``P (m,)`` at ``y``, made infinite where ``w`` is not ``B y``: across a flat body."""
-    if B.shape[1] < B.shape[0]:
-        P[np.linalg.norm(W - Y @ B.T, axis=1) > OUT_OF_SPAN * np.linalg.norm(W, axis=1)] = np.inf
-    return P
+    @property
+    @abstractmethod
+    def _volume(self) -> float: ...
+
+    @abstractmethod
+    def _value(self, Y: FloatArray) -> FloatArray: ...
+
+    @abstractmethod
+    def _gradient(self, Y: FloatArray) -> FloatArray: ...
+
+    @abstractmethod
+    def _farthest(self, T: FloatArray) -> FloatArray: ...
 
 
 def rows(w: ArrayLike, dimension: int) -> FloatArray:
@@ -132,66 +152,3 @@ def supported_shadow(support: Callable[[FloatArray], FloatArray], dimension: int
     twice = np.where((order == 0) | (2 * order == n), 1.0, 2.0)
     # by Parseval h^2 - h'^2 becomes a factor 1 - k^2, without a difference quotient
     return float(np.pi * (twice * (1 - order**2) * np.abs(c) ** 2).sum())
-
-
-@dataclass(frozen=True, eq=False)
-class Image(LimitSurface):
-    """The surface ``{B y : P(y) = 1}`` of another one of full rank, ``inner``; flat if ``B (d, r)`` has ``r < d``.
-
-    The columns of ``B`` are independent.
-    """
-
-    inner: LimitSurface
-    B: FloatArray
-    flag: FitFlag = FitFlag.CLEAN
-
-    @property
-    def degree(self) -> int:
-        """Degree of ``P``."""
-        return self.inner.degree
-
-    @property
-    def dimension(self) -> int:
-        """Number of components of a wrench."""
-        return len(self.B)
-
-    @property
-    def span(self) -> FloatArray:
-        """Orthonormal directions ``(d, rank)`` in which the body extends."""
-        return np.linalg.qr(self.B)[0]
-
-    @property
-    def volume(self) -> float:
-        """Volume of the body; 0 if it is flat."""
-        return abs(float(np.linalg.det(self.B))) * self.inner.volume if self.rank == self.dimension else 0.0
-
-    @property
-    def shadow_area(self) -> float:
-        """Area of the shadow on the first two components."""
-        if self.rank == 1:
-            return 0.0
-        if self.rank == 2:
-            # the shadow of a plane body is its linear image
-            return abs(float(np.linalg.det(self.B[:2]))) * self.inner.volume
-        return supported_shadow(self.support, self.dimension)
-
-    def value(self, w: ArrayLike) -> FloatArray:
-        """``P(w)``, ``(m, d) -> (m,)``; infinite where the body does not extend."""
-        W = rows(w, self.dimension)
-        Y = self._inner(W)
-        return mapped_value(self.inner.value(Y), Y, self.B, W)
-
-    def gradient(self, w: ArrayLike) -> FloatArray:
-        """Gradient of ``P`` within the span, ``(m, d) -> (m, d)``."""
-        return self.inner.gradient(self._inner(rows(w, self.dimension))) @ np.linalg.pinv(self.B)
-
-    def support_points(self, t: ArrayLike) -> FloatArray:
-        """Points of the surface farthest along ``t``, ``(m, d) -> (m, d)``."""
-        return self.inner.support_points(rows(t, self.dimension) @ self.B) @ self.B.T
-
-    def scaled(self, factors: ArrayLike) -> Image:
-        """Image of the body under ``w -> factors * w``, ``(d,)``, factors not zero."""
-        return Image(self.inner, np.asarray(factors, float)[:, None] * self.B, self.flag)
-
-    def _inner(self, W: FloatArray) -> FloatArray:
-        return W @ np.linalg.pinv(self.B).T

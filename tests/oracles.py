@@ -7,7 +7,8 @@ from softjaw.friction.wrench import friction_limits, friction_wrench
 from softjaw.lsfit.body import hull_volume
 from softjaw.lsfit.ellipsoid import nearest_solution
 from softjaw.lsfit.form import hessian_tensor
-from softjaw.lsfit.quartic_fit import convex_quartic, normal_equations, placed, round_samples
+from softjaw.lsfit.quartic import Quartic
+from softjaw.lsfit.quartic_fit import convex_quartic, normal_equations, round_samples
 from softjaw.lsfit.samples import normalised_samples
 from softjaw.lsfit.sos import ball_gram
 
@@ -39,7 +40,7 @@ def least_squares_quartic(W, T=None, gamma=0.0):
     samples = round_samples(W, some_motions(W) if T is None else T)
     N, b = normal_equations(samples, gamma)
     v, flag = nearest_solution(N, b, ball_gram(samples.B.shape[1])[: len(b)])
-    return placed(v, samples, samples.flag | flag)
+    return Quartic(v, samples.B, samples.flag | flag)
 
 
 def least_curvature(surface, w):

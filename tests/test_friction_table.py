@@ -167,7 +167,7 @@ def fits_in_six_dimensions(inputs, _):
     full = full_ellipsoid(W)
     E = exponents(6, 4)
     M = monomials(W, E)
-    quartic = Quartic(np.linalg.solve(M.T @ M + 1e-6 * np.eye(len(E)), M.sum(axis=0)), 6)
+    quartic = Quartic.of_coefficients(np.linalg.solve(M.T @ M + 1e-6 * np.eye(len(E)), M.sum(axis=0)), 6)
     return {
         "W_absmax": np.abs(W).max(axis=0), "W_first3": W[:3], "ell_full.A": full.A,
         **errors_of("ell_full", full, W, T), **errors_of("quartic_ls_reg1e-6", quartic, W, T),

@@ -219,7 +219,7 @@ def _six_samples(patch: ContactPatch, rho: float, S: float, model: str, count: i
 def fitted_surface(coefficients: FloatArray, matrix: FloatArray) -> LimitSurface | None:
     """The quartic ``(15,)`` or the ellipsoid ``(3, 3)`` in ``(f_x, f_y, tau_z / rho) / (mu S)``; None for NaN."""
     if np.isfinite(coefficients).all():
-        return Quartic(coefficients)
+        return Quartic.of_coefficients(coefficients)
     return Ellipsoid.of_matrix(matrix) if np.isfinite(matrix).all() else None
 
 

@@ -22,7 +22,7 @@ from softjaw.lsfit.form import directions, exponents, substitute
 from softjaw.lsfit.quartic import Quartic
 from softjaw.lsfit.quartic_fit import convex_quartic
 from softjaw.lsfit.samples import fit_error, normalised_samples, sample_rank, sphere_motions
-from softjaw.lsfit.surface import FitError, FitFlag, Image
+from softjaw.lsfit.surface import FitError, FitFlag
 from tests.generators import cylinder_grid, disc_polar, lcg_patch, points_patch
 from tests.oracles import least_squares_quartic, samples, wrenches_alone
 from tests.turns import TURNS, shaken
@@ -159,7 +159,7 @@ def test_loads_in_the_plane_of_a_flat_body_are_in_it():
     def decide(rng):
         R = turn(rng)
         B = R[:, :2] * [1.0, 0.5]
-        bodies = Image(Quartic([1.0, 0, 2, 0, 1], 2), B), Ellipsoid(B)
+        bodies = Quartic(np.array([1.0, 0, 2, 0, 1]), B), Ellipsoid(B)
         inside = shaken(rng, w @ B.T)
         return tuple(
             (bool(body.holds(inside).all()), bool(body.holds(inside + 1e-3 * R[:, 2]).any())) for body in bodies
@@ -179,7 +179,7 @@ def test_a_full_body_has_no_outside_across():
     rng = np.random.default_rng(0)
     for _ in range(20):
         B = turn(rng) * [1.0, 1.0, 1e-9] @ turn(rng)
-        assert np.isfinite(Image(Quartic(BALL, 3), B).value(directions(3, 50) @ B.T)).all()
+        assert np.isfinite(Quartic(BALL, B).value(directions(3, 50) @ B.T)).all()
 
 
 def test_a_wrench_that_is_the_rounding_of_none_is_left_out():
@@ -210,7 +210,7 @@ def test_a_polynomial_that_is_zero_at_a_sample_is_endless_there():
 
     def decide(rng):
         R = turn(rng)
-        surface = Quartic(shaken(rng, substitute(cylinder, E, R.T)))
+        surface = Quartic.of_coefficients(shaken(rng, substitute(cylinder, E, R.T)))
         return fit_error(surface, [R[:, 2]], [R[:, 0]]).Erad
 
     assert outcomes(decide) == {np.inf: TURNS}

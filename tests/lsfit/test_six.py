@@ -64,7 +64,7 @@ def test_a_nearly_flat_patch_ends_where_rounding_lets_it():
 
 def plane_samples(c, K=60):
     """Points and normals of ``x^4 + c x^2 y^2 + y^4 = 1``, which is convex for ``0 <= c <= 6``."""
-    surface = Quartic([1, 0, c, 0, 1], 2)
+    surface = Quartic.of_coefficients([1, 0, c, 0, 1], 2)
     phi = np.pi * (np.arange(K) + 0.5) / K
     u = np.column_stack([np.cos(phi), np.sin(phi)])
     W = u * surface.radius(u)[:, None]

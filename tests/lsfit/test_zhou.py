@@ -53,7 +53,7 @@ def test_no_neighbour_is_better(fit, weights):
             E = exponents(3, 4)
             fourth = np.zeros(len(E))
             fourth[E.max(axis=1) == 4] = np.abs(F[0])
-            beside = Quartic(0.99 * best.coefficients + 0.01 * fourth)
+            beside = Quartic.of_coefficients(0.99 * best.coefficients + 0.01 * fourth)
         assert objective(beside, W, T, *weights) > value * (1 - 1e-7)
 
 

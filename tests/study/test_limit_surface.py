@@ -141,7 +141,7 @@ def test_fitted_quartics_in_any_pose_have_the_volume_of_their_surfaces():
     [values] = cases(OVAL, angles="[30]", forces="[5]")
     contacts = list(soft_contacts(values, CURVED))
     for f, contact in enumerate(contacts):
-        quartic = Quartic(values["limit_surface/coefficients"][f][CURVED], 3)
+        quartic = Quartic.of_coefficients(values["limit_surface/coefficients"][f][CURVED], 3)
         body = quartic.scaled(MU * np.array([1.0, 1.0, values["limit_surface/rho"][f]]))
         contacts[f] = SoftContact(contact.position, contact.axes, body)
     expected = pose_volume(*contacts, EXTENTS, 0.05, relative_error=1e-4, with_l1=False).linf

@@ -61,7 +61,7 @@ def test_monomials_are_named_in_the_order_of_the_fits():
 
 @pytest.mark.parametrize(("i", "j"), [(0, 1), (0, 2), (1, 2)])
 def test_shadows_of_ellipsoids_are_ellipses(i, j):
-    for surface in (Ellipsoid.of_axes(SEMI), Quartic(squared_ellipsoid(SEMI), 3)):
+    for surface in (Ellipsoid.of_axes(SEMI), Quartic.of_coefficients(squared_ellipsoid(SEMI), 3)):
         outline = shadow_outline(surface, i, j, 120)
         assert ((outline / SEMI[[i, j]]) ** 2).sum(axis=1) == pytest.approx(1.0, rel=1e-7)
 
