@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 from softjaw.study.flags import OF_FILE, Flag, flag_words, flags_in
-from softjaw.study.quantities import MODELS, NO_GRASP
+from softjaw.study.quantities import MODELS, NO_GRASP, STATES
 from softjaw.study.ranking import judged, ranked, score_of, shown_level
 from softjaw.study.result.layout import DONE, FAILED
 from softjaw.study.result.read import axes_of
@@ -165,6 +165,12 @@ def note(ds: xr.Dataset, index: Index, known: int = 0) -> str:
         return ""
     words = flag_words(int(ds["flags"].values[index]) & ~known)
     return ", ".join(text for text in (*flagged(ds, index), words) if text)
+
+
+def stated(ds: xr.Dataset, index: Index) -> str:
+    """State and notes of a case; empty for one that is solved without any."""
+    state = int(ds.variables["status"].values[index])
+    return ": ".join(filter(None, [STATES[state] * (state != DONE), note(ds, index)]))
 
 
 def reason_lines(ds: xr.Dataset, *states: int) -> list[str]:

@@ -42,8 +42,7 @@ function object3d(div, all) {
   function told(c) {
     if (c < 0) return "no candidate";
     const q = quantity(), v = q && q.values[at.force][c], key = `${at.force} ${c}`;
-    return `${all.names[c]}<br>` + (v == null ? (state(c) === 1 ? "" : all.stated[state(c)])
-      : `${q.label}: ${+v.toPrecision(4)}`) + (all.notes[key] ? `<br>${all.notes[key]}` : "");
+    return `${all.names[c]}<br>` + (v == null ? "" : `${q.label}: ${+v.toPrecision(4)}<br>`) + (all.notes[key] || "");
   }
 
   function segments(s) {  // pairs of points as one broken line

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from softjaw.study.page import Block, label, plot
-from softjaw.study.quantities import DONE, FAILED, FIRST, MISSING, MODELS, NO_GRASP, STATES, TABLE
+from softjaw.study.quantities import FAILED, FIRST, MISSING, MODELS, NO_GRASP, TABLE
 from softjaw.study.show import plots
 from softjaw.study.show.grasps import (
     Index,
@@ -19,10 +19,10 @@ from softjaw.study.show.grasps import (
     field,
     forces,
     label_of,
-    note,
     number,
     quantity,
     spoken,
+    stated,
 )
 from softjaw.study.units import shown_unit
 
@@ -31,7 +31,6 @@ MORE = ("quality_fitted", "epsilon", "f_x_max", "f_y_max", "tau_z_max", "safety_
         "closing", "curvature_loss", "fit_error", "overclaim", "overclaim_ellipsoid",
         "indentation", "wall_stress", "support_force", *(q.of_error.name for q in TABLE if q.error and q.rank))
 MARKS = (((FAILED,), "x-thin-open", 8), (NO_GRASP, "line-ew-open", 8), ((MISSING,), "circle", 3))  # of states; size
-NOT_SOLVED = {DONE: "", MISSING: STATES[MISSING], **{state: f"{STATES[state]}: " for state in (FAILED, *NO_GRASP)}}
 
 
 def main_axis(ds: xr.Dataset) -> int:
@@ -169,7 +168,7 @@ def _notes(ds: xr.Dataset) -> np.ndarray | None:
     status = ds.status.values
     if status.size > MOST_NOTES:
         return None
-    notes = [label(NOT_SOLVED[int(status[i])] + note(ds, i)) for i in np.ndindex(status.shape)]
+    notes = [label(stated(ds, i)) for i in np.ndindex(status.shape)]
     return np.array(notes, object).reshape(status.shape)
 
 

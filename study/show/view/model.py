@@ -15,14 +15,14 @@ import xarray as xr
 
 from softjaw.fem.objects.gap import Pose
 from softjaw.study.case.build import own_frame
-from softjaw.study.flags import flag_words
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.pictures import span
-from softjaw.study.quantities import ALONG, AROUND, DONE, FAILED, NO_GRASP, STATES, TABLE
+from softjaw.study.quantities import ALONG, AROUND, DONE, TABLE
 from softjaw.study.ranking import nearest
 from softjaw.study.result.read import axes_of, read_field, read_patch, scene_of
 from softjaw.study.scene import SceneError
-from softjaw.study.show.grasps import Index, at, candidate_of, field, forces, number, order, place, quantity, unravelled
+from softjaw.study.show.best_grasps import value_text
+from softjaw.study.show.grasps import Index, candidate_of, field, forces, order, place, quantity, stated, unravelled
 from softjaw.study.show.object_surface import NOBODY, Foot, Surface, moved, on_wall, surface_of, undeformed
 from softjaw.study.show.stored_surface import body, stored_surface, weaker
 from softjaw.study.show.view.pads import Faces, Pad, pads_of
@@ -188,19 +188,13 @@ class View:
         return 0.5 * out + 0.8 * beside / np.linalg.norm(beside) + 0.35 * up, up
 
     def summary(self, index: Index, name: str) -> list[str]:
-        """A case in lines: where it is, its main values and the map ``name``, its flags; or why it has none."""
+        """A case in lines: where it is, its main values and the map ``name``, its notes; or why it has none."""
         lines = [f"candidate {candidate_of(self.ds, index)}: {place(self.ds, index, force=True)}"]
-        state = self.ds.status.values[index]
-        if state == FAILED or state in NO_GRASP:
-            return [*lines, f"{STATES[state]}: {self.ds.message.values[index] or 'no reason was given'}"]
-        if state != DONE:
-            return [*lines, "not computed yet"]
-        for key in dict.fromkeys((name, "quality", "e_n", "f_x_max", "f_y_max", "tau_z_max", "p_max", "indentation")):
-            if (found := field(self.ds, key)) is not None:
-                text, unit, factor = quantity(self.ds, key)
-                lines.append(f"{text}: {number(found[index] * factor)} {unit}".rstrip())
-        flags = flag_words(int(self.ds["flags"].values[index]), at(self.ds, "misalignment", index))
-        return [*lines, f"flags: {flags}"] if flags else lines
+        keys = dict.fromkeys((name, "quality", "e_n", "f_x_max", "f_y_max", "tau_z_max", "p_max", "indentation"))
+        for key in keys if self.ds.status.values[index] == DONE else ():
+            if field(self.ds, key) is not None:
+                lines.append(f"{quantity(self.ds, key)[0]}: {value_text(self.ds, key, index, 3, unit=True)}")
+        return [*lines, *filter(None, [stated(self.ds, index)])]
 
     def legend(self, index: Index, motion: str) -> list[str]:
         """What colours and marks of the picture of a case mean."""

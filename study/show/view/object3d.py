@@ -15,10 +15,10 @@ import numpy as np
 import plotly.graph_objects as go
 
 from softjaw.study.page import Block, Section, label, page, plot, text
-from softjaw.study.quantities import ALONG, AROUND, STATES
+from softjaw.study.quantities import ALONG, AROUND
 from softjaw.study.result.layout import DONE
 from softjaw.study.show import plots
-from softjaw.study.show.grasps import Index, field, forces, label_of, note, order, place
+from softjaw.study.show.grasps import Index, field, forces, label_of, order, place, stated
 from softjaw.study.show.stored_surface import NAMES
 from softjaw.study.show.view.model import ARROW_MM, CROSSED, FORCE, NEUTRAL, OPEN, PAD, View
 
@@ -78,9 +78,8 @@ def payload(
         "forces": forces(ds).tolist(),
         "names": [label(place(ds, view.index(c, 0))) for c in range(view.candidates)],
         "states": [view.state(k).tolist() for k in levels],
-        "stated": STATES,
         "words": {key: view.summary(i, quantity) for key, i in every.items()},
-        "notes": {key: label(said) for key, i in every.items() if (said := note(ds, i))},
+        "notes": {key: label(said) for key, i in every.items() if (said := stated(ds, i))},
         "quantities": [_choice(view, n) for n in dict.fromkeys((*CHOICES, quantity)) if field(ds, n) is not None],
         "points": _packed(1e3 * surface.points, "<f4"),
         "triangles": _packed(surface.triangles, "<i4"),

@@ -187,7 +187,7 @@ def test_the_page_holds_every_solved_case(shown):
     assert left_out == 0
     assert set(told["cases"]) == {f"{k} {c}" for k in (0, 1) for c in range(6)} - {"1 5", "1 0"}
     assert told["start"] == {"candidate": 2, "force": 1, "quantity": "quality"}
-    assert told["notes"]["1 5"] == "no &lt;/script&gt; convergence"
+    assert told["notes"]["1 5"] == "failed: no &lt;/script&gt; convergence"
     assert told["words"]["1 5"][-1] == "failed: no </script> convergence"
     assert told["states"] == [[1] * 6, [0, 1, 1, 1, 1, 2]]
     assert told["quantities"][0]["values"][1][2] == pytest.approx(quality(index))
