@@ -285,8 +285,3 @@ class Shell(Generic[MeshT]):
     def entries(self, unknown: IntArray) -> tuple[IntArray, IntArray]:
         """Row and column ``(nnz,)`` of every value; ``unknown (6 k,)`` numbers the shell's numbers, -1 where fixed."""
         return np.repeat(unknown, np.diff(self.start)), unknown[self.column]
-
-    def displacement(self, q: FloatArray) -> FloatArray:
-        """Displacement ``u + w`` of the outer face's nodes, ``(k, 3)`` [m]."""
-        parts = q.reshape(-1, 6)
-        return parts[:, :3] + parts[:, 3:]

@@ -154,7 +154,7 @@ def test_compliance_is_what_single_forces_do():
     load = np.zeros((body[0].nodes, 6))
     load[node + 7, [1, 4]] = 2.0
     q = linear.solve(load.ravel())
-    assert 2 * C[:, 7] == pytest.approx(body[0].displacement(q)[nodes].ravel(), rel=1e-12)
+    assert 2 * C[:, 7] == pytest.approx(q.reshape(-1, 2, 3).sum(axis=1)[nodes].ravel(), rel=1e-12)
 
 
 @pytest.mark.parametrize("support", ["free", "standing", "clamped"])
@@ -165,7 +165,7 @@ def test_the_support_carries_what_is_left_over(support):
     load[:, 2] = 1e-3 * body[0].node_area / body[0].node_area.sum()
     q = LinearShell(*body).solve(load.ravel())
     assert reaction(body, q, load.ravel()) == pytest.approx([0, 0, -2e-3], rel=1e-5, abs=1e-9)
-    rise = body[0].displacement(q)[:, 2].mean()
+    rise = q.reshape(-1, 2, 3)[:, :, 2].sum(axis=1).mean()
     assert rise == pytest.approx(2e-3, rel=0.05) if support == "free" else rise < 1e-5
 
 
