@@ -72,12 +72,12 @@ def cases(
 
 
 def _fingers(ds: xr.Dataset, model: str) -> dict[str, np.ndarray]:
-    """What `FINGER` lists, over axes and finger."""
+    """What `FINGER` lists, in its order, over axes and finger."""
     of_model = ds.sel(model=model)
     R, o = ds.finger_pose_rotation.values, ds.finger_pose_origin.values
     S, rho = ds.finger_S.values, ds.limit_surface_rho.values
     muS = ds.finger_f_x_max.sel(model="pcm").values  # the planar model's friction is mu S in every direction
-    values = {
+    return {
         "pose_origin": o,
         "pose_rotation": R,
         "frame_origin": np.einsum("...ij,...j->...i", R, ds.finger_frame_origin.values) + o,
@@ -89,7 +89,6 @@ def _fingers(ds: xr.Dataset, model: str) -> dict[str, np.ndarray]:
         "unit": muS[..., None] * np.stack([np.ones_like(rho), np.ones_like(rho), rho], axis=-1),
         **{name: of_model[f"limit_surface_{name}"].values for name in ("coefficients", "matrix", "certificate")},
     }
-    return {name: values[name] for name, _, _ in FINGER}
 
 
 def as_json(ds: xr.Dataset, model: str = "ccm", listed: Iterable[dict[str, Any]] | None = None) -> str:

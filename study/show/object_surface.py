@@ -127,21 +127,14 @@ class Cells:
         """Angle after which the map repeats itself [rad]."""
         return 2 * math.pi / math.lcm(2, max(self.symmetry, 1))
 
-    def borders(self) -> tuple[np.ndarray, np.ndarray]:
-        """Planes between the cells: unit normals ``(p, 3)`` and offsets ``(p,)`` [m]."""
-        z = edges(np.sort(self.stations), self.along)
-        normals, offsets = [np.array([0.0, 0.0, 1.0])] * len(z), list(z)
-        for angle in self._between():
-            for turn in range(round(math.pi / self.period)):
-                phi = angle + turn * self.period
-                normals.append(np.array([-math.sin(phi), math.cos(phi), 0.0]))
-                offsets.append(0.0)
-        if self._narrow:
-            for turn in range(round(math.pi / self.period)):
-                phi = self.angles[0] + turn * self.period
-                normals += [np.array([-math.sin(phi), math.cos(phi), 0.0])] * 2
-                offsets += [-0.5 * self.across, 0.5 * self.across]
-        return np.array(normals), np.array(offsets)
+    def borders(self) -> list[tuple[np.ndarray, float]]:
+        """Planes between the cells: unit normals and offsets [m]."""
+        planes = [(np.array([0.0, 0.0, 1.0]), z) for z in edges(np.sort(self.stations), self.along)]
+        sides = [(angle, 0.0) for angle in self._between()]
+        sides += [(self.angles[0], side * 0.5 * self.across) for side in (-1.0, 1.0)] * self._narrow
+        turns = self.period * np.arange(round(math.pi / self.period))
+        angles = ((phi + turn, offset) for phi, offset in sides for turn in turns)
+        return planes + [(np.array([-math.sin(phi), math.cos(phi), 0.0]), offset) for phi, offset in angles]
 
     def at(self, x: np.ndarray) -> np.ndarray:
         """Candidate ``(n,)`` (station times number of angles plus angle) of points ``(n, 3)`` between the borders."""
@@ -179,7 +172,7 @@ class Cells:
 
 def coloured(corners: np.ndarray, cells: Cells) -> tuple[np.ndarray, np.ndarray]:
     """Triangles ``(m, 3, 3)`` cut at the borders of the cells, and the candidate ``(m,)`` of each."""
-    for normal, offset in zip(*cells.borders(), strict=True):
+    for normal, offset in cells.borders():
         corners = cut(corners, normal, offset)
     return corners, cells.at(corners.mean(axis=1))
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from jobs.figures import __main__ as figures
-from jobs.figures import studies, surfaces
+from jobs.figures import drawing, studies, surfaces
 from jobs.figures.__main__ import FIGURES, Figure, draw, figures_of, targets
 from softjaw.friction.motion import fibonacci_twists
 from softjaw.friction.wrench import friction_limits
@@ -34,6 +34,12 @@ def test_every_figure_has_scenes_and_a_picture_in_the_docs(figure):
     picture = (ROOT / "docs" / f"fig{figure.name}.png").read_bytes()
     assert picture.startswith(PNG)
     assert len(picture) <= MOST
+
+
+def test_balls_are_drawn_in_their_colour():
+    image = drawing.rendered(lambda p: drawing.dots(p, np.eye(3), 0.2, "red"), (1, 1, 1), (0, 0, 1), (60, 60))
+    red = (image[..., 0] > 100) & (image[..., 1] < 60)
+    assert 0.05 < red.mean() < 0.6
 
 
 def test_figures_go_by_number_and_letters():

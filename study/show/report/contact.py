@@ -64,14 +64,10 @@ def pad_face(pad: Pad, motion: str, top: float, bar: bool) -> list[Any]:
         colorscale=plots.colours("pressure"), showscale=bar, hoverinfo="skip", colorbar=plots.bars("pressure [kPa]"),
         **plots.FLAT,
     ))  # fmt: skip
-    places, forces = pad.friction(motion)
     high = np.array([0, 0, 0.3 + np.ptp(corners[:, 2])])
-    if len(places):
-        middle = 1e3 * pad.own(places) * [1, 1, 0] + high
-        step = np.ptp(corners[:, 0]) / 16 / max(float(np.linalg.norm(forces, axis=1).max()), 1e-300)
-        half = 0.5 * step * (forces @ pad.rotation)
-        traces.append(plots.segments(np.stack([middle - half, middle + half], 1), line={"color": FORCE, "width": 4}))
-        traces.append(plots.points(middle + half, FORCE, 2.5))
+    arrows = 1e3 * pad.own(1e-3 * pad.arrows(motion, np.ptp(corners[:, 0]) / 16)) * [1, 1, 0] + high
+    traces.append(plots.segments(arrows, line={"color": FORCE, "width": 4}))
+    traces.append(plots.points(arrows[:, 1], FORCE, 2.5))
     axes = 0.3 * np.ptp(corners[:, 1]) * (pad.frame @ pad.rotation)[:2]
     ends = 1e3 * pad.own(pad.origin) * [1, 1, 0] + high + np.stack([np.zeros((2, 3)), axes], 1)
     traces.append(plots.segments(ends, line={"color": plots.INK, "width": 5}))
