@@ -212,7 +212,7 @@ class Stepping:
         return NotReachedError(
             f"the force stays below {force:.4g} N: it has a maximum of {peak[0]:.4g} N at a closing displacement of "
             f"{1e3 * peak[1]:.4g} mm and falls to {low[1]:.4g} N at {1e3 * self.problem.closing(low[0]):.4g} mm, a "
-            "limit point of the pad on this mesh; whether a finer mesh moves it was not tried"
+            "limit point of the pad on this mesh"
         )
 
     def _land(self, low: State, high: State, force: float, work: Work) -> FloatArray:
