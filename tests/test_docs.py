@@ -28,7 +28,7 @@ def cells(name: str) -> set[str]:
     return {found.strip("`") for found in re.findall(r"^\| (.+?) \|", page(name), re.M)}
 
 
-def test_every_key_of_a_scene_has_a_row():
+def test_every_key_quantity_flag_and_effect_has_a_row_and_every_command_is_shown():
     schema = Scene.model_json_schema()
     models = [*schema["$defs"].values(), schema]
     keys = {key for model in models for key in model.get("properties", {})} - set(schema["properties"]) - {"shape"}
@@ -36,15 +36,9 @@ def test_every_key_of_a_scene_has_a_row():
     assert not keys - cells("scene")
     for section in schema["properties"]:
         assert f"## `[{section}]`" in page("scene")
-
-
-def test_every_quantity_flag_and_effect_has_a_row():
     assert not {q.name for q in TABLE} - cells("quantities")
     assert not {str(int(flag)) for flag in Flag} - cells("flags")
     assert not set(EFFECT_TABLE) - cells("flags")
-
-
-def test_every_command_and_option_is_shown():
     for name in (name for group in COMMANDS.values() for name, *_ in group):
         assert f"### softjaw {name}\n" in page("commands")
         assert f"usage: softjaw {name} " in page("commands")

@@ -115,13 +115,10 @@ def test_make_knows_the_target(command):
 PYTEST = sorted(set(re.findall(r"(?<=`)pytest [^`]+(?=`)", TEXT)))
 
 
-def test_the_test_files_that_it_names_exist():
+def test_every_path_that_it_names_exists():
     assert len(PYTEST) > 3
     named = {word for command in PYTEST for word in shlex.split(command) if word.startswith("tests/")}
     assert not [path for path in sorted(named) if not (ROOT / path).exists()]
-
-
-def test_every_path_that_it_names_exists():
     named = set(re.findall(r"(?<=[`(])((?:jobs|tests|docs|study)/[\w./-]+\.\w+)(?=[`)])", TEXT))
     assert len(named) > 5
     assert not [path for path in sorted(named) if not (ROOT / path).exists()]

@@ -41,15 +41,12 @@ def test_the_line_of_a_bent_tube_is_its_arc():
     assert [bool(remark) for remark in remarks] == [False, True, True]
 
 
-def test_a_straightened_tube_stands_about_the_axis():
+def test_a_straightened_tube_stands_about_the_axis_and_a_straight_body_has_it():
     points, triangles = bent()
     line = centre_line(points, triangles, 0.025)
     moved = line.straightened(points)
     assert np.hypot(*moved[np.abs(points[:, 2]) < 0.04, :2].T) == pytest.approx(0.018, abs=3.5e-3)
     assert line.straightened(moved, -1.0) == pytest.approx(points, abs=1e-15)
-
-
-def test_a_straight_body_has_the_axis_itself():
     mesh = trimesh.creation.cylinder(0.03, 0.2, sections=64)
     line = centre_line(np.asarray(mesh.vertices), np.asarray(mesh.faces, dtype=np.int64), 0.025)
     assert line.straight

@@ -31,15 +31,12 @@ def test_a_missing_row_is_an_error(name):
         replace(patch, **{name: getattr(patch, name)[:-1]})
 
 
-def test_corners_need_three_per_face():
+def test_corners_need_three_per_face_and_no_normal_force_is_an_error_of_its_own_kind():
     patch = lcg_patch(1, 10)
     with pytest.raises(ValueError, match="corners"):
         replace(patch, corners=np.zeros((10, 2, 3)))
     with pytest.raises(ValueError, match="corners"):
         replace(patch, corners=np.zeros((10, 12)))
-
-
-def test_no_normal_force_is_an_error_of_its_own_kind():
     patch = lcg_patch(1, 10)
     with pytest.raises(NoContactError):
         replace(patch, pressure=np.zeros(10))

@@ -55,17 +55,13 @@ every_flat = pytest.mark.parametrize("surface", FLAT.values(), ids=FLAT)
 
 
 @every
-def test_points_on_the_surface_are_on_it(surface):
+def test_points_on_the_surface_are_on_it_and_the_gradient_is_the_derivative_of_the_value(surface):
     u = np.random.default_rng(0).normal(size=(40, 3))
     w = u * surface.radius(u)[:, None]
     np.testing.assert_allclose(surface.value(w), 1, rtol=1e-12)
     assert surface.holds(w).all()
     assert surface.holds((1 - 1e-9) * w).all()
     assert not surface.holds((1 + 1e-9) * w).any()
-
-
-@every
-def test_the_gradient_is_the_derivative_of_the_value(surface):
     u = np.random.default_rng(1).normal(size=(20, 3))
     w, h = u * surface.radius(u)[:, None], 1e-6
     slope = np.stack([(surface.value(w + e) - surface.value(w - e)) / (2 * h) for e in h * np.eye(3)], axis=1)
@@ -86,7 +82,7 @@ def test_the_support_is_what_the_point_with_that_normal_gives(surface):
 
 
 @every
-def test_another_unit_changes_nothing_but_the_numbers(surface):
+def test_another_unit_changes_nothing_but_the_numbers_and_supports_have_the_same_shadow(surface):
     factors = np.array([3.0, 3.0, 0.02])
     t = np.random.default_rng(6).normal(size=(10, 3))
     other = surface.scaled(factors)
@@ -95,10 +91,6 @@ def test_another_unit_changes_nothing_but_the_numbers(surface):
     assert other.volume == pytest.approx(surface.volume * factors.prod(), rel=1e-10)
     assert other.shadow_area == pytest.approx(surface.shadow_area * 9, rel=1e-10)
     np.testing.assert_allclose(other.semi_axes, factors * surface.semi_axes, rtol=1e-11)
-
-
-@every
-def test_the_shadow_from_supports_is_the_same(surface):
     if surface is not SURFACES["fourth powers"]:  # its support has kinks in the curvature
         assert supported_shadow(surface.support, 3, 4096) == pytest.approx(surface.shadow_area, rel=1e-8)
 
@@ -171,15 +163,12 @@ def test_errors_of_flat_bodies_are_numbers(surface):
     assert off.Erad == pytest.approx(1)
 
 
-def test_a_thin_body_is_measured_in_its_units():
+def test_a_thin_body_is_measured_in_its_units_and_vectors_of_another_dimension_are_refused():
     """A thousandth in one direction, mixed with the others: only there have coefficients such digits."""
     thin = rounded_box().scaled([1.0, 1.0, 1e-5])
     again = Quartic.of_coefficients(thin.coefficients)
     for surface, size in ((thin, 1e-5), (again, 1e-5), (again.scaled([1e-3, 1e4, 1.0]), 1e-4)):
         assert surface.volume == pytest.approx(size * rounded_box().volume, rel=1e-11)
-
-
-def test_vectors_of_another_dimension_are_refused():
     with pytest.raises(ValueError, match="vectors of shape"):
         fourth_powers().value([1.0, 2.0])
 
@@ -199,14 +188,11 @@ def on_the_ellipsoid(K=200):
     return t * AXES**2 / np.linalg.norm(t * AXES, axis=1, keepdims=True), t
 
 
-def test_errors_of_a_swollen_ellipsoid():
+def test_errors_and_overclaims_of_a_swollen_ellipsoid():
     """Radii too large by 10 %: P = 1 / 1.21 on the true surface, and P^(-1/2) = 1.1."""
     W, T = on_the_ellipsoid()
     errors = fit_error(Ellipsoid.of_axes(1.1 * AXES), W, T)
     np.testing.assert_allclose(errors, [1 - 1 / 1.21, 0.1, 0], atol=1e-12)
-
-
-def test_only_what_is_claimed_too_much_is_an_overclaim():
     W, _ = on_the_ellipsoid()
     longer = Ellipsoid.of_axes(AXES * [1.0, 1.0, 1.2])
     assert overclaim(Ellipsoid.of_axes(1.1 * AXES), W) == pytest.approx(0.1, rel=1e-9)

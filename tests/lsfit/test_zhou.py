@@ -73,17 +73,12 @@ def test_the_quartic_is_convex_where_the_samples_are_not():
 
 
 @FITS
-def test_the_fit_is_free_of_units(fit):
+def test_the_fit_is_free_of_units_and_samples_in_a_plane_give_a_flat_surface(fit):
     """Scaled to one, samples in other units are the same samples, and motions change inversely."""
     W, T = samples(lcg_patch(6, 40), 60)
     factors = np.array([1.0, 1.0, 1e3])
     metre, other = fit(span_samples(W, T)), fit(span_samples(W * factors, unit(T / factors)))
     np.testing.assert_allclose(other.semi_axes, metre.semi_axes * factors, rtol=1e-5)
-
-
-@FITS
-def test_samples_in_a_plane_give_a_flat_surface(fit):
-    """Translations alone say nothing of torques: the semi-axis there is 0, not infinite."""
     phi = np.pi * np.arange(12)[:, None] / 12
     twist = np.cos(phi) * SLIDE_X + np.sin(phi) * SLIDE_Y
     surface = fit(span_samples(*normalised_samples(friction_wrench(DISC, twist, 1.0), twist, DISC.load.sum(), 2.0)))

@@ -48,12 +48,9 @@ def test_a_trouble_comes_with_its_cure(monkeypatch, check, answer, found, cure):
     assert code == USAGE
 
 
-def test_several_threads_per_rank_are_a_trouble(monkeypatch):
+def test_several_threads_per_rank_and_a_cache_folder_that_cannot_be_written_are_troubles(monkeypatch, tmp_path):
     monkeypatch.setenv("OMP_NUM_THREADS", "8")
     assert doctor.check_threads()[1] == "export OMP_NUM_THREADS=1"
-
-
-def test_a_cache_folder_that_cannot_be_written_is_a_trouble(monkeypatch, tmp_path):
     (tmp_path / "file").write_text("in the way")
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "file" / "cache"))
     _, cure, code = doctor.check_cache()
@@ -69,20 +66,17 @@ def test_what_is_missing_outweighs_what_cannot_be_written(monkeypatch, capsys, c
     assert capsys.readouterr().out.count("cure: do this") == len(codes)
 
 
-def test_a_check_that_fails_itself_does_not_hide_the_others(monkeypatch, capsys):
+def test_a_check_that_fails_itself_does_not_hide_the_others_and_a_crash_and_a_hang_are_answers(monkeypatch, capsys):
     monkeypatch.setattr(doctor, "CHECKS", {"broken": lambda: 1 / 0, "good": lambda: ("good", "", 0)})
     assert doctor.doctor() == 2
     broken, good = capsys.readouterr().out.splitlines()
     assert "ZeroDivisionError" in broken
     assert good.startswith("fine")
-
-
-def test_a_crash_and_a_hang_are_answers():
     assert trouble(ask("import os; os.abort()")) == "ended with exit code -6"
     assert trouble(ask("import time; time.sleep(60)", limit=0.5)) == "no answer in time"
 
 
-def test_the_variables_of_a_surrounding_mpirun_are_left_out(monkeypatch):
+def test_the_variables_of_a_surrounding_mpirun_are_left_out_and_threads_are_pinned_unless_the_user_chose(monkeypatch):
     monkeypatch.setenv("OMPI_COMM_WORLD_RANK", "1")
     monkeypatch.setenv("PMIX_RANK", "1")
     monkeypatch.setenv("PATH_TO_KEEP", "yes")
@@ -90,9 +84,6 @@ def test_the_variables_of_a_surrounding_mpirun_are_left_out(monkeypatch):
     assert kept["PATH_TO_KEEP"] == "yes"
     assert kept["OMP_NUM_THREADS"] == "1"
     assert not {"OMPI_COMM_WORLD_RANK", "PMIX_RANK"} & set(kept)
-
-
-def test_threads_are_pinned_unless_the_user_chose(monkeypatch):
     monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
     monkeypatch.setenv("OPENBLAS_NUM_THREADS", "4")
     doctor.pin_threads()

@@ -119,9 +119,6 @@ def test_the_level_at_a_force_does_not_depend_on_other_forces(choice):
     levels = levels_of(choice([0.0042, 0.005, 0.006]))
     assert [level.reason for level in levels] == [effects.LITTLE] * 3
     assert [level.change for level in levels] == pytest.approx([0.0042, 0.005, 0.006], rel=1e-9)
-
-
-def test_what_is_measured_on_a_few_elements_is_not_known(choice):
     [level] = levels_of(choice([np.nan]))
     assert (level.reason, level.indicator) == (effects.UNDECIDED, 0.1)
     assert np.isnan(level.change)

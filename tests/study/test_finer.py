@@ -35,9 +35,6 @@ def test_rivals_are_those_that_may_be_better_than_the_last_of_the_list_or_than_t
     assert rivals(places, value, np.full(13, 0.04)) == []
     assert rivals(places, value, np.where(np.arange(13) == 11, 0.3, 0.04)) == [11]
     assert rivals([Place(0, [1], 0.0, [])], np.array([1.0, 0.99]), np.array([0.05, 0.02])) == [1]
-
-
-def test_what_seems_lost_on_the_coarse_mesh_is_a_rival_if_it_may_hold_more_than_the_best():
     places, value = [Place(0, [], 0.0, []), Place(1, [], 0.0, [])], np.array([1.0, 0.5, 0.3, 0.4, 0.0])
     error = np.array([0.05, 0.02, 0.7, 0.3, np.inf])
     assert rivals(places, value, error, [2, 3, 4]) == [2, 4]

@@ -19,18 +19,15 @@ TABLE = sum(Flag)  # all bits that have a row
 OF_LOWER = {member.name for kind in (FrameFlag, ScoreFlag) for member in kind if member}
 
 
-def test_flags_of_lower_packages_have_rows_of_the_same_names():
+def test_flags_of_lower_packages_have_rows_of_the_same_names_and_every_row_is_reachable():
     for kind in (FrameFlag, ScoreFlag):
         members = [member for member in kind if member]
         assert raised(kind(sum(members))) == sum(Flag[member.name] for member in members)
-
-
-def test_every_row_is_reachable():
     used = "".join(file.read_text() for file in (ROOT / "study").rglob("*.py") if file.name != "flags.py")
     assert [flag.name for flag in Flag if flag.name not in OF_LOWER and f"Flag.{flag.name}" not in used] == []
 
 
-def test_words_fit_their_column_and_sentences_their_message():
+def test_words_fit_their_column_sentences_their_message_and_the_definition_tells_every_bit_of_a_file():
     assert len({flag.word for flag in Flag}) == len({flag.sentence for flag in Flag}) == len(Flag)
     for flag in Flag:
         assert flag.value.bit_count() == 1
@@ -38,9 +35,6 @@ def test_words_fit_their_column_and_sentences_their_message():
         assert flag.sentence
         assert ";" not in flag.sentence + flag.word
     assert len(flag_sentences(OF_FILE).encode()) < MESSAGE_BYTES - 400
-
-
-def test_the_definition_in_the_file_tells_every_bit_of_a_file_and_no_other():
     text = map_row("flags").definition
     assert text == flag_definitions()
     for flag in Flag:

@@ -41,10 +41,12 @@ def test_a_preset_sets_pad_and_opening_and_is_gone(tmp_path, name):
     assert Scene.of_tables(scene.effective()) == scene
 
 
-def test_keys_of_the_scene_come_first(tmp_path):
+def test_keys_of_the_scene_come_first_and_a_preset_may_stand_on_the_command_line(tmp_path):
     found = loaded(tmp_path, "franka_hand", more="pad_thickness_mm = 10\npad_width_mm = 30")
     assert (found.pad_width_mm, found.pad_thickness_mm, found.max_opening_mm) == (30, 10, 60)
     assert loaded(tmp_path, "franka_hand", more="max_opening_mm = 33").max_opening_mm == 33
+    scene = Scene.from_file(ROOT / "jobs" / "smoke.toml", ["gripper.preset=wsg50", "load.normal_force_n=[5, 10]"])
+    assert scene.gripper.max_opening_mm == 100
 
 
 @pytest.mark.parametrize(
@@ -58,11 +60,6 @@ def test_what_a_gripper_cannot_do_is_refused_with_its_key_and_line(tmp_path, nam
     (problem,) = error.value.problems
     assert problem.key == key
     assert problem.line is not None
-
-
-def test_a_preset_on_the_command_line():
-    scene = Scene.from_file(ROOT / "jobs" / "smoke.toml", ["gripper.preset=wsg50", "load.normal_force_n=[5, 10]"])
-    assert scene.gripper.max_opening_mm == 100
 
 
 def test_joints_of_a_parallel_hand_are_half_the_gap_within_the_stroke():

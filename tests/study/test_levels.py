@@ -135,9 +135,6 @@ def test_a_third_mesh_is_taken_where_the_error_is_not_surely_below_the_target(sp
     # the error that is the target is undecided
     assert {k for k, n in count.items() if n > math.prod(OWN)} == {k for k, error in errors.items() if error >= target}
     assert set(count.values()) <= {math.prod(mesh) for mesh in (OWN, FINER, FINEST)}
-
-
-def test_a_case_that_meets_the_target_is_the_one_of_two_meshes(split):
     errors, _, found = split
     k = min(errors, key=errors.__getitem__)
     assert without_count(found[k]) == bits(whole(())[k])

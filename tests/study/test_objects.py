@@ -126,14 +126,11 @@ def test_a_signal_stops_in_order_and_the_run_resumes(scene, solved):
     same(out, solved)
 
 
-def test_index_answers_commands(solved):
+def test_index_answers_commands_and_its_page_has_a_row_for_every_object(solved, tmp_path):
     assert command(0, "status", solved)[0] == DONE
     code, text, _ = command(0, "show", solved, "--csv")
     assert (code, len(text.splitlines())) == (DONE, len(NAMES) + 2)
     assert command(0, "watch", solved / "index.hdf")[0] == SOME_FAILED
-
-
-def test_the_page_has_a_row_for_every_object_and_a_section_for_solved_ones(solved, tmp_path):
     assert command(0, "report", solved, "-o", tmp_path / "page.html")[0] == DONE
     html = (tmp_path / "page.html").read_text()
     assert [name for name in (*NAMES, "empty") if f'"#object-{name}"' in html] == ["a", "grows", "longest"]

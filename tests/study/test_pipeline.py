@@ -246,16 +246,13 @@ def test_a_load_path_that_ends_names_the_last_good_force_and_what_was_not_tried(
     assert any(2 < force < 20 for force in met)
     assert last_good == 2
     assert numbers_of(above.message, "N")[0] == 20
+    path = solved(OVAL, "petsc.contact_snes_max_it=2")[0][1]
+    assert all(isinstance(result, CaseFailure) for result in path)
+    assert numbers_of(path[1].message, "N")[0] == 2
 
 
 def numbers_of(text, unit):
     return [float(number) for number in re.findall(rf"([\d.]+) {unit}\b", text)]
-
-
-def test_a_load_path_without_a_first_step_fails_all_forces():
-    path = solved(OVAL, "petsc.contact_snes_max_it=2")[0][1]
-    assert all(isinstance(result, CaseFailure) for result in path)
-    assert numbers_of(path[1].message, "N")[0] == 2
 
 
 def test_a_solver_that_is_cut_short_takes_more_steps_to_the_same_answer():

@@ -59,18 +59,12 @@ def test_the_best_of_a_steep_peak_is_found(peak, width):
     assert np.abs(np.array(added) - peak).max() < 12 + width
 
 
-def test_nothing_is_added_where_nothing_can_be_gained():
+def test_nothing_is_added_where_nothing_can_be_gained_a_jump_is_followed_and_a_budget_kept():
     assert rounds_until_known(lambda x: 0.1 + 1e-4 * x)[0] == []
     assert rounds_until_known(lambda x: np.full(x.shape, np.nan))[0] == []
-
-
-def test_a_jump_is_followed_to_the_finest_distance_and_no_further():
     added, _ = rounds_until_known(lambda x: np.where(x < 90.0, 0.1, 0.2))
     assert len(added) < 16
     assert np.diff(sorted([*GIVEN, *added])).min() > 0.9 * FINEST_SPACING_SHARE * np.diff(GIVEN)[0]
-
-
-def test_a_budget_is_kept():
     assert len(rounds_until_known(lambda x: tent(x, 66.75, 4.0), budget=3)[0]) == 3
 
 

@@ -127,7 +127,7 @@ def test_every_missing_force_is_in_one_share(ranks):
     assert all(forces == tuple(sorted(forces)) for _, forces in found)
 
 
-def test_one_candidate_is_divided_evenly_and_many_only_at_the_end():
+def test_one_candidate_is_divided_evenly_many_only_at_the_end_and_load_paths_never():
     [one] = units_of([1.0])
     assert divided([one], 1) == [(0, (0, 1, 2, 3, 4, 5))]
     assert divided([one], 2) == [(0, (0, 2, 4)), (0, (1, 3, 5))]
@@ -136,9 +136,6 @@ def test_one_candidate_is_divided_evenly_and_many_only_at_the_end():
     assert [len(forces) for _, forces in divided(units_of([1.0] * 35), 2)] == [6] * 33 + [3] * 4
     # a candidate that takes longer than all others together
     assert divided(units_of([100.0, 1.0]), 2)[:2] == [(0, (0, 2, 4)), (0, (1, 3, 5))]
-
-
-def test_load_paths_are_not_divided():
     whole = (0, 1, 2, 3, 4, 5)
     assert divided(units_of([1.0], apart=False), 2) == [(0, whole)]
 
@@ -153,13 +150,10 @@ def test_ranks_are_busy_to_the_end(ranks):
     assert makespan(costs, ranks) >= even
 
 
-def test_more_ranks_than_load_paths_are_not_sensible():
+def test_more_ranks_than_load_paths_are_not_sensible_and_times_follow_from_costs():
     assert sensible_ranks([1.0] * 35) == 35
     assert sensible_ranks([10.0, 1.0, 1.0]) == 1
     assert sensible_ranks([]) == 1
-
-
-def test_times_of_unsolved_units_follow_from_their_cost():
     units = tuple(SimpleNamespace(rows=((2 * i, 2 * i + 1),), cost=c, state=0) for i, c in enumerate([1.0, 2.0, 4.0]))
     plan = Plan(None, None, units)
     assert unit_seconds(plan, np.array([3.0, 3.0, np.nan, 1.0, np.nan, np.nan])) == pytest.approx([6.0, 12.0, 24.0])

@@ -56,7 +56,7 @@ def test_a_line_contact_ends_at_its_edges_and_at_the_rims():
         assert counted > area
 
 
-def test_a_contact_from_a_rim_ends_at_its_edge():
+def test_a_contact_from_a_rim_ends_at_its_edge_and_one_without_an_edge_is_the_whole_face():
     """p = sqrt(1 - s / b) (1 + s / (2 b)) from the end of the pad on, exact but for the integration over the faces."""
     for b in (0.013, 0.0215):
 
@@ -66,9 +66,6 @@ def test_a_contact_from_a_rim_ends_at_its_edge():
 
         patch, faces = patch_of(pressure, (20, 3))
         assert contact_area(patch, faces) == pytest.approx(b * WIDTH, rel=0.02)
-
-
-def test_a_contact_without_an_edge_is_the_whole_face():
     patch, faces = patch_of(lambda x, y: 1.0 + 0.0 * x, (4, 3))
     assert contact_area(patch, faces) == pytest.approx(LENGTH * WIDTH, rel=1e-12)
     assert largest_pressure(patch, faces, 2) == pytest.approx(1.0, rel=1e-9)
@@ -86,4 +83,3 @@ def test_one_loaded_line_of_nodes_has_about_the_width_of_its_share(line):
     found = ContactPatch(place.reshape(-1, 3), patch.area, patch.normal, load.ravel(), patch.corners)
     assert 0.8 < contact_area(found, faces) / (LENGTH * share * (1.0 if line else 0.5)) < 1.3
     assert largest_pressure(found, faces, 2) == pytest.approx(1.0, rel=0.35)
-

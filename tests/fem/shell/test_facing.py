@@ -48,15 +48,12 @@ def test_the_undeformed_cylinder_is_faced_along_its_radius(wall, points):
     np.testing.assert_allclose(found.H, around[:, :, None] * around[:, None, :] / r[:, None, None], atol=2e-2)
 
 
-def test_a_wall_that_swells_is_nearer_by_the_swelling(wall, points):
+def test_a_wall_that_swells_is_nearer_and_one_that_moves_rigidly_is_faced_by_points_that_move_along(wall, points):
     _, normal = nodes(wall)
     grown = face(wall, points, wall.places(points), 1e-3 * normal, np.zeros_like(normal))
     start = face(wall, points, wall.places(points), *still(wall))
     # displacements are interpolated bilinearly: the arc between two nodes is flatter by 1 - cos(half the step)
     np.testing.assert_allclose(start.gap - grown.gap, 1e-3, atol=1e-3 * (1 - np.cos(np.pi / 40)) + 1e-8)
-
-
-def test_a_wall_that_moves_rigidly_is_faced_by_points_that_move_along(wall, points):
     move = np.array([2e-3, -1e-3, 3e-3])
     there = face(wall, points + move, wall.places(points), np.tile(move, (840, 1)), np.zeros((840, 3)))
     here = face(wall, points, wall.places(points), *still(wall))

@@ -10,6 +10,8 @@ from softjaw.fem.contact.load_stepping import Work
 from softjaw.fem.contact.path import OnPath
 from softjaw.fem.contact.press import Press
 from softjaw.fem.contact.problem import Control
+from softjaw.fem.errors import ConvergenceError
+from softjaw.fem.shell.grip import Grip
 from softjaw.fem.shell.wall_material import WallMaterial, wall_material
 from softjaw.fem.shell.wall_mesh import MeshSize
 from tests.fem.grips import check_tangent, e_n, gap_at, grip, pose, stirred, thin
@@ -94,6 +96,21 @@ def test_so_is_that_of_a_grasp_with_friction(allowed, level, control):
         assert slips.any()
         assert ((size > 0) & ~slips).any()
     check_tangent(problem, x, 1e-10, 1e-7)
+
+
+def test_where_one_kind_of_gaps_has_no_state_the_path_goes_on_with_the_next(monkeypatch):
+    expected = [s.fingers[0].closing for s in grip(thin(), elements=(4, 2, 2)).load_path(FORCES)]
+    problem, level, failed = grip(thin(), elements=(4, 2, 2)).problem, Grip._level, []
+
+    def fails_once(self, here, force, work):
+        if force > FORCES[0] and not failed:
+            failed.append(force)
+            raise ConvergenceError("cycles")
+        return level(self, here, force, work)
+
+    monkeypatch.setattr(Grip, "_level", fails_once)
+    found = [s.fingers[0].closing for s in Grip([lambda: problem] * 2).load_path(FORCES)]
+    assert (found, failed) == (pytest.approx(expected, rel=1e-8), [FORCES[1]])
 
 
 def test_without_friction_nothing_changes():

@@ -182,16 +182,12 @@ def test_a_walk_lands_on_the_first_crossing(wanted):
     assert (np.diff(forces) < 0).any() == (wanted > 2.5)
 
 
-def test_a_landing_far_from_its_bracket_is_refused_and_tried_from_closer():
+def test_a_landing_far_from_its_bracket_is_tried_from_closer_and_a_force_that_is_never_reached_is_an_error():
     work = Work()
     x = stepping(close=0.003).displacement_control(np.zeros(1), 2.2, work, 0.5 * MM)
     assert x[0] / MM == pytest.approx(crossings(2.2)[0], abs=1e-9)
     assert work.steps > 8  # brackets were halved
-
-
-def test_a_force_that_is_never_reached_is_an_error():
     flat = stepping()
     flat.problem.normal_force = lambda x: 1.0 - np.exp(-x[0] / MM)
     with pytest.raises(ConvergenceError):
         flat.displacement_control(np.zeros(1), 2.0, Work(), 0.5 * MM)
-

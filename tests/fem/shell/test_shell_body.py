@@ -96,7 +96,7 @@ def test_grid_lines_are_fine_where_asked():
     assert mesh.outer[mesh.foot, 2] == pytest.approx(mesh.outer[:, 2].min(), abs=1e-12)
 
 
-def test_a_step_of_the_thickness_is_not_missed_between_two_lines():
+def test_a_step_of_the_thickness_is_not_missed_and_sizes_grow_no_faster_than_asked():
     steps = [(0.0, 5e-4), (0.121, 5e-4), (0.123, 1.2e-3), (0.135, 1.2e-3)]
     mesh = body_mesh(SURFACES["flask"], steps, COARSE, QUARTER)
     z = SURFACES["flask"].curve.derivative(mesh.s)[:, 0]
@@ -104,9 +104,6 @@ def test_a_step_of_the_thickness_is_not_missed_between_two_lines():
         assert np.abs(z - height).min() < 1e-9
     at = mesh.X[:, 2] > 0.1231
     assert mesh.thickness[at] == pytest.approx(1.2e-3)
-
-
-def test_sizes_grow_no_faster_than_asked():
     x = np.linspace(0, 2, 201)
     assert limited(x, np.where(np.abs(x - 1) < 1e-9, 0.1, 9.0), 0.25) == pytest.approx(0.1 + 0.25 * np.abs(x - 1))
     assert divided(1.0, 3.0, x, np.full(201, 0.25)) == pytest.approx(np.linspace(1, 3, 9), abs=1e-12)

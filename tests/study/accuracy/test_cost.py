@@ -44,22 +44,16 @@ def test_a_few_cases_are_solved_on_coarser_and_finer_meshes_of_both_kinds():
     assert parse_scene(scene.effective_toml()) == scene
 
 
-def test_a_wall_that_may_be_simulated_has_meshes_too():
+def test_a_wall_has_meshes_too_what_makes_a_study_long_is_left_out_and_an_own_sweep_stays():
     bottle = Scene.from_file(JOBS / "bottle.toml")
     assert mesh_sweep(bottle)["accuracy.wall_element_mm"] == pytest.approx([3, 1.5, 1.05])
     assert "gripper.element" in mesh_sweep(bottle.with_values({"effects.object": "rigid"}))
     assert cost_scene(bottle).cases == 4 * 3 * 9
-
-
-def test_what_makes_a_study_long_is_left_out_and_poses_are_spread():
     scene = Scene.from_file(JOBS / "box-poses.toml", ["accuracy.target=0.01", "candidates.refine=true"])
     cost = cost_scene(scene)
     assert (cost.accuracy.target, cost.candidates.refine) == (None, None)
     assert 1 < len(cost.candidates.poses) <= 3
     assert set(cost.candidates.poses) <= set(scene.candidates.poses)
-
-
-def test_the_scene_s_own_sweep_stays():
     scene = cost_scene(parse_scene(SCENE, "x.toml", ["sweep.accuracy.contact=['weighted', 'nodal']"]))
     assert scene.sweep == {"accuracy.contact": ("weighted", "nodal")}
 

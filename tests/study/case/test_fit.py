@@ -48,12 +48,9 @@ def test_candidates_of_every_kind_are_too_wide_where_they_are(scene):
     assert states(scene, "gripper.max_opening_mm=39") == [WIDE, WIDE] * per
 
 
-def test_what_rounding_decides_is_solved():
+def test_what_rounding_decides_is_solved_and_each_point_of_a_sweep_decides_for_itself():
     assert states(POSES, "gripper.max_opening_mm=40") == [WIDE, MISSING]
     assert states(POSES, "gripper.max_opening_mm=39.999999999") == [WIDE, MISSING]
-
-
-def test_each_point_of_a_sweep_decides_for_itself():
     scene = parse_scene(POSES, overrides=["gripper.max_opening_mm=45", "sweep.object.semi_axis_a_mm=[21, 25]"])
     found = make_plan(scene).units
     assert [unit.state for unit in found] == [MISSING, MISSING, WIDE, MISSING]

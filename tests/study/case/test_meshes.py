@@ -1,4 +1,4 @@
-"""Whole cases of meshes: poses in the frame of the file, mirror images, facets, triangles as users have them."""
+"""Whole cases of meshes: poses in the frame of the file, and the mirror image of the other finger."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ from softjaw.study.case.pressing import OnRigid
 from softjaw.study.result.read import open as open_dataset
 from softjaw.study.result.skeleton import create
 from softjaw.study.run.plan import make_plan
-from tests.study.scenes import BALL, NO_COUPLING, mesh_of, pose_of, results_of, scene_of, units_of
+from tests.study.scenes import NO_COUPLING, mesh_of, pose_of, scene_of, units_of
 
 TURN = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])  # the object's z is the file's x
 SHIFT = np.array([120.0, -45.0, 30.0])  # mm
@@ -43,11 +43,7 @@ def solved(made):
     return pipeline.image(result, unit, 0).values
 
 
-def explicit(turn, shift):
-    return pose_of(turn @ [0.0, 0, 40] + shift, turn @ [-1.0, 0, 0], turn @ [0.0, 0, 1])
-
-
-def test_a_mesh_that_was_moved_in_its_file_has_its_grasps_moved(files):
+def test_a_mesh_that_was_moved_in_its_file_has_its_grasps_moved_and_its_poses_read_in_its_frame(files):
     upright, moved = (solved(scene(files, name)) for name in ("upright", "moved"))
     assert moved["maps/quality"] == pytest.approx(upright["maps/quality"], rel=1e-5)  # STL has single precision
     assert moved["maps/payload"] == pytest.approx(upright["maps/payload"], rel=2e-3)
@@ -55,13 +51,10 @@ def test_a_mesh_that_was_moved_in_its_file_has_its_grasps_moved(files):
     there = upright["fingers/pose_origin"] @ TURN.T + 1e-3 * SHIFT
     np.testing.assert_allclose(moved["fingers/pose_origin"], there, atol=1e-7)
     np.testing.assert_allclose(upright["fingers/pose_origin"], [[0.02, 0, 0.04], [-0.02, 0, 0.04]], atol=2e-5)
-
-
-def test_poses_of_a_scene_are_read_in_the_frame_of_the_file(files):
-    grid = solved(scene(files, "moved"))
-    posed = solved(scene(files, "moved", explicit(TURN, SHIFT)))
-    assert posed["maps/e_n"] == pytest.approx(grid["maps/e_n"], rel=1e-6)
-    np.testing.assert_allclose(posed["fingers/pose_origin"], grid["fingers/pose_origin"], atol=1e-7)
+    pose = pose_of(TURN @ [0.0, 0, 40] + SHIFT, TURN @ [-1.0, 0, 0], TURN @ [0.0, 0, 1])
+    posed = solved(scene(files, "moved", pose))
+    assert posed["maps/e_n"] == pytest.approx(moved["maps/e_n"], rel=1e-6)
+    np.testing.assert_allclose(posed["fingers/pose_origin"], moved["fingers/pose_origin"], atol=1e-7)
 
 
 def test_the_file_states_the_frame_in_which_stations_count(files, tmp_path):
@@ -70,46 +63,6 @@ def test_the_file_states_the_frame_in_which_stations_count(files, tmp_path):
     attributes = open_dataset(tmp_path / "a.hdf").attrs
     np.testing.assert_array_equal(attributes["object_rotation"], TURN)
     np.testing.assert_allclose(attributes["object_origin"], 1e-3 * SHIFT, atol=1e-6)
-
-
-PAD = ("gripper.pad_length_mm=30", "gripper.pad_width_mm=20", "gripper.pad_thickness_mm=12")
-
-
-def mesh(body, folder, name):
-    body.export(folder / f"{name}.stl")
-    return mesh_of(folder / f"{name}.stl")
-
-
-def solved_shape(shape, elements=(10, 6, 4), station=0.0, angle=0.0):
-    place = {"stations": f"[{station}]", "angles": f"[{angle}]", "elements": list(elements)}
-    [result] = results_of(scene_of(shape, *PAD, **place))
-    return result
-
-
-@pytest.mark.long
-def test_a_mirrored_mesh_gives_mirrored_results(tmp_path):
-    body = trimesh.creation.icosphere(3, 30)
-    body.vertices *= [0.7, 0.9, 1.3]
-    body.vertices += 0.0015 * body.vertices[:, [1, 2, 0]] * body.vertices[:, [2, 0, 1]]
-    # STL files hold numbers of single precision: both meshes have the same
-    body.vertices = body.vertices.astype(np.float32)
-    other = trimesh.Trimesh(body.vertices * [1, -1, 1], body.faces[:, ::-1], process=False)
-    one, two = (
-        solved_shape(mesh(own, tmp_path, name), station=35, angle=sign * 20)
-        for own, name, sign in ((body, "one", 1), (other, "two", -1))
-    )
-    names = [name for name in one.values if name in ("maps/quality", "maps/e_n") or "overestimate" in name]
-    assert len(names) > 3
-    for name in names:
-        assert np.asarray(two.values[name]) == pytest.approx(np.asarray(one.values[name]), rel=1e-6), name
-
-
-@pytest.mark.long
-def test_a_ball_of_facets_is_the_ball(tmp_path):
-    facets = trimesh.creation.uv_sphere(30, count=[25, 48])
-    ball = solved_shape(BALL, (20, 14, 6))
-    found = solved_shape(mesh(facets, tmp_path, "ball"), (20, 14, 6), station=30)
-    assert found.values["maps/quality"] == pytest.approx(ball.values["maps/quality"], rel=5e-3)
 
 
 @pytest.fixture(scope="module")

@@ -95,7 +95,7 @@ def test_stations_of_a_straight_mesh_stay_on_the_axis(tmp_path):
             assert pose.origin == pytest.approx(same.origin, abs=1e-15)
 
 
-def test_axes_end_with_station_angle_and_force_in_si_units():
+def test_axes_end_with_station_angle_and_force_in_si_units_and_poses_are_numbered():
     over = [
         "sweep.object.semi_axis_b_mm=[40, 10, 20]", "sweep.gripper.material=['linear', 'blatz_ko']",
         "sweep.friction.mu=[0.5]",
@@ -108,9 +108,6 @@ def test_axes_end_with_station_angle_and_force_in_si_units():
     assert (axes[1].long_name, axes[1].options) == ("gripper.material", ("linear", "blatz_ko"))
     assert axes[3].values.tolist() == [-0.01, 0, 0.03]
     assert axes[5].values.tolist() == [1, 2, 5]
-
-
-def test_axes_of_explicit_poses_number_the_candidates():
     axes = candidates.axes(posed(((0, 0, 0), (1, 0, 0), (0, 0, 1)), ((0, 0, 9), (0, 1, 0), (0, 0, 1))))
     assert [(a.name, a.values.tolist(), a.units) for a in axes[:2]] == [("station", [0, 1], ""), ("angle", [0], "rad")]
 
@@ -190,13 +187,10 @@ def test_every_row_is_filled_exactly_once_and_stands_for_its_axis_values(swept):
                 assert at.get("semi_axis_b", scene.object.semi_axis_b) == unit.scene.object.semi_axis_b
 
 
-def test_the_symmetry_is_asked_for_at_every_point_of_the_sweep():
+def test_the_symmetry_is_asked_for_at_every_point_of_the_sweep_and_a_swept_roll_turns_the_pads():
     scene = parse_scene(CYLINDER, overrides=["sweep.object.semi_axis_b_mm=[20, 25]"])
     round_or_not = [u.scene.object.semi_axis_b for u in candidates.units(scene)]
     assert (round_or_not.count(0.02), round_or_not.count(0.025)) == (9, 3)
-
-
-def test_a_swept_roll_turns_the_pads():
     scene = parse_scene(CYLINDER, overrides=["object.semi_axis_b_mm=25", "sweep.candidates.roll_deg=[0, 90]"])
     sides = [u.candidate.poses[0].rotation[2, 0] for u in candidates.units(scene)]
     assert sides == pytest.approx([1, 1, 1, 0, 0, 0], abs=1e-15)

@@ -41,8 +41,12 @@ def test_a_hand_comes_from_above_only_where_its_palm_stays_over_the_object(path)
     assert not any(grasp.hold.unfit for grasp in found)
 
 
-def test_without_a_palm_every_grasp_is_taken_from_above(path):
+def test_without_a_palm_grasps_are_taken_from_above_and_fingers_open_no_wider_than_the_stroke(path):
     assert all(grasp.rotation[2, 2] < -0.99 for grasp in taken(path, Hand()))
+    hand = Hand(stroke_mm=80)
+    for grasp in taken(path, hand):
+        assert grasp.hold.open_joints == pytest.approx({"finger_joint1": 0.040, "finger_joint2": 0.040})
+        assert grasp.hold.closed_joints == pytest.approx({"finger_joint1": 0.034, "finger_joint2": 0.034})
 
 
 @pytest.mark.parametrize(("hand", "why"), [
@@ -55,13 +59,6 @@ def test_what_the_gripper_cannot_take_is_left_out_with_the_reason(path, hand, wh
     assert not kept
     assert why in said
     assert said.startswith("5 of 5 ")
-
-
-def test_fingers_open_no_wider_than_the_stroke(path):
-    hand = Hand(stroke_mm=80)
-    for grasp in taken(path, hand):
-        assert grasp.hold.open_joints == pytest.approx({"finger_joint1": 0.040, "finger_joint2": 0.040})
-        assert grasp.hold.closed_joints == pytest.approx({"finger_joint1": 0.034, "finger_joint2": 0.034})
 
 
 def test_clearance_of_a_sphere_from_boxes():

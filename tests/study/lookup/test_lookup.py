@@ -191,7 +191,7 @@ def test_angles_repeat_with_the_objects_symmetry(tmp_path):
     )
 
 
-def test_a_gap_that_was_not_solved_is_not_bridged(tmp_path):
+def test_a_gap_that_was_not_solved_is_not_bridged_but_of_round_objects(tmp_path):
     part = GraspMap(make(tmp_path / "a.hdf", axes=grid_axes(angles=[0, 0.1, 0.2])))
     assert part.at(0.01, 0.15, 2).ok
     assert "angle 90 deg, solved: 0 deg to 11.459 deg" in part.at(0.01, np.pi / 2, 2).reason
@@ -199,9 +199,6 @@ def test_a_gap_that_was_not_solved_is_not_bridged(tmp_path):
     one = GraspMap(make(tmp_path / "b.hdf", axes=grid_axes(angles=[0.3])))
     assert one.at(0.01, force=2).e_n == pytest.approx(one.at(0.01, 0.3, 2).e_n, rel=1e-12)
     assert one.at(0.01, 0.4, 2).reason.endswith("solved: 17.189 deg only")
-
-
-def test_round_objects_may_be_asked_at_any_angle(tmp_path):
     bottle = GraspMap(make(tmp_path / "a.hdf", axes=grid_axes(angles=[0]), scene=ROUND))
     assert bottle.value("e_n", 0.01, np.linspace(-9, 9, 50), 2) == pytest.approx(np.full(50, linear(0.01, 0, 2)))
     assert bottle.at(0.01, force=2).ok

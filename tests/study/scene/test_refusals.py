@@ -95,11 +95,8 @@ def test_pads_that_leave_the_object_along_its_axis_get_a_warning(body, inside, o
     assert len(across) == (body == FLASK)  # 22 mm wide: 11 mm to each side
 
 
-def test_a_swept_pad_that_leaves_the_object_gets_a_warning():
+def test_a_swept_pad_that_leaves_the_object_and_stations_in_metres_get_a_warning():
     assert warnings(at([0], CYLINDER, "sweep.object.length_mm=[40, 200]"))
-
-
-def test_stations_in_metres_get_a_warning():
     metres = ("candidates.stations=7", "candidates.stations_mm=[0.025, 0.175]")
     assert len(warnings(at([100], BOTTLE, *metres))) > len(warnings(at([100, 101], BOTTLE))) == 0
     assert len(warnings(at([0.1], BOTTLE))) == 1  # the pad leaves the bottle

@@ -180,9 +180,6 @@ def test_every_problem_is_found_at_once_and_in_the_order_of_the_file():
     listed = problems(text, "friction.mu=-1", "fricton.mu=1")
     assert [p.line for p in listed] == [3, 6, 9, 11, 12, 16, None, None]
     assert {p.file for p in listed[-2:]} == {"--set fricton.mu=1", "--set friction.mu=-1"}
-
-
-def test_rules_of_several_sections_hold_beside_wrong_ones():
     text = BALL + "[effects]\nobject = 'linear_shell'\n[friction]\nmu = -1\n[petsc]\nfoo = 1\n"
     assert [p.key for p in problems(text)] == ["effects.object", "friction.mu", "petsc.foo"]
 

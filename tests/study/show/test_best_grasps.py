@@ -154,9 +154,6 @@ def test_of_grasps_that_errors_cannot_tell_apart_the_simpler_comes_first():
     assert stations(best(ds)) == [2.0, 1.0, 0.0, 3.0]  # by their opening, which is the number of the payload here
     ds["opening"] = (ds.status.dims, np.repeat([0.01, 0.02, 0.03, 0.001], 2).reshape(ds.status.shape), {"units": "m"})
     assert stations(best(ds)) == [0.0, 1.0, 2.0, 3.0]
-
-
-def test_a_large_error_of_its_own_brings_no_grasp_forward():
     ds = study([[1.0], [0.5]], flags=[float(Flag.NOT_ANTIPODAL), 0.0])
     ds["payload_error"] = (ds.status.dims, np.repeat([0.02, 1.2], 2).reshape(ds.status.shape), {"units": ""})
     assert stations(best(ds)) == [0.0, 1.0]

@@ -95,15 +95,12 @@ def test_a_lone_angle_claims_what_its_pads_cover_unless_all_angles_are_alike():
     assert (Cells(np.array([0.0]), np.array([0.0]), 0, 0.05, 0.02).at(x) == 0).all()
 
 
-def test_values_between_the_places_of_a_wall_are_bilinear_and_close_round_the_axis():
+def test_a_wall_moves_bilinearly_between_the_places_of_its_grid_that_begins_at_finger_one():
     i, j = np.meshgrid(np.arange(AROUND), np.arange(ALONG), indexing="ij")
     grid = np.stack([np.cos(2 * np.pi * i / AROUND), 1.0 * j, 0.0 * j], axis=-1)
     assert between(grid, np.array([3.0, 3.5]), np.array([7.25, ALONG - 1.0]))[:, 1] == pytest.approx([7.25, ALONG - 1])
     one, other = between(grid, np.array([AROUND - 0.5, -0.5]), np.array([0.0, 0.0]))[:, 0]
     assert one == other == pytest.approx(0.5 * (1 + math.cos(2 * math.pi / AROUND)))
-
-
-def test_a_wall_moves_with_the_grid_that_begins_at_finger_one():
     u = np.zeros((AROUND, ALONG, 3))
     u[0] = (-1e-3, 0, 0)  # under finger 1
     shifts = moved(np.array([[12.0, 5.0], [0.0, 5.0], [np.nan, 5.0]]), u, angle=math.pi / 2)
