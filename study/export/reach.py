@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from trimesh.remesh import subdivide_to_size
 
 from softjaw.study.case.build import own_frame, surface_triangles
 from softjaw.study.grippers import Hand
@@ -31,18 +32,8 @@ def surface_points(shape: Any) -> FloatArray:
     points, triangles = surface_triangles(shape)
     points = own_frame(shape).to_object(np.asarray(points, float))
     size = max(SPACING, float(np.linalg.norm(np.ptp(points, axis=0))) / MOST_SPACINGS)
-    corners = points[np.asarray(triangles)]
-    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-    parts = np.maximum(np.ceil(longest / size), 1).astype(int)
-    finer = [_grid(n) @ corners[parts == n] for n in np.unique(parts)]
-    return np.unique(np.round(np.concatenate([x.reshape(-1, 3) for x in finer]), 7), axis=0)
-
-
-def _grid(n: int) -> FloatArray:
-    """Barycentric coordinates ``(k, 3)`` of points that divide the sides of a triangle into ``n`` parts."""
-    i, j = np.meshgrid(np.arange(n + 1), np.arange(n + 1), indexing="ij")
-    i, j = i[i + j <= n], j[i + j <= n]
-    return np.column_stack([i, j, n - i - j]) / n
+    finer = subdivide_to_size(points, np.asarray(triangles), size, max_iter=20)[0]
+    return np.unique(np.round(finer, 7), axis=0)
 
 
 def boxes(hand: Hand, along: str, pad: FloatArray, opening: float, depth: float) -> FloatArray:
