@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.interpolate import RegularGridInterpolator
+from scipy.spatial import cKDTree
 from trimesh.intersections import slice_faces_plane
 
 from softjaw.fem.objects.gap import Pose
@@ -103,8 +105,8 @@ def edges(values: np.ndarray, alone: float = 1.0) -> np.ndarray:
     values = np.asarray(values, float)
     if len(values) == 1:
         return values[0] + 0.5 * alone * np.array([-1.0, 1.0])
-    middle = 0.5 * (values[1:] + values[:-1])
-    return np.concatenate([[2 * values[0] - middle[0]], middle, [2 * values[-1] - middle[-1]]])
+    beyond = np.pad(values, 1, mode="reflect", reflect_type="odd")
+    return 0.5 * (beyond[1:] + beyond[:-1])
 
 
 @dataclass(frozen=True)
@@ -205,10 +207,9 @@ def moved(places: np.ndarray, u: np.ndarray, angle: float) -> np.ndarray:
 
 def between(grid: np.ndarray, around: np.ndarray, along: np.ndarray) -> np.ndarray:
     """Values ``(n, c)`` between the places of a grid ``(AROUND, ALONG, c)``, which closes round the axis."""
-    i, j = np.floor(around).astype(int), np.clip(np.floor(along).astype(int), 0, ALONG - 2)
-    s, t = (around - i)[:, None], (along - j)[:, None]
-    i, k = i % AROUND, (i + 1) % AROUND
-    return (1 - s) * ((1 - t) * grid[i, j] + t * grid[i, j + 1]) + s * ((1 - t) * grid[k, j] + t * grid[k, j + 1])
+    closed = np.concatenate([grid, grid[:1]])
+    places = np.column_stack([around % AROUND, along])
+    return np.asarray(RegularGridInterpolator((np.arange(AROUND + 1), np.arange(ALONG)), closed)(places))
 
 
 def on_wall(shape: Any, points: np.ndarray) -> np.ndarray | None:
@@ -216,9 +217,6 @@ def on_wall(shape: Any, points: np.ndarray) -> np.ndarray | None:
 
     Around from angle 0 about the axis, and along it, in steps of the file's grid; NaN for points that are not on it.
     """
-    # Imported here: it is slow to load, and only views of walls need it.
-    from scipy.spatial import cKDTree
-
     grid = undeformed(shape, 0.0)
     if grid is None or not len(points):
         return None

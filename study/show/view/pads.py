@@ -119,17 +119,9 @@ class Pad:
 
 def corners_of(centres: np.ndarray) -> np.ndarray:
     """Corners ``(i + 1, j + 1, c)`` of a grid of faces from their centres ``(i, j, c)``, continued beyond the rim."""
-    for axis in (0, 1):
-        c = np.moveaxis(centres, axis, 0)
-        if len(c) > 1:
-            # Continued by a line and averaged: the outermost corners lie half a face beyond the centres.
-            c = np.concatenate([2 * c[:1] - c[1:2], c, 2 * c[-1:] - c[-2:-1]])
-            c = 0.5 * (c[1:] + c[:-1])
-        else:
-            # A single face has no neighbour to take the pitch from.
-            c = np.concatenate([c, c])
-        centres = np.moveaxis(c, 0, axis)
-    return centres
+    # Continued by a line and averaged: the outermost corners lie half a face beyond the centres.
+    c = np.pad(centres, ((1, 1), (1, 1), (0, 0)), mode="reflect", reflect_type="odd")
+    return 0.25 * (c[1:, 1:] + c[1:, :-1] + c[:-1, 1:] + c[:-1, :-1])
 
 
 def pads_of(ds: xr.Dataset, gripper: Any, index: Index, faces: Faces) -> list[Pad]:
