@@ -17,7 +17,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from softjaw.fem.errors import MeshError
-from softjaw.fem.objects.gap import FloatArray, IntArray, edges_of
+from softjaw.fem.objects.gap import FloatArray, IntArray, cone_volumes, edges_of
 from softjaw.fem.objects.mesh_file import LENGTHS
 from softjaw.fem.objects.mesh_holes import border_loops, lid_corners, with_holes_filled
 from softjaw.fem.objects.triangle_tree import TriangleTree
@@ -243,7 +243,7 @@ def turned_alike(points: FloatArray, triangles: IntArray) -> tuple[IntArray, boo
     flip = (label[:n] > label[n:]) & ~one_sided
     triangles = np.where(flip[:, None], triangles[:, ::-1], triangles)
     piece = np.unique(np.minimum(label[:n], label[n:]), return_inverse=True)[1].ravel()
-    volume = np.asarray(np.bincount(piece, _volumes(points, triangles)), dtype=float)
+    volume = np.asarray(np.bincount(piece, cone_volumes(points, triangles)), dtype=float)
     # volume of a piece over its area and size, below which it has no inside
     flat = np.abs(volume) <= 1e-6 * np.bincount(piece, _areas(points, triangles)) * _sizes(points, triangles, piece)
     inverted = (volume < 0) & ~flat
@@ -251,13 +251,6 @@ def turned_alike(points: FloatArray, triangles: IntArray) -> tuple[IntArray, boo
     turned = int(np.sum(flip != inverted[piece]))
     closed = bool((joined.at_edge == 2).all() and not one_sided.any() and not flat.any())
     return np.ascontiguousarray(triangles), closed, [f"turned {turned} of {n} triangles"] if turned else []
-
-
-def _volumes(points: FloatArray, triangles: IntArray) -> FloatArray:
-    """Signed volumes ``(m,)`` of the tetrahedra from the bounding box's centre to each triangle [m^3]."""
-    # about the middle: an origin far away would cost digits
-    a, b, c = (points[triangles] - 0.5 * (points.min(axis=0) + points.max(axis=0))).transpose(1, 0, 2)
-    return np.einsum("ij,ij->i", a, np.cross(b, c)) / 6
 
 
 def _without_shells(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray, list[str]]:

@@ -74,7 +74,7 @@ class Side:
         depth = bed_closing(self.height, jaws.force / (jaws.stiffness * self.cell))
         self.pressure = jaws.stiffness * np.maximum(depth - self.height, 0.0)
         filled = np.where(np.isfinite(self.height), self.height, jaws.pad[2])
-        self.slope = _slopes(filled, x[1] - x[0], y[1] - y[0])
+        self.slope = np.stack(np.gradient(filled, x[1] - x[0], y[1] - y[0]), axis=-1)
         # a cell whose neighbour misses the object, or lies far behind it, is at a silhouette: its slope says nothing
         # slope of a height field that still counts as touched: further out it is the object's flank
         edge = np.abs(self.slope).max(axis=-1) > 3.0
@@ -105,17 +105,6 @@ class Side:
         centroid = np.column_stack([self.x[on], self.y[on], self.height[on]])
         patch = ContactPatch(centroid, np.full(len(normal), self.cell), normal, self.pressure[on])
         return Contact(patch, self.jaws.mu, pose)
-
-
-def _slopes(height: FloatArray, dx: float, dy: float) -> FloatArray:
-    """Central differences of a height field on even steps, one-sided at its sides ``(m, n, 2)``."""
-    # as numpy.gradient, which takes twice the time on fields as small as these
-    slope = np.empty((*height.shape, 2))
-    for k, (h, step) in enumerate(((height, dx), (height.T, dy))):
-        along = slope[..., k] if k == 0 else slope[..., k].T
-        along[1:-1] = (h[2:] - h[:-2]) / (2.0 * step)
-        along[0], along[-1] = (h[1] - h[0]) / step, (h[-1] - h[-2]) / step
-    return slope
 
 
 def _direction(slope: FloatArray) -> FloatArray:

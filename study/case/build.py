@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.fem.objects import shapes as objects
-from softjaw.fem.objects.gap import GapObject, Pose, solid_centroid
+from softjaw.fem.objects.gap import GapObject, Pose, cone_volumes, solid_centroid
 from softjaw.fem.objects.outer_surface import OuterSurface, Section, of_revolution, of_sections
 from softjaw.fem.pad.halving import refined
 from softjaw.fem.pad.shape import PadShape
@@ -87,9 +87,7 @@ def volume(shape: Any) -> float:
     obj = build_object(shape)
     if not getattr(obj, "closed", True):
         raise ValueError("the mesh is not closed")
-    points, triangles = surface_triangles(shape)
-    corners = points[triangles] - points.mean(axis=0)
-    return abs(float(np.einsum("ka,ka->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])))) / 6.0
+    return abs(float(cone_volumes(*surface_triangles(shape)).sum()))
 
 
 def with_mass(scene: Scene) -> Scene:
