@@ -1,5 +1,7 @@
 """The path of equilibria: its tangent, stability, jumps, and states that do not depend on the forces asked before."""
 
+import contextlib
+
 import numpy as np
 import pytest
 
@@ -150,6 +152,25 @@ def test_a_jump_is_an_error_where_there_is_another_way():
     x = steps.step_to(np.array([0.01 * MM]), force(0.01), 2.4, Work(), by_displacement=False)
     assert x[0] < MM
     assert not steps.jumped
+
+
+@pytest.mark.parametrize("by_displacement", [True, False])
+def test_where_no_state_is_found_under_force_the_path_goes_on_by_displacement_if_it_may(by_displacement):
+    steps, closings = following(StrainedCurve()), []
+    solve = steps.solver.solve
+
+    def fails(x, *limits):
+        control = steps.problem.control
+        closings.append(control.closing)
+        if control.force and control.force > 2.0 and not any(closings):
+            raise ConvergenceError("cycles")
+        return solve(x, *limits)
+
+    steps.solver.solve = fails
+    with contextlib.nullcontext() if by_displacement else pytest.raises(ConvergenceError, match="cycles"):
+        x = steps.step_to(np.array([0.01 * MM]), force(0.01), 2.2, Work(), by_displacement=by_displacement)
+        assert x[0] / MM == pytest.approx(crossings(2.2)[0])
+    assert any(closings) == by_displacement
 
 
 def test_a_fold_of_the_foam_is_a_jump():
