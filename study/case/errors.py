@@ -18,11 +18,12 @@ from softjaw.study.case.evaluate import LIMITS, EvaluationSettings, overestimate
 from softjaw.study.case.task import payload_alone
 from softjaw.study.quantities import BY_KEY, TABLE
 
-# Weight of what two views of the coarser mesh tell beside the whole difference of two meshes, and the floor: a share of
-# the value, over the root of the number of elements that bear, and how much more where single faces tell it. On 96
-# random scenes with a reference twice as fine they cover 95 % of the errors of each quantity (docs/accuracy.md).
-OF_VIEWS, EDGE = 0.2, 0.02
-WIDER = {"contact_area": 30.0, "p_max": 200.0, "closing": 7.5, "opening_loaded": 0.3}
+# Elements of half the size are that many times better than what two meshes, and views of the coarser one, are apart
+# (`estimate`); and the floor: a share of the value, over the root of the number of elements that bear, less where
+# sums over all faces tell it and more where single ones do. Measured on 130 comparisons of random scenes with a
+# reference of half the element size (docs/accuracy.md).
+OF_MESHES, EDGE = 0.18, 0.12
+WIDER = {"f_x_max": 0.75, "f_y_max": 0.75, "opening_loaded": 0.1, "closing": 1.7, "contact_area": 5.0, "p_max": 25.0}
 # The same of the coarse mesh alone, without friction that acts back, beside the distance to the farther view: of the
 # traction that is left out, and of the value. On 209 cases of seven meshes they cover at least 97 % of the errors of
 # the payload against the scene's mesh, and are some 7 times too large in the median.
@@ -33,13 +34,14 @@ def mesh_errors(
     fine: Sequence[Contact], coarse: Sequence[Contact], values: Mapping[str, Any], other: Mapping[str, Any],
     settings: EvaluationSettings, views: Sequence[Sequence[Contact]] = (),
     pairs: Sequence[tuple[Sequence[Any], Sequence[Any]]] = (), floor: float = 0.0, left_out: float = 0.0,
+    step: float = 2.0,
 ) -> dict[str, float]:  # fmt: skip
     """Errors of all quantities that have one, from the contacts on the mesh and on a coarser one.
 
     ``values`` are those of the fine mesh, ``other`` what the coarser one says beside its contacts; keyed alike.
     ``views`` are the coarse contacts with their pressures at Gauss points and at nodes, ``pairs`` are contacts on the
-    coarse mesh that differ too, ``floor`` is a share of the value, `WIDER` where single faces tell a quantity, and
-    ``left_out`` one of every value.
+    coarse mesh that differ too, ``floor`` is a share of the value, `WIDER` for some, and ``left_out`` one of every
+    value. ``step`` is how many times larger the coarser mesh's elements are.
     """
     # of one value for each friction model the curved one's, which comes first; fits would double the time
     fine_mesh: dict[str, Any] = {key: np.ravel(value)[:1] for key, value in values.items()} | _sums(fine)
@@ -51,9 +53,8 @@ def mesh_errors(
     errors = {}
     for q in (q for q in TABLE if q.error and q.key in coarse_mesh):
         seen = [view[q.key] for view in viewed if q.key in view]
-        error = estimate(fine_mesh[q.key], coarse_mesh[q.key], seen, q.error)
-        both = [[np.asarray(side[q.key], float) for side in pair] for pair in compared if q.key in pair[0]]
-        error += sum(estimate(one, other, (), q.error) for one, other in both)
+        error = estimate(fine_mesh[q.key], coarse_mesh[q.key], seen, q.error, step)
+        error += sum(distance(before[q.key], after[q.key], q.error) for before, after in compared if q.key in before)
         size = 1.0 if q.error == "relative" else float(np.max(np.abs(fine_mesh[q.key])))
         errors[q.of_error.key] = error + (floor * WIDER.get(q.name, 1.0) + left_out) * size
     return errors
@@ -91,6 +92,7 @@ def coarse_errors(
 def error_of(
     name: str, fine: Sequence[Contact], coarse: Sequence[Contact], views: Sequence[Sequence[Contact]],
     settings: EvaluationSettings, pairs: Sequence[tuple[Sequence[Any], Sequence[Any]]] = (), floor: float = 0.0,
+    step: float = 2.0,
 ) -> float:  # fmt: skip
     """Error of one quantity, ``e_n``, ``quality`` or ``payload``, as `mesh_errors` has it."""
     key = f"maps/{name}"
@@ -98,25 +100,32 @@ def error_of(
     def value(contacts: Sequence[Contact]) -> ArrayLike:
         return _sums(contacts)[key] if name == "e_n" else _grasp(contacts, settings)[key]
 
-    error = estimate(value(fine), value(coarse), [value(view) for view in views], BY_KEY[key].error)
-    return error + floor + sum(estimate(value(one), value(other), (), BY_KEY[key].error) for one, other in pairs)
+    kind = BY_KEY[key].error
+    error = estimate(value(fine), value(coarse), [value(view) for view in views], kind, step)
+    return error + floor + sum(distance(value(before), value(after), kind) for before, after in pairs)
 
 
-def estimate(fine: ArrayLike, coarse: ArrayLike, views: Sequence[ArrayLike], kind: str) -> float:
-    """Error of a number, or the largest of those of the fingers, from its values on two meshes.
+def estimate(fine: ArrayLike, coarse: ArrayLike, views: Sequence[ArrayLike], kind: str, step: float) -> float:
+    """Error of a number on the finer mesh: a share of its distances to the coarser one.
 
-    The difference alone passes through zero where the contact's edge lies alike on both meshes; that of the ``views``
-    of the coarse contact does not. ``kind`` as in `quantities.Quantity.error`; NaN where there is no value for the
-    error to be a share of.
+    The difference of two meshes alone passes through zero where the contact's edge lies alike on both; those to the
+    ``views`` of the coarse contact do not, so the farthest of all counts as well. ``step`` is how many times larger
+    the elements of the coarser mesh are; the error is taken to fall with their size.
     """
-    f, c = np.asarray(fine, float), np.asarray(coarse, float)
-    error = np.abs(c - f)
-    if views:
-        gauss, nodal = (np.asarray(view, float) for view in views)
-        error = error + OF_VIEWS * np.abs(gauss - nodal)
+    farthest = max(distance(fine, other, kind) for other in (coarse, *views))
+    return OF_MESHES / (step - 1.0) * (distance(fine, coarse, kind) + farthest)
+
+
+def distance(value: ArrayLike, other: ArrayLike, kind: str) -> float:
+    """How far a number, or that of the finger where it is most, is from another solution's.
+
+    ``kind`` as in `quantities.Quantity.error`; NaN where there is no value for it to be a share of.
+    """
+    v, o = np.asarray(value, float), np.asarray(other, float)
+    apart = np.abs(o - v)
     if kind == "relative":
-        error = np.divide(error, f, out=np.full(f.shape, np.nan), where=f > 0)
-    return float(error.max())
+        apart = np.divide(apart, v, out=np.full(v.shape, np.nan), where=v > 0)
+    return float(apart.max())
 
 
 def _all(contacts: Sequence[Any], settings: EvaluationSettings) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from softjaw.scoring.contact import SoftContact
 from softjaw.scoring.pose import pose_volume
 from softjaw.study.case.build import build_object, centre_of_volume
 from softjaw.study.case.contact import Contact, topology
-from softjaw.study.case.errors import OF_VIEWS, WIDER, edge_floor, estimate, mesh_errors
+from softjaw.study.case.errors import OF_MESHES, WIDER, distance, edge_floor, estimate, mesh_errors
 from softjaw.study.case.evaluate import FACING, EvaluationSettings, evaluate, lengths, quality
 from softjaw.study.case.task import Task
 from softjaw.study.flags import Flag
@@ -105,7 +105,7 @@ def test_contacts_that_lean_are_flagged_and_errors_are_differences_of_meshes():
     errors = mesh_errors(fine, coarse, values, {}, SETTINGS)
     other, _ = evaluate(coarse, SETTINGS)
     for name in ("e_n", "f_y_max", "quality"):
-        expected = abs(other[f"maps/{name}"][0] / values[f"maps/{name}"][0] - 1)
+        expected = 2 * OF_MESHES * abs(other[f"maps/{name}"][0] / values[f"maps/{name}"][0] - 1)
         assert errors[f"maps/{name}_error"] == pytest.approx(expected, rel=1e-9, abs=1e-12)
     assert not any(mesh_errors(fine, fine, values, {}, SETTINGS).values())
     floor = mesh_errors(fine, fine, values, {}, SETTINGS, floor=0.01)
@@ -116,7 +116,7 @@ def test_contacts_that_lean_are_flagged_and_errors_are_differences_of_meshes():
     task = replace(SETTINGS, task=Task((fine[0].origin + fine[1].origin) / 2))
     held, less = (evaluate(contacts, task)[0]["maps/payload"][0] for contacts in (fine, coarse))
     error = mesh_errors(fine, coarse, {**values, "maps/payload": [held]}, {}, task)["maps/payload_error"]
-    assert error == pytest.approx(abs(less / held - 1), rel=1e-9)
+    assert error == pytest.approx(2 * OF_MESHES * abs(less / held - 1), rel=1e-9)
 
 
 def test_every_quantity_with_an_error_gets_one_from_two_meshes():
@@ -128,18 +128,19 @@ def test_every_quantity_with_an_error_gets_one_from_two_meshes():
     errors = mesh_errors(fine, coarse, values, other, task)
     assert set(errors) == {q.of_error.key for q in TABLE if q.error and "wall" not in q.needs}
     assert np.isfinite([*errors.values()]).all()
-    assert errors["maps/closing_error"] == pytest.approx(0.1, rel=1e-9)
-    assert errors["maps/opening_loaded_error"] == pytest.approx(1e-3, rel=1e-9)
-    assert errors["maps/p_max_error"] == pytest.approx(
-        abs(coarse[0].patch.pressure.max() / fine[0].patch.pressure.max() - 1), rel=1e-9
-    )
+    assert errors["maps/closing_error"] == pytest.approx(2 * OF_MESHES * 0.1, rel=1e-9)
+    assert errors["maps/opening_loaded_error"] == pytest.approx(2 * OF_MESHES * 1e-3, rel=1e-9)
+    peaks = [contacts[0].patch.pressure.max() for contacts in (fine, coarse)]
+    assert errors["maps/p_max_error"] == pytest.approx(2 * OF_MESHES * abs(peaks[1] / peaks[0] - 1), rel=1e-9)
     assert errors["maps/safety_factor_error"] == pytest.approx(errors["maps/payload_error"], rel=1e-9)
-    assert estimate([1.0, 2.0], [1.1, 2.1], [], "relative") == pytest.approx(0.1, rel=1e-9)
-    assert np.isnan(estimate([0.0], [1.0], [], "relative"))
-    assert estimate([0.0], [-1.0], [], "absolute") == pytest.approx(1.0)
+    assert distance([1.0, 2.0], [1.1, 2.1], "relative") == pytest.approx(0.1, rel=1e-9)
+    assert np.isnan(distance([0.0], [1.0], "relative"))
+    assert distance([0.0], [-1.0], "absolute") == pytest.approx(1.0)
     # views of the coarser contact count, too: both meshes may agree by chance
-    assert estimate([1.0], [1.0], [[1.3], [0.8]], "relative") == pytest.approx(0.5 * OF_VIEWS, rel=1e-9)
-    assert estimate([1.0], [1.4], [[1.3], [0.8]], "relative") == pytest.approx(0.4 + 0.5 * OF_VIEWS, rel=1e-9)
+    found = [estimate([1.0], [c], [[1.3], [0.8]], "relative", 2.0) / OF_MESHES for c in (1.0, 1.4)]
+    assert found == pytest.approx([0.3, 0.8], rel=1e-9)
+    # meshes that differ less tell more by the same difference
+    assert estimate([1.0], [1.4], [], "relative", 1.5) == pytest.approx(1.6 * OF_MESHES, rel=1e-9)
     found = [misses(e, t) for e, t in ((0.01, None), (0.02, None), (0.02, 0.02), (0.021, 0.02), (np.nan, 0.02))]
     assert found == [False, True, False, True, False]
 
