@@ -95,12 +95,6 @@ class Solved:
         """Share of a value that meshes can agree on by luck."""
         return edge_floor(self.fine.contacts, self.fine.contacts[0].state.pad.shape.per_side ** 2)
 
-    @property
-    def step(self) -> float:
-        """How many times larger the elements of the coarser mesh are."""
-        fine, coarse = (math.prod(mesh.contacts[0].state.pad.shape.elements) for mesh in self.meshes[:2])
-        return float((fine / coarse) ** (1 / 3))
-
 
 def followed(
     load_path: Callable[[Sequence[float]], Iterator[State]], forces: Sequence[float]
@@ -216,9 +210,7 @@ class CandidateSolver:
         if coarse is None:
             return math.nan
         settings = settings_of(self.scene, build_object(self.scene.object))
-        return error_of(
-            name, fine.contacts, coarse.contacts, coarse.views, settings, solved.pairs, solved.floor, solved.step
-        )
+        return error_of(name, fine.contacts, coarse.contacts, coarse.views, settings, solved.pairs, solved.floor)
 
     def _refined(self, solved: Solved, k: int, levels: Levels) -> Solved:
         """The case as it is where its error is surely below the target, else on further meshes.
