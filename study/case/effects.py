@@ -60,6 +60,7 @@ SURFACES = {
 DOUBT = 0.3
 # What may be raised where a contact is smaller than a coarse element: that says nothing, and harms no case.
 TOO_SMALL = (ArithmeticError, ConvergenceError, CheckError, NoContactError)
+CHANGES = ("e_n", "payload", "quality")  # whose changes a `Level` holds, in its order
 PAYLOAD_MOTIONS = 100  # whose wrenches bound the payload; both levels err alike
 LEFT_OUT = "friction that acts back on the pressure was not solved ({reason})"
 MODEL_SIZES = ("full", "half", "quarter")  # by the number of planes of symmetry
@@ -300,15 +301,20 @@ class EffectChoice:
         solved = self._solved(k)
         if solved.coarse is None:
             return solved
-        names = [name for name in ("sheet", COUPLING) if self.level(name, k).reason == LITTLE]
-        pairs = [self._coarse_pair(name, STEPS[name][0], k) for name in names]
+        pairs = [self._coarse_pair(name, STEPS[name][0], k) for name in self._left_out(k)]
         return replace(solved, pairs=[*solved.pairs, *filter(None, pairs)])
+
+    def _left_out(self, k: int) -> list[str]:
+        """Effects whose dearer level was measured and left out."""
+        return [name for name in ("sheet", COUPLING) if self.level(name, k).reason == LITTLE]
 
     def _solved(self, k: int) -> Solved:
         """A case without what its effects leave out."""
         level, coupled = self.level(COUPLING, k), self.levels._replace(friction_pressure_coupling="tangential")
         if level.reason == FORCED or level.level != level_named(COUPLING, "tangential"):
-            return self.solver.case(k, self.levels)
+            changes = [dict(zip(CHANGES, self.level(name, k)[3:], strict=True)) for name in self._left_out(k)]
+            of = self.solver.scene.accuracy.target_of
+            return self.solver.case(k, self.levels, self.skipped_share(k) + sum(abs(change[of]) for change in changes))
         try:
             # a wall whose coarse load path with friction has ended: the fine one takes long to end, too
             walled = self.solver.walled and self.levels.object.endswith("shell")

@@ -174,8 +174,10 @@ class CandidateSolver:
         parts = range(len(self.pressing(mesh, levels).parts))
         return next((s for part in parts if isinstance(s := self._state(k, mesh, levels, part), Failure)), None)
 
-    def case(self, k: int, levels: Levels) -> Solved:
+    def case(self, k: int, levels: Levels, left_out: float = 0.0) -> Solved:
         """Solutions of a case on the scene's meshes, and on finer ones where ``accuracy.target`` asks for them.
+
+        ``left_out`` is the error that effects add which are left out.
 
         Raises `ConvergenceError, CheckError` if there is no acceptable state on the scene's mesh.
         """
@@ -188,7 +190,7 @@ class CandidateSolver:
             solved = Solved([fine, self.solve(k, COARSE, levels)])
             if levels.friction_pressure_coupling != "none":
                 solved = self._with_long_steps(solved, k, levels)
-        return self._refined(solved, k, levels) if isinstance(fine.fingers, OnRigid) else solved
+        return self._refined(solved, k, levels, left_out) if isinstance(fine.fingers, OnRigid) else solved
 
     def _with_long_steps(self, solved: Solved, k: int, levels: Levels) -> Solved:
         """The case with what the steps of its load path leave: the difference to steps of twice the length."""
@@ -212,7 +214,7 @@ class CandidateSolver:
         settings = settings_of(self.scene, build_object(self.scene.object))
         return error_of(name, fine.contacts, coarse.contacts, coarse.views, settings, solved.pairs, solved.floor)
 
-    def _refined(self, solved: Solved, k: int, levels: Levels) -> Solved:
+    def _refined(self, solved: Solved, k: int, levels: Levels, left_out: float) -> Solved:
         """The case as it is where its error is surely below the target, else on further meshes.
 
         Where a finer mesh has no state the case keeps the answer of the one before, with a note.
@@ -222,7 +224,7 @@ class CandidateSolver:
         for mesh in range(FINE + 1, self.finest[k] + 1):
             # undecided, and unknown, is refined, which is right in both cases
             too_large = math.prod(pad_elements(self.scene, mesh)) > MOST_ELEMENTS
-            if surely_below(self.error(solved), target) or too_large:
+            if surely_below(self.error(solved) + left_out, target) or too_large:
                 break
             try:
                 solved = replace(solved, meshes=[self.solve(k, mesh, levels), *solved.meshes])
