@@ -82,13 +82,10 @@ def _module(name: str) -> Any:
 
 
 def _unforeseen(options: Namespace, error: Exception) -> int:
-    """The exit code of an error that no command expects: too little memory, a damaged file, or a bug."""
+    """The exit code of an error that no command expects: too little memory, or a bug."""
     if is_out_of_memory(error):
         print(f"error: {no_room(str(error) or type(error).__name__)}", file=sys.stderr, flush=True)
         return _ended(STOPPED if options.command == "run" else USAGE)
-    # Damage is asked last, because the answer means reading every file again.
-    if options.command != "run" and (damage := _module("cli.results").damage(options)):
-        return complain(damage)
     traceback.print_exc()
     # Abort does not flush what still waits.
     sys.stderr.flush()

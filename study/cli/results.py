@@ -6,10 +6,9 @@ from argparse import Namespace
 from functools import partial
 from pathlib import Path
 
-from softjaw.study.messages import OTHER_FILE, USAGE, StudyError, beside, write_file
+from softjaw.study.messages import USAGE, StudyError, beside, write_file
 from softjaw.study.result.index import index_path
 from softjaw.study.result.read import open
-from softjaw.study.result.store import open_result, torn_rows
 from softjaw.study.show import objects
 from softjaw.study.show.best_grasps import best, best_text
 from softjaw.study.show.compare import compare as compared
@@ -91,19 +90,3 @@ def _target(options: Namespace, name: str) -> Path:
     if path.resolve() == Path(options.file).resolve():
         raise StudyError(USAGE, f"--{name}: {path} is the result file itself; choose another name")
     return path
-
-
-def damage(options: Namespace) -> StudyError | None:
-    """What is wrong with the result files of a command that ended in a bug: their values are not those written."""
-    files = [*getattr(options, "files", []), getattr(options, "file", "")]
-    for file in (Path(name) for name in files if str(name).endswith(".hdf")):
-        try:
-            with open_result(file) as result:
-                layout = result.layout
-            torn = torn_rows(file, layout)
-        except StudyError as found:
-            return found
-        if torn:
-            text = f"{file}: damaged ({len(torn)} cases do not match their checksums)"
-            return StudyError(OTHER_FILE, f"{text}; 'softjaw run' solves them again, or restore it from a copy")
-    return None
