@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -71,7 +72,8 @@ def best(
         return Table(f"no candidate is solved at {forces(ds)[k]:g} N{why}{_solved_elsewhere(ds)}", table.columns, ())
     rows = [row | {"others": folded_text(ds, place)} for row, place in zip(table.rows, places, strict=False)]
     others = [Column("others", programs=False, wrap=OTHERS_WIDTH)] * any(row["others"] for row in rows)
-    columns = [*table.columns[:-1], *others, table.columns[-1]]
+    kept = [replace(column, drop=0) if column.name == score else column for column in table.columns]
+    columns = [*kept[:-1], *others, kept[-1]]
     what = "places" if lines else "candidates"
     title = f"best {len(listed)} {what} of {len(order)} solved candidates by {score} at {forces(ds)[k]:g} N"
     first = (*unravelled(order[0], shape), k)

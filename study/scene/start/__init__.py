@@ -74,7 +74,7 @@ def init(options: Namespace, measure: Callable[[Namespace], Measured]) -> str:
         write_file(path, text, folders=True)
     measured = []
     if mesh:
-        measured = ["object:  {SIZE} mm, the last along its axis, with --unit {UNIT} --axis {AXIS}".format(**mesh)]
+        measured = ["object:  {SIZE} mm along the file's x, y and z, with --unit {UNIT} --axis {AXIS}".format(**mesh)]
         measured += [f"         {note}" for note in notes]
     lines = [
         f"written: {scene!s:<{len(str(batch))}}  the scene: what is grasped, where and how hard",
@@ -137,7 +137,7 @@ def _about_mesh(options: Namespace, scene: Path, measure: Callable) -> tuple[dic
         "MESH": json.dumps(file, ensure_ascii=False),
         "UNIT": options.unit,
         "AXIS": axis,
-        "SIZE": " x ".join(f"{side:.4g}" for side in extents),
+        "SIZE": " x ".join(f"{extents[i - 'xyz'.index(axis) - 1]:.4g}" for i in range(3)),
         "LONG": _larger(PAD_LENGTH, longest_side, "longer"),
         "WIDE": _larger(PAD_WIDTH, next_side, "wider"),
         "STATIONS": _stations(extents, stations),
