@@ -14,7 +14,7 @@ def scene_text(scene: Any, file: str) -> str:
     """What would be run, in a few lines."""
     c, g, o = scene.candidates, scene.gripper, scene.object
     name = f" '{o.name}'" if getattr(o, "name", None) else ""
-    where = "explicit poses" if c.poses else "sampled of each object"
+    where = "sampled grasps" if c.poses and c.sampled else "explicit poses" if c.poses else "sampled of each object"
     if not c.poses and not c.sampled:
         where = f"at {_list([*c.station_values_mm], 'mm')} along the axis, {_list(c.angles_deg, 'deg')} about it"
     size = " x ".join(f"{shown(s, 'm'):g}" for s in g.pad_size)
@@ -31,7 +31,7 @@ def scene_text(scene: Any, file: str) -> str:
         "cases": str(scene.cases),
         "refinement": _refinement(c),
         "pad": f"{size} mm, {g.material}, {g.shear_modulus_kpa:g} kPa, {mesh} elements ({g.element})",
-        "accuracy": _meshes(scene.accuracy),
+        "accuracy": _meshes(scene.accuracy, "those that may be the best" if c.sampled else "every case"),
         "intervals": _intervals(scene),
         "effects": ", ".join(levels),
         "petsc": " ".join(f"-{key} {value}" for key, value in scene.petsc.items()),
@@ -45,12 +45,12 @@ def _refinement(where: Any) -> str:
     return f"at most {where.refine} more cases" if where.refine else ""
 
 
-def _meshes(accuracy: Any) -> str:
-    """On how many meshes a case is solved."""
+def _meshes(accuracy: Any, which: str) -> str:
+    """On how many meshes the cases ``which`` are solved."""
     if accuracy.target is None:
-        return "every case on two meshes" if accuracy.meshes > 1 else "one mesh, no error maps"
+        return f"{which} on two meshes" if accuracy.meshes > 1 else "one mesh, no error maps"
     goal = f"{accuracy.target_of} within {100 * accuracy.target:g} %"
-    return f"{goal}: every case on two meshes, on up to {accuracy.most_meshes} where its error asks for it"
+    return f"{goal}: {which} on two meshes, on up to {accuracy.most_meshes} where the error asks for it"
 
 
 def limits_text(run: Any) -> str:
