@@ -11,7 +11,10 @@ import xarray as xr
 
 from softjaw.friction.patch import NEGLIGIBLE
 from softjaw.study.case.result import TIE
+from softjaw.study.export.cases import cases
+from softjaw.study.export.selection import GripperFrame, holds
 from softjaw.study.flags import LOST, OF_FILE, Flag, flags_in
+from softjaw.study.grippers import Hand
 from softjaw.study.quantities import BY_KEY, FORCE_RANGE, MAIN, MODELS, STATES, map_row
 from softjaw.study.ranking import (
     LARGEST,
@@ -340,6 +343,9 @@ def _limit(ds: xr.Dataset, index: Index, lever: float) -> str:
     if lever > LEVER and at(ds, "payload", index) < slide * (1 - LEVER_SHARE):
         free = f"{number(shown(slide, 'kg'))} g"
         parts.append(f"the weight pulls {shown_text(lever, 'm', 2)} beside the pads, {free} without that lever")
+    if np.isfinite(lever):  # else the object is not known
+        (hold,) = holds(ds, next(cases(ds, MODELS[0], [index])), GripperFrame(Hand(), ())).values()
+        parts += hold.unfit
     done = np.flatnonzero(ds["status"].values[..., k].ravel() == DONE)
     name = score_of(ds)
     values = rank_values(ds, name, k)[done]

@@ -9,6 +9,7 @@ import shutil
 import matplotlib
 import numpy as np
 import pytest
+import trimesh
 
 from softjaw.fem.objects.gap import Pose
 from softjaw.fem.objects.shapes import EllipticCylinder
@@ -19,9 +20,10 @@ from softjaw.study.result.read import dataset
 from softjaw.study.result.store import open_result
 from softjaw.study.show.grasps import judge, order
 from softjaw.study.show.object_surface import NOBODY, Cells, Foot, areas, between, coloured, cut, moved, pressed
-from softjaw.study.show.view.model import quantity_of, view_of
+from softjaw.study.show.view.model import View, quantity_of, view_of
 from softjaw.study.show.view.object3d import object_block, payload, view_page
 from softjaw.study.show.view.pads import pads_of
+from tests.study.scenes import mesh_of, text_of
 from tests.study.view_files import CLOSING, FAILED, PRESSURE, SIZE, make, quality
 
 
@@ -137,6 +139,17 @@ def test_arrows_add_up_to_the_friction_of_the_whole(shown):
     assert np.abs(forces.sum(axis=0)).max() < 1e-12
     arms = np.linalg.norm(places - pad.origin, axis=1)
     assert (np.cross(places - pad.origin, forces) @ pad.frame[2]) == pytest.approx(arms * load)
+
+
+@pytest.mark.parametrize("axis", "xyz")
+def test_a_mesh_is_drawn_in_the_frame_of_its_file(tmp_path, axis):
+    box = trimesh.creation.box(extents=(30, 40, 80)).apply_translation((100, -50, 7))
+    box.export(tmp_path / "box.stl")
+    scene = text_of(mesh_of(tmp_path / "box.stl") + f'\naxis = "{axis}"')
+    with open_result(make(tmp_path / "a.hdf", scene=scene)) as result:
+        drawn = View(judge(dataset(result))).surface.points
+    np.testing.assert_allclose(1e3 * drawn.min(axis=0), box.bounds[0], atol=1e-3)
+    np.testing.assert_allclose(1e3 * drawn.max(axis=0), box.bounds[1], atol=1e-3)
 
 
 def test_no_pads_are_invented(file, tmp_path, shown):
