@@ -130,7 +130,7 @@ def _result(
         other = _state_values(coarse)
         values |= mesh_errors(
             contacts, coarse.contacts, values, other, settings, coarse.views, solved.pairs,
-            solved.floor, choice.skipped_share(k),
+            solved.floor, choice.skipped_share(k), solved.doubt,
         )  # fmt: skip
         # only where every case has a target: without one the sums at the end say how many cases miss the usual one
         if (target := scene.accuracy.target) is not None and not unit.finest:

@@ -21,7 +21,7 @@ from softjaw.fem.objects.gap import Pose
 from softjaw.fem.petsc import Seconds
 from softjaw.study.case.build import build_object, forces_apart, has_wall, pad_elements
 from softjaw.study.case.contact import Contact
-from softjaw.study.case.errors import edge_floor, error_of
+from softjaw.study.case.errors import DOUBTED, edge_floor, error_of
 from softjaw.study.case.evaluate import settings_of
 from softjaw.study.case.model import approach
 from softjaw.study.case.pressing import OnRigid, OnWall, PressedContact, pressing, refuse_along_axis
@@ -94,6 +94,11 @@ class Solved:
     def floor(self) -> float:
         """Share of a value that meshes can agree on by luck."""
         return edge_floor(self.fine.contacts, self.fine.contacts[0].state.pad.shape.per_side ** 2)
+
+    @property
+    def doubt(self) -> float:
+        """How many times distances of meshes count as error."""
+        return DOUBTED if any(contact.coarse for contact in self.fine.contacts) else 1.0
 
 
 def followed(
@@ -212,7 +217,9 @@ class CandidateSolver:
         if coarse is None:
             return math.nan
         settings = settings_of(self.scene, build_object(self.scene.object))
-        return error_of(name, fine.contacts, coarse.contacts, coarse.views, settings, solved.pairs, solved.floor)
+        return error_of(
+            name, fine.contacts, coarse.contacts, coarse.views, settings, solved.pairs, solved.floor, solved.doubt
+        )
 
     def _refined(self, solved: Solved, k: int, levels: Levels, left_out: float) -> Solved:
         """The case as it is where its error is surely below the target, else on further meshes.
