@@ -72,7 +72,11 @@ def view(options: Namespace) -> str:
 
     if options.html is None and options.screenshot is None:
         options.html = str(Path(options.file).with_suffix("")) + "-3d.html"
-    paths = {name: _target(options, name) for name in ENDINGS if getattr(options, name) is not None}
+    paths = {name: Path(getattr(options, name)) for name in ENDINGS if getattr(options, name) is not None}
+    for name, path in paths.items():
+        if path.suffix.lower() not in ENDINGS[name]:
+            text = f"--{name}: found '{path}', expected a file ending in {' or '.join(ENDINGS[name])}"
+            raise StudyError(USAGE, text)
     shown, index = model.view_of(judge(open(options.file)), *choice(options), options.force)
     quantity = model.quantity_of(shown.ds, options.quantity)
     if "screenshot" in paths:
@@ -81,12 +85,3 @@ def view(options: Namespace) -> str:
     if "html" in paths:
         write_file(paths["html"], object3d.view_page(shown, index, quantity, options.motion))
     return "\n".join(f"written: {path}" for path in paths.values())
-
-
-def _target(options: Namespace, name: str) -> Path:
-    path, endings = Path(getattr(options, name)), ENDINGS[name]
-    if path.suffix.lower() not in endings:
-        raise StudyError(USAGE, f"--{name}: found '{path}', expected a file ending in {' or '.join(endings)}")
-    if path.resolve() == Path(options.file).resolve():
-        raise StudyError(USAGE, f"--{name}: {path} is the result file itself; choose another name")
-    return path
