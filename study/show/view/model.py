@@ -183,7 +183,9 @@ class View:
         """Where one sees both pads, finger 1's from behind, and the object upright: direction of the eye, and up."""
         pads = self.pads(index)
         out = -pads[0].approach if pads else np.array([1.0, 0.0, 0.0])
-        up = np.array([0.0, 0.0, 1.0]) if abs(out[2]) < 0.9 else np.array([0.0, 1.0, 0.0])
+        up = np.array([0.0, 0.0, 1.0])
+        if abs(out[2]) > 0.9:  # pads above and below the object
+            return np.array([0.8, -0.5, 0.35]), up
         beside = np.cross(up, out)
         return 0.5 * out + 0.8 * beside / np.linalg.norm(beside) + 0.35 * up, up
 
