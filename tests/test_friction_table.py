@@ -1,8 +1,4 @@
-"""Every worked case of the reference table: patch, mesh or contacts in, every expected value within its tolerance out.
-
-A case is dispatched by its category and by what its inputs hold, so that other cases of the same kinds can be added to
-the table as they are.
-"""
+"""Every worked case of the reference table: patch, mesh or contacts in, every expected value in its tolerance out."""
 
 import json
 import re

@@ -1,7 +1,4 @@
-"""Time of studies of 10^3 to 10^6 cases on 1 to 4096 ranks: ``python -m tests.benchmark.scaling RESULT FIGURE.png``.
-
-The measured times of a finished file are replayed by the rules that hand out the work.
-"""
+"""Time of studies of 10^3 to 10^6 cases on 1 to 4096 ranks: ``python -m tests.benchmark.scaling RESULT FIGURE.png``."""
 
 import sys
 from pathlib import Path

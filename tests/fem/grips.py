@@ -88,10 +88,7 @@ def stirred(problem: WallProblem, rng: np.random.Generator) -> np.ndarray:
 
 
 def check_tangent(problem: WallProblem, x: np.ndarray, h: float, within: float) -> None:
-    """Compare the tangent with central differences of ``h`` for the wall's and each finger's unknowns, part by part.
-
-    The differences are those of large forces: ``within`` is relative to the largest entry of the whole column.
-    """
+    """Compare the tangent with central differences of ``h`` for the wall's and each finger's unknowns, part by part."""
     K, rng = dense(problem, x), np.random.default_rng(2)
     parts = [slice(0, problem.model.size), *(f.unknowns for f in problem.fingers)]
     for moved in parts:

@@ -1,8 +1,4 @@
-"""Closed forms that the solver is measured against: energies, homogeneous states, Hertz, and rigid objects.
-
-Nothing here uses the code under test, but for ``placed``, which puts an object before the pad, ``e_n``, and the usual
-pad with two objects.
-"""
+"""Closed forms that the solver is measured against: energies, homogeneous states, Hertz, and rigid objects."""
 
 from dataclasses import dataclass
 

@@ -1,7 +1,4 @@
-"""Outcomes of the finite element package that rounding does not decide: meshes, touch, profiles, symmetry, grids.
-
-Each decision is put where it is hardest, on its limit, then turned, scaled and moved by a few ulp: the same each time.
-"""
+"""Outcomes of the finite element package that rounding does not decide: meshes, touch, profiles, symmetry, grids."""
 
 from dataclasses import replace
 from types import SimpleNamespace

@@ -87,10 +87,7 @@ def test_region_reports_errors_that_the_triangles_explain(region, flask):
 
 
 def test_points_outside_the_region_keep_the_sign_and_grow(region, flask):
-    """Outside the box the distance to the sheet is taken; far out along the approach it grows like the way.
-
-    What the finger cannot see counts as inside.
-    """
+    """Outside the box the distance to the sheet is taken; far out along the approach it grows like the way."""
     z = -np.array([0.007, 0.02, 0.1, 1.0])
     far = region.pose.to_object(np.stack([0 * z, 0 * z, z], axis=1))
     assert (np.diff(region.gap(far)[0]) > 0).all()

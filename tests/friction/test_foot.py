@@ -20,11 +20,7 @@ def height(x, y):
 
 
 def bridge(share, n=24, gap=0.25):
-    """A pad that is bent as a parabola and loaded at both sides of a gap, ``share`` of the force on the right one.
-
-    The nearest points of the object lie on the lips of the gap: the object's normals over it point inwards from both
-    sides, and jump in the middle.
-    """
+    """A pad that is bent as a parabola and loaded at both sides of a gap, ``share`` of the force on the right one."""
     patch = mesh_patch(grid_mesh(n, 6, 1, 0.4, height))
     x = patch.centroid[:, 0]
     over = np.abs(x) < gap

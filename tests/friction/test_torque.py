@@ -34,11 +34,7 @@ def test_three_equal_supports_turn_about_the_point_of_fermat(corner):
 
 
 def test_of_two_points_the_pure_torque_turns_about_the_heavier_one():
-    """``mu F_2 d`` about the heavier point and ``2 mu d F_1 F_2 / (F_1 + F_2)`` about the centre of pressure.
-
-    Their ratio, twice the heavier point's share of the load, is at most 2; no plane patch has more about its centre of
-    pressure, for the distances to it add up to at most twice those to the median.
-    """
+    """``mu F_2 d`` about the heavier point and ``2 mu d F_1 F_2 / (F_1 + F_2)`` about the centre of pressure."""
     for heavy in (0.5, 0.6, 0.9, 0.999):
         patch = centred(points_patch([[-0.02, 0], [0.03, 0]], [heavy, 1 - heavy]))
         about_cop = friction_limits(patch, 0.8).tau_z

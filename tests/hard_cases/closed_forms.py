@@ -8,10 +8,7 @@ from softjaw.study.scene import Scene
 
 
 def pressed_column(scene: Scene) -> dict[str, np.ndarray]:
-    """Closing displacement and e_n of a neo-Hookean pad with Poisson's ratio 0 between plates.
-
-    It does not bulge: ``F = G A (1 / l - l)`` with the stretch ``l``, and the pressure is uniform.
-    """
+    """Closing displacement and e_n of a neo-Hookean pad with Poisson's ratio 0 between plates."""
     g = scene.gripper
     p = np.array(scene.load.normal_force) / (g.pad_length * g.pad_width * g.shear_modulus)
     stretch = (np.sqrt(p**2 + 4.0) - p) / 2.0

@@ -146,10 +146,7 @@ CASES = _load()
 
 
 def tables_of(case: HardCase, change: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """Tables of a case's scene, with further sections changed.
-
-    Sections over those of its base key by key, but another shape or place replaces the whole.
-    """
+    """Tables of a case's scene, with further sections changed."""
     base = BASES.get(case.base) or tomllib.loads((FOLDER / case.base).read_text())
     data: dict[str, Any] = {name: dict(table) for name, table in base.items()}
     for name, table in (*case.sections.items(), *(change or {}).items()):

@@ -21,10 +21,7 @@ LIMITS = {
 
 @dataclass(frozen=True)
 class Verdict:
-    """What is wrong with a case (nothing: it is right), how far it is from the second number, and what is allowed.
-
-    A case is ``ok`` only beside a second number; ``gap`` is a known fault of the program that the case states.
-    """
+    """What is wrong with a case (nothing: it is right), how far it is from the second number, and what is allowed."""
 
     wrong: tuple[str, ...] = ()
     difference: float | None = None

@@ -1,7 +1,4 @@
-"""No decision hangs on rounding: turned samples and bodies, and changes of a few units in the last place.
-
-Turns of all three components are no turns of friction; they bring every zero of the data down to rounding.
-"""
+"""No decision hangs on rounding: turned samples and bodies, and changes of a few units in the last place."""
 
 import collections
 

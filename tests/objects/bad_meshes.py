@@ -1,7 +1,4 @@
-"""Meshes as simulators, drawing programs and scanners give them, by script: eleven kinds of what is wrong with meshes.
-
-Each kind is made of several shapes. All are in metres, of sizes that a common gripper holds.
-"""
+"""Meshes as simulators, drawing programs and scanners give them, by script: eleven kinds of what is wrong."""
 
 from collections.abc import Callable
 from functools import partial

@@ -1,8 +1,4 @@
-"""What users bring, from file to map: ``python -m tests.objects.survey``, which is ``make objects``.
-
-Every mesh goes through `softjaw init`, the sampler and all solves; so do random scenes without a mesh. Outcomes are
-kept one by one beside the results, so that a part can be run again: ``--only banana``.
-"""
+"""What users bring, from file to map: ``python -m tests.objects.survey``, which is ``make objects``."""
 
 import re
 import signal

@@ -1,7 +1,4 @@
-"""Chromium without a window, driven through a pair of pipes: pages, their console, requests and prints.
-
-Needs nothing but the standard library: the browser's debugging protocol is JSON, each message ended by a zero byte.
-"""
+"""Chromium without a window, driven through a pair of pipes: pages, their console, requests and prints."""
 
 from __future__ import annotations
 

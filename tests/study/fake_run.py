@@ -23,10 +23,7 @@ FACES, FORCES = 6, 3
 
 
 def fake_plan(digest="scene", stations=6, derived=True, wide=-1, rounds=(), apart=False):
-    """Stations x two angles x three forces; both angles of an even station are one unit, one of them is too wide.
-
-    Stations that rounds have added [mm] stand among those of the study; values follow from the place alone.
-    """
+    """Stations x two angles x three forces; both angles of an even station are one unit, one of them is too wide."""
     from softjaw.study.quantities import WIDE, Axis, Quantity
     from softjaw.study.result.layout import Header, Layout
     from softjaw.study.run.plan import Plan

@@ -1,7 +1,4 @@
-"""Outcomes of a study that rounding does not decide: rankings, levels of effects, flags, windows, probes, look-ups.
-
-Each decision is put where it is hardest, on its limit or on a tie, moved by a few ulp or turned: the same each time.
-"""
+"""Outcomes of a study that rounding does not decide: rankings, levels of effects, flags, windows, probes, look-ups."""
 
 import math
 from types import SimpleNamespace

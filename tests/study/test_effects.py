@@ -70,10 +70,7 @@ def test_an_effect_is_skipped_taken_or_measured(indicator, changes, target, leve
 
 
 class Prepared:
-    """Solver of a candidate whose e_n and payload friction changes by given shares at each force, on the coarse mesh.
-
-    ``lost`` are forces without a state with friction on any mesh.
-    """
+    """Solver of a candidate whose e_n and payload friction changes by shares at each force; ``lost`` have no state."""
 
     def __init__(self, changes, payloads=None, lost=()):
         self.scene, self.walled, self.lost = scene_of(PLATE, "accuracy.meshes=2", elements="[4, 4, 2]"), False, lost

@@ -1,7 +1,4 @@
-"""What two meshes say of the errors of e_n, against references on a mesh of hex27, 16 x 16 x 4, Gauss points.
-
-The weights in `study.case.evaluate` were chosen on most of these cases.
-"""
+"""What two meshes say of the errors of e_n, against references on a mesh of hex27, 16 x 16 x 4, Gauss points."""
 
 import json
 from functools import lru_cache

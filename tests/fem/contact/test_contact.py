@@ -95,10 +95,7 @@ def test_the_condensed_tangent_is_symmetric_and_gives_the_same_step(contact, con
 @pytest.mark.parametrize("symmetry", [(False, False), (True, False), (True, True)])
 @pytest.mark.parametrize("element", ["hex8", "hex27"])
 def test_a_confined_pad_pressed_flat(element, symmetry):
-    """``F = diag(1, 1, l)`` has the nominal stress ``P33 = G (1 - l^-3)``.
-
-    With that pressure the rows along z, of the closing and of the pressures vanish; only the sides had to be held.
-    """
+    """``F = diag(1, 1, l)`` has the nominal stress ``P33 = G (1 - l^-3)``."""
     pad = Pad(PadShape(SIZE, (4, 4, 2), (2.0, 1.0, 1.5), element), material("blatz_ko", G), symmetry)
     problem = RigidProblem(pad, reference.plane)
     squeeze = 2e-3

@@ -1,8 +1,4 @@
-"""Where only the pad's rim bears: the foot of the shipped bottle's neck, whose shoulder is steep.
-
-With weighted gaps the points between the few nodes in contact penetrated by 0.25 mm there, the closing displacement
-jumped from one station to the next, and a station moved by 2 um lost four forces of six.
-"""
+"""Where only the pad's rim bears: the foot of the shipped bottle's neck, whose shoulder is steep."""
 
 from pathlib import Path
 

@@ -45,10 +45,7 @@ def moment(points, middle):
 
 @pytest.mark.parametrize("stiffness", [0.5, 5.0])
 def test_the_mount_bears_the_moment_of_the_contact(stiffness):
-    """``k theta`` is the moment of the contact's forces about the middle of the back.
-
-    Rotations are small: what the foam's thrust to both sides does on the turned plate, ``theta`` times itself, is left.
-    """
+    """``k theta`` is the moment of the contact's forces about the middle of the back."""
     pad, state = pressed(beside(0.003), stiffness)
     theta, none, middle = tilt(pad, state)
     assert stiffness * theta == pytest.approx(moment(state.points, middle), rel=0.02)
