@@ -15,7 +15,7 @@ import json
 import shutil
 import tarfile
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -81,7 +81,8 @@ def write_data_set(index: Path, out: Path, form: str, gripper: GripperFrame) -> 
         raise StudyError(USAGE, f"-o: found '{out}', expected another folder than that of the results")
     listed: dict[str, list[str]] = {split: [] for split in SPLITS}
     good = whole = 0
-    with FORMS[form](out) as write:
+    with ExitStack() as stack:
+        write = FORMS[form](out, stack)
         for grasps in _objects(index, gripper):
             write(grasps)
             listed[grasps.split].append(grasps.file)
@@ -114,19 +115,17 @@ def _copied(mesh: Path, target: Path) -> None:
         shutil.copyfile(mesh, part)
 
 
-@contextmanager
-def _graspgen(out: Path) -> Iterator[Writer]:
+def _graspgen(out: Path, _: ExitStack) -> Writer:
     """``objects/NAME.stl``, and ``grasps/NAME.json`` for each."""
 
     def write(grasps: ObjectGrasps) -> None:
         _copied(grasps.mesh, out / "objects" / grasps.file)
         write_file(out / "grasps" / f"{grasps.name}.json", _as_json(grasps), folders=True)
 
-    yield write
+    return write
 
 
-@contextmanager
-def _acronym(out: Path) -> Iterator[Writer]:
+def _acronym(out: Path, _: ExitStack) -> Writer:
     """``meshes/NAME.stl``, and ``grasps/NAME_SCALE.h5`` for each, with more qualities beside the simulated one."""
 
     def write(grasps: ObjectGrasps) -> None:
@@ -138,11 +137,10 @@ def _acronym(out: Path) -> Iterator[Writer]:
         made |= {f"grasps/qualities/softjaw/{name}": values for name, values in arrays.items()}
         write_arrays(out / "grasps" / f"{grasps.name}_{grasps.scale!r}.h5", made)
 
-    yield write
+    return write
 
 
-@contextmanager
-def _webdataset(out: Path) -> Iterator[Writer]:
+def _webdataset(out: Path, stack: ExitStack) -> Writer:
     """``train-000000.tar``, ...: for each object ``NAME.json``, as GraspGen keeps it, and ``NAME.mesh.stl``."""
     counts, shards = dict.fromkeys(SPLITS, 0), dict[str, tarfile.TarFile]()
 
@@ -159,8 +157,7 @@ def _webdataset(out: Path) -> Iterator[Writer]:
             entry.size = len(content)
             shards[grasps.split].addfile(entry, io.BytesIO(content))
 
-    with ExitStack() as stack:
-        yield write
+    return write
 
 
 FORMS = {"graspgen": _graspgen, "acronym": _acronym, "webdataset": _webdataset}

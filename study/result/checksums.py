@@ -30,15 +30,6 @@ def of_array(values: Any) -> int:
     return zlib.crc32(np.ascontiguousarray(values).tobytes())
 
 
-def of_lines(lines: NDArray[np.uint8]) -> NDArray[np.uint32]:
-    """Checksum of every line of bytes ``(n, k)``.
-
-    >>> of_lines(np.frombuffer(b"123456789", np.uint8)[None]) == zlib.crc32(b"123456789")
-    array([ True])
-    """
-    return np.array([zlib.crc32(line) for line in np.ascontiguousarray(lines)], np.uint32)
-
-
 def of_row(layout: Layout, values: Sequence[Any], state: int) -> NDArray[np.uint32]:
     """Checksums of a row and of its state; ``values`` as from `study.result.write.record`."""
     columns = zip(layout.columns, values, strict=True)
@@ -52,7 +43,8 @@ def of_column(layout: Layout, column: Column, values: NDArray[Any], rows: NDArra
     if not values.size:
         return rows, np.zeros(len(rows), np.uint32)
     size = int(np.prod(column.shape, dtype=int)) * column.dtype.itemsize
-    return rows, of_lines(np.ascontiguousarray(values).reshape(-1).view(np.uint8).reshape(-1, size)[lines])
+    stored = np.ascontiguousarray(values).reshape(-1).view(np.uint8).reshape(-1, size)[lines]
+    return rows, np.array([zlib.crc32(line) for line in stored], np.uint32)
 
 
 def broken_rows(file: StoredFile, layout: Layout, column: Column, values: Any, rows: NDArray[Any]) -> NDArray[Any]:

@@ -22,6 +22,7 @@ from softjaw.study.quantities import ALONG, AROUND
 
 FINER = 6  # places between those of the file among which the nearest is searched
 NOBODY = -1  # candidate of triangles that no candidate grasps
+Feet = Iterable[tuple[int, Pose, float]]  # pads: their candidate, where they first touch, how far they close [m]
 
 
 class Surface(NamedTuple):
@@ -32,15 +33,7 @@ class Surface(NamedTuple):
     candidate: np.ndarray
 
 
-class Foot(NamedTuple):
-    """A pad as it first touches the object, of a candidate, and how far it closes from there [m]."""
-
-    candidate: int
-    pose: Pose
-    closing: float
-
-
-def surface_of(scene: Any, axes: Any, feet: Iterable[Foot] = ()) -> Surface:
+def surface_of(scene: Any, axes: Any, feet: Feet = ()) -> Surface:
     """The surface of a scene's object, cut along its candidates' cells; with explicit poses below their ``feet``.
 
     Raises `ValueError, OSError`: the object cannot be built, as when its mesh is not there.
@@ -66,25 +59,25 @@ def surface_of(scene: Any, axes: Any, feet: Iterable[Foot] = ()) -> Surface:
     return Surface(points, inverse.reshape(-1, 3), cell)
 
 
-def pressed(corners: np.ndarray, feet: Iterable[Foot], size: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
+def pressed(corners: np.ndarray, feet: Feet, size: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
     """Triangles ``(m, 3, 3)`` cut along what pads of a ``size`` [m] meet, and the candidate ``(m,)`` of each.
 
     A pad meets what lies before its undeformed face, as deep as it closes. Where pads overlap the first one has it.
     """
     cell = np.full(len(corners), NOBODY)
-    for foot in feet:
+    for candidate, pose, closing in feet:
         # what stands before first touch is rounding [m]
-        low, high = np.array([*(-0.5 * np.array(size)), -1e-3]), np.array([*(0.5 * np.array(size)), foot.closing])
-        local = foot.pose.to_pad(corners)
+        low, high = np.array([*(-0.5 * np.array(size)), -1e-3]), np.array([*(0.5 * np.array(size)), closing])
+        local = pose.to_pad(corners)
         near = (local.min(axis=1) < high).all(axis=1) & (local.max(axis=1) > low).all(axis=1) & (cell == NOBODY)
         pieces = corners[near]
         for axis, bound in ((0, low), (0, high), (1, low), (1, high), (2, high)):
-            normal = foot.pose.rotation[:, axis]
-            pieces = cut(pieces, normal, float(foot.pose.origin @ normal + bound[axis]))
-        middle = foot.pose.to_pad(pieces.mean(axis=1))
+            normal = pose.rotation[:, axis]
+            pieces = cut(pieces, normal, float(pose.origin @ normal + bound[axis]))
+        middle = pose.to_pad(pieces.mean(axis=1))
         met = ((middle > low) & (middle < high)).all(axis=1)
         corners = np.concatenate([corners[~near], pieces])
-        cell = np.concatenate([cell[~near], np.where(met, foot.candidate, NOBODY)])
+        cell = np.concatenate([cell[~near], np.where(met, candidate, NOBODY)])
     return corners, cell
 
 

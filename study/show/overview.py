@@ -29,7 +29,7 @@ def scene_text(scene: Any, file: str) -> str:
         "friction": f"mu = {scene.friction.mu:g}; CCM, PCM and PCM scaled by F_N",
         "sweep": "; ".join(f"{key}: {_list(values)}" for key, values in scene.sweep.items()),
         "cases": str(scene.cases),
-        "refinement": _refinement(c),
+        "refinement": f"at most {c.refine} more cases" if c.refine else "",
         "pad": f"{size} mm, {g.material}, {g.shear_modulus_kpa:g} kPa, {mesh} elements ({g.element})",
         "accuracy": _meshes(scene.accuracy, "those that may be the best" if c.sampled else "every case"),
         "intervals": _intervals(scene),
@@ -38,11 +38,6 @@ def scene_text(scene: Any, file: str) -> str:
         "each case": limits_text(scene.run),
     }
     return "\n".join([f"{file}: no errors", *aligned(rows), *told(scene)])
-
-
-def _refinement(where: Any) -> str:
-    """What a refinement may add; empty without one."""
-    return f"at most {where.refine} more cases" if where.refine else ""
 
 
 def _meshes(accuracy: Any, which: str) -> str:

@@ -23,7 +23,7 @@ from softjaw.study.result.read import axes_of, read_field, read_patch, scene_of
 from softjaw.study.scene import SceneError
 from softjaw.study.show.best_grasps import value_text
 from softjaw.study.show.grasps import Index, candidate_of, field, forces, order, place, quantity, stated, unravelled
-from softjaw.study.show.object_surface import NOBODY, Foot, Surface, moved, on_wall, surface_of, undeformed
+from softjaw.study.show.object_surface import NOBODY, Surface, moved, on_wall, surface_of, undeformed
 from softjaw.study.show.stored_surface import body, stored_surface, weaker
 from softjaw.study.show.view.pads import Faces, Pad, pads_of
 
@@ -115,7 +115,7 @@ class View:
         owners[self.surface.triangles] = self.surface.candidate[:, None]
         return owners
 
-    def _feet(self) -> Iterator[Foot]:
+    def _feet(self) -> Iterator[tuple[int, Pose, float]]:
         """Pads of explicit poses at the force that is nearest to the one shown, the best grasp first."""
         names, seen = ("finger_pose_rotation", "finger_pose_origin", "finger_closing"), set[int]()
         if not self.ds.attrs["poses"] or any(name not in self.ds for name in names):
@@ -126,7 +126,7 @@ class View:
             for i in (i for i in here if self.candidate(i) not in seen):
                 seen.add(self.candidate(i))
                 for R, x, closing in zip(*(self.ds[name].values[i] for name in names), strict=True):
-                    yield Foot(self.candidate(i), Pose(self.placed.rotation.T @ R, self.placed.to_pad(x)), closing)
+                    yield self.candidate(i), Pose(self.placed.rotation.T @ R, self.placed.to_pad(x)), closing
 
     @cached_property
     def wall(self) -> np.ndarray | None:

@@ -19,7 +19,7 @@ from softjaw.study.quantities import ALONG, AROUND
 from softjaw.study.result.read import dataset
 from softjaw.study.result.store import open_result
 from softjaw.study.show.grasps import judge, order
-from softjaw.study.show.object_surface import NOBODY, Cells, Foot, areas, between, coloured, cut, moved, pressed
+from softjaw.study.show.object_surface import NOBODY, Cells, areas, between, coloured, cut, moved, pressed
 from softjaw.study.show.view.model import View, quantity_of, view_of
 from softjaw.study.show.view.object3d import object_block, payload, view_page
 from softjaw.study.show.view.pads import pads_of
@@ -57,7 +57,7 @@ def test_a_grasp_owns_what_its_pads_meet_and_the_first_has_what_two_do():
     """Two pads of 50 mm x 22 mm on a plate of two triangles, the second 30 mm further; a third one passes."""
     corners = np.array([[[-1, -1, 0], [1, -1, 0], [1, 1, 0]], [[-1, -1, 0], [1, 1, 0], [-1, 1, 0]]]) * 0.1
     places = [(0.0, 0.0, 0.0), (0.03, 0.0, -1e-3), (0.0, 0.0, 2e-3)]
-    feet = [Foot(n, Pose(np.eye(3), np.array(x)), 2e-3) for n, x in enumerate(places)]
+    feet = [(n, Pose(np.eye(3), np.array(x)), 2e-3) for n, x in enumerate(places)]
     cut_up, cell = pressed(corners, feet, (0.05, 0.022))
     area = [areas(cut_up[cell == n]).sum() for n in (0, 1, 2, NOBODY)]
     assert area == pytest.approx([50e-3 * 22e-3, 30e-3 * 22e-3, 0.0, 0.04 - 80e-3 * 22e-3], rel=1e-9)
