@@ -75,8 +75,8 @@ def best(
         return Table(f"no candidate is solved at {forces(ds)[k]:g} N{why}{_solved_elsewhere(ds)}", table.columns, ())
     rows = [row | {"others": folded_text(ds, place)} for row, place in zip(table.rows, places, strict=False)]
     others = [Column("others", programs=False, wrap=OTHERS_WIDTH)] * any(row["others"] for row in rows)
-    kept = [replace(column, drop=0) if column.name == score else column for column in table.columns]
-    columns = [*kept[:-1], *others, kept[-1]]
+    columns = [replace(column, drop=0) if column.name == score else column for column in table.columns]
+    columns = [*columns[:-1], *others, columns[-1]]
     what = "places" if lines else "candidates"
     title = f"best {len(listed)} {what} of {len(order)} solved candidates by {score} at {forces(ds)[k]:g} N"
     first = (*unravelled(order[0], shape), k)

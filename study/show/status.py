@@ -35,7 +35,7 @@ from softjaw.study.table import (
 
 MOST_PLACES = 2
 LONG = 120  # characters of a message, beyond which a text shows its first clause
-NO_ERRORS = "errors: not known; accuracy.meshes = 2 in the scene gives them"
+NO_ERRORS = "errors are not known; accuracy.meshes = 2 in the scene gives them"
 RESUME = "run the same command again to resume"
 Index = tuple[int, ...]
 
