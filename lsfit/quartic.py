@@ -53,12 +53,15 @@ class Quartic(LimitSurface):
     @cached_property
     def coefficients(self) -> FloatArray:
         """Coefficients ``(k,)`` in a wrench's components; NaN for a flat body, and one that is too thin and tilted."""
+        unknown = np.full(len(exponents(self.dimension, 4)), np.nan)
+        if self.rank < self.dimension:
+            return unknown
         E, reach = exponents(self.rank, 4), np.linalg.norm(self.B, axis=1)
         # rows of one length: what is left of the condition is tilt, which no choice of units undoes
         turn = self.B / reach[:, None]
         # condition of a frame's directions; coefficients lose its fourth power times rounding
-        if self.rank < self.dimension or np.linalg.cond(turn) > 50.0:
-            return np.full(len(exponents(self.dimension, 4)), np.nan)
+        if np.linalg.cond(turn) > 50.0:
+            return unknown
         # turned first and stretched last, as a division by units costs a coefficient no digits
         return substitute(self.form, E, np.linalg.inv(turn)) / np.prod(reach**E, axis=1)
 
