@@ -149,7 +149,7 @@ class FacingSheet:
         places = np.stack(np.meshgrid(*(np.arange(n) / COARSE for n in x.shape[:3]), indexing="ij"), axis=-1)
         g = evaluate_grid(grid_coefficients(known), np.zeros(3), 1.0, places.reshape(-1, 3))[0].reshape(x.shape[:3])
         # contact is decided near the sheet, so no sample is interpolated there
-        near = np.abs(g) < 5 * step  # steps from the sheet within which every sample is taken
+        near = np.abs(g) < 3 * step  # steps from the sheet within which every sample is taken
         g[near] = self.signed(x[near])[0]
         return _with_shadows(g, step, STAIRS)
 
