@@ -94,6 +94,15 @@ def direction(text: str) -> tuple[float, ...]:
     return vector
 
 
+def candidate(text: str) -> int:
+    """Number of a candidate from its name in a list.
+
+    >>> candidate("p07"), candidate("12")
+    (7, 12)
+    """
+    return int(text.removeprefix("p").removeprefix("s"))
+
+
 def _option(*names: str, **settings: Any) -> tuple[tuple[str, ...], dict[str, Any]]:
     """Names of an option, and its settings in argparse's words; those of the same ``dest`` exclude each other."""
     return names, settings
@@ -130,7 +139,7 @@ OPTIONS = {
                     help="how many grasps, 0: all (default: 1 for a simulator, which gets a file for each, else all)"),
     "compared": _option("--quantity", default="e_n", metavar="NAME", help="map that is listed by case (default e_n)"),
     "model": _option("--model", choices=MODELS, default="ccm", help="friction model (default ccm)"),
-    "candidate": _option("--candidate", type=int, metavar="N", help="candidate, counted over stations and angles"),
+    "candidate": _option("--candidate", type=candidate, metavar="N", help="candidate by its number or name, as p07"),
     "at": _option("--at", type=several(number(), "a station, or station,angle as in 75,90", 1, 2), default=(),
                   metavar="MM,DEG", help="candidate nearest to this station and angle; --at=-5 for negative numbers"),
     "page": _option("-o", metavar="HTML", dest="output", help="page to write (default: beside the file)"),

@@ -11,8 +11,6 @@ import xarray as xr
 
 from softjaw.friction.patch import NEGLIGIBLE
 from softjaw.study.case.result import TIE
-from softjaw.study.export.cases import cases
-from softjaw.study.export.selection import GripperFrame, holds
 from softjaw.study.flags import LOST, OF_FILE, Flag, flags_in
 from softjaw.study.grippers import Hand
 from softjaw.study.quantities import BY_KEY, FORCE_RANGE, MAIN, MODELS, STATES, map_row
@@ -343,7 +341,11 @@ def _limit(ds: xr.Dataset, index: Index, lever: float) -> str:
     if lever > LEVER and at(ds, "payload", index) < slide * (1 - LEVER_SHARE):
         free = f"{number(shown(slide, 'kg'))} g"
         parts.append(f"the weight pulls {shown_text(lever, 'm', 2)} beside the pads, {free} without that lever")
-    if np.isfinite(lever):  # else the object is not known
+    if np.isfinite(lever) and ds.attrs["poses"]:  # else the object is not known, or a hand has room about its axis
+        # Imported here: they are slow to load.
+        from softjaw.study.export.cases import cases
+        from softjaw.study.export.selection import GripperFrame, holds
+
         (hold,) = holds(ds, next(cases(ds, MODELS[0], [index])), GripperFrame(Hand(), ())).values()
         parts += hold.unfit
     done = np.flatnonzero(ds["status"].values[..., k].ravel() == DONE)

@@ -32,7 +32,7 @@ def folded_text(ds: xr.Dataset, place: Place) -> str:
 
 
 def short_name(ds: xr.Dataset, candidate: int) -> str:
-    """Name of a candidate in a list, with the number that ``--candidate`` takes: p07 of poses, s07 of stations."""
+    """Name of a candidate in a list, which ``--candidate`` takes: p07 of poses, s07 of stations."""
     return f"{'p' if ds.attrs['poses'] else 's'}{candidate:02d}"
 
 
