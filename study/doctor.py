@@ -83,7 +83,7 @@ def mpirun(ranks: int) -> list[str]:
     command = ["mpirun", "-n", str(ranks)]
     trial = subprocess.run([*command, "true"], env=launch_environment(), stdin=subprocess.DEVNULL, capture_output=True,
                            timeout=60, check=False)  # fmt: skip
-    return command if trial.returncode == 0 else [*command, "--oversubscribe"]
+    return command if trial.returncode == 0 else f"mpirun -n {ranks} --oversubscribe".split()
 
 
 def trouble(answer: CompletedProcess[str]) -> str:
