@@ -19,16 +19,12 @@ def values(limits):
     return [limits.f_x, limits.f_y, limits.tau_z]
 
 
-def test_pressures_over_twelve_decades():
+def test_pressures_over_twelve_decades_and_axes_next_to_an_element_keep_their_digits():
     wide = replace(lcg_patch(9, 300), pressure=10 ** np.linspace(-6, 6, 300))
     exact = math.fsum(math.hypot(*np.cross(n, X)) * f for n, f in zip(wide.normal, wide.load, strict=True))
     assert friction_limits(wide, 1.0).f_x == pytest.approx(exact, rel=1e-15)
     weak = replace(wide, pressure=np.where(np.arange(300) < 150, wide.pressure, 0.0))
     assert friction_limits(weak, 1.0).f_x > 0
-
-
-def test_digits_next_to_an_element():
-    """The speed is formed as a difference, so no digit is lost however near the axis runs; |f| = mu p a."""
     for distance in 10.0 ** np.arange(-12, 0):
         offset = np.array([[0.6, 0.8]]) * distance
         place = np.array([[0.25, -0.5]])

@@ -228,16 +228,13 @@ def test_elliptic_cylinder_is_the_infinite_one_within_its_length_and_ends_as_a_t
     assert round_.bounds == pytest.approx(tube.bounds, abs=1e-9)
 
 
-def test_rim_continues_a_curved_end_smoothly():
+def test_rim_continues_a_curved_end_smoothly_and_an_end_on_the_axis_has_no_tip():
     """The vase's wall flares at its open ends; the rim takes over direction and curvature and stays about a circle."""
     z = MM * np.linspace(0, 100, 11)
     vase = Revolution(np.stack([z, 0.03 + 4 * (z - 0.05) ** 2], axis=1), rim=0.003)
     assert np.abs(vase.curve.curvature(vase.curve.inner(50))).max() < 3 / 0.003
     s = vase.curve.breaks[1:-1]
     assert vase.curve.curvature(s) == pytest.approx(vase.curve.curvature(s - 1e-12), abs=1e-3)
-
-
-def test_end_on_the_axis_has_no_tip():
     tip = Revolution([[0, 0], [0.05, 0.03]])
     g, normal, H = tip.gap(np.array([[0, 0, -0.01], [1e-12, 0, -0.01]]))
     assert g == pytest.approx([0.01, 0.01], abs=1e-15)

@@ -44,17 +44,13 @@ def test_corners_need_three_per_face_and_no_normal_force_is_an_error_of_its_own_
         ContactPatch(np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3)), np.zeros(0))
 
 
-def test_a_patch_cannot_be_changed():
+def test_a_patch_cannot_be_changed_and_unit_normals_keep_their_bits():
     patch = lcg_patch(1, 10)
     with pytest.raises(ValueError, match="read-only"):
         patch.pressure[0] = 1.0
     source = np.ones(3)
     ContactPatch(np.eye(3), source, np.eye(3), source)
     source[0] = 2.0
-
-
-def test_unit_normals_keep_their_bits():
-    """A patch made from another one's normals, or of its loaded faces, gives the same friction to the last bit."""
     patch = lcg_patch(2, 500)
     np.testing.assert_array_equal(replace(patch, area=patch.area).normal, patch.normal)
     for scale in (3.0, 1e-310, 1e308):

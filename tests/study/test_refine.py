@@ -66,9 +66,6 @@ def test_nothing_is_added_where_nothing_can_be_gained_a_jump_is_followed_and_a_b
     assert len(added) < 16
     assert np.diff(sorted([*GIVEN, *added])).min() > 0.9 * FINEST_SPACING_SHARE * np.diff(GIVEN)[0]
     assert len(rounds_until_known(lambda x: tent(x, 66.75, 4.0), budget=3)[0]) == 3
-
-
-def test_grasps_that_cannot_be_used_are_no_best_ones():
     stations, score = np.arange(4.0), np.array([1.0, 2.0, 9.0, 1.0]).reshape(1, 4, 1, 1)
     found = chances(stations, score, np.array([True, True, False, False]).reshape(1, 4, 1, 1), 0.1)
     assert found[0] > 0  # judged against 2, not 9

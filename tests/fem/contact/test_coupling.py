@@ -33,15 +33,11 @@ def test_the_path_leads_through_the_same_forces_to_every_force(stride):
             assert load_steps(reached, force, 100.0, stride) == [f for f in steps if f > reached]
 
 
-def test_without_friction_nothing_changes():
+def test_without_friction_nothing_changes_and_a_pad_that_does_not_spread_rubs_nowhere():
     coupled, plain = press(BALL, 0.0).load_path([2.0, 5.0]), Press(pad_of(), BALL).load_path([2.0, 5.0])
     for one, other in zip(coupled, plain, strict=True):
         assert one.closing == pytest.approx(other.closing, rel=1e-9)
         assert np.abs(one.pressure - other.pressure).max() < 1e-8 * other.pressure.max()
-
-
-def test_a_pad_that_does_not_spread_rubs_nowhere():
-    """Without Poisson's effect columns on a plane only shorten, so that friction has nothing to resist."""
     pad = pad_of(law=material("neo_hookean", 0.04e6, 0.0))
     (rough,) = press(reference.plane, 0.8, pad).load_path([5.0])
     (smooth,) = Press(pad, reference.plane).load_path([5.0])

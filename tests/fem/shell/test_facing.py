@@ -48,7 +48,7 @@ def test_the_undeformed_cylinder_is_faced_along_its_radius(wall, points):
     np.testing.assert_allclose(found.H, around[:, :, None] * around[:, None, :] / r[:, None, None], atol=2e-2)
 
 
-def test_a_wall_that_swells_is_nearer_and_one_that_moves_rigidly_is_faced_by_points_that_move_along(wall, points):
+def test_a_wall_that_swells_or_moves_is_faced_along_and_points_beyond_the_ends_face_nothing(wall, points):
     _, normal = nodes(wall)
     grown = face(wall, points, wall.places(points), 1e-3 * normal, np.zeros_like(normal))
     start = face(wall, points, wall.places(points), *still(wall))
@@ -59,9 +59,6 @@ def test_a_wall_that_swells_is_nearer_and_one_that_moves_rigidly_is_faced_by_poi
     here = face(wall, points, wall.places(points), *still(wall))
     np.testing.assert_allclose(there.gap, here.gap, atol=1e-12)
     np.testing.assert_allclose(there.normal, here.normal, atol=1e-9)
-
-
-def test_points_beyond_the_ends_face_nothing(wall):
     beyond = np.array([[R + 1e-3, 0, -0.004], [R + 1e-3, 0, LENGTH + 0.004], [0, R + 1e-3, 0.5 * LENGTH]])
     gap = face(wall, beyond, wall.places(beyond), *still(wall)).gap
     assert (gap[:2] == FAR).all()

@@ -93,7 +93,7 @@ def still(wall):
     return none, none.copy()
 
 
-def test_a_part_of_a_wall_is_not_faced_from_beyond_its_edges(quarter):
+def test_a_part_of_a_wall_is_not_faced_from_beyond_its_edges_but_from_the_wrong_end(quarter):
     assert not quarter.closed
     assert grip(thin(), elements=(4, 2, 2), mesh=ROUGH, allowed=(False, False)).problem.fingers[0].wall.closed
     theta = np.array([-0.02, 0.02, 0.5 * np.pi - 0.02, 0.5 * np.pi + 0.02])
@@ -101,9 +101,6 @@ def test_a_part_of_a_wall_is_not_faced_from_beyond_its_edges(quarter):
     found = face(quarter, points, quarter.places(points), *still(quarter))
     assert (found.gap == FAR).tolist() == [True, False, False, True]
     np.testing.assert_allclose(found.gap[1:3], 1e-3, atol=1e-7)
-
-
-def test_a_search_that_begins_at_the_wrong_end_of_the_wall_finds_the_place(quarter):
     points = np.array([[0.036, 1e-3, 0.075], [0.036, 5e-3, 0.1]])
     good, bad = quarter.places(points), np.tile([0.5 * np.pi, quarter.s[-1]], (2, 1))
     here = face(quarter, points, good, *still(quarter))

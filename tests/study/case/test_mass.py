@@ -16,7 +16,7 @@ def scene(density=1000, sweep=None, **shape):
     return Scene.from_dict({**tables, "load": {"normal_force_n": [1]}, "sweep": sweep or {}})
 
 
-def test_it_is_density_times_volume():
+def test_it_is_density_times_volume_and_what_has_no_volume_or_several_is_refused():
     ball = with_sampled_grasps(scene(shape="sphere", radius_mm=30))
     assert ball.object.mass == pytest.approx(1000 * 4 / 3 * math.pi * 0.03**3, rel=1e-4)
     assert ball.object.density is None
@@ -25,9 +25,6 @@ def test_it_is_density_times_volume():
     a, r = 0.03, 0.02  # at both ends of a frustum of 100 mm
     cone = scene(shape="revolution", profile_mm=[[0, 30], [40, 26], [50, 25], [100, 20]])
     assert volume(cone.object) == pytest.approx(math.pi * 0.1 / 3 * (a * a + a * r + r * r), rel=1e-9)
-
-
-def test_what_has_no_volume_or_several_is_refused():
     with pytest.raises(StudyError, match="mass_g"):
         with_sampled_grasps(scene(shape="plane", thickness_mm=30))
     with pytest.raises(StudyError, match="mass_g"):

@@ -121,7 +121,7 @@ def test_a_bowl_is_held_by_the_middle_of_its_bottom_which_is_as_wide_as_the_pad_
     assert abs(best.approach[2]) > 0.999
 
 
-def test_on_a_flat_face_the_springs_hold_what_the_planar_contact_holds():
+def test_on_a_flat_face_the_springs_hold_what_the_planar_contact_holds_and_edges_bear_their_share():
     """A pad on a large plate: the nearest side of two friction cones, and less for a load that stands beside it."""
     grip = at_origin(box(0.2, 0.2, 0.05))
     strain = JAWS.force / (PAD[0] * PAD[1] * JAWS.stiffness * PAD[2])
@@ -129,9 +129,6 @@ def test_on_a_flat_face_the_springs_hold_what_the_planar_contact_holds():
     cones = 2 * JAWS.mu * JAWS.force / np.hypot(1.0, JAWS.mu) / GRAVITY
     assert held(grip.contacts, TASK) == pytest.approx(cones, rel=0.01)
     assert held(grip.contacts, Task(np.array([0.0, 0.1, 0.0]))) < 0.2 * cones
-
-
-def test_what_a_pad_bears_beside_an_edge_is_a_share_of_its_force():
     length, width = PAD[:2]
     assert at_origin(box(0.2, 0.2, 0.05)).on_edges == pytest.approx(0.0, abs=1e-12)
     # the object ends between the last cells of the face and the ones beyond it, along the length or the width

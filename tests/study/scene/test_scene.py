@@ -339,13 +339,10 @@ def test_the_digest_follows_results_only():
     assert listed.digest == spread.digest
 
 
-def test_texts_survive_being_written_out():
+def test_texts_survive_being_written_out_and_a_scene_holds_its_rules_in_python_too():
     name = 'a "b" \\ é 😀'
     scene = parse_scene(BALL).with_values({"object.name": name})
     assert parse_scene(scene.effective_toml()).object.name == name
-
-
-def test_a_scene_is_frozen_and_holds_its_rules_in_python_too():
     scene = parse_scene(BALL)
     with pytest.raises(ValidationError):
         scene.friction.mu = 1.0

@@ -77,7 +77,7 @@ def test_differences_are_judged_by_the_errors_of_both_files(pair):
     assert summary["largest"] == pytest.approx(0.1)
 
 
-def test_rounding_is_no_difference_of_two_maps_without_errors(pair):
+def test_rounding_is_no_difference_and_errors_of_one_file_alone_are_unknown(pair, tmp_path):
     """Errors of 0 are exceeded by 1e-4 of a value, and not by what another order of operations may change."""
     one = softjaw.open(pair[0])
     one["e_n_error"][:] = 0.0
@@ -85,9 +85,6 @@ def test_rounding_is_no_difference_of_two_maps_without_errors(pair):
         other = one.copy(deep=True)
         other["e_n"] *= 1 + change
         assert {row["beyond_error"] for row in compare(one, other).rows if row["a"]} == {beyond}
-
-
-def test_errors_of_one_file_alone_are_unknown(pair, tmp_path):
     found = compared(pair[0], make(tmp_path / "c.hdf"))
     assert {row["beyond_error"] for row in found.rows} == {None}
     assert not any(c.people for c in found.columns if c.name in ("error", "beyond_error"))
