@@ -33,12 +33,15 @@ def test_facing_contacts_score_as_in_closed_form():
 def test_epsilon_off_the_line_and_of_turned_contacts_is_searched():
     one, two = facing()
     x, y, N = two.axes
-    turned = SoftContact(two.position, np.array([(x + y) / 2**0.5, (y - x) / 2**0.5, N]), two.body)
-    exact = grasp_score([one, two], *LENGTHS)
-    for contacts, com in (((one, turned), (0, 0, 0)), ((one, two), (0, 0.02, 0.01))):
+    turned, back = (SoftContact(two.position, np.array([x + s * y, y - s * x, 2**0.5 * N]) / 2**0.5, two.body)
+                    for s in (1, -1))  # fmt: skip
+    exact, scores = grasp_score([one, two], *LENGTHS), []
+    for contacts, com in (((one, turned), (0, 0, 0)), ((one, back), (0, 0, 0)), ((one, two), (0, 0.02, 0.01))):
         found = grasp_score(contacts, *LENGTHS, centre_of_mass=com)
         assert (found.quality, found.method) == (pytest.approx(exact.quality, rel=1e-12), "antipodal")
         assert 0 < found.epsilon < 1
+        scores.append(found.epsilon)
+    assert scores[0] == pytest.approx(scores[1], rel=1e-4)  # mirror images; to the tolerance of the search
 
 
 def test_tilted_contacts_go_on_from_facing_ones():
