@@ -93,7 +93,7 @@ class Solved:
     @property
     def floor(self) -> float:
         """Share of a value that meshes can agree on by luck."""
-        return edge_floor(self.fine.contacts, self.fine.contacts[0].state.pad.shape.per_side ** 2)
+        return edge_floor(self.fine.contacts)
 
     @property
     def doubt(self) -> float:
