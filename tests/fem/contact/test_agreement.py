@@ -28,23 +28,26 @@ A = 1e-3 * TABLE["object"]["semi_axis_a_mm"]
 MU = 0.8
 
 
-def pressed_states(ratio, elements, forces, symmetry=(True, True), contact="weighted"):
-    pad = Pad(PadShape(SIZE, elements), FOAM, symmetry, contact)
+def pressed_states(ratio, elements, forces, symmetry=(True, True), contact="weighted", element="hex8"):
+    pad = Pad(PadShape(SIZE, elements, element=element), FOAM, symmetry, contact)
     gap = reference.placed(EllipticCylinder(A, ratio * A, 0.2), reference.facing(A))
     return pad, list(Press(pad, gap).load_path(forces))
 
 
-def figures(ratio, elements):
+def figures(ratio, elements, element="hex8"):
     """Closing [mm], e_n [mm], f_x / (mu F_N), largest face pressure [MPa], sum of face forces over F; per force."""
-    pad, states = pressed_states(ratio, elements, TABLE["force_n"])
+    pad, states = pressed_states(ratio, elements, TABLE["force_n"], element=element)
     rows = []
     for pressed in states:
         patch = extract(pad, pressed)
         limits = friction_limits(in_frame(patch, contact_frame(patch, [1, 0, 0])), MU)
         rows.append(
             (
-                1e3 * pressed.closing, 1e3 * limits.e_n_projected, limits.f_x / (MU * limits.F_N),
-                1e-6 * patch.pressure.max(), (patch.load * patch.normal[:, 2]).sum() / pressed.force,
+                1e3 * pressed.closing,
+                1e3 * limits.e_n_projected,
+                limits.f_x / (MU * limits.F_N),
+                1e-6 * patch.pressure.max(),
+                (patch.load * patch.normal[:, 2]).sum() / pressed.force,
             )
         )
         assert pressed.halvings == 0
@@ -85,6 +88,16 @@ def test_fine_mesh(ratio):
     agree(e_n, case["e_n_mm"], case["e_n_tolerance"])
     agree(f_x, case["f_x"], 0.006 if ratio < 1 else 0.001)
     agree(p_max, case["p_max_mpa"], 0.15 if ratio < 1 else 0.02)
+    agree(force, 1.0, 0.002)
+
+
+@pytest.mark.long
+def test_triquadratic_elements():
+    """On as many nodes as the fine trilinear mesh has; at 3 N the contact is six elements wide."""
+    case = CASES[1.0]
+    closing, e_n, _, _, force = figures(1.0, COARSE, "hex27")
+    agree(closing, case["d_mm"], [0.005, 0.002, 0.002])
+    agree(e_n, case["e_n_mm"], case["e_n_tolerance"])
     agree(force, 1.0, 0.002)
 
 

@@ -51,8 +51,10 @@ def cylinder_errors(n, factors, element="hex8", width=20.0, grade=20.0):
         patch, faces = extract(pad, pressed), shape.patch_faces
         errors.append(
             (
-                half_width / hertz.radius - 1, pressed.pressure.max() / hertz.peak - 1,
-                profile_error(pad, pressed, y, hertz), contact_area(patch, faces) / (2 * hertz.radius * length) - 1,
+                half_width / hertz.radius - 1,
+                pressed.pressure.max() / hertz.peak - 1,
+                profile_error(pad, pressed, y, hertz),
+                contact_area(patch, faces) / (2 * hertz.radius * length) - 1,
                 largest_pressure(patch, faces, shape.per_side) / hertz.peak - 1,
                 patch.area[patch.load > 0].sum() / (2 * hertz.radius * length) - 1,
             )
@@ -87,13 +89,14 @@ def test_triquadratic_cylinder():
     assert fitted < 0.04
 
 
-def sphere_errors(n, factors=(0.8, 0.88, 0.96, 1.04, 1.12, 1.2), width=6.0, nu=0.3):
+def sphere_errors(n, factors=(0.8, 0.88, 0.96, 1.04, 1.12, 1.2), element="hex8", width=6.0, nu=0.3):
     """Relative errors of radius, peak pressure and profile; and what the approach lacks, in units of F / (E* W)."""
     a = 0.005 * R
     E_star, W = E / (1 - nu**2), width * a
     pad = Pad(
-        PadShape((2 * W, 2 * W, W), (2 * n, 2 * n, n), (width, width, width)),
-        material("linear", E / 2 / (1 + nu), nu), (True, True),
+        PadShape((2 * W, 2 * W, W), (2 * n, 2 * n, n), (width, width, width), element),
+        material("linear", E / 2 / (1 + nu), nu),
+        (True, True),
     )
     errors, lacking = [], []
     for pressed in Press(pad, reference.sphere(R)).load_path([4 * E_star * (f * a) ** 3 / (3 * R) for f in factors]):
@@ -101,7 +104,8 @@ def sphere_errors(n, factors=(0.8, 0.88, 0.96, 1.04, 1.12, 1.2), width=6.0, nu=0
         r = np.linalg.norm(pressed.points.position[..., :2], axis=-1)
         errors.append(
             (
-                radius(pressed, [0, 1], 2.5) / hertz.radius - 1, pressed.pressure[0] / hertz.peak - 1,
+                radius(pressed, [0, 1], 2.5) / hertz.radius - 1,
+                pressed.pressure[0] / hertz.peak - 1,
                 profile_error(pad, pressed, r, hertz),
                 contact_area(extract(pad, pressed), pad.shape.patch_faces) / (np.pi * hertz.radius**2) - 1,
                 largest_pressure(extract(pad, pressed), pad.shape.patch_faces, pad.shape.per_side) / hertz.peak - 1,
@@ -113,7 +117,8 @@ def sphere_errors(n, factors=(0.8, 0.88, 0.96, 1.04, 1.12, 1.2), width=6.0, nu=0
 
 def test_sphere_converges_at_the_expected_orders():
     """Three meshes of quarter pads with a Poisson's ratio of 0.3."""
-    errors, lacking = zip(*(sphere_errors(n) for n in np.array([5, 7, 10])), strict=True)
+    meshes = np.array([5, 7, 10])
+    errors, lacking = zip(*(sphere_errors(n) for n in meshes), strict=True)
     order = np.log2(errors[0] / errors[2])  # over all three, twice as many elements per direction
     assert (np.diff(errors, axis=0)[:, [0, 1, 2, 4]] < 0).all()
     assert order[0] > 1.1
@@ -123,6 +128,18 @@ def test_sphere_converges_at_the_expected_orders():
     # a finite pad is stiffer than the half space, by the same compliance at every force: 0.44 F / (E* W), a tenth of
     # the approach here, so that the scatter of 15 % is 1.5 % of the approach
     assert lacking[2] == pytest.approx(lacking[2].mean(), rel=0.15)
+
+
+@pytest.mark.long
+def test_sphere_on_a_fine_mesh():
+    (coarse, _), (errors, lacking) = sphere_errors(10), sphere_errors(16)
+    assert np.log(coarse / errors)[0] / np.log(1.6) > 1.4
+    assert np.log(coarse / errors)[3] / np.log(1.6) > 1.0
+    assert errors[3] < 0.06
+    assert 0.8 < np.log(coarse / errors)[2] / np.log(1.6) < 1.5
+    assert errors[0] < 0.01
+    assert errors[1] < 0.015
+    assert lacking == pytest.approx(lacking.mean(), rel=0.08)
 
 
 def test_nafems_cylinder_on_a_block():

@@ -4,6 +4,8 @@ Nonlinear: Sze, Liu and Lo, Finite Elements in Analysis and Design 40, 2004; lin
 in Analysis and Design 1, 1985. Lengths, forces and moduli as printed there.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -37,10 +39,12 @@ def case(X, normal, thickness, E, nu):
 
 
 def symmetric(fixed, nodes, axis):
+    """Plane of symmetry at right angles to the axis."""
     fixed[nodes, axis] = fixed[nodes, 3 + axis] = True
 
 
 def line_load(c, nodes, force):
+    """Force per length along a line of nodes."""
     length = np.linalg.norm(np.diff(c.shell.mesh.X[nodes], axis=0), axis=1)
     for i, part in enumerate(length):
         c.load[nodes[i : i + 2]] += 0.5 * part * np.asarray(force)
@@ -96,6 +100,15 @@ def cylinder(radius, length, thickness, angle, E, nu, around, along):
     return c, k
 
 
+def hinged_roof(thickness, n=16):
+    """Quarter of a shallow cylindrical roof on two hinged straight sides; a quarter of the load in the middle."""
+    c, k = cylinder(2540.0, 254.0, thickness, 0.1, 3102.75, 0.3, n, n)
+    c.fixed[k[-1], :3] = True
+    c.load[k[0, 0]] = -3000 / 4 * UZ
+    c.probes = [(k[0, 0], 2, -1)]
+    return c
+
+
 def scordelis_lo(n):
     """Quarter of a roof under its weight of 90 per area, on rigid diaphragms; 0.3024 down at the middle of the side."""
     c, k = cylinder(25.0, 25.0, 0.25, np.radians(40), 4.32e8, 0.0, n, n)
@@ -112,6 +125,25 @@ def pinched_cylinder(n):
     c.fixed[np.ix_(k[:, -1], [0, 2, 3, 5])] = True
     c.load[k[0, 0]] = -0.25 * UZ
     c.probes = [(k[0, 0], 2, -1)]
+    return c
+
+
+def pulled_cylinder(around=24, along=36):
+    """Eighth of a cylinder with free ends, pulled outwards by two opposing forces."""
+    c, k = cylinder(4.953, 5.175, 0.094, np.pi / 2, 10.5e6, 0.3125, around, along)
+    symmetric(c.fixed, k[-1], 2)
+    c.load[k[0, 0]] = 40e3 / 4 * UZ
+    c.probes = [(k[0, 0], 2, 1), (k[-1, 0], 0, -1), (k[-1, -1], 0, -1)]
+    return c
+
+
+def pinched_half_cylinder(n=40):
+    """Half of a half cylinder, clamped at one end, pressed down at the other's crown; the straight side slides."""
+    c, k = cylinder(101.6, 304.8, 3.0, np.pi / 2, 2068.5, 0.3, n, n)
+    symmetric(c.fixed, k[-1], 2)
+    c.fixed[k[:, 0]] = True
+    c.load[k[0, -1]] = -2000 / 2 * UZ
+    c.probes = [(k[0, -1], 2, -1)]
     return c
 
 

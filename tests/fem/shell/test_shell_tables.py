@@ -8,7 +8,7 @@ import pytest
 
 from softjaw.fem.shell.wall_model import LinearShell
 from tests.fem.shell import shell_problems
-from tests.fem.shell.shell_path import load_steps
+from tests.fem.shell.shell_path import follow, load_steps
 
 TABLES = json.loads((Path(__file__).parents[2] / "data" / "shell_tables.json").read_text(encoding="utf-8"))
 NONLINEAR = {
@@ -53,9 +53,39 @@ def test_the_plain_tangent_finds_the_same_state():
     assert plain.iterations > mixed.iterations
 
 
+def path_of(case, largest_factor):
+    """Displacements and load factors along the path up to this factor."""
+    path = [(0.0, 0.0)]
+    for state in follow(case.loaded, 0.05, longest=10.0):
+        path.append((case.read(state.q)[0], state.factor))
+        if state.factor > largest_factor:
+            return np.array(path).T
+
+
+def test_hinged_roof_past_both_limit_points():
+    table = TABLES["hinged_roof_12.7"]
+    w, P = path_of(shell_problems.hinged_roof(12.7), 1.0)
+    rows = np.array(table["table"])
+    assert np.abs(np.interp(rows[:, 1], w, P) - rows[:, 0]).max() < table["tol_abs_P"]
+
+
 @pytest.mark.parametrize("name", LINEAR)
 @pytest.mark.parametrize("n", [4, 8, 16, pytest.param(32, marks=pytest.mark.long)])
 def test_linear_course(name, n):
     case, table = LINEAR[name](n), TABLES["linear"][name]
     q = LinearShell(*case.loaded[:2]).solve(case.loaded.load)
     assert case.read(q)[0] / table["ref"] == pytest.approx(table["measured_Q4"][str(n)][1], abs=2e-4)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("name", "levels", "expected", "tolerance"),
+    [
+        ("pulled_cylinder", [1.0], [2.768, 4.551, 3.269], 0.01),
+        ("pinched_half_cylinder", np.linspace(0.05, 1, 20), [171.505], 0.01),
+    ],
+)
+def test_other_problems_at_full_load(name, levels, expected, tolerance):
+    case = getattr(shell_problems, name)()
+    *_, last = load_steps(case.loaded, levels)
+    assert case.read(last.q) == pytest.approx(expected, rel=tolerance)
