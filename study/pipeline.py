@@ -78,7 +78,7 @@ class UnitSolver:
     def cases(self, wanted: Collection[int]) -> Generator[tuple[int, CaseResult | CaseFailure], None, None]:
         """Cases at these forces, upward."""
         start, before = time.perf_counter(), self._solver.seconds
-        self._solver.finest = tuple(self.unit.finest) or self._solver.finest
+        self._solver.finest = tuple(self.unit.finest) or (FINEST,) * len(self._solver.forces)
         choice = self._choice = self._choice or EffectChoice(self._solver)
         for k, outcome in _outcomes(choice, wanted):
             if isinstance(outcome, CaseFailure):

@@ -1,6 +1,7 @@
 """Forces of a candidate on two meshes, on a rigid object and on a thin wall: each by itself, from the coarse one."""
 
 import math
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -15,6 +16,7 @@ from softjaw.study.case.result import CaseFailure
 from softjaw.study.case.solver import CandidateSolver, Levels
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import misses
+from softjaw.study.scene.sections import FINE
 from tests.study.scenes import CONE, NO_COUPLING, pose_of, scene_of, units_of
 
 # Fingers that are no images of each other, so that there are two coarse paths.
@@ -212,6 +214,16 @@ def test_a_simulated_wall_keeps_two_meshes():
     two, three = (refined(*WALL, *more, wanted=[0])[0] for more in ((), aim(1e-3)))
     assert three.values["maps/pad_elements"] == 6 * 4 * 2
     assert three.values["maps/e_n"] == pytest.approx(two.values["maps/e_n"], rel=1e-12)
+
+
+def test_what_an_earlier_question_was_content_with_does_not_bind_the_next(split, monkeypatch):
+    monkeypatch.setattr(pipeline, "MOST_SOLVERS", 1)
+    _, target, found = split
+    unit = unit_of(*aim(target))
+    list(pipeline.solve_unit(replace(unit, finest=(FINE,) * 3)))
+    for k, result in pipeline.solve_unit(unit):
+        assert result.values["maps/pad_elements"] == found[k].values["maps/pad_elements"]
+        assert np.array_equal(result.values["maps/e_n"], found[k].values["maps/e_n"])
 
 
 @pytest.mark.parametrize("of", ["quality", "payload"])

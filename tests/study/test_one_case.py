@@ -106,7 +106,7 @@ def test_the_threads_of_a_script_change_no_bit():
     (FLASK.with_values(**{"candidates.stations_mm": [30], "candidates.angles_deg": [0]}),
      {"station": 0.03, "force": 5}, (0, 0, 1)),
     (sj.Scene.from_file(JOBS / "sampled.toml", [COARSE, "candidates.sampled=2"]),
-     {"candidate": 1, "force": 2}, (1, 0, 0)),
+     {"candidate": 0, "force": 5}, (0, 0, 1)),  # others, and smaller forces, have coarser meshes in a run
     (sj.Scene.from_file(JOBS / "cup.toml", [
         COARSE, "candidates.stations_mm=[55]", "load.normal_force_n=[0.5, 2]", "accuracy.wall_element_mm=4",
         "accuracy.meshes=1",
