@@ -362,7 +362,7 @@ class NonlinearSolver:
     def answer(self, right: FloatArray) -> FloatArray:
         """Solution of a linear system with the last solve's last tangent; its factors are at hand."""
         b, y = self._f.duplicate(), self._f.duplicate()
-        b.array[:] = self._stepped.right_side(right) if self._condensed and self._stepped else right
+        b.array[:] = self._stepped.right_side(right) if self._stepped else right
         self._snes.getKSP().solve(b, y)
         solution = y.array.copy()
         b.destroy()

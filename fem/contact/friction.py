@@ -81,11 +81,13 @@ def stick_or_slip(
     def in_plane(vector: FloatArray) -> FloatArray:
         return vector - np.einsum("...i,...i->...", normal, vector)[..., None] * normal
 
-    size = np.linalg.norm(in_plane(judged), axis=-1)
+    trial = in_plane(d)
+    slip = trial if before is None else in_plane(judged)
+    size = np.linalg.norm(slip, axis=-1)
     # at zero pressure nothing sticks, and a point without a trial traction has no direction to slip in
     slips = (size > most)[..., None]
-    along = in_plane(judged) / np.where(size > 0.0, size, 1.0)[..., None]
-    t = np.where(slips, most[..., None] * along, in_plane(d))
+    along = slip / np.where(size > 0.0, size, 1.0)[..., None]
+    t = np.where(slips, most[..., None] * along, trial)
     if not derivatives:
         return (t,)
     ratio = np.where(slips[..., 0], most / np.where(size > 0.0, size, 1.0), 1.0)[..., None, None]

@@ -60,7 +60,7 @@ SURFACES = {
 DOUBT = 0.3
 # What may be raised where a contact is smaller than a coarse element: that says nothing, and harms no case.
 TOO_SMALL = (ArithmeticError, ConvergenceError, CheckError, NoContactError)
-CHANGES = ("e_n", "payload", "quality")  # whose changes a `Level` holds, in its order
+CHANGE_OF = {"e_n": "change", "payload": "payload_change", "quality": "quality_change"}  # fields of a `Level`
 PAYLOAD_MOTIONS = 100  # whose wrenches bound the payload; both levels err alike
 LEFT_OUT = "friction that acts back on the pressure was not solved ({reason})"
 MODEL_SIZES = ("full", "half", "quarter")  # by the number of planes of symmetry
@@ -308,13 +308,16 @@ class EffectChoice:
         """Effects whose dearer level was measured and left out."""
         return [name for name in ("sheet", COUPLING) if self.level(name, k).reason == LITTLE]
 
+    def _share_left_out(self, k: int) -> float:
+        """What effects that were left out add to the error of the quantity that ``accuracy.target`` is for."""
+        field = CHANGE_OF[self.solver.scene.accuracy.target_of]
+        return self.skipped_share(k) + sum(abs(getattr(self.level(name, k), field)) for name in self._left_out(k))
+
     def _solved(self, k: int) -> Solved:
         """A case without what its effects leave out."""
         level, coupled = self.level(COUPLING, k), self.levels._replace(friction_pressure_coupling="tangential")
         if level.reason == FORCED or level.level != level_named(COUPLING, "tangential"):
-            changes = [dict(zip(CHANGES, self.level(name, k)[3:], strict=True)) for name in self._left_out(k)]
-            of = self.solver.scene.accuracy.target_of
-            return self.solver.case(k, self.levels, self.skipped_share(k) + sum(abs(change[of]) for change in changes))
+            return self.solver.case(k, self.levels, self._share_left_out(k))
         try:
             # a wall whose coarse load path with friction has ended: the fine one takes long to end, too
             walled = self.solver.walled and self.levels.object.endswith("shell")
