@@ -73,7 +73,7 @@ def thorough() -> list[Stage]:
         for kernel in usable()
     ]  # fmt: skip
     return [
-        Stage("long", tests("long and not ranks", "--durations", "10", *workers()), 90),
+        Stage("long", tests("long and not ranks", "--durations", "20", *workers()), 180),
         Stage("long-ranks", tests("long and ranks", "--durations", "10"), 60, ("mpirun",)),
         Stage("decisions", tests("not ranks", *workers(), *decisions), 60, variables={"TURNS": "200"}),
         *kernels,
