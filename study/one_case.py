@@ -262,10 +262,8 @@ def _joined(values: Sequence[float], value: float) -> tuple[list[float], int]:
 
 
 def _with_candidates(scene: Scene, table: dict[str, Any]) -> Scene:
-    """The scene with these candidates; what names others by number or label changes no value of a case."""
-    tables = scene.effective() | {"candidates": table}
-    tables["limit_surface"] = tables["limit_surface"] | {"wrench_samples": "none"}
-    return Scene.of_tables(tables)
+    """The scene with these candidates."""
+    return Scene.of_tables(scene.effective() | {"candidates": table})
 
 
 def _at_force(scene: Scene, force: float) -> tuple[Scene, int]:

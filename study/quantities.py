@@ -27,9 +27,8 @@ LISTED_TARGET = 0.03  # the same of the payload, of the best of sampled grasps
 LISTED = 10  # places that a list of the best grasps has where nobody asks for another number
 BOTH_ENDS = RIMS[0] | RIMS[1]
 PARTS = ("assembly", "factorisation", "rest", "friction")  # of a case's time
-# What a quantity may need that not every scene asks for; the layout of a file knows of `HELD` by their sizes.
-NEEDS = ("two meshes", "six components", "mass", "task", "wall", "finer meshes")
-HELD = ("samples", "patches")
+# What a quantity may need that not every scene asks for.
+NEEDS = ("two meshes", "six components", "mass", "task", "wall", "finer meshes", "patches")
 # Exponents of x, y and t, highest power of x first.
 MONOMIALS = tuple(
     " ".join(f"{letter}^{k}" if k > 1 else letter for letter, k in zip("xyt", (i, j, 4 - i - j), strict=True) if k)
@@ -131,7 +130,7 @@ class Quantity:
     symbol : str
         Head of a column; the name where it is empty.
     needs : tuple of str
-        Of `NEEDS` or `HELD`; without all of them the quantity is not in the file.
+        Of `NEEDS`; without all of them the quantity is not in the file.
     rank : int
         Place among the main maps, 1 for the first; 0 for all others.
     meanings : tuple of str
@@ -166,11 +165,6 @@ class Quantity:
     def by_model(self) -> bool:
         """Whether there is one value for each of `MODELS`."""
         return "model" in self.dims
-
-    @property
-    def sampled(self) -> bool:
-        """Whether it is stored for the candidates of ``limit_surface.wrench_samples`` alone."""
-        return "samples" in self.needs
 
     def error_in_unit(self, error: Any, value: Any) -> Any:
         """An error of this map as it is stored, in the map's unit; ``value`` is what a relative one is a share of."""
@@ -405,11 +399,6 @@ ROWS = (
              f"Outer face in the frame of the object's own file at {AROUND} angles about the axis, in equal steps from"
              f" finger 1's, times {ALONG} places along the outline, in equal steps of its arc length from the bottom's"
              " middle or rim to the top; the angle runs slowest.", "wall", needs=("wall",)),
-    # large arrays
-    Quantity("wrench", (*FM, "sample", "component"), "N, N, N m", "wrenches of sampled motions",
-             "Friction (f_x, f_y, tau_z) about the contact frame's origin for the motions in wrenches/motion; the"
-             " opposite motions have the opposite wrenches. Of the candidates in wrenches/candidate only.", "wrenches",
-             needs=("samples",)),
     # effects: level, indicator and reason of each
     *(
         Quantity(f"{name}_{part}", (), "", f"{part} of the effect '{name}'", text, "effects", meanings=meanings)
@@ -458,7 +447,7 @@ def misses(error: Any, target: float | None) -> Any:
 
 
 def quantities(has: Collection[str] = ()) -> tuple[Quantity, ...]:
-    """All quantities of a file whose scene asks for these of `NEEDS` and `HELD`."""
+    """All quantities of a file whose scene asks for these of `NEEDS`."""
     return tuple(q for q in TABLE if set(q.needs) <= set(has))
 
 

@@ -59,7 +59,6 @@ class EvaluationSettings:
     task: Task | None = None
     epsilon_everywhere: bool = False
     six: bool = False
-    sampled: bool = False
 
 
 def lengths(scene: Scene, obj: Any) -> tuple[FloatArray, float]:
@@ -85,7 +84,7 @@ def settings_of(scene: Scene, obj: Any) -> EvaluationSettings:
     return EvaluationSettings(
         *lengths(scene, obj), scene.limit_surface, task_of(scene, obj),
         epsilon_everywhere=scene.score.epsilon == "everywhere",
-        six=scene.effects.wrench == "6-D", sampled=bool(scene.sampled),
+        six=scene.effects.wrench == "6-D",
     )  # fmt: skip
 
 
@@ -101,7 +100,7 @@ def evaluate(
     # friction limits come with the contacts, so fitting is the first step that takes time
     fits = _per_patch(contacts, lambda c: {m: fit_surface(c, m, settings.surface) for m in MODELS})
     scores, best = _scores(contacts, fits, settings)
-    values = _friction_values(contacts) | scores | surface_values(contacts, fits, settings.sampled, settings.six)
+    values = _friction_values(contacts) | scores | surface_values(contacts, fits, settings.six)
     values["maps/flags"] = pose_flags(contacts) | raised(best.flag) | fit_flag(fits)
     if settings.task:
         payloads, flag = payload_values(contacts, fits, settings.task)

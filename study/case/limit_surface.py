@@ -148,9 +148,7 @@ def _fit_error(surface: LimitSurface, W: FloatArray, T: FloatArray) -> FitErrors
     return FitErrors(*errors) if np.isfinite(errors).all() else FitErrors(np.nan, np.nan, np.nan)
 
 
-def surface_values(
-    contacts: Sequence[Contact], fits: Sequence[Mapping[str, SurfaceFit]], sampled: bool, six: bool
-) -> dict[str, Any]:
+def surface_values(contacts: Sequence[Contact], fits: Sequence[Mapping[str, SurfaceFit]], six: bool) -> dict[str, Any]:
     """What is stored of both fingers' surfaces, keyed as in ``study.quantities``."""
     every = [list(finger.values()) for finger in fits]
     per_model = {
@@ -168,10 +166,6 @@ def surface_values(
         sixes = [six_ellipsoid(c.local, c.rho, c.unit_limits["ccm"].S) for c in contacts]
         for name, part in zip(("matrix_6d", "rank_6d", "fit_error_6d"), zip(*sixes, strict=True), strict=True):
             values[f"limit_surface/{name}"] = list(part)
-    if sampled:
-        values["wrenches/wrench"] = [
-            [c.mu * b.wrench[:, [0, 1, 5]] for b in finger] for c, finger in zip(contacts, every, strict=True)
-        ]
     return values | {
         "limit_surface/rho": [b.rho for b in curved],
         "maps/fit_error": np.max([b.fit_error.Erad for b in curved]),

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.study.quantities import MISSING, STATES
-from softjaw.study.result.datasets import SUMS, Column
+from softjaw.study.result.datasets import SUMS
 from softjaw.study.result.hdf5 import StoredFile
-from softjaw.study.result.layout import ROOT, Layout
+from softjaw.study.result.layout import ATTEMPTS, ROOT, Layout
 
 OF_STATE = {state: zlib.crc32(bytes([state])) for state in range(len(STATES))}
 ABOUT = {"axes": ("units", "long_name", "scene_key"), "scene": ("digest", "file", "overrides", "petsc_options")}
@@ -36,21 +36,15 @@ def of_row(layout: Layout, values: Sequence[Any], state: int) -> NDArray[np.uint
     return np.array([*(of_array(np.asarray(v, c.dtype)) for c, v in columns), OF_STATE[state]], "<u4")
 
 
-def of_column(layout: Layout, column: Column, values: NDArray[Any], rows: NDArray[Any]) -> tuple[Any, Any]:
-    """Those of the ``rows`` that have a place in a column's dataset ``values``, and their checksums."""
-    lines = layout.lines(column, rows)
-    rows, lines = rows[lines >= 0], lines[lines >= 0]
-    if not values.size:
-        return rows, np.zeros(len(rows), np.uint32)
-    size = int(np.prod(column.shape, dtype=int)) * column.dtype.itemsize
-    stored = np.ascontiguousarray(values).reshape(-1).view(np.uint8).reshape(-1, size)[lines]
-    return rows, np.array([zlib.crc32(line) for line in stored], np.uint32)
+def of_rows(layout: Layout, values: Any, rows: NDArray[Any]) -> NDArray[np.uint32]:
+    """Checksums of some ``rows`` of a dataset's ``values``."""
+    stored = np.ascontiguousarray(values).reshape(layout.rows, -1)
+    return np.array([zlib.crc32(stored[row]) for row in rows], np.uint32)
 
 
-def broken_rows(file: StoredFile, layout: Layout, column: Column, values: Any, rows: NDArray[Any]) -> NDArray[Any]:
-    """Those of the ``rows`` whose values in a column's dataset do not match their checksum."""
-    rows, sums = of_column(layout, column, values, rows)
-    return rows[sums != stored_sums(file, layout, column.path)[rows]]
+def broken_rows(file: StoredFile, layout: Layout, path: str, values: Any, rows: NDArray[Any]) -> NDArray[Any]:
+    """Those of the ``rows`` whose values in the dataset at a path do not match their checksum."""
+    return rows[of_rows(layout, values, rows) != stored_sums(file, layout, path)[rows]]
 
 
 def stored_sums(file: StoredFile, layout: Layout, path: str) -> NDArray[np.uint32]:
@@ -70,7 +64,7 @@ def broken_states(file: StoredFile, layout: Layout, codes: np.ndarray, under_way
     wrong = np.array([OF_STATE.get(state, 0) for state in range(256)], np.uint32)[codes] != stored
     if under_way and wrong.any():
         # A kill between checksum and state leaves exactly this: begun, not computed, and the sum of an end.
-        begun = file.values(file.checked(f"{ROOT}/status/attempts", layout.shape, np.dtype("u1"))).ravel() > 0
+        begun = file.values(file.checked(ATTEMPTS, layout.shape, np.dtype("u1"))).ravel() > 0
         ends = [crc for state, crc in OF_STATE.items() if state != MISSING]
         wrong &= ~(begun & (codes == MISSING) & np.isin(stored, ends))
     return np.flatnonzero(wrong)
@@ -94,7 +88,6 @@ def of_header(file: StoredFile, layout: Layout) -> int:
         parts += [[str(text) for text in attributes["options"]]] if "options" in attributes else []
     crc = zlib.crc32(repr(parts).encode())
     arrays = ["scene", "definitions", "candidates/label", *axes]
-    arrays += ["wrenches/motion", "wrenches/candidate"] * bool(layout.sampled)
     for name in arrays:
         crc = zlib.crc32(np.asarray(file.values(file.plain(f"{ROOT}/{name}"))).tobytes(), crc)
     return crc

@@ -14,13 +14,11 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softjaw.study.quantities import (
     ALONG,
     AROUND,
     FINGERS,
-    HELD,
     MODELS,
     MONOMIALS,
     NEEDS,
@@ -31,8 +29,10 @@ from softjaw.study.quantities import (
 from softjaw.study.quantities import DONE as DONE
 from softjaw.study.quantities import FAILED as FAILED
 from softjaw.study.quantities import MISSING as MISSING
-from softjaw.study.result.datasets import CODE, Column, Dataset, columns_of, datasets_of
+from softjaw.study.result.datasets import CODE, Dataset, of_cases, others
 from softjaw.study.result.datasets import ROOT as ROOT
+
+ATTEMPTS = f"{ROOT}/status/attempts"
 
 PROGRAM, VERSION = "softjaw", 8
 LABEL_BYTES, MOST_SESSIONS, REPORT_BYTES = 80, 256, 8192
@@ -67,22 +67,18 @@ class Header:
 class Layout:
     """The file of one study: its axes (``name, values, units, long_name``), the faces of a patch and the options.
 
-    ``has`` names what of `NEEDS` the scene asks for besides two meshes; the wrenches of ``samples`` motions are stored
-    for the candidates ``sampled``, counted over stations and angles. ``rounds`` is what each round of a run added:
-    stations [mm], poses as `study.run.refine.Place`, or cases that are solved on a finer mesh, by the numbers of their
-    point of a sweep, candidate and force. ``stored`` are the paths of the columns in an existing file, which
-    may be others than those of this version; empty for a new one. ``derived`` are quantities over some of the axes that
-    are filled once, after all rows.
+    No ``faces``: patches are not stored. ``has`` names what of `NEEDS` the scene asks for besides two meshes and
+    patches. ``rounds`` is what each round of a run added: stations [mm], poses as `study.run.refine.Place`, or cases
+    that are solved on a finer mesh, by the numbers of their point of a sweep, candidate and force. ``stored`` are the
+    paths of the columns in an existing file, which may be others than those of this version; empty for a new one.
+    ``derived`` are quantities over some of the axes that are filled once, after all rows.
     """
 
     axes: tuple[Any, ...]
     faces: int
     meshes: int = 1
-    patches: bool = True
     derived: tuple[Quantity, ...] = ()
     has: tuple[str, ...] = ()
-    samples: int = 0
-    sampled: tuple[int, ...] = ()
     rounds: tuple[tuple[Any, ...], ...] = ()
     stored: tuple[str, ...] = ()
 
@@ -120,8 +116,7 @@ class Layout:
     @cached_property
     def asked(self) -> tuple[Quantity, ...]:
         """All quantities that this version stores for such a scene."""
-        held = zip(HELD, (self.sampled, self.patches), strict=True)
-        return quantities((*self.has, *[NEEDS[0]] * (self.meshes > 1), *(name for name, size in held if size)))
+        return quantities((*self.has, *[NEEDS[0]] * (self.meshes > 1), *[NEEDS[-1]] * bool(self.faces)))
 
     @property
     def rows(self) -> int:
@@ -152,20 +147,19 @@ class Layout:
         parts |= {"wrench": 6, "wrench_2": 6} if "six components" in self.has else {}
         if "wall" in self.has:
             parts["wall_place"] = AROUND * ALONG
-        if self.sampled:
-            parts |= {"sampled": len(self.sampled), "sample": self.samples}
-        return {**parts, **({"face": self.faces} if self.patches else {})}
+        return {**parts, **({"face": self.faces} if self.faces else {})}
 
     @cached_property
-    def columns(self) -> tuple[Column, ...]:
-        """All columns of a row that this version knows."""
-        known = {c.path: c for c in columns_of(self)}
+    def columns(self) -> tuple[Dataset, ...]:
+        """The values of a case that this version knows, all but its state."""
+        known = {d.path: d for d in of_cases(self) if d.path not in (CODE, ATTEMPTS)}
         return tuple(known[path] for path in self.stored or known if path in known)
 
     @cached_property
     def datasets(self) -> tuple[Dataset, ...]:
         """All datasets of the study but axes, texts and sessions."""
-        return tuple(datasets_of(self))
+        states = (d for d in of_cases(self) if d.path in (CODE, ATTEMPTS))
+        return (*self.columns, *states, *others(self))
 
     @property
     def nbytes(self) -> int:
@@ -173,25 +167,6 @@ class Layout:
         count = len(self.datasets) + len(self.axes) + 16
         texts = MOST_SESSIONS * SESSION.itemsize + REPORT_BYTES
         return sum(d.nbytes for d in self.datasets) + texts + 4096 * count + 2**16
-
-    def places(self, row: int) -> list[tuple[int, ...] | None]:
-        """Where a row's values stand in the columns' datasets; None for what is stored of other candidates only."""
-        *lead, station, angle, force = (int(i) for i in np.unravel_index(row, self.shape))
-        number = station * self.shape[-2] + angle
-        among = (*lead, self.sampled.index(number), force) if number in self.sampled else None
-        return [among if c.sampled else (*lead, station, angle, force) for c in self.columns]
-
-    def lines(self, column: Column, rows: NDArray[Any]) -> NDArray[Any]:
-        """Where rows stand in a column's dataset, counted over the axes of the rows in it; -1 where they have none."""
-        if not column.sampled:
-            return rows
-        index = np.unravel_index(rows, self.shape)
-        slots = np.full(int(np.prod(self.shape[-3:-1])), -1)
-        slots[list(self.sampled)] = np.arange(len(self.sampled))
-        slot = slots[index[-3] * self.shape[-2] + index[-2]]
-        lead = (*self.shape[:-3], len(self.sampled), self.shape[-1])
-        lines = np.ravel_multi_index((*index[:-3], np.maximum(slot, 0), index[-1]), lead)  # -1 cannot be ravelled
-        return np.where(slot < 0, -1, lines)
 
     def definitions(self) -> str:
         """The definitions of all quantities of this layout, derived ones included."""
@@ -203,10 +178,9 @@ class Layout:
             {"name": q.name, "units": q.unit, "long_name": q.label, "definition": q.definition, "axes": q.dims}
             for q in self.derived
         ]
-        names = ("faces", "meshes", "patches", "has", "samples", "sampled", *["rounds"] * bool(self.rounds))
-        return json.dumps(
-            {**{name: getattr(self, name) for name in names}, "derived": derived, "columns": self.summed[:-1]}
-        )
+        names = ("faces", "meshes", "has", *["rounds"] * bool(self.rounds))
+        own = {name: getattr(self, name) for name in names}
+        return json.dumps(own | {"derived": derived, "columns": self.summed[:-1]})
 
 
 def is_case(added: Any) -> bool:
@@ -222,18 +196,12 @@ def layout_from_options(axes: Sequence[Any], text: str) -> Layout:
             Quantity(d["name"], tuple(d["axes"]), d["units"], d["long_name"], d["definition"], "derived")
             for d in options["derived"]
         )
-        faces, meshes = int(options["faces"]), int(options["meshes"])
-        # No real study reaches these bounds: a damaged text must not make a reader allocate without end.
-        if not 0 <= faces < 10**7:
-            raise ValueError(f"{faces} faces")
-        has, sampled, samples = tuple(options["has"]), tuple(map(int, options["sampled"])), int(options["samples"])
-        if not set(has) <= set(NEEDS) or not 0 <= samples < 10**6 or len(set(sampled)) < len(sampled):
-            raise ValueError(f"has {has}, {samples} samples of candidates {sampled[:5]}")
-        patches = bool(options["patches"])
+        if options.get("sampled"):
+            raise ValueError("it holds wrenches of sampled motions, which this version does not: run the scene again")
         rounds = tuple(tuple(map(_place, some)) for some in options.get("rounds", ()) if some)
-        stored = tuple(map(str, options["columns"]))
-        return Layout(tuple(axes), faces, meshes, patches, derived, has, samples, sampled, rounds, stored)
-    except (KeyError, TypeError, AttributeError) as error:
+        has, stored = tuple(options["has"]), tuple(map(str, options["columns"]))
+        return Layout(tuple(axes), int(options["faces"]), int(options["meshes"]), derived, has, rounds, stored)
+    except (KeyError, TypeError, AttributeError, OverflowError) as error:
         raise ValueError(f"its layout attribute is damaged ({error})") from error
 
 

@@ -24,7 +24,7 @@ from softjaw.study.scene import Scene, parse_scene
 from softjaw.study.scene.sections import UPPER
 
 XYZ = ("x", "y", "z")
-FIELDS = ("wrenches/wrench", "wall/place")  # too large to be read with the rest
+FIELDS = ("wall/place",)  # too large to be read with the rest
 KINDS = {"pieces": 7, "holes": 7, "rims": 1}  # what a kind of contact is told by, and the largest number that counts
 UNCERTAIN_MAPS = tuple(q.name for q in TABLE if q.group == "maps" and q.error and q.rank)
 
@@ -92,7 +92,7 @@ def read_patch(file: str | Path, **at: int | slice) -> xr.Dataset:
     with open_result(file) as result:
         rows = xr.DataArray(np.arange(result.layout.rows).reshape(result.layout.shape), dims=result.layout.names)
         rows = rows.isel(_as_given(result) | at)
-        faces = [result.patch(int(row)) for row in rows.values.ravel()] if result.layout.patches else []
+        faces = [result.patch(int(row)) for row in rows.values.ravel()] if result.layout.faces else []
         variables = {}
         for name in faces[0] if faces else ():
             values = np.stack([case[name] for case in faces]).reshape(rows.shape + faces[0][name].shape)
@@ -104,7 +104,7 @@ def read_patch(file: str | Path, **at: int | slice) -> xr.Dataset:
 
 
 def read_field(file: str | Path, path: str, **at: int | slice) -> xr.DataArray:
-    """One of the large datasets that `open` leaves out (``wall/place``, ``wrenches/wrench``), at positions.
+    """One of the large datasets that `open` leaves out (``wall/place``), at positions.
 
     ``at`` is as in `read_patch`; `KeyError` if the file has no such dataset.
     """
@@ -195,17 +195,15 @@ def maps_in(ds: xr.Dataset) -> dict[str, str]:
 
 
 def _variable(result: Result, q: Quantity) -> xr.Variable:
-    """A quantity of all cases; of one that some candidates have alone, over these."""
+    """A quantity of all cases."""
     names = result.layout.names
     if q.group == "maps" and q.by_model:
         values = np.stack([result.read(f"{q.name}/{model}") for model in MODELS], axis=-1)
     else:
         values = result.read(f"{q.name}/{q.name}" if q.group == "maps" else q.key)
-    lead = (*names[:-3], "sampled", names[-1]) if q.sampled else names
-    # What few candidates have alone has other axes than the states.
-    if not q.sampled and values.dtype.kind == "f":
+    if values.dtype.kind == "f":
         values[result.status != DONE] = np.nan
-    return xr.Variable((*lead, *q.dims), values, _about(q))
+    return xr.Variable((*names, *q.dims), values, _about(q))
 
 
 def _about(q: Quantity) -> dict[str, Any]:

@@ -18,7 +18,6 @@ from typing import Any
 import h5py
 import numpy as np
 
-from softjaw.friction.motion import fibonacci_twists
 from softjaw.study.messages import CANNOT_WRITE, StudyError, remove
 from softjaw.study.quantities import BY_KEY, FIRST, MODELS
 from softjaw.study.result import checksums
@@ -45,7 +44,7 @@ TEXT = h5py.string_dtype("utf-8")
 SESSION_ROWS, REPORT = f"{ROOT}/provenance/sessions", f"{ROOT}/report"
 MIN_PACKED_BYTES, CHUNK_BYTES, DEFLATE_LEVEL = 4096, 2**20, 4
 # What a grown file has of its own, or what is filled again once nothing is missing.
-NOT_COPIED = (f"{ROOT}/derived/", CLOSING_SUMS, f"{ROOT}/wrenches/motion", f"{ROOT}/wrenches/candidate")
+NOT_COPIED = (f"{ROOT}/derived/", CLOSING_SUMS)
 TEXTS = {
     "title": "name of the object or of the scene",
     "scene": "the scene with all settings, as TOML",
@@ -84,13 +83,13 @@ def rewrite(path: Path, layout: Layout, header: Header, *, packed: bool = False)
     with _whole(path, path.with_name(path.name + ".new")) as new:
         create(new, layout, header, packed=packed)
         with open_result(path, unchecked=True) as old, h5py.File(new, "r+", libver=HDF5_VERSIONS) as file:
-            places = _places(old.layout, layout)
+            stations = _places(old.layout, layout)
             left_out = () if old.layout.shape == layout.shape else NOT_COPIED
             known = {d.path for d in old.layout.datasets}
             for dataset in (d for d in layout.datasets if d.path in known and not d.path.startswith(left_out)):
                 values = old.file.values(old.file.plain(dataset.path))
                 target = file[dataset.path]
-                target[...] = _spread(values, dataset, places).astype(target.dtype)  # texts with their encoding
+                target[...] = _spread(values, dataset, stations).astype(target.dtype)  # texts with their encoding
             for name in (SESSION_ROWS, *([] if left_out else [REPORT])):
                 file[name][...] = old.file.values(old.file.plain(name))
 
@@ -115,25 +114,21 @@ def _whole(path: Path, part: Path) -> Iterator[Path]:
     os.close(folder)
 
 
-def _places(old: Layout, new: Layout) -> dict[str, Any]:
-    """Where the entries of the dimensions that grow stand in the new file."""
+def _places(old: Layout, new: Layout) -> np.ndarray:
+    """Where the stations of the old file stand in the new one."""
     before, now = (np.asarray(layout.axes[-3].values) for layout in (old, new))
     stations = np.searchsorted(now, before)
     if not np.array_equal(now[np.minimum(stations, len(now) - 1)], before):
         raise ValueError("a station of the file is not among those of its scene")
-    angles = new.shape[-2]
-    moved = [int(stations[n // angles]) * angles + n % angles for n in old.sampled]
-    return {"station": stations, "sampled": np.array([new.sampled.index(n) for n in moved], int)}
+    return stations
 
 
-def _spread(values: np.ndarray, dataset: Dataset, places: dict[str, Any]) -> np.ndarray:
-    """The values at their places in the new shape, and the dataset's fill value elsewhere."""
+def _spread(values: np.ndarray, dataset: Dataset, stations: np.ndarray) -> np.ndarray:
+    """The values at their stations in the new shape, and the dataset's fill value elsewhere."""
+    if "station" not in dataset.scales:
+        return values
     spread = np.full(dataset.shape, dataset.fill, dataset.dtype)
-    index: list[Any] = [slice(None)] * spread.ndim
-    for axis, name in enumerate(dataset.scales[: spread.ndim]):
-        if name in places:
-            index[axis] = places[name]
-    spread[tuple(index)] = values
+    spread[(*[slice(None)] * dataset.scales.index("station"), stations)] = values
     return spread
 
 
@@ -213,9 +208,6 @@ def _write_texts(study: h5py.Group, layout: Layout, header: Header, packed: bool
     named = study["candidates"].create_dataset("label", data=labels.reshape(layout.shape[-3:-1]))
     named.attrs["long_name"] = "name of the candidate in the scene"
     _attach_scales(named, layout.names[-3:-1])
-    if layout.sampled:
-        study["wrenches/motion"][...] = fibonacci_twists(layout.samples, 1.0)
-        study["wrenches/candidate"][...] = layout.sampled
 
 
 def text_bytes(text: str, length: int) -> bytes:
@@ -239,8 +231,7 @@ def report_bytes(text: str) -> np.ndarray:
 
 def _create_dataset(file: h5py.File, dataset: Dataset, packed: bool) -> None:
     plist = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
-    nbytes = int(np.prod(dataset.shape)) * dataset.dtype.itemsize
-    if packed and nbytes >= MIN_PACKED_BYTES:
+    if packed and dataset.nbytes >= MIN_PACKED_BYTES:
         plist.set_chunk(_chunk(dataset))
         plist.set_shuffle()
         plist.set_deflate(DEFLATE_LEVEL)

@@ -99,8 +99,8 @@ class ResultWriter:
         """The stored values of a row, tried on the mesh that is wanted, with one more message."""
         assert self._wanted is not None
         values: list[np.ndarray] = []
-        for column, dataset, place in zip(self.layout.columns, self._columns, self.layout.places(row), strict=True):
-            value = np.full(column.shape, column.fill, column.dtype) if place is None else np.asarray(dataset[place])
+        for column, dataset in zip(self.layout.columns, self._columns, strict=True):
+            value = np.asarray(dataset[self._index(row)])
             if column.key == MESH:
                 value = np.asarray(self._wanted[row], column.dtype)
             elif column.dtype.kind == "S":
@@ -118,15 +118,12 @@ class ResultWriter:
             self._code[index] = MISSING
         if not self._attempts[index]:  # a row that is stored is begun: only such a one may be without its mark
             self._attempts[index] = 1
-        places = self.layout.places(row)
         # Values, sums, state: a kill in between leaves a row that reads as not computed.
-        for column, dataset, value, place in zip(self.layout.columns, self._columns, values, places, strict=True):
-            if place is None:
-                continue
+        for column, dataset, value in zip(self.layout.columns, self._columns, values, strict=True):
             if column.dtype.kind == "S":
                 dataset[index] = value.astype(dataset.dtype)  # with its encoding
             elif value.size:
-                _write_block(dataset, place, value)
+                _write_block(dataset, index, value)
         _write_block(self._sums, index, checksums.of_row(self.layout, values, state))
         self._code[index] = state
 
@@ -216,7 +213,7 @@ def _write_block(dataset: h5py.Dataset, index: tuple[int, ...], value: np.ndarra
 def blank(layout: Layout, message: str = "", seconds: float = math.nan) -> list[np.ndarray]:
     """A row without values, as a case without a result leaves it; ``seconds`` is what was spent on it."""
     spent = {"work/seconds_total": seconds}
-    row = [np.full(c.shape, spent.get(c.key, c.fill), c.dtype) for c in layout.columns]
+    row = [np.full(c.share, spent.get(c.key, c.fill), c.dtype) for c in layout.columns]
     row[-1] = np.array(text_bytes(message, MESSAGE_BYTES), layout.columns[-1].dtype)
     return row
 
@@ -232,8 +229,8 @@ def record(layout: Layout, result: CaseResult) -> list[np.ndarray]:
         if column.key not in given:
             continue
         value = np.asarray(given.pop(column.key), column.dtype)
-        if value.shape != column.shape:
-            raise ValueError(f"'{column.key}' of a case has shape {value.shape}, its quantity says {column.shape}")
+        if value.shape != column.share:
+            raise ValueError(f"'{column.key}' of a case has shape {value.shape}, its quantity says {column.share}")
         row[i] = value
     # A key that nobody stores would be lost without a word.
     if given:
@@ -249,7 +246,7 @@ def _flattened(layout: Layout, result: CaseResult) -> dict[str, Any]:
             if values.shape != (len(MODELS),):
                 raise ValueError(f"'{q.key}' of a case has shape {values.shape}, expected one for each of {MODELS}")
             given.update({f"{q.key}/{model}": value for model, value in zip(MODELS, values, strict=True)})
-    if layout.patches and result.patch is not None:
+    if layout.faces and result.patch is not None:
         given.update({f"patch/{name}": value for name, value in result.patch.items()})
     for name, (level, indicator, reason, *changes) in result.effects.items():
         index = EFFECTS.get(name, ()).index(level) if isinstance(level, str) else level

@@ -90,8 +90,7 @@ def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = (), r
     digest, text = scene.digest, scene.effective_toml()
     if rounds:
         scene = refined(scene, rounds)
-    patches = scene.run.patches != "none"
-    faces = math.prod(pad_shape(scene.gripper).patch_faces) if patches else 0
+    faces = math.prod(pad_shape(scene.gripper).patch_faces) if scene.run.patches != "none" else 0
     axes = tuple(grasps.axes(scene))
     placed = own_frame(scene.object)
     units: Sequence[Any] = decided(grasps.units(scene))
@@ -112,11 +111,8 @@ def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = (), r
         axes,
         faces,
         scene.accuracy.meshes,
-        patches,
         tuple(derived(scene)),
         has(scene),
-        scene.limit_surface.samples,
-        scene.sampled,
         rounds,
     )
     return Plan(layout, header, tuple(units))
@@ -135,7 +131,7 @@ def _with_meshes(unit: Any, scene: Any, rounds: Rounds) -> Any:
 
 
 def has(scene: Any) -> tuple[str, ...]:
-    """Which of `study.quantities.NEEDS` besides two meshes a scene asks for."""
+    """Which of `study.quantities.NEEDS` besides two meshes and patches a scene asks for."""
     asked = {"six components": scene.effects.wrench == "6-D", "mass": scene.object.mass_g is not None}
     asked["task"] = asked["mass"] or scene.task.direction is not None
     asked["wall"] = has_wall(scene.object)

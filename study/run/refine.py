@@ -41,24 +41,12 @@ def refined(scene: Scene, rounds: Rounds) -> Scene:
         return scene.model_copy(update={"candidates": where.model_copy(update=grown)})
     stations = tuple(sorted({*given, *(s for added in rounds for s in added)}))
     grown = {"stations": None, "stations_mm": stations, "refine": None}
-    parts: dict[str, Any] = {"candidates": where.model_copy(update=grown)}
-    if not isinstance(names := scene.limit_surface.wrench_samples, str):
-        samples = _renumbered(where.numbers(names), given, stations, len(where.angles_deg))
-        parts["limit_surface"] = scene.limit_surface.model_copy(update={"wrench_samples": samples})
-    return scene.model_copy(update=parts)
+    return scene.model_copy(update={"candidates": where.model_copy(update=grown)})
 
 
 def with_places(poses: Sequence[GraspPose], rounds: Sequence[Sequence[Place]]) -> tuple[GraspPose, ...]:
     """The poses of a scene, then those that rounds added."""
     return (*poses, *(pose_of(x[1:]) for added in rounds for x in added))
-
-
-def _renumbered(
-    numbers: Sequence[int], given: Sequence[float], stations: Sequence[float], angles: int
-) -> tuple[int, ...]:
-    """Numbers of candidates among more ``stations``, from those among the ``given`` ones."""
-    places = [(stations.index(given[n // angles]), n % angles) for n in numbers]
-    return tuple(s * angles + a for s, a in places)
 
 
 def chances(stations: FloatArray, score: FloatArray, sound: NDArray[np.bool_], finest: float) -> FloatArray:

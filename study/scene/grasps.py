@@ -8,7 +8,6 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr
 
-from softjaw.study.messages import closest, shown
 from softjaw.study.scene.objects import LARGEST_MM, Plate, Shape, Span, SphereShape
 from softjaw.study.scene.section import Direction, Errors, SceneSection, Text, Vector, once_and_rising, wrong
 from softjaw.study.scene.sections import Gripper
@@ -115,10 +114,6 @@ class Candidates(SceneSection):
         """Number of candidates; of a sampler that has not run as many as it may give."""
         return len(self.poses) or self.sampled or len(self.station_values_mm) * len(self.angles_deg)
 
-    def numbers(self, names: Sequence[int | str]) -> tuple[int, ...]:
-        """Numbers of the candidates that are given by number or label, each once, in the order given."""
-        return tuple(dict.fromkeys(n if isinstance(n, int) else self.labels.index(n) for n in names))
-
     def rules(self) -> Errors:
         """Exactly one way of giving the candidates."""
         given = {"stations_mm": self.stations_mm, "poses": self.poses or None, "sampled": self.sampled}
@@ -143,15 +138,6 @@ class Candidates(SceneSection):
         for angle in self.angles_deg if isinstance(shape, Plate) and self.station_values_mm else ():
             if abs(math.cos(math.radians(angle))) < 0.5:
                 yield wrong(angle, "angles within 60 of 0 or 180: the two planes face x", "angles_deg")
-
-    def name_rules(self, key: str, wanted: Any) -> Errors:
-        """Numbers and labels that no candidate has, in another section's list ``key`` of candidates."""
-        labels = self.labels
-        numbers = f"a candidate's number, 0 to {len(labels) - 1}, or its label"
-        for i, name in enumerate(wanted if isinstance(wanted, tuple) else ()):
-            if name not in (labels if isinstance(name, str) else range(len(labels))):
-                near = closest(str(name), labels) or labels[0]
-                yield wrong(name, f"{numbers}, as {shown(near)}", key, i)
 
     def half_extent_mm(self, gripper: Gripper) -> float:
         """Half of what a pad covers along the object's axis [mm]."""

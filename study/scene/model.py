@@ -57,7 +57,7 @@ ALTERNATIVES = {  # what an override of a way of giving candidates replaces
 }
 NOT_SWEPT = (  # they change which datasets a file has and how large they are, or no number of a case
     "object.shape", "object.mesh", "object.name", "object.mass_g", "object.density", "candidates.stations",
-    "accuracy.meshes", "accuracy.target", "effects.wrench", "limit_surface.samples", "limit_surface.wrench_samples",
+    "accuracy.meshes", "accuracy.target", "effects.wrench", "limit_surface.samples",
 )  # fmt: skip
 OF_FACES = ("gripper.element", "gripper.elements")  # keys that the number of stored faces depends on
 NO_RESULT = ("run", "uncertainty")  # sections that change no result of a case
@@ -70,9 +70,6 @@ JOINT: dict[str, tuple[tuple[Rule, tuple[str, ...]], ...]] = {
     "gripper": ((Gripper.symmetry_rules, ("effects",)), (Gripper.support_rules, ("effects", "accuracy"))),
     "friction": ((Friction.used_rules, ("effects",)),),
     "candidates": ((Candidates.rules_on, ("object",)),),
-    "limit_surface": (
-        (lambda surface, c: c.name_rules("wrench_samples", surface.wrench_samples), ("candidates",)),
-    ),
     "petsc": ((petsc_rules, ()),),
     "uncertainty": ((Uncertainty.spread_rules, UNCERTAIN),),
 }
@@ -172,14 +169,6 @@ class Scene(SceneSection):
             yield "accuracy.target refines cases on rigid objects alone: on a simulated wall there are two meshes"
         if g.poisson_ratio > 0.45 and g.element == "hex8":
             yield f'gripper.poisson_ratio = {g.poisson_ratio:g} makes hex8 elements too stiff: use element = "hex27"'
-
-    @property
-    def sampled(self) -> tuple[int, ...]:
-        """Numbers of the candidates whose sampled wrenches are stored, rising."""
-        names = self.limit_surface.wrench_samples
-        if isinstance(names, str):
-            return tuple(range(self.candidates.total)) if names == "all" else ()
-        return tuple(sorted(self.candidates.numbers(names)))
 
     @property
     def axis_symmetry(self) -> int:

@@ -32,6 +32,7 @@ RENAMED = {  # keys of earlier versions, and what stands for them
     "effects.limit_surface": "limit_surface.model",
     "gripper.alpha": "gripper.terms_kpa",
     "gripper.shear_moduli_kpa": "gripper.terms_kpa",
+    "limit_surface.wrench_samples": "run.patches",  # from which `softjaw.friction_wrench` has them
     "object.base": "object.open_ends",
     "object.open_top": "object.open_ends",
     "object.wall_profile_mm": "object.wall_mm",

@@ -28,7 +28,6 @@ Force = Annotated[float, Field(gt=0, le=1000)]
 Grading = Annotated[float, Field(ge=0.05, le=20)]
 Gradings = Annotated[tuple[Grading, Grading, Grading], Field(strict=False)]
 WallSize = Annotated[float, Field(ge=0.2, le=50)]
-Names = Annotated[tuple[int | str, ...], Field(strict=False, min_length=1)]
 MOST_ELEMENTS, LARGEST_ASPECT = 1_000_000, 20.0
 UNCERTAIN = ("object", "gripper", "friction", "candidates", "task")  # sections whose numbers may be
 COARSE, FINE = 0, 1  # meshes of a case: half as many elements in every direction as the scene says, and its own
@@ -235,9 +234,6 @@ class LimitSurfaceKeys(SceneSection):
         "least_squares", description="what the fit of a full ellipsoid or a quartic minimises; zhou is slower"
     )
     samples: int = Field(500, ge=50, le=20_000, description="motions that the surface is fitted to")
-    wrench_samples: Names | Literal["none", "all"] = Field(
-        "none", description="candidates whose sampled wrenches are stored, by number or label"
-    )
 
     def rules(self) -> Errors:
         """Only some models have several objectives."""

@@ -84,7 +84,7 @@ def make(
     what is there.
     """
     axes = axes or grid_axes()
-    layout = Layout(axes, 0, meshes, patches=False, derived=derived, rounds=added)
+    layout = Layout(axes, 0, meshes, derived=derived, rounds=added)
     fresh(path, layout, Header("d" * 64, scene, "made", "made.toml", labels=labels))
     grid = np.meshgrid(*(axis.values for axis in axes), indexing="ij")
     e_n = np.broadcast_to(formula(*grid), layout.shape)

@@ -20,8 +20,8 @@ def sealed(path):
         sums = file[SUMS][()].reshape(layout.rows, -1)
         for column in layout.columns:
             values = file[column.path][()]
-            rows, found = checksums.of_column(layout, column, values, np.flatnonzero(codes != MISSING))
-            sums[rows, layout.summed.index(column.path)] = found
+            rows = np.flatnonzero(codes != MISSING)
+            sums[rows, layout.summed.index(column.path)] = checksums.of_rows(layout, values, rows)
         sums[:, -1] = [checksums.OF_STATE.get(code, 0) for code in codes]
         file[SUMS][...] = sums.reshape(file[SUMS].shape)
         for i, name in enumerate(layout.closing):

@@ -99,17 +99,6 @@ def test_a_fit_that_fails_leaves_the_ellipsoid_and_a_flag(monkeypatch):
     assert not cases(OVAL, "limit_surface.samples=60", forces="[5]")[0]["maps/flags"] & Flag.NO_FIT
 
 
-def test_sampled_wrenches_are_those_of_the_patch_times_mu():
-    [(_, [result])] = solved(OVAL, "limit_surface.wrench_samples=all", "limit_surface.samples=60", forces="[5]")
-    values = result.values
-    found = np.array(values["wrenches/wrench"])
-    assert found.shape == (2, 3, 60, 3)
-    for m, model in enumerate(MODELS):
-        unit = MU * values["fingers/S"][0] * np.array([1, 1, values["limit_surface/rho"][0]])
-        assert found[0, m] == pytest.approx(exact(result, 0, model, 60) * unit, rel=1e-9, abs=1e-12)
-    assert "wrenches/wrench" not in cases(OVAL)[0]
-
-
 def soft_contacts(values, m):
     """Contacts with the ellipsoids from three motions, from what a case stores."""
     for f in range(2):

@@ -21,7 +21,7 @@ pytestmark = pytest.mark.ranks
 
 # Two stations x three angles: 205 degrees is the image of 25, so there are four load paths of two forces.
 ROUNDED = BOX.replace("edge_radius_mm = 4", "edge_radius_mm = 8")
-CHANGES = ("limit_surface.samples=80", "limit_surface.wrench_samples=[2, 5]", "accuracy.target=0.01",
+CHANGES = ("limit_surface.samples=80", "accuracy.target=0.01",
            "accuracy.target_of='e_n'", NO_COUPLING)  # fmt: skip
 PLACES = {"stations": "[0, 30]", "angles": "[0, 5, 185]", "forces": "[1, 3]"}
 SCENE = scene_of(ROUNDED, *CHANGES, **PLACES)
@@ -84,7 +84,7 @@ def test_two_ranks_divide_the_forces_of_a_candidate():
 @pytest.mark.parametrize("name", ["box", "cup"])
 def test_one_candidate_of_many_forces_is_divided_to_the_same_bits(tmp_path, scene, ranks, name):
     changes = ("candidates.stations_mm=[30]", "candidates.angles_deg=[5]", "load.normal_force_n=[0.5, 1, 2, 3, 4, 6]",
-               "limit_surface.wrench_samples='none'", "effects.friction_pressure_coupling='auto'")  # fmt: skip
+               "effects.friction_pressure_coupling='auto'")  # fmt: skip
     if name == "cup":
         changes += ("accuracy.wall_element_mm=4",
                     "gripper.pad_length_mm=30")  # fmt: skip
@@ -106,8 +106,8 @@ def test_any_number_of_ranks_writes_the_same_bits(tmp_path, scene, alone, ranks)
     expected = contents(alone)
     # all that is compared: maps of every model, both fingers, the checks and every face
     for name in ("e_n/ccm", "quality/pcm", "checks/ellipticity", "patch/pressure",
-                 "checksums/rows/study/patch/pressure", "quality_fitted/pcm", "limit_surface/coefficients",
-                 "wrenches/wrench"):  # fmt: skip
+                 "checksums/rows/study/patch/pressure", "quality_fitted/pcm",
+                 "limit_surface/coefficients"):  # fmt: skip
         assert f"study/{name}" in expected
     with open_result(path) as result:
         elements = result.read("pad_elements/pad_elements")

@@ -74,15 +74,14 @@ def test_nothing_is_added_where_nothing_can_be_gained_a_jump_is_followed_and_a_b
 
 VASE = 'shape = "revolution"\nprofile_mm = [[0, 30], [20, 30], [40, 26], [50, 25], [60, 26], [80, 30], [100, 30]]'
 PLACES = "stations_mm = [28, 38, 46, 54, 64]\nangles_deg = [0, 90]\nrefine = 12\n"
-SAMPLES = "[limit_surface]\nsamples = 80\nwrench_samples = "
-SCENE = text_of(VASE, PLACES, forces="[1, 2]") + SAMPLES + '[2, "54 mm, 90 deg"]'
+SAMPLES = "[limit_surface]\nsamples = 80\n"
+SCENE = text_of(VASE, PLACES, forces="[1, 2]") + SAMPLES
 
 
 def test_a_grown_file_keeps_every_row(tmp_path):
     scene, path = parse_scene(SCENE), tmp_path / "a.hdf"
     small, big = (make_plan(scene, rounds=rounds) for rounds in ((), ((50.0,), (33.0, 42.0))))
     assert big.header.digest == small.header.digest == scene.digest
-    assert big.layout.sampled == (4, 13)  # stations 38 and 54 mm among eight
     filled(path, small)
     with open_result(path) as before:
         old = {d.path: before.file.values(before.file.plain(d.path)) for d in before.layout.datasets}
@@ -109,8 +108,7 @@ def filled(path, plan):
     def case(index):
         random = np.random.default_rng(index)
         values = {f"maps/{name}": random.random(3) for name in ("quality", "e_n")} | {"maps/flags": 0.0}
-        patch = {"pressure": random.random((2, plan.layout.faces))}
-        return CaseResult(values | {"wrenches/wrench": random.random((2, 3, plan.layout.samples, 3))}, patch)
+        return CaseResult(values, {"pressure": random.random((2, plan.layout.faces))})
 
     written(path, plan.layout, case, plan.header)
 
@@ -154,7 +152,7 @@ BODY = 'shape = "box"\nsize_mm = [60, 40, 120]\nedge_radius_mm = 6'
 def posed(budget, shape=BODY):
     places = pose_of((0, 0, 8), label="wide") + pose_of((0, 0, -20), (0, 1, 0), (1, 0, 0))
     pad = "[8, 4, 2]\nmax_opening_mm = 65"
-    return text_of(shape, f"refine = {budget}\n{places}", forces="[1, 2]", elements=pad) + SAMPLES + '["wide"]'
+    return text_of(shape, f"refine = {budget}\n{places}", forces="[1, 2]", elements=pad) + SAMPLES
 
 
 def scene_with(budget, shape=BODY):
@@ -269,7 +267,6 @@ def test_a_grown_file_of_poses_keeps_rows_labels_and_places(tmp_path):
     small, big = make_plan(scene), make_plan(scene, rounds=tuple(rounds))
     assert big.header.digest == small.header.digest == scene.digest
     assert parse_scene(scene.effective_toml()).candidates.refine == scene.candidates.refine
-    assert small.layout.sampled == big.layout.sampled == (0,)
     filled(path, small)
     with open_result(path) as before:
         quality = before.read("quality/ccm")

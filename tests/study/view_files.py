@@ -80,7 +80,7 @@ def solved(layout, index):
 
 def make(path, scene=SCENE, patches=True, failed=FAILED):
     """A file of 3 stations x 2 angles x 2 forces; one case has failed, (0, 0, 1) is missing."""
-    layout = Layout(axes(), int(np.prod(GRID)), patches=patches)
+    layout = Layout(axes(), int(np.prod(GRID)) * patches)
 
     def case(index):
         if index == failed:

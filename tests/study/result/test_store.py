@@ -154,7 +154,7 @@ def test_a_scene_that_asks_for_one_thing_alone_has_lengths_for_all_its_datasets(
 
 
 def test_every_dataset_says_what_it_is(tmp_path):
-    layout = small(meshes=2, has=NEEDS[1:], samples=7, sampled=(3,))
+    layout = small(meshes=2, has=NEEDS[1:])
     create(tmp_path / "whole.hdf", layout, HEADER)
     seen = set()
 
@@ -196,7 +196,7 @@ def test_an_axis_of_two_values_has_a_name_only_beside_an_uneven_one():
 
 def test_a_sweep_comes_first(tmp_path):
     axes = (axis("object_radius", 3, "m"), *small().axes)
-    layout = Layout(axes, 4, 2, False, (Quantity("slope", ("object_radius",), "1", "slope", "a slope", "derived"),))
+    layout = Layout(axes, 0, 2, (Quantity("slope", ("object_radius",), "1", "slope", "a slope", "derived"),))
     create(tmp_path / "s.hdf", layout, HEADER)
     with open_result(tmp_path / "s.hdf") as read:
         assert read.layout.shape == (3, 5, 2, 3)
@@ -225,28 +225,14 @@ def test_damage_in_a_done_row_is_found(path):
     assert torn_rows(path, layout) == [0, 3, 7, 29]
 
 
-def test_wrenches_are_stored_for_the_candidates_that_were_named(tmp_path):
-    """Candidates 3 (station 1, angle 1) and 8 (station 4, angle 0) have places, the others cost nothing."""
-    layout, path = small(samples=7, sampled=(3, 8)), tmp_path / "w.hdf"
-    create(path, layout, HEADER)
-    wrench = np.random.default_rng(0).random((2, 3, 7, 3))
-    for row in (10, 25, 0):  # force 1 of both, and a candidate that has no place
-        put(path, layout, row, record(layout, CaseResult({"maps/S": 1.0, "wrenches/wrench": wrench + row})))
+def test_a_file_of_an_earlier_version_is_read_or_says_why_not(tmp_path):
+    """Their scenes had one key more, which named candidates whose wrenches of sampled motions were stored."""
+    layout, path = small(), tmp_path / "w.hdf"
+    create(path, layout, replace(HEADER, scene="[limit_surface]\nsamples = 500\nwrench_samples = 'none'\n"))
     with open_result(path) as read:
-        found = read.read("wrenches/wrench")
-        assert found.shape == (2, 3, 2, 3, 7, 3)
-        assert np.array_equal(found[0, 1], wrench + 10)
-        assert np.array_equal(found[1, 1], wrench + 25)
-        assert np.isnan(found[:, [0, 2]]).all()
-        assert read.read("wrenches/candidate").tolist() == [3, 8]
-        assert np.linalg.norm(read.read("wrenches/motion"), axis=1) == pytest.approx(1.0)
-        assert "wrenches/wrench" in read.definitions
-    assert torn_rows(path, layout) == []
-    with h5py.File(path, "r+") as file:
-        file["study/wrenches/wrench"][0, 1, 0, 0, 0, 0] += 1
-    assert torn_rows(path, layout) == [10]
-    assert layout_from_options(layout.axes, layout.options()).options() == layout.options()
-    assert "wrenches" not in {d.path.split("/")[2] for d in small(samples=7).datasets}
+        assert read.scene.split() == ["[limit_surface]", "samples", "=", "500"]
+    with pytest.raises(ValueError, match="run the scene again"):
+        layout_from_options(layout.axes, layout.options().replace("{", '{"sampled": [3, 8], ', 1))
 
 
 def test_a_result_that_does_not_fit_the_tables_is_a_bug():

@@ -65,9 +65,6 @@ WRONG_LINES = [
     ("[effects]\nobject = 'linear_shell'", 12, "effects.object", '"linear_shell"', ""),
     ("[gripper]\ntilt_stiffness_nm_per_rad = 1\n[effects]\nsheet = 'elastic'", 12, "gripper.tilt_stiffness_nm_per_rad",
      "1.0", ""),
-    ("[limit_surface]\nwrench_samples = 'some'", 12, "limit_surface.wrench_samples", '"some"', ""),
-    ("[limit_surface]\nwrench_samples = [0, 2]", 12, "limit_surface.wrench_samples[1]", "2", ""),
-    ("[limit_surface]\nwrench_samples = ['0 mm, 9 deg']", 12, "limit_surface.wrench_samples[0]", '"0 mm, 9 deg"', ""),
     ("[task]\nweight_direction = [0, 0, 0]", 12, "task.weight_direction", "[0, 0, 0]", ""),
     ("[petsc]\nsnes_max_it = 9", 12, "petsc.snes_max_it", "9", ""),
     ("[petsc]\ncontact_snes_view = 'ascii:/tmp/a'", 12, "petsc.contact_snes_view", '"ascii:/tmp/a"', ""),
@@ -386,12 +383,6 @@ def test_checking_a_scene_starts_no_heavy_machinery():
     )
     done = subprocess.run([sys.executable, "-c", code, JOBS[0]], cwd=ROOT, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
-
-
-def test_candidates_whose_wrenches_are_stored_go_by_number_or_label():
-    wanted = {"'none'": (), "'all'": (0, 1), "[1]": (1,), "['0 mm, 90 deg', 0, 1]": (0, 1), "['0 mm, 0 deg']": (0,)}
-    for text, numbers in wanted.items():
-        assert parse_scene(BALL, "ball.toml", [f"limit_surface.wrench_samples={text}"]).sampled == numbers
 
 
 def test_a_scene_from_tables_is_that_of_a_file_and_takes_numpy(tmp_path):

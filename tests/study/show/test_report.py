@@ -70,7 +70,7 @@ def solved(layout, index, message="", **changes):
     values |= {"work/seconds_assembly": 1.0, "fingers/frame_origin": np.zeros((2, 3))}
     values |= {"fingers/frame_axes": np.stack([np.eye(3)] * 2)} | changes
     values = {key: value for key, value in values.items() if value is not None}
-    faces = patch() if layout.patches else None
+    faces = patch() if layout.faces else None
     return CaseResult(values, faces, message, {"sheet": ("elastic plate", 0.2, 0)})
 
 
@@ -221,7 +221,7 @@ def test_maps_show_every_case_in_both_models_with_crosses_for_failed_ones(ordina
 
 
 def test_values_have_their_error_where_the_file_has_it(tmp_path):
-    layout = Layout(axes(), 0, meshes=2, patches=False)
+    layout = Layout(axes(), 0, meshes=2)
     path = make(tmp_path / "two.hdf", layout, **{"maps/e_n_error": 0.0042, "maps/tau_z_max_error": 0.011})
     with open_result(path) as result:
         (folded,) = tables.every_case(judge(dataset(result)))
@@ -256,12 +256,12 @@ TEXTS = (replace(axis("material", (0, 1), "", "gripper.material"), options=("bla
 
 
 @pytest.mark.parametrize(("layout", "options", "expected"), [
-    (Layout(SMALL, 0, patches=False), {}, "station 10 mm"),
+    (Layout(SMALL, 0), {}, "station 10 mm"),
     (Layout(SMALL, 24), {"state": lambda i: "it failed"}, "0 of 1"),
     (Layout(SMALL, 24), {"state": lambda i: "missing", "scene": "a = 1"}, "0 of 1"),
-    (Layout(SMALL, 0, patches=False), {"maps/quality": None, "maps/e_n": None}, "station 10 mm"),
-    (Layout(POSES, 0, patches=False), {"labels": ("left <&>", "right")}, "right"),
-    (Layout(axes((0,), (0,), (1.0,), sweep=TEXTS), 0, patches=False), {"scene": "a = 1"}, "blatz_ko"),
+    (Layout(SMALL, 0), {"maps/quality": None, "maps/e_n": None}, "station 10 mm"),
+    (Layout(POSES, 0), {"labels": ("left <&>", "right")}, "right"),
+    (Layout(axes((0,), (0,), (1.0,), sweep=TEXTS), 0), {"scene": "a = 1"}, "blatz_ko"),
 ], ids=["one case", "all failed", "nothing done", "no scores", "poses", "sweep of texts"])  # fmt: skip
 def test_odd_files_give_a_page(tmp_path, layout, options, expected):
     page = page_of(make(tmp_path / "odd.hdf", layout, **options))
@@ -274,14 +274,14 @@ def test_odd_files_give_a_page(tmp_path, layout, options, expected):
     (Layout(SMALL, 0), {"maps/payload": [0.25] * 3}, "250 g"),
 ], ids=["bad check", "payload"])  # fmt: skip
 def test_the_verdict_warns_of_what_the_best_case_lacks(tmp_path, layout, values, expected):
-    with open_result(make(tmp_path / "one.hdf", replace(layout, patches=False), **values)) as result:
+    with open_result(make(tmp_path / "one.hdf", replace(layout, faces=0), **values)) as result:
         data = judge(dataset(result))
         lines = [" ".join(line) for line in best_grasps.answer(data, data.attrs["best"]).values()]
         assert expected in " ".join([*lines, *verdict.verdict(data), *verdict.warnings(data)])
 
 
 def test_the_verdict_says_why_a_higher_score_is_not_the_best_grasp(tmp_path):
-    with open_result(make(tmp_path / "two.hdf", Layout(axes((0, 0.02), (0.0,), (1.0,)), 0, patches=False))) as result:
+    with open_result(make(tmp_path / "two.hdf", Layout(axes((0, 0.02), (0.0,), (1.0,)), 0))) as result:
         data = judge(dataset(result))
         worse, better = sorted(order(data, 0), key=lambda i: at(data, "quality", i))
         assert Flag.TOO_STRONG.word not in best_grasps.answer(data, data.attrs["best"])["limit"][1]
@@ -301,7 +301,7 @@ def test_the_same_file_gives_the_same_bytes(tmp_path):
 def test_differences_are_drawn_over_the_ratio_of_the_axes_and_the_curvature(tmp_path):
     """Pressed along a = 25 mm: a / b = 2.5, 1, 0.5 and a / b^2 = 250, 40, 10 per metre."""
     sweep = (axis("semi_axis_b", (0.01, 0.025, 0.05), "m", "object.semi_axis_b_mm"),)
-    layout = Layout(axes((0.0,), (0.0,), (1.0, 5.0), sweep=sweep), 0, patches=False)
+    layout = Layout(axes((0.0,), (0.0,), (1.0, 5.0), sweep=sweep), 0)
     path = make(tmp_path / "sweep.hdf", layout, scene=SWEEP, **{"maps/f_y_overestimate": 0.04})
     with open_result(path) as result:
         data = judge(dataset(result)).assign(b_over_a=("semi_axis_b", [0.4, 1.0, 2.0]))
@@ -314,7 +314,7 @@ def test_differences_are_drawn_over_the_ratio_of_the_axes_and_the_curvature(tmp_
 
 
 def test_files_that_must_not_be_overwritten_or_cannot_be_written(tmp_path):
-    path = make(tmp_path / "study.hdf", Layout(SMALL, 0, patches=False))
+    path = make(tmp_path / "study.hdf", Layout(SMALL, 0))
     with pytest.raises(StudyError, match="html") as error:
         write_report(path, path)
     assert error.value.code == CANNOT_WRITE

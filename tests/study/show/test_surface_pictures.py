@@ -99,7 +99,7 @@ def test_figures_show_both_models_with_their_exact_wrenches(file):
 
 
 def test_a_file_without_patches_has_the_surfaces_alone_and_one_without_fits_has_no_figure(tmp_path, file):
-    layout = Layout(axes(stations=(0.0,), angles=(0.0,), forces=(1.0,)), 0, patches=False)
+    layout = Layout(axes(stations=(0.0,), angles=(0.0,), forces=(1.0,)), 0)
     with open_result(file) as result:
         data = judge(dataset(result))
         names = ("semi_axes", "rho", "coefficients")
