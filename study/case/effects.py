@@ -323,10 +323,10 @@ class EffectChoice:
             walled = self.solver.walled and self.levels.object.endswith("shell")
             if walled and forces_apart(self.solver.scene) and (lost := self.solver.failure(k, COARSE, coupled)):
                 raise ConvergenceError(f"on the coarse mesh {lost}")
-            return self.solver.case(k, coupled)
+            return self.solver.case(k, coupled, self._share_left_out(k))
         except (ConvergenceError, CheckError) as error:
             self._chosen[COUPLING, k] = level._replace(level=level_named(COUPLING, "none"), reason=FAILED)
-            solved = self.solver.case(k, self.levels)
+            solved = self.solver.case(k, self.levels, self._share_left_out(k))
             return replace(solved, note=join_notes(LEFT_OUT.format(reason=error), solved.note))
 
     def effects_at(self, k: int, contacts: Sequence[PressedContact]) -> dict[str, Level]:

@@ -163,7 +163,8 @@ def next_cases(result: Any, scene: Scene) -> tuple[Case, ...]:
     if not chosen:
         relative = error / np.maximum(known.value, np.finfo(float).tiny)
         target, most = scene.accuracy.target, max((known.value[i] - error[i] for i in order), default=-np.inf)
-        near = [i for i in order if times[i] == 1 and known.value[i] + error[i] > most]
+        listed = {place.best for place in places[:LISTED]}
+        near = [i for i in order if times[i] == 1 and (i in listed or known.value[i] + error[i] > most)]
         chosen = [i for i in near if not (target and surely_below(relative[i], target))]
     # The least force that holds a mass lies between this force and the one below.
     levels = (k - 1, k) if k and "safety_factor" in ds else (k,)

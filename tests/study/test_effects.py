@@ -90,7 +90,7 @@ class Prepared:
         ended = k in self.lost and levels.friction_pressure_coupling == "tangential"
         return ConvergenceError("the wall collapsed") if ended and mesh == COARSE else None
 
-    def case(self, k, levels):
+    def case(self, k, levels, left_out):
         return Solved([levels])
 
 
@@ -139,7 +139,7 @@ def test_friction_is_left_out_on_a_wall_whose_coarse_path_with_it_has_ended(choi
 
 
 def test_friction_that_cannot_be_solved_on_the_scenes_mesh_is_left_out(choice, monkeypatch):
-    def case(k, levels):
+    def case(k, levels, left_out):
         if levels.friction_pressure_coupling == "tangential":
             raise ConvergenceError("no state")
         return Solved([levels], "own note")
