@@ -22,6 +22,7 @@ from softjaw.study.case.candidates import meshes_cost
 from softjaw.study.case.fit import bed_closing, doubt, heights_over, jaws_of
 from softjaw.study.case.poses import turn_of_pose
 from softjaw.study.messages import OTHER_FILE, StudyError
+from softjaw.study.quantities import LISTED
 from softjaw.study.result.layout import Layout
 from softjaw.study.result.store import open_result
 from softjaw.study.run.progress import duration
@@ -37,6 +38,8 @@ FIRST_FORCE_FACTOR = 2.0  # times as long the first force takes, which begins wi
 REGION_S = 0.7  # seconds until the distance to a mesh is known round both pads
 # times as dear with friction that acts back, everywhere or where it is found to matter
 COUPLED = {"none": 1.0, "auto": 2.2, "tangential": 2.2}
+SCREENED_COST = 0.15  # of a force on the coarse mesh alone, over that on the scene's
+ROUNDS = 1.5  # of the cases that a list shows, each once on the scene's mesh: with others, and with finer meshes
 DEEP, HARD = 0.4, 4.0  # closing over the pad's thickness from which forces are cut into steps, and how much that costs
 
 WRITE_S = 1.5e-5  # seconds of one write of a rank, measured on one machine with a local disk
@@ -49,10 +52,13 @@ def estimated(units: Sequence[Any]) -> list[float]:
     # load paths that are looked at, evenly spread; the others take the time of the nearest one
     step = -(-len(units) // 40) if units else 1
     known = [_seconds(unit, *surface_triangles(unit.scene.object)) for unit in units[::step]]
-    return [known[i // step] for i in range(len(units))]
+    # any of sampled grasps may be among those that rounds solve well
+    rounds = ROUNDS * min(LISTED, len(units)) / max(len(units), 1)
+    return [known[i // step][0] + rounds * known[i // step][1] for i in range(len(units))]
 
 
-def _seconds(unit: Any, points: FloatArray, triangles: NDArray[np.int64]) -> float:
+def _seconds(unit: Any, points: FloatArray, triangles: NDArray[np.int64]) -> tuple[float, float]:
+    """Time before any round, and that of its cases which rounds may solve [s]."""
     scene, gripper = unit.scene, unit.scene.gripper
     pose, other = unit.candidate.poses
     low, high = heights((points - pose.origin) @ pose.rotation, triangles, gripper.pad_size[:2])
@@ -69,7 +75,11 @@ def _seconds(unit: Any, points: FloatArray, triangles: NDArray[np.int64]) -> flo
         shares = [bed_closing(bed, f / (jaws.stiffness * cell)) / gripper.pad_thickness for f in forces]
         times = [t * (HARD if share > DEEP else 1.0) for t, share in zip(times, shares, strict=True)]
     region = REGION_S if scene.object.shape == "mesh" else 0.0
-    return region + each * sum(times)
+    if not unit.finest:
+        return region + each * sum(times), 0.0
+    # with a mass the least force that holds it lies between two
+    levels = 2 if scene.object.mass_g is not None and len(forces) > 1 else 1
+    return SCREENED_COST * each * sum(times), region + levels * FIRST_FORCE_FACTOR * each
 
 
 def _planes(scene: Any, low: FloatArray, high: FloatArray, off: float) -> int:

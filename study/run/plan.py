@@ -27,7 +27,7 @@ from softjaw.study.case.candidates import decided
 from softjaw.study.quantities import ALONG, AROUND, NO_GRASP, STATES
 from softjaw.study.result.derived import derived
 from softjaw.study.result.layout import Header, Layout, is_case
-from softjaw.study.run.estimate import START_S, estimated, measured_seconds, unit_seconds
+from softjaw.study.run.estimate import SCREENED_COST, START_S, estimated, measured_seconds, unit_seconds
 from softjaw.study.run.progress import duration
 from softjaw.study.run.refine import Rounds, added_cases, refined
 from softjaw.study.run.shares import makespan, sensible_ranks
@@ -38,7 +38,6 @@ FILL_FACTOR = 20.0  # factor entries over dofs^(4/3), the growth of nested disse
 # Measured on a cup of 0.4 mm, 5 000 to 21 000 unknowns: a force takes 7 Newton steps of 15 us per unknown each; the
 # factors, what they are made from and what is not given back take 16 kB per unknown of the wall.
 SECONDS_PER_UNKNOWN, BYTES_PER_UNKNOWN = 1e-4, 1.6e4
-SCREENED_COST = 0.25  # of a force on the coarse mesh alone, over that on the scene's
 
 
 @dataclass(frozen=True)
@@ -122,9 +121,7 @@ def _with_meshes(unit: Any, scene: Any, rounds: Rounds) -> Any:
     """A unit whose forces are solved on the coarse mesh, and on finer ones as often as rounds named a case of it."""
     named = Counter(case for some in rounds if is_case(some[0]) for case in some)
     forces, count = len(scene.load.normal_force), scene.candidates.total
-    times = [
-        max(named[*divmod(rows[0] // forces, count), k] for rows in unit.rows) for k in range(forces)
-    ]
+    times = [max(named[*divmod(rows[0] // forces, count), k] for rows in unit.rows) for k in range(forces)]
     finest = tuple((COARSE, FINE, FINEST)[min(n, 2)] for n in times)
     share = sum(1.0 if mesh else SCREENED_COST for mesh in finest) / forces
     return replace(unit, finest=finest, cost=unit.cost * share)
@@ -252,8 +249,8 @@ def _mirrors(scene: Any, symmetric: tuple[bool, bool]) -> tuple[bool, bool]:
     """Planes of symmetry of a grasp across the axis that the meshes can use."""
     if scene.candidates.poses or scene.effects.model_size == "full":
         return False, False
-    even = scene.gripper.elements[1] % 2 == 0 and abs(math.sin(2 * scene.candidates.roll)) < 1e-9
-    return symmetric[0] and scene.effects.model_size != "half", symmetric[1] and even
+    upright, even = abs(math.sin(scene.candidates.roll)) < 1e-9, scene.gripper.elements[1] % 2 == 0
+    return symmetric[0] and scene.effects.model_size != "half", symmetric[1] and upright and even
 
 
 def _covered(scene: Any, surface: Any) -> tuple[tuple[float, float], float]:
@@ -262,9 +259,10 @@ def _covered(scene: Any, surface: Any) -> tuple[tuple[float, float], float]:
     margin = 0.1 * max(gripper.pad_size[:2])  # share of the pad's length, round what it covers
     ends = surface.heights
     middle = 0.5 * sum(ends) if where.poses else where.station_values[len(where.station_values) // 2]
-    along = 1e-3 * where.half_extent_mm(gripper) + margin
-    low, high = np.clip([middle - along, middle + along], *ends)
-    return (float(low), float(high)), 0.5 * gripper.pad_size[1] + margin
+    c, s = abs(math.cos(where.roll)), abs(math.sin(where.roll))
+    height, breadth = 0.5 * np.array([[c, s], [s, c]]) @ gripper.pad_size[:2] + margin
+    low, high = np.clip([middle - height, middle + height], *ends)
+    return (float(low), float(high)), breadth
 
 
 def _pad_nodes(scene: Any, mesh: int = 1) -> int:

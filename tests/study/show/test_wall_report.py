@@ -77,16 +77,15 @@ def changed(path, folder, name, values, index=...):
 
 def test_the_size_of_a_shell_is_that_of_the_mesh_that_is_solved(solved):
     scene = solved[0].with_values({"accuracy.wall_element_mm": 4.0})
-    pads, size = wall_unknowns(scene)
-    unit = make_plan(scene).units[1]  # the middle station of an even number
-    solver = CandidateSolver(scene, unit.candidate.poses)
-    fingers = solver.pressing(FINE, EffectChoice(solver).levels)
-    assert size == pytest.approx(6 * fingers.shell.nodes, rel=0.04)  # the axis is one node
-    solver.put_away()
+    size = wall_unknowns(scene)[1]
+    for roll in (0.0, 90.0, 30.0):
+        turned = scene.with_values({"candidates.roll_deg": roll})
+        solver = CandidateSolver(turned, make_plan(turned).units[1].candidate.poses)  # the middle station
+        shell = solver.pressing(FINE, EffectChoice(solver).levels).shell
+        assert wall_unknowns(turned)[1] == pytest.approx(6 * shell.nodes, rel=0.04)  # the axis is one node
+        solver.put_away()
     fine = scene.with_values({"accuracy.wall_element_mm": 1.5})
     assert wall_unknowns(fine)[1] > 2.5 * size
-    rolled = [wall_unknowns(scene.with_values({"candidates.roll_deg": roll}))[0] for roll in (90.0, 30.0)]
-    assert rolled == pytest.approx([pads, 2 * pads], abs=1)  # half of a pad, and all of it
     assert memory(fine) > memory(scene)
     assert memory(scene) > memory(scene.with_values({"effects.object": "rigid"}))
 
