@@ -44,6 +44,7 @@ class ExactSurface:
     wrench: Callable[[FloatArray], FloatArray]
     rho: float = 1.0
     count: int = 8000
+    sampled = True  # the volume is not exact
 
     def samples(self, count: int | None = None) -> FloatArray:
         """Wrenches for evenly spread motions of one sense of rotation, ``(count, 3)``."""

@@ -18,20 +18,22 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
-from softjaw.scoring.contact import Body, ellipsoid_matrix, hull_volume, vertices_of
+from softjaw.scoring.contact import Body, ellipsoid_matrix, fibonacci_vertices, hull_volume, vertices_of
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
 
 
 MIN_SINGULAR_VALUE = 1e-200  # instead of a singular value 0
+MIN_THICKNESS = 1e-9  # of the longest extent, which flat ellipsoids are given so that their rims have normals
+HULL_THICKNESS = 1e-6  # the same of flat hulls, whose normals are differences of points
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +68,7 @@ class Fibre(Protocol):
 
     exact: bool
     finest: int
+    error_share: float  # part of what extrapolation adds to the finest level that is taken for its error at least
 
     def measures(self, level: int) -> tuple[float, float]:
         """Volume of the cone K and area of its shadow along T."""
@@ -81,9 +84,9 @@ class Fibre(Protocol):
 
 
 def fibre_of(body: Body, span: Span) -> Fibre:
-    """Closed form for ellipsoids, triangles for other bodies."""
+    """Closed form for ellipsoids, hulls for other bodies."""
     A = ellipsoid_matrix(body)
-    return MeshFibre(body, span) if A is None else EllipsoidFibre(A, span)
+    return HullFibre(body, span) if A is None else EllipsoidFibre(A, span)
 
 
 class EllipsoidFibre:
@@ -91,6 +94,7 @@ class EllipsoidFibre:
 
     exact = False
     finest = 7
+    error_share = 0.0
 
     def __init__(self, A: FloatArray, span: Span) -> None:
         axes, vectors = np.linalg.eigh(A)
@@ -185,21 +189,26 @@ def _disc(
     return W * s, c, (W.T @ c) / s, sphere
 
 
-class MeshFibre:
-    """Parts of a body with a mesh of triangles; exact for polytopes, an error of order h^2 for others."""
+class HullFibre:
+    """Parts of a polytope; of any other body those of hulls of its support points, ``20 * 4**level`` of them.
+
+    The hulls lie inside the body, so their volumes are too small, in proportion to 1 over the number of points.
+    """
+
+    error_share = 0.5
 
     def __init__(self, body: Body, span: Span) -> None:
         self.body, self.span = body, span
-        self.exact = hasattr(body, "vertices")
+        self.exact = vertices_of(body) is not None
         self.finest = 7 if self.exact else 5
         self.meshes: dict[int, tuple[FloatArray, IntArray, FloatArray]] = {}
 
     def _mesh(self, level: int) -> tuple[FloatArray, IntArray, FloatArray]:
         """Points, corners of the triangles and the sides they make."""
         # the faces of a polytope are exact at any level
-        level = 0 if self.exact else level + 1
+        level = 0 if self.exact else level
         if level not in self.meshes:
-            points, triangles = surface_mesh(self.body, level)
+            points, triangles = hull_mesh(inner_points(self.body, 20 * 4**level))
             a, b, c = (points[triangles[:, i]] for i in range(3))
             det = np.einsum("mi,mi->m", a, np.cross(b, c))
             normals = np.column_stack([-det, np.cross(b - a, c - a)]) / 6
@@ -207,24 +216,12 @@ class MeshFibre:
         return self.meshes[level]
 
     def measures(self, level: int) -> tuple[float, float]:
-        """Volume of the cone from the triangles, its shadow from the vertices or from the support function."""
+        """Volume of the cone from the triangles, its shadow from the points."""
         points, _, normals = self._mesh(level)
         # a cone of four dimensions has a quarter of base times height, and the normal force goes to 1
         volume = -self.span.det * normals[:, 0].sum() / 4
         M = self.span.M
-        if self.exact:
-            return volume, hull_volume(np.vstack([points @ M[:, 1:].T + M[:, 0], np.zeros((1, 2))]))
-        return volume, self._shadow
-
-    @cached_property
-    def _shadow(self) -> float:
-        """Area of the hull of the body's shadow and 0, measured where the shadow is about as wide as long."""
-        M, phi = self.span.M, 2 * math.pi * np.arange(512) / 512
-        W, s, _ = np.linalg.svd(M[:, 1:] * self.body.support(np.eye(3)))
-        # a shadow that is thin or far from 0 is stretched: equal steps of angle must see its round parts
-        s = np.maximum(s, [MIN_SINGULAR_VALUE, max(abs(W[:, 1] @ M[:, 0]) / 10, 1e-12 * s[0], MIN_SINGULAR_VALUE)])
-        u = np.column_stack([np.cos(phi), np.sin(phi)]) @ (W / s).T @ M
-        return float(s.prod()) * fan_area(u[:, 0] + self.body.support(u[:, 1:]))
+        return volume, hull_volume(np.vstack([points @ M[:, 1:].T + M[:, 0], np.zeros((1, 2))]))
 
     def base(self, level: int) -> FloatArray:
         """The base has the volume of the body."""
@@ -239,82 +236,49 @@ class MeshFibre:
         points, triangles, _ = self._mesh(level)
         n = self.sides(level, away)
         x, y = n @ away, n @ np.array([-away[1], away[0]])
-        edges = np.sort(np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
+        edges = np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
         # an edge of a closed mesh has two triangles, which follow each other once sorted
-        order = np.lexsort((edges[:, 1], edges[:, 0]))
+        order = np.lexsort(np.sort(edges, axis=1).T)
         i, j = order[0::2] % len(triangles), order[1::2] % len(triangles)
         between = ((y[i] < 0) != (y[j] < 0)) & ((x[i] * y[j] - x[j] * y[i]) * (y[j] - y[i]) > 0)
         v = points @ self.span.M[:, 1:].T + self.span.M[:, 0]
-        a, b = v[edges[order[0::2]][between, 0]], v[edges[order[0::2]][between, 1]]
-        return 0.5 * float(np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum())
+        a, b = np.moveaxis(v[edges[order[0::2]][between]], 1, 0)
+        # with signs, so that what slivers without a normal add on one side they take away on the other
+        return 0.5 * abs(float(np.where(y[i][between] < 0, 1, -1) @ (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])))
 
 
 def _cross(a: FloatArray, b: FloatArray) -> float:
     return float(a[0] * b[1] - a[1] * b[0])
 
 
-MIN_THICKNESS = 1e-9  # of the longest extent, which flat bodies are given so that their rims have normals
-
-
-def surface_mesh(body: Body, level: int) -> tuple[FloatArray, IntArray]:
-    """Points ``(k, 3)`` and triangles ``(m, 3)`` inscribed in the body's surface, seen anticlockwise from outside.
-
-    Those of a polytope are its faces, whatever the level; of a smooth body each level has four times as many as the one
-    before, 20 at level 0.
-    """
-    vertices = vertices_of(body)
-    if vertices is not None:
-        return _hull_mesh(vertices)
-    points, triangles = sphere_mesh(level)
+def inner_points(body: Body, count: int) -> FloatArray:
+    """Vertices of a polytope; of any other body its ``count`` farthest points in directions all around, ``(k, 3)``."""
+    if (vertices := vertices_of(body)) is not None:
+        return vertices
     reach = body.support(np.eye(3))
-    # where the radius is known no search for a point with a given normal is needed
-    if hasattr(body, "radius") and (reach > 0).all():
-        u = points * reach
-        return u * np.asarray(body.radius(u))[:, None], triangles
-    return body.support_points(points / np.where(reach > 0, reach, 1.0)), triangles
+    points = body.support_points(fibonacci_vertices(1 / np.where(reach > 0, reach, 1.0), 320))
+    # directions that are even where the body is round
+    _, size, axes = np.linalg.svd(points, full_matrices=False)
+    return body.support_points(fibonacci_vertices(1 / np.maximum(size, HULL_THICKNESS * size[0]), count) @ axes)
 
 
-def _hull_mesh(vertices: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Faces of the hull, seen anticlockwise from outside."""
-    hull = ConvexHull(vertices)
-    triangles = hull.simplices.astype(np.intp)
-    a, b, c = (vertices[triangles[:, i]] for i in range(3))
-    inward = np.einsum("mi,mi->m", np.cross(b - a, c - a), hull.equations[:, :3]) < 0
-    triangles[inward] = triangles[inward][:, ::-1]
-    return vertices, triangles
+def hull_mesh(points: FloatArray) -> tuple[FloatArray, IntArray]:
+    """Points and triangles ``(m, 3)`` of their hull, seen anticlockwise from outside.
 
-
-@lru_cache(maxsize=8)
-def sphere_mesh(level: int) -> tuple[FloatArray, IntArray]:
-    """Icosahedron with every triangle split in four ``level`` times, corners on the unit sphere."""
-    g = (1 + 5**0.5) / 2
-    points = np.array([(s, t * g, 0.0) for s in (-1, 1) for t in (-1, 1)])
-    points = np.vstack([np.roll(points, i, axis=1) for i in range(3)]) / np.hypot(1, g)
-    triangles = _hull_mesh(points)[1]
-    for _ in range(level):
-        edges = np.sort(np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
-        edges, place = np.unique(edges, axis=0, return_inverse=True)
-        middle = points[edges].sum(axis=1)
-        ab, bc, ca = place.reshape(3, -1) + len(points)
-        points = np.vstack([points, middle / np.linalg.norm(middle, axis=1, keepdims=True)])
-        a, b, c = triangles.T
-        triangles = np.vstack([np.column_stack(t) for t in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))])
-    return points, triangles
-
-
-def fan_area(support: FloatArray) -> float:
-    """Area of the hull of a convex figure and 0, from its support ``(k,)`` at equal steps of the full turn.
-
-    The hull consists of the triangles between 0 and the sides that look away from it: ``1/2 int h (h + h'')`` over the
-    directions with ``h > 0``. Trigonometric interpolation to 64 points per step leaves only the error of ``h`` itself.
+    Points of a plane or a line get some more beside their centre, so that the hull has two sides.
     """
-    k, fine = len(support), 64
-    c = np.fft.rfft(support)
-    order = np.arange(len(c))
-    if k % 2 == 0:
-        # the last order of an even count stands for two, which part once the series is padded
-        c[-1] *= 0.5
-    h, bent = (np.fft.irfft(factor * c, fine * k) * fine for factor in (np.ones(len(c)), 1.0 - order**2))
-    if (h >= 0).all():
-        return 0.5 * float((h * bent).mean()) * 2 * np.pi
-    return 0.5 * float((np.maximum(h, 0) * bent).mean()) * 2 * np.pi
+    centre, n = points.mean(axis=0), len(points)
+    _, size, axes = np.linalg.svd(np.vstack([points - centre, np.zeros((3, 3))]), full_matrices=False)
+    flat = size <= HULL_THICKNESS * size[0]
+    size = np.maximum(size, HULL_THICKNESS * size[0])
+    beside = np.concatenate([sign * (axes * size[:, None])[flat] / math.sqrt(n) for sign in (-1, 1)])
+    points = np.vstack([points, centre + beside])
+    # Qhull loses facets of points that are much longer than wide; joggled, many points of a plane take no time
+    hull = ConvexHull((points - centre) @ axes.T / size, qhull_options="QJ" if flat.any() else "Qt")
+    triangles = hull.simplices.astype(np.intp)
+    a, b, c = (hull.points[triangles[:, i]] for i in range(3))
+    inward = np.einsum("mi,mi->m", np.cross(b - a, c - a), hull.equations[:, :3]) < 0
+    # axes that make a left-handed frame turn the triangles round
+    turned = inward == (np.linalg.det(axes) > 0)
+    triangles[turned] = triangles[turned][:, ::-1]
+    return points, triangles

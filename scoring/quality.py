@@ -94,12 +94,13 @@ def grasp_score(
     """Score of two soft contacts in any poses, with any limit surfaces; lengths and centre as in `scoring.epsilon`.
 
     The contacts count as facing each other, and the closed form is used, if both normals are within ``tolerance`` of
-    the line of the contacts [rad]; the volume is then off by up to some 10 times its square. Both epsilons, nan unless
-    asked for, take longer than the volumes without a closed form; they are the lower bounds if a gap was left.
+    the line of the contacts [rad]; the volume is then off by up to some 10 times its square. Bodies that are sampled
+    have no closed form. Both epsilons, nan unless asked for, take longer than the volumes without one; they are the
+    lower bounds if a gap was left.
     """
     lengths = object_length, contact_length, centre_of_mass
     bodies = [contact.body for contact in contacts]
-    if faces(contacts, tolerance):
+    if faces(contacts, tolerance) and not any(getattr(body, "sampled", False) for body in bodies):
         d = float(np.linalg.norm(contacts[1].position - contacts[0].position)) / object_length
         (V1, A1), (V2, A2) = ((body.volume / contact_length, body.shadow_area) for body in bodies)
         linf, l1 = volume_linf(V1, A1, V2, A2, d), volume_l1(V1, A1, V2, A2, d)

@@ -125,7 +125,7 @@ def grasp_lengths(
 
 
 def exact_surface(contact: Contact, model: str) -> ExactSurface:
-    """The limit surface itself of a contact, per unit of S [-, -, m]; 2000 motions give its volume to some 1e-4."""
+    """The limit surface itself of a contact, per unit of S [-, -, m]; 2000 motions give its volume to some 1e-3."""
     share = contact.mu / contact.limits[model].S
     return ExactSurface(lambda t: friction_wrench(contact.local, t, share, model)[:, [0, 1, 5]], contact.rho, 2000)
 
