@@ -167,21 +167,19 @@ def smooth_rings(values: FloatArray, waves: FloatArray, count: int) -> FloatArra
 class Wall:
     """Upright part of a mesh: first and last height, those of the lids, centres and mean radius [m].
 
-    A lid is None at an end that was asked for, not found; ``centre`` gives ``(k, 2)`` by height and order of the
-    derivative.
+    ``centre`` gives ``(k, 2)`` by height and order of the derivative.
     """
 
     ends: tuple[float, float]
-    lids: tuple[float | None, float | None]
+    lids: tuple[float, float]
     centre: Callable
     radius: float
 
 
-def find_wall(mesh: MeshObject, facet: float, wanted: tuple[float, float] | None, tolerance: float) -> Wall:
+def find_wall(mesh: MeshObject, facet: float, tolerance: float) -> Wall:
     """Wall of a mesh, between the part that counts as its bottom and the part that counts as its top.
 
-    Folds below the size ``facet`` of the triangles do not matter, centres within ``tolerance`` of the axis are on it,
-    and ``wanted`` are heights to keep to [m].
+    Folds below the size ``facet`` of the triangles do not matter, centres within ``tolerance`` of the axis are on it.
     """
     low, high = (float(v) for v in mesh.bounds[:, 2])
     z = low + (np.arange(LEVELS) + 0.5) * (high - low) / LEVELS
@@ -193,19 +191,16 @@ def find_wall(mesh: MeshObject, facet: float, wanted: tuple[float, float] | None
     bad, slope = folded(outer, inner, facet).any(axis=1) & at_end, np.gradient(r, z)
     first, last = _run(bad | (slope > STEEP)), len(z) - 1 - _run((bad | (slope < -STEEP))[::-1])
     rim = Revolution.rim  # left to the rounding of the edge
-    steep_ends = max(z[min(first, len(z) - 1)], low + rim), min(z[max(last, 0)], high - rim)
-    asked = wanted or (low, high)
-    ends = max(steep_ends[0], asked[0]), min(steep_ends[1], asked[1])
+    ends = max(z[min(first, len(z) - 1)], low + rim), min(z[max(last, 0)], high - rim)
     # share of the height has to be wall
-    if ends[1] - ends[0] < 0.3 * (min(asked[1], high) - max(asked[0], low)) or ends[1] <= ends[0]:
+    if ends[1] - ends[0] < 0.3 * (high - low):
         raise MeshError(
-            f"the mesh has no upright wall: of z = {asked[0]:.4g} m to {asked[1]:.4g} m only {ends[0]:.4g} m to "
+            f"the mesh has no upright wall: of z = {low:.4g} m to {high:.4g} m only {ends[0]:.4g} m to "
             f"{max(ends):.4g} m is neither bottom nor top; check the mesh's axis, or treat the object as rigid"
         )
     inside = (z >= ends[0]) & (z <= ends[1])
     radius = float(r[inside].mean())
-    lids = low if ends[0] == steep_ends[0] else None, high if ends[1] == steep_ends[1] else None
-    return Wall(ends, lids, _centre_line(z[inside], centre[inside], ends, 2 * radius, tolerance), radius)
+    return Wall(ends, (low, high), _centre_line(z[inside], centre[inside], ends, 2 * radius, tolerance), radius)
 
 
 def folded(outer: FloatArray, inner: FloatArray, facet: float) -> NDArray[np.bool_]:

@@ -82,8 +82,7 @@ def _refuse_folds(z: FloatArray, bad: NDArray[np.bool_]) -> None:
         raise MeshError(
             f"between z = {z[k[0]]:.4g} m and {z[k[-1]]:.4g} m a ray from the mesh's centre line does not meet the "
             f"surface exactly once, most often at {360 * ray / bad.shape[1]:.0f} degrees (a handle, fold or hollow): "
-            "choose stations elsewhere and leave these heights out with object.wall_heights_mm = [low, high], or treat "
-            "the object as rigid"
+            "cut such a part off in a mesh editor, or treat the object as rigid"
         )
 
 
@@ -116,22 +115,14 @@ class TraceReport:
     wavelength: float
 
 
-def traced(mesh: MeshObject, heights: tuple[float, float] | None = None) -> tuple[OuterSurface, TraceReport]:
+def traced(mesh: MeshObject) -> tuple[OuterSurface, TraceReport]:
     """Smooth surface near a closed mesh with the axis z, for a thin-walled body of the same outside.
 
-    Parameters
-    ----------
-    mesh : MeshObject
-    heights : (float, float), optional
-        Part of the mesh to trace [m]; by default all of it but the bottom and the top.
-
-    Raises
-    ------
-    MeshError
-        For sections that a ray from the centre line leaves more than once, and where the surface does not fit.
+    All of it but the bottom and the top. Raises `MeshError` for sections that a ray from the centre line leaves more
+    than once, and where the surface does not fit.
     """
     facet, size = facet_size(mesh), float(np.ptp(mesh.bounds, axis=0).max())
-    wall = find_wall(mesh, facet, heights, SYMMETRIC * size)
+    wall = find_wall(mesh, facet, SYMMETRIC * size)
     # the shortest wave has three facets, or a share of the wall's height
     length = min(3.0 * facet, 0.15 * (wall.ends[1] - wall.ends[0]))
     # a share of the facets' sagitta, which says nothing about the body
@@ -142,8 +133,8 @@ def traced(mesh: MeshObject, heights: tuple[float, float] | None = None) -> tupl
         z, angle = report.place
         raise MeshError(
             f"near z = {z:.4g} m at {np.degrees(angle):.0f} degrees the smooth wall lies {report.largest * 1e3:.3g} mm "
-            "off the mesh (a ledge, an edge or a part that sticks out): leave these heights out with "
-            "object.wall_heights_mm = [low, high], or treat the object as rigid"
+            "off the mesh (a ledge, an edge or a part that sticks out): smooth it in a mesh editor, or treat the "
+            "object as rigid"
         )
     return surface, report
 

@@ -48,7 +48,7 @@ def traced_surface(shape: Mesh) -> tuple[OuterSurface, TraceReport]:
             f"{shape.mesh}: is not a closed surface ({'; '.join(mesh.notes) or 'its triangles are not turned alike'}),"
             " which a thin wall needs; close it in a mesh editor, or leave wall_mm out"
         )
-    return traced(mesh, shape.wall_heights)
+    return traced(mesh)
 
 
 def trace_warning(shape: Mesh) -> str:

@@ -10,12 +10,11 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, get_args
 from pydantic import Field, ValidationInfo, field_validator
 
 from softjaw.fem.objects.mesh_file import ENDINGS, lacking
-from softjaw.study.scene.section import Errors, Interval, Point, SceneSection, Text, numbers_text, refusal, wrong
+from softjaw.study.scene.section import Errors, Point, SceneSection, Text, numbers_text, refusal, wrong
 from softjaw.study.units import in_si, si
 
 SMALLEST_MM, LARGEST_MM = 1.0, 2000.0
-WALL_KEYS = ("base_wall_mm", "young_modulus_gpa", "wall_poisson_ratio", "yield_strength_mpa", "allowed_dent_mm",
-             "wall_heights_mm")  # fmt: skip
+WALL_KEYS = ("base_wall_mm", "young_modulus_gpa", "wall_poisson_ratio", "yield_strength_mpa", "allowed_dent_mm")
 
 
 Span = tuple[float, float]
@@ -291,10 +290,7 @@ class Mesh(Walled):
     crease_angle_deg: Annotated[float, Field(ge=0, le=180)] = Field(
         30.0, description="edges that turn by less are facets of a smooth surface, others stay edges; 0: all stay"
     )
-    wall_heights_mm: Interval | None = Field(
-        None, description="part of the mesh along its axis that a thin wall is traced on, [low, high]; else all of it"
-    )
-    grid_step, wall_heights = si("grid_step_mm"), si("wall_heights_mm")
+    grid_step: ClassVar[Any] = si("grid_step_mm")
 
     @field_validator("mesh")
     @classmethod

@@ -35,6 +35,7 @@ RENAMED = {  # keys of earlier versions, and what stands for them
     "limit_surface.wrench_samples": "run.patches",  # from which `softjaw.friction_wrench` has them
     "object.base": "object.open_ends",
     "object.open_top": "object.open_ends",
+    "object.wall_heights_mm": "effects.object",  # a mesh with a handle is rigid
     "object.wall_profile_mm": "object.wall_mm",
     "output": "run.patches",
     "score.length_scale": "score.object_length_mm",
@@ -102,12 +103,6 @@ def numbers_text(values: Sequence[float]) -> str:
     return f"[{', '.join(f'{v:g}' for v in values)}]"
 
 
-def _lower_first(pair: tuple[float, float]) -> tuple[float, float]:
-    if pair[0] >= pair[1]:
-        raise refusal(f"two different values, the lower first, as in {numbers_text(pair[::-1])}")
-    return pair
-
-
 def _direction(vector: tuple[float, float, float]) -> tuple[float, float, float]:
     if not 1e-6 <= math.hypot(*vector) <= 1e6:
         raise refusal("a direction, as in [0, 0, -1]")
@@ -132,7 +127,6 @@ Text = Annotated[str, AfterValidator(_one_line)]
 Point = Annotated[tuple[float, float], Field(strict=False)]
 Vector = Annotated[tuple[float, float, float], Field(strict=False)]
 Direction = Annotated[Vector, AfterValidator(_direction)]
-Interval = Annotated[Point, AfterValidator(_lower_first)]
 
 
 # --- what is wrong with a scene ---------------------------------------------------------------------------------------

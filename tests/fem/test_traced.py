@@ -204,13 +204,10 @@ def cup_with_handle(top=0.07):
     return MeshObject(points, np.concatenate([cup.triangles, bar.triangles + len(cup.points)]))
 
 
-def test_a_handle_is_refused_with_its_place_and_can_be_left_out():
+def test_a_handle_is_refused_with_its_place():
     for top, place in ((0.07, r"0.030\d* m and 0.0[67]\d* m .* (8|9)\d deg"), (0.1, r"0.030\d* m and 0.0[89]\d* m")):
         with pytest.raises(MeshError, match=place):  # also where it reaches up to the edge: it is no top
             traced(cup_with_handle(top))
-    surface, report = traced(cup_with_handle(), heights=(0.0, 0.029))
-    assert report.largest < 2e-4
-    assert surface.curve.derivative(np.array(surface.wall))[:, 0] == pytest.approx([0.002, 0.029], abs=1e-4)
 
 
 def test_what_does_not_fit_is_refused():
@@ -219,13 +216,9 @@ def test_what_does_not_fit_is_refused():
     )
     with pytest.raises(MeshError, match=r"0.0[45]\d* m"):
         traced(ledge)
-    _, report = traced(ledge, heights=(0.0, 0.045))
-    assert report.largest < 1e-4
     flat = rings(lambda t, z: 0.002 + 4 * z, np.linspace(0, 0.02, 20))
     with pytest.raises(MeshError):
         traced(flat)
-    with pytest.raises(MeshError):
-        traced(rings(lambda t, z: 0.03 + 0 * t, np.linspace(0, 0.1, 30)), heights=(0.2, 0.3))
 
 
 def test_prisms_count_as_round_and_turned_flasks_as_unsymmetric():
