@@ -39,7 +39,7 @@ from softjaw.study.result.provenance import SAMPLING
 from softjaw.study.result.store import open_result
 from softjaw.study.units import shown_text
 
-HDF5_VERSIONS = ("earliest", "v110")  # programs that bring an older HDF5 of their own can read it
+HDF5_VERSIONS = ("v108", "v110")  # v110 would mark a file as open for writing, and a killed run could not resume
 TEXT = h5py.string_dtype("utf-8")
 SESSION_ROWS, REPORT = f"{ROOT}/provenance/sessions", f"{ROOT}/report"
 MIN_PACKED_BYTES, CHUNK_BYTES, DEFLATE_LEVEL = 4096, 2**20, 4
@@ -285,7 +285,6 @@ def _attach_scales(dataset: h5py.Dataset, names: Sequence[str]) -> None:
         if name not in dataset.parent:
             dataset.parent[name] = scale
         h5py.h5ds.attach_scale(dataset.id, scale.id, i)
-        h5py.h5ds.set_label(dataset.id, i, name.encode())
 
 
 def _write_attribute(node: Any, key: str, value: Any) -> None:
@@ -301,7 +300,7 @@ def view_slice(layout: Layout) -> list[str]:
     return ["." if i in layout.shown else str(n - 1 if i == last else 0) for i, n in enumerate(layout.shape)]
 
 
-def axes_of(layout: Layout, chosen: Sequence[int]) -> dict[str, Any]:
+def axes_of(layout: Layout, chosen: Sequence[int]) -> list[str]:
     """Names of some axes, as NeXus wants them.
 
     silx takes an axis of exactly two values for a linear calibration and draws nothing: no axis (``.``) is better
@@ -310,24 +309,25 @@ def axes_of(layout: Layout, chosen: Sequence[int]) -> dict[str, Any]:
     values = [np.asarray(layout.axes[i].values, float) for i in chosen]
     # relative difference of steps that makes an axis uneven
     even = all(np.ptp(np.diff(v)) <= 1e-6 * np.ptp(v) for v in values[-2:] if len(v) > 2)
-    names = ["." if len(v) == 2 and even else layout.names[i] for v, i in zip(values, chosen, strict=True)]
-    return {"axes": names, **{f"{name}_indices": i for i, name in enumerate(names) if name != "."}}
+    return ["." if len(v) == 2 and even else layout.names[i] for v, i in zip(values, chosen, strict=True)]
 
 
 def groups(layout: Layout) -> dict[str, dict[str, Any]]:
     """Every group below ``/study`` with its attributes; NXdata groups draw themselves in NeXus viewers."""
-    plot = {"NX_class": "NXdata", **axes_of(layout, range(len(layout.shape))), "default_slice": view_slice(layout)}
+    whole = range(len(layout.shape))
+    plot = {"NX_class": "NXdata", "axes": axes_of(layout, whole), "default_slice": view_slice(layout)}
     others = [(axis, int(i)) for axis, i in zip(layout.axes, view_slice(layout), strict=True) if i != "."]
     at = [f"{axis.name} {shown_text(axis.values[i], axis.units, 5)}" for axis, i in others]
     title = ", ".join(["grasp map, curved contact model", *at])
     first = {"signal": FIRST[0], "auxiliary_signals": list(FIRST[1:]), "title": title}
-    attributes: dict[str, dict[str, Any]] = {"map": {"NX_class": "NXdata", **axes_of(layout, layout.shown), **first}}
+    attributes: dict[str, dict[str, Any]] = {"map": plot | first | {"axes": axes_of(layout, layout.shown)}}
+    del attributes["map"]["default_slice"]
     for q in layout.quantities:
         if q.group != "maps":
             continue
         several = {"signal": MODELS[0], "auxiliary_signals": list(MODELS[1:])}
         signal = several if q.by_model else {"signal": q.name}
-        attributes[q.name] = {**plot, **signal, "title": q.label, "definition": q.definition}
+        attributes[q.name] = {**plot, **signal, "title": q.label}
     attributes["status"] = {**plot, "signal": "code", "title": "state of the cases"}
     collections = ["axes", "candidates", "checksums", "provenance", *{q.group for q in layout.quantities} - {"status"}]
     collections += ["derived"] * bool(layout.derived)
