@@ -20,7 +20,7 @@ from softjaw.friction.wrench import FrictionLimits
 from softjaw.lsfit.surface import LimitSurface
 from softjaw.study import pipeline
 from softjaw.study.case.build import check_object, with_mass
-from softjaw.study.case.candidates import check_poses, decided, units, with_sampled_grasps
+from softjaw.study.case.candidates import check_candidates, decided, units, with_sampled_grasps
 from softjaw.study.case.contact import Contact
 from softjaw.study.case.limit_surface import finger_surface
 from softjaw.study.case.model import check_petsc
@@ -167,7 +167,7 @@ def solved_case(
     scene, k = _at_force(scene, force)
     try:
         check_object(scene)
-        check_poses(scene)
+        check_candidates(scene)
     except StudyError as error:  # here a station off a mesh is an argument
         raise ValueError(str(error)) from error
     if scene.petsc:

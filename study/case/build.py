@@ -16,8 +16,9 @@ from softjaw.fem.objects.outer_surface import OuterSurface, Section, of_revoluti
 from softjaw.fem.pad.halving import refined
 from softjaw.fem.pad.shape import PadShape
 from softjaw.study.messages import USAGE, StudyError
+from softjaw.study.quantities import LISTED_TARGET
 from softjaw.study.scene import Scene
-from softjaw.study.scene.sections import Gripper
+from softjaw.study.scene.sections import Accuracy, Gripper
 from softjaw.study.units import converted, in_si
 
 
@@ -67,6 +68,14 @@ def centre_of_volume(obj: Any) -> NDArray[np.float64]:
     if hasattr(obj, "centroid"):
         return np.asarray(obj.centroid[0])
     return solid_centroid(*obj.surface())
+
+
+def body_of(shape: Any) -> dict[str, NDArray[np.float64]]:
+    """Centroid ``(3,)`` and bounds ``(2, 3)`` [m] of an object in the frame of its own file."""
+    placed = own_frame(shape)
+    points = placed.to_object(np.asarray(surface_triangles(shape)[0], float))
+    centroid = placed.to_object(centre_of_volume(build_object(shape))[None])[0]
+    return {"object_centroid": centroid, "object_bounds": np.stack([points.min(axis=0), points.max(axis=0)])}
 
 
 def volume(shape: Any) -> float:
@@ -256,6 +265,12 @@ def _remarks(scene: Scene) -> Iterator[str]:
 def forces_apart(scene: Scene) -> bool:
     """Whether every force is solved by itself, on a fine mesh that starts from a coarse one and its load path."""
     return scene.accuracy.meshes > 1
+
+
+def listed_accuracy(scene: Scene) -> Accuracy:
+    """The accuracy in effect: of sampled grasps without a target of their own that of those that are listed."""
+    own = not scene.candidates.sampled or scene.accuracy.target is not None or not forces_apart(scene)
+    return scene.accuracy if own else scene.accuracy.model_copy(update={"target": LISTED_TARGET})
 
 
 def pad_elements(scene: Scene, mesh: int) -> tuple[int, int, int]:

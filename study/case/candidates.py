@@ -74,11 +74,15 @@ def candidates(scene: Scene) -> list[Candidate]:
     ]  # fmt: skip
 
 
-def check_poses(scene: Scene) -> None:
-    """Refuse explicit poses whose pads pass the object.
+def check_candidates(scene: Scene) -> None:
+    """Refuse explicit poses whose pads pass the object, and a sampler that finds no grasp, without all its grasps.
 
     Raises `StudyError` with the numbers and labels of the poses.
     """
+    if scene.candidates.sampled and not scene.candidates.poses:
+        from softjaw.study.case import sampler  # compiled loops, which most scenes are checked without
+
+        sampler.check_sampler(scene)
     if not scene.candidates.poses or scene.object.shape == "plane":  # which has no end
         return
     labels: dict[int, str] = {}
@@ -141,7 +145,7 @@ def with_sampled_grasps(scene: Scene) -> Scene:
     if scene.candidates.sampled is None:
         return scene
     check_object(scene)
-    from softjaw.study.case import sampler  # compiled loops, which most scenes are checked without
+    from softjaw.study.case import sampler
 
     return sampler.with_sampled_grasps(scene)
 

@@ -8,7 +8,7 @@ wider than the opening, runs into the fingers or slips comes with that state.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
@@ -19,13 +19,13 @@ from numpy.typing import NDArray
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.friction.patch import NoContactError
 from softjaw.study.case.bed import JawsOnSurface, Side, grips, held
-from softjaw.study.case.build import build_object, forces_apart, own_frame, surface_triangles
+from softjaw.study.case.build import build_object, listed_accuracy, own_frame, surface_triangles
 from softjaw.study.case.contact import slips
 from softjaw.study.case.fit import Jaws, fit_of, jaws_of
 from softjaw.study.case.poses import across, in_file, pad_axes, pose_of
 from softjaw.study.case.task import Task, task_of
 from softjaw.study.messages import USAGE, NoGraspError
-from softjaw.study.quantities import LISTED_TARGET, MISSING, SLIPS, STATES
+from softjaw.study.quantities import MISSING, SLIPS, STATES
 from softjaw.study.scene import Scene
 from softjaw.study.scene.grasps import OF_EVERY_KIND, Candidates
 
@@ -137,38 +137,46 @@ def antipodal_grasps(
     on every machine. ``samples``: number of those points. ``lids`` (n, 3, 3) array, optional: corners of the triangles
     that close holes [m]: no pad is put there if there are other places.
     """
-    points, triangles = np.ascontiguousarray(surface[0]), np.ascontiguousarray(surface[1])
+    surface = np.ascontiguousarray(surface[0]), np.ascontiguousarray(surface[1])
+    offered: list[SampledGrasp] = []
+    seen: list[SampledGrasp] = []
+    over_holes: list[SampledGrasp] = []
+    for grasp, over in offers(surface, jaws, task, seed, samples, lids):
+        (offered if over is None else over_holes if over else seen).append(grasp)
+    # an open box may be held nowhere else
+    seen = seen if any(not grasp.state for grasp in seen) else [*seen, *over_holes]
+    best = [grasp for grasp in thinned(seen, count, jaws.pad[0]) if not grasp.state]
+    seen += [climbed(surface, grasp, jaws, task, lids) for grasp in best]
+    seen += offered
+    return thinned(seen, count, jaws.pad[0])
+
+
+def offers(
+    surface: tuple[FloatArray, IntArray], jaws: Jaws, task: Task, seed: int, samples: int, lids: FloatArray | None
+) -> Iterator[tuple[SampledGrasp, bool | None]]:
+    """Grasps as they are found, and whether a pad is over a hole; None: as aimed, with the state that rejects it."""
+    points, triangles = surface
     corners = points[triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])  # twice the area long
     axes = principal_axes(corners, np.linalg.norm(normals, axis=1))
     axis = axes[-1]
     # places that only a pad in their middle meets squarely, such as the bottom of a bowl, are seldom hit at random
     through_centre = [(np.asarray(task.centre_of_mass, float), direction) for direction in axes]
-    seen: list[SampledGrasp] = []
-    over_holes: list[SampledGrasp] = []
     starts: list[JawsOnSurface] = []
-    offered: list[SampledGrasp] = []
     for place, normal in [*through_centre, *sampled(corners, normals, samples, seed)]:
         try:
-            aimed = JawsOnSurface((points, triangles), place, axes_of(-normal, axis), jaws)
+            aimed = JawsOnSurface(surface, place, axes_of(-normal, axis), jaws)
             if state := state_of(aimed):
-                offered.append(SampledGrasp(aimed.point, aimed.axes[:, 2], aimed.axes[:, 0], aimed.opening, 0.0, state))
-            start = straightened((points, triangles), place, axes_of(-normal, axis), jaws)
+                yield SampledGrasp(aimed.point, aimed.axes[:, 2], aimed.axes[:, 0], aimed.opening, 0.0, state), None
+            start = straightened(surface, place, axes_of(-normal, axis), jaws)
             if any(same_place(start, other) for other in starts):
                 continue
             starts.append(start)
             for along in long_sides(start, axis):
-                grip = straightened((points, triangles), start.point, axes_of(start.axes[:, 2], along), jaws)
-                over = lids is not None and grip.over(lids)
-                (over_holes if over else seen).append(judged(grip, task))
+                grip = straightened(surface, start.point, axes_of(start.axes[:, 2], along), jaws)
+                yield judged(grip, task), lids is not None and grip.over(lids)
         except NoContactError:
             continue
-    # an open box may be held nowhere else
-    seen = seen if any(not grasp.state for grasp in seen) else [*seen, *over_holes]
-    best = [grasp for grasp in thinned(seen, count, jaws.pad[0]) if not grasp.state]
-    seen += [climbed((points, triangles), grasp, jaws, task, lids) for grasp in best]
-    seen += offered
-    return thinned(seen, count, jaws.pad[0])
 
 
 def climbed(
@@ -280,27 +288,36 @@ def with_sampled_grasps(scene: Scene) -> Scene:
 
     Raises `NoGraspError` where no grasp fits between the pads.
     """
-    given, surface, obj = scene.candidates, surface_triangles(scene.object), build_object(scene.object)
-    task = task_of(scene, obj)
+    given, obj = scene.candidates, build_object(scene.object)
+    task, surface = task_of(scene, obj), surface_triangles(scene.object)
     found = antipodal_grasps(surface, jaws_of(scene), task, given.sampled or 1, lids=lids_of(obj))
     placed = own_frame(scene.object)
     given_as = [(in_file(grasp.point, grasp.approach, grasp.long_side, placed), grasp.state) for grasp in found]
     poses = tuple(pose_of(numbers) for numbers, state in given_as if not state)
     if not poses:
-        states = [STATES[state] for state in sorted({grasp.state for grasp in found})] or ["the pads miss the object"]
-        raise NoGraspError(
-            USAGE,
-            f"candidates.sampled: found no grasp between the pads ({', '.join(states)}); expected at least one: give"
-            " poses, another pad, or a larger gripper.max_opening_mm",
-        )
+        raise _no_grasp(found)
     kept = {key: getattr(given, key) for key in OF_EVERY_KIND}
     # how many were asked for stays, which tells that they are screened
     where = Candidates(poses=poses, **kept).model_copy(update={"sampled": given.sampled})
     where._rejected = tuple((*numbers, state) for numbers, state in given_as if state)
-    parts: dict[str, Any] = {"candidates": where}
-    if forces_apart(scene) and scene.accuracy.target is None:
-        parts["accuracy"] = scene.accuracy.model_copy(update={"target": LISTED_TARGET})
-    return scene.model_copy(update=parts)
+    return scene.model_copy(update={"candidates": where, "accuracy": listed_accuracy(scene)})
+
+
+def check_sampler(scene: Scene) -> None:
+    """Refuse a scene of which `with_sampled_grasps` would find no grasp; it ends with the first one."""
+    obj, seen = build_object(scene.object), list[SampledGrasp]()
+    surface, task = surface_triangles(scene.object), task_of(scene, obj)
+    for grasp, _ in offers(surface, jaws_of(scene), task, 0, SAMPLES, lids_of(obj)):
+        if not grasp.state:
+            return
+        seen.append(grasp)
+    raise _no_grasp(seen)
+
+
+def _no_grasp(found: Sequence[SampledGrasp]) -> NoGraspError:
+    states = [STATES[state] for state in sorted({grasp.state for grasp in found})] or ["the pads miss the object"]
+    text = f"candidates.sampled: found no grasp between the pads ({', '.join(states)}); expected at least one: give"
+    return NoGraspError(USAGE, f"{text} poses, another pad, or a larger gripper.max_opening_mm")
 
 
 def lids_of(obj: Any) -> FloatArray | None:

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from softjaw.study.case.build import build_object, check_object, geometry, mesh_notes, told
-from softjaw.study.case.candidates import check_poses, with_sampled_grasps
+from softjaw.study.case.build import build_object, check_object, geometry, mesh_notes, told, with_mass
+from softjaw.study.case.candidates import check_candidates, with_sampled_grasps
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.run.estimate import START_S, estimated, scaling_text
 from softjaw.study.run.object_folder import Listed, ObjectFolder, folder_of
@@ -64,9 +64,9 @@ def check(options: Namespace) -> str:
         names = ", ".join(one.name for one in listed[:5]) + ", ..." * (len(listed) > 5)
         text += f"\n  objects     {len(listed)}: {names}; the mesh above stands for all of them"
         return hanging(text, terminal_width())
-    scene = with_sampled_grasps(scene_of(options))
+    scene = with_mass(scene_of(options))
     check_object(scene)
-    check_poses(scene)
+    check_candidates(scene)
     return hanging(scene_text(scene, options.scene), terminal_width())
 
 

@@ -22,7 +22,7 @@ from softjaw.study.result.layout import ATTEMPTS, ROOT, Layout
 
 OF_STATE = {state: zlib.crc32(bytes([state])) for state in range(len(STATES))}
 ABOUT = {"axes": ("units", "long_name", "scene_key"), "scene": ("digest", "file", "overrides", "petsc_options")}
-PLACED = ("object_rotation", "object_origin", "rejected")
+ABOUT_OBJECT = ("object_rotation", "object_origin", "rejected", "object_centroid", "object_bounds")
 
 
 def of_array(values: Any) -> int:
@@ -84,7 +84,7 @@ def of_header(file: StoredFile, layout: Layout) -> int:
     for name in ("scene", *axes):
         attributes = file.attributes(f"{ROOT}/{name}")
         parts.append([attributes.get(key) for key in ABOUT[name.partition("/")[0]]])
-        parts += [np.asarray(attributes[key]).tolist() for key in PLACED if key in attributes]
+        parts += [np.asarray(attributes[key]).tolist() for key in ABOUT_OBJECT if key in attributes]
         parts += [[str(text) for text in attributes["options"]]] if "options" in attributes else []
     crc = zlib.crc32(repr(parts).encode())
     arrays = ["scene", "definitions", "candidates/label", *axes]

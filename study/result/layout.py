@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -48,8 +48,9 @@ SESSION = np.dtype(
 class Header:
     """What a file says about the scene it was made from; ``labels`` name the candidates in row order.
 
-    ``placed`` is rotation and origin of the frame of stations and angles in that of the poses, the object's own file.
-    ``rejected`` are the grasps that a sampler offered and rejected: point [mm], approach, long side, state.
+    ``about`` holds attributes of the scene, by the names of `study.result.checksums.ABOUT_OBJECT`: rotation and origin
+    of the frame of stations and angles in that of the poses, the object's own file, in which centroid and bounds are;
+    grasps that a sampler offered and rejected: point [mm], approach, long side, state.
     """
 
     digest: str
@@ -59,8 +60,7 @@ class Header:
     overrides: tuple[str, ...] = ()
     petsc_options: str = ""
     labels: tuple[str, ...] = ()
-    placed: Any = None
-    rejected: tuple[tuple[float, ...], ...] = ()
+    about: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

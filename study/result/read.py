@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from softjaw.study.flags import OF_FILE, Flag
 from softjaw.study.quantities import BOTH_ENDS, BY_KEY, FINGERS, MISSING, MODELS, REALISATION, TABLE, Axis, Quantity
+from softjaw.study.result.checksums import ABOUT_OBJECT
 from softjaw.study.result.index import index_path, open_index
 from softjaw.study.result.layout import DONE, ROOT, VERSION
 from softjaw.study.result.store import Result, open_result
@@ -235,9 +236,8 @@ def _attributes(result: Result) -> dict[str, Any]:
         "provenance": result.sessions, "has": layout.has, "meshes": layout.meshes,
         "patches": "patch/pressure" in {c.key for c in layout.columns}, "poses": not result.axes[-3].units,
         "derived": tuple(q.name for q in layout.derived),
-        "object_rotation": np.asarray(scene.get("object_rotation", np.eye(3))),
-        "object_origin": np.asarray(scene.get("object_origin", np.zeros(3))),
-        "rejected": np.asarray(scene.get("rejected", np.zeros((0, 10)))),
+        "object_rotation": np.eye(3), "object_origin": np.zeros(3), "rejected": np.zeros((0, 10)),
+        **{name: np.asarray(scene[name]) for name in ABOUT_OBJECT if name in scene},
     }  # fmt: skip
 
 

@@ -193,11 +193,7 @@ def _write_texts(study: h5py.Group, layout: Layout, header: Header, packed: bool
         study[name].attrs["long_name"] = label
     study["provenance"].attrs["sampling"] = SAMPLING
     study["scene"].attrs.update(digest=header.digest, file=header.scene_file, petsc_options=header.petsc_options)
-    # Stations and angles count in the object's frame, poses are in that of its mesh file.
-    if header.placed is not None:
-        study["scene"].attrs.update(object_rotation=header.placed.rotation, object_origin=header.placed.origin)
-    if header.rejected:
-        study["scene"].attrs["rejected"] = np.array(header.rejected, np.float32)
+    study["scene"].attrs.update(header.about)
     study["scene"].attrs["overrides"] = "\n".join(header.overrides)
     how = {"compression": DEFLATE_LEVEL} if packed else {}
     sessions = study["provenance"].create_dataset("sessions", data=np.zeros(MOST_SESSIONS, SESSION), **how)

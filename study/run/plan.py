@@ -14,6 +14,7 @@ import numpy as np
 
 from softjaw.study.case import candidates as grasps
 from softjaw.study.case.build import (
+    body_of,
     check_object,
     forces_apart,
     geometry,
@@ -85,13 +86,12 @@ def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = (), r
     """The plan of a scene, with what ``rounds`` of refinement added; builds its objects."""
     # First, because all that follows builds the object and would fail less clearly.
     check_object(scene)
-    grasps.check_poses(scene)
+    grasps.check_candidates(scene)
     digest, text = scene.digest, scene.effective_toml()
     if rounds:
         scene = refined(scene, rounds)
     faces = math.prod(pad_shape(scene.gripper).patch_faces) if scene.run.patches != "none" else 0
     axes = tuple(grasps.axes(scene))
-    placed = own_frame(scene.object)
     units: Sequence[Any] = decided(grasps.units(scene))
     if scene.candidates.sampled and forces_apart(scene):
         units = [_with_meshes(unit, scene, rounds) for unit in units]
@@ -103,8 +103,7 @@ def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = (), r
         overrides=tuple(overrides),
         petsc_options=" ".join(f"-{key} {value}" for key, value in scene.petsc.items()),
         labels=tuple(candidate.label for candidate in grasps.candidates(scene)),
-        placed=placed,
-        rejected=scene.candidates.rejected,
+        about=_about(scene),
     )
     layout = Layout(
         axes,
@@ -115,6 +114,17 @@ def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = (), r
         rounds,
     )
     return Plan(layout, header, tuple(units))
+
+
+def _about(scene: Any) -> dict[str, Any]:
+    """What a file says about its object besides the scene; centroid and bounds where building it takes a mesh."""
+    placed = own_frame(scene.object)
+    about: dict[str, Any] = {"object_rotation": placed.rotation, "object_origin": placed.origin}
+    if scene.candidates.rejected:
+        about["rejected"] = np.array(scene.candidates.rejected, np.float32)
+    if scene.object.shape == "mesh" and not any(key.startswith("object.") for key in scene.sweep):
+        about |= body_of(scene.object)
+    return about
 
 
 def _with_meshes(unit: Any, scene: Any, rounds: Rounds) -> Any:

@@ -6,15 +6,16 @@ from collections.abc import Sequence
 from typing import Any
 
 from softjaw.fem.shell.wall_material import wall_material
-from softjaw.study.case.build import axis_span, has_wall, told
+from softjaw.study.case.build import axis_span, has_wall, listed_accuracy, told
 from softjaw.study.units import UNITS, shown, shown_text
 
 
 def scene_text(scene: Any, file: str) -> str:
     """What would be run, in a few lines."""
     c, g, o = scene.candidates, scene.gripper, scene.object
+    most = "at most " * bool(c.sampled)
     name = f" '{o.name}'" if getattr(o, "name", None) else ""
-    where = "sampled grasps" if c.poses and c.sampled else "explicit poses" if c.poses else "sampled of each object"
+    where = "sampled grasps" if c.sampled else "explicit poses"
     if not c.poses and not c.sampled:
         where = f"at {_list([*c.station_values_mm], 'mm')} along the axis, {_list(c.angles_deg, 'deg')} about it"
     size = " x ".join(f"{shown(s, 'm'):g}" for s in g.pad_size)
@@ -24,14 +25,14 @@ def scene_text(scene: Any, file: str) -> str:
         "object": f"{o.shape}{name}{_extent(o)}",
         "mesh": getattr(o, "mesh", ""),  # the effective path, wherever the scene's leads
         "wall": wall_text(o),
-        "candidates": f"{c.total} {where}",
+        "candidates": f"{most}{c.total} {where}",
         "forces": _list(scene.load.normal_force_n, "N"),
         "friction": f"mu = {scene.friction.mu:g}; CCM, PCM and PCM scaled by F_N",
         "sweep": "; ".join(f"{key}: {_list(values)}" for key, values in scene.sweep.items()),
-        "cases": str(scene.cases),
+        "cases": f"{most}{scene.cases}",
         "refinement": f"at most {c.refine} more cases" if c.refine else "",
         "pad": f"{size} mm, {g.material}, {g.shear_modulus_kpa:g} kPa, {mesh} elements ({g.element})",
-        "accuracy": _meshes(scene.accuracy, "those that may be the best" if c.sampled else "every case"),
+        "accuracy": _meshes(listed_accuracy(scene), "those that may be the best" if c.sampled else "every case"),
         "intervals": _intervals(scene),
         "effects": ", ".join(levels),
         "petsc": " ".join(f"-{key} {value}" for key, value in scene.petsc.items()),

@@ -11,7 +11,7 @@ import numpy as np
 
 from softjaw.study import pipeline
 from softjaw.study.case.build import check_object
-from softjaw.study.case.candidates import check_poses, units
+from softjaw.study.case.candidates import check_candidates, units
 from softjaw.study.case.result import CaseFailure, CaseResult
 from softjaw.study.messages import StudyError
 from softjaw.study.quantities import NEEDS, quantities
@@ -172,7 +172,7 @@ def outcome_of(made_scene: Callable[[], Scene], begin_only: bool = False) -> Out
         scene = made_scene()
         check_object(scene)
         made = units(scene)
-        check_poses(scene)
+        check_candidates(scene)
     except SceneError as error:
         return Outcome(
             "\n".join(f"{p.key}: found {p.found}, expected {p.expected}; {p.remedy}" for p in error.problems)

@@ -24,7 +24,7 @@ from softjaw.fem.objects.gap import Pose
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.study import pipeline
 from softjaw.study.case.build import build_object, check_object
-from softjaw.study.case.candidates import check_poses, units, with_sampled_grasps
+from softjaw.study.case.candidates import check_candidates, units, with_sampled_grasps
 from softjaw.study.case.result import CaseResult
 from softjaw.study.cli import main as softjaw
 from softjaw.study.flags import flags_in
@@ -109,7 +109,7 @@ def solve(outcome: Outcome, seed: int, folder: Path) -> None:
     obj: Any = build_object(scene.object)
     outcome.notes = list(getattr(obj, "notes", ()))
     made = units(scene)
-    check_poses(scene)
+    check_candidates(scene)
     for unit in made:
         forces, results = unit.scene.load.normal_force, []
         outcome.cases += len(forces)

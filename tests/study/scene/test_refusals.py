@@ -5,7 +5,7 @@ import contextlib
 import pytest
 
 from softjaw.study.case.build import check_object, shapes_of, warnings
-from softjaw.study.case.candidates import check_poses
+from softjaw.study.case.candidates import check_candidates
 from softjaw.study.cli import main
 from softjaw.study.cli.quick import petsc_overrides
 from softjaw.study.launch import prepare
@@ -46,7 +46,7 @@ def test_a_pad_that_passes_the_object_is_named_by_its_number(body):
     """The second stands at the corner of the box round the ball."""
     scene = scene_of(body, where=pose_of() + pose_of((0, 48, 46) if body == BALL else (0, 90, 0)))
     with pytest.raises(StudyError, match=r"^candidates.poses\[1\]"):
-        check_poses(scene)
+        check_candidates(scene)
 
 
 @pytest.mark.parametrize(("off", "meets"), [(30.9, True), (31.1, False)])
@@ -54,7 +54,7 @@ def test_a_pad_that_just_meets_the_object_is_not_refused(off, meets):
     """A pad 22 mm wide reaches a face at 20 mm from 31 mm off the middle."""
     scene = scene_of(BOX, where=pose_of((0.3, off, 0)))
     with contextlib.nullcontext() if meets else pytest.raises(StudyError):
-        check_poses(scene)
+        check_candidates(scene)
 
 
 @pytest.mark.ranks
