@@ -78,11 +78,13 @@ class Flag(IntFlag):
     # of no file: derived where a file holds the safe force range
     TOO_WEAK = 1 << 20, "too weak", "this force does not hold the object's mass with the safety that [task] asks for"
     TOO_STRONG = 1 << 21, "too strong", "this force dents the wall deeper than is allowed, or makes it yield"
+    # of no file: of the few best grasps, where the scene names a gripper
+    OUT_OF_REACH = 1 << 26, "out of reach", "palm or fingers of the hand meet the object, from whichever side it comes"
 
 
-DERIVED = Flag.TOO_WEAK | Flag.TOO_STRONG
+DERIVED = Flag.TOO_WEAK | Flag.TOO_STRONG | Flag.OUT_OF_REACH
 BORNE = Flag.SLIDES_OUT | Flag.YIELDS | Flag.TOO_WEAK | Flag.TOO_STRONG  # what another force may cure
-LOST = Flag.SLIPS | Flag.COLLISION | Flag.NOT_BORNE | BORNE  # of a grasp that does not hold, or does harm
+LOST = Flag.SLIPS | Flag.COLLISION | Flag.NOT_BORNE | Flag.OUT_OF_REACH | BORNE  # of a grasp that fails or does harm
 OF_FILE = sum(flag for flag in Flag if not flag & DERIVED)  # mask of the bits that a file holds
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,7 +20,7 @@ from softjaw.study.scene.text import scene_table
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
-LARGEST = "the largest that was solved"
+LARGEST = "the largest solved"
 MIN_ROLL_COSINE = math.cos(math.radians(30.0))  # pads rolled by more are another place
 
 
@@ -219,7 +220,7 @@ def distinct(ds: xr.Dataset, order: Sequence[int], score: np.ndarray, k: int, to
     """The first ``top`` distinct places (0: all) of a ranking at a force level.
 
     Grasps are neighbours where both pads touch less than half a pad apart, rolled by at most 30 degrees. Stations and
-    angles have images too: grasps at one station with the same ``score``.
+    angles have images too, which have neighbours of their own: grasps at one station with the same ``score``.
     """
     shape, rest, places = ds.status.shape[:-1], np.asarray(order, int), list[Place]()
     count = int(np.prod(shape))
@@ -230,22 +231,22 @@ def distinct(ds: xr.Dataset, order: Sequence[int], score: np.ndarray, k: int, to
     while len(rest) and not 0 < top <= len(places):
         head = rest[0]
         here = (index[rest, :-2] == index[head, :-2]).all(axis=1)
+        alike = np.abs(score[rest] - score[head]) <= TIE * abs(score[head])
+        images = here & (index[rest, -2] == index[head, -2]) & alike & (not ds.attrs["poses"])
         near, far = np.zeros(len(rest), bool), np.zeros(len(rest))
         if origin is not None and turn is not None:
             x, R = origin[..., k, :, :].reshape(count, 2, 3), turn[..., k, :, :, :].reshape(count, 2, 3, 3)
-            rolled = np.abs(R[rest, 0, :, 0] @ R[head, 0, :, 0]) < MIN_ROLL_COSINE
             # The fingers of two grasps may have changed sides.
-            for pads in (x[rest], x[rest][:, ::-1]):
-                apart = np.einsum("nfi,fij->nfj", pads - x[head], R[head])
+            for i, pads in product((head, *rest[images]), (x[rest], x[rest][:, ::-1])):
+                rolled = np.abs(R[rest, 0, :, 0] @ R[i, 0, :, 0]) < MIN_ROLL_COSINE
+                apart = np.einsum("nfi,fij->nfj", pads - x[i], R[i])
                 close = (np.abs(apart) < half).all(axis=(1, 2)) & here & ~rolled
                 near, far = near | close, np.where(close, np.linalg.norm(apart, axis=2).max(axis=1), far)
-        alike = np.abs(score[rest] - score[head]) <= TIE * abs(score[head])
-        images = here & (index[rest, -2] == index[head, -2]) & alike & (not ds.attrs["poses"]) & ~near
-        near[0], images[0] = False, False
         gone = near | images
+        near[0] = images[0] = False
         gone[0] = True
-        found = (rest[mask].tolist() for mask in (near, images))
-        places.append(Place(int(head), next(found), float(far[near].max(initial=0.0)), next(found)))
+        found = (rest[mask].tolist() for mask in (near & ~images, images))
+        places.append(Place(int(head), next(found), float(far[near & ~images].max(initial=0.0)), next(found)))
         rest = rest[~gone]
     return places
 
@@ -260,13 +261,13 @@ def at_level(ds: Any, force: float | None = None) -> tuple[Any, int, str]:
     forces = ds["normal_force"].values
     if force is None:
         k, why = shown_level(ds, judged(ds))
-        return ds, k, f", {why}"
+        return ds, k, why
     near = np.flatnonzero(np.isclose(forces, force))
     if near.size:
         return ds, int(near[0]), ""
     at = at_force(ds, force)
     low, high = (forces[i] for i in (np.searchsorted(forces, force) - 1, np.searchsorted(forces, force)))
-    return at, 0, f", by straight lines from {low:g} to {high:g} N"
+    return at, 0, f"by straight lines from {low:g} to {high:g} N"
 
 
 def shown_level(ds: Any, flags: np.ndarray) -> tuple[int, str]:

@@ -117,14 +117,15 @@ def filled_in(tables: dict[str, Any], folder: Path) -> tuple[str, Any, str] | No
     """Put the keys of ``gripper.preset`` into a scene's tables, where it has none of its own; what is wrong with it.
 
     The largest opening is what the foam leaves of the stroke. An error is a key, what it has, and what was expected; a
-    gripper's own file is looked for from ``folder``.
+    gripper's own file is looked for from ``folder``, and has its whole path then.
     """
     gripper = tables.get("gripper")
-    if not isinstance(gripper, dict) or "preset" not in gripper:
+    if not isinstance(gripper, dict) or not isinstance(name := gripper.get("preset"), str):
         return None
-    name = gripper.pop("preset")
+    if name not in PRESETS:
+        gripper["preset"] = str((folder / name).absolute())
     try:
-        keys, hand = gripper_file(name if name in PRESETS else str(folder / str(name)))
+        keys, hand = gripper_file(gripper["preset"])
     except StudyError as error:
         return "gripper.preset", name, f"one of {', '.join(PRESETS)}, or a file of the same form: {error}"
     for key, value in keys.items():

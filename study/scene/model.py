@@ -56,8 +56,8 @@ ALTERNATIVES = {  # what an override of a way of giving candidates replaces
     "sampled": ("stations", "stations_mm", "poses"),
 }
 NOT_SWEPT = (  # they change which datasets a file has and how large they are, or no number of a case
-    "object.shape", "object.mesh", "object.name", "object.mass_g", "object.density", "candidates.stations",
-    "accuracy.meshes", "accuracy.target", "effects.wrench", "limit_surface.samples",
+    "object.shape", "object.mesh", "object.name", "object.mass_g", "object.density", "gripper.preset",
+    "candidates.stations", "accuracy.meshes", "accuracy.target", "effects.wrench", "limit_surface.samples",
 )  # fmt: skip
 OF_FACES = ("gripper.element", "gripper.elements")  # keys that the number of stored faces depends on
 NO_RESULT = ("run", "uncertainty")  # sections that change no result of a case
@@ -219,6 +219,7 @@ class Scene(SceneSection):
         """SHA-256 of what changes results, the mesh's bytes included; not names, paths, ``[run]``."""
         data = self.effective()
         del data["run"], data["object"]["name"]
+        data["gripper"].pop("preset", None)  # whose keys stand beside it
         if not self.uncertainty.spread:  # files of scenes without it keep their digest
             del data["uncertainty"]
         if isinstance(self.object, Mesh):
@@ -368,7 +369,7 @@ def _scene(
         data["sweep"] = flat(data["sweep"])  # dotted keys mean the same with and without quotes
     given: dict[KeyPath, Place] = {}
     problems = put_overrides(data, overrides, given)
-    if trouble := filled_in(data, path.parent):
+    if check_files and (trouble := filled_in(data, path.parent)):
         key, found, expected = trouble
         line = lines_of(text).get(tuple(key.split(".")))
         where = given.get(tuple(key.split(".")), (str(path), line))

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import AfterValidator, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from softjaw.fem.pad.halving import halved
 from softjaw.study.grippers import PRESETS
@@ -41,16 +41,13 @@ VALUE_CHARACTERS = {*string.ascii_letters, *string.digits, *"_,.+-"}
 OTHERS = "other options go into the environment variable PETSC_OPTIONS"
 
 
-def _with_preset(schema: dict[str, Any]) -> None:
-    """Name the key that is no field, because the file's own keys take its place when a scene is read."""
-    about = "a gripper whose pad, largest opening and forces are taken, or a file of the same form"
-    schema["properties"]["preset"] = {"type": "string", "examples": [*PRESETS], "description": about}
-
-
 class Gripper(SceneSection):
     """The two equal pads. No dimension of the original gripper is published; the defaults are plausible ones."""
 
-    model_config = ConfigDict(json_schema_extra=_with_preset)
+    preset: str | None = Field(
+        None, description="a gripper whose pad, largest opening and forces are taken, or a file of the same form",
+        examples=[*PRESETS],
+    )  # fmt: skip
     pad_length_mm: float = Field(50.0, ge=1, le=500, description="long side of the pad")
     pad_width_mm: float = Field(22.0, ge=1, le=500, description="short side of the pad")
     pad_thickness_mm: float = Field(15.0, ge=0.5, le=200, description="thickness of the pad")

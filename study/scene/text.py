@@ -143,7 +143,7 @@ def _values(text: str) -> dict[str, Any]:
     for pose in values.get("candidates.poses", ()):
         # Labels name candidates and change no result.
         pose.pop("label", None)
-    return {key: value for key, value in values.items() if key != "object.name"}
+    return {key: value for key, value in values.items() if key not in ("object.name", "gripper.preset")}
 
 
 def value_text(value: Any) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,28 +12,15 @@ import xarray as xr
 
 from softjaw.friction.patch import NEGLIGIBLE
 from softjaw.study.case.result import TIE
-from softjaw.study.flags import LOST, OF_FILE, Flag, flags_in
-from softjaw.study.grippers import Hand
-from softjaw.study.quantities import BY_KEY, FORCE_RANGE, MAIN, MODELS, STATES, map_row
-from softjaw.study.ranking import (
-    LARGEST,
-    Sure,
-    at_level,
-    distinct,
-    judged,
-    passed_over,
-    rank_values,
-    ranked,
-    score_of,
-    sure,
-    task_keys,
-)
+from softjaw.study.flags import LOST, OF_FILE, Flag, flag_words, flags_in
+from softjaw.study.quantities import BY_KEY, FORCE_RANGE, LEAST_FORCE, LISTED, MAIN, MODELS, STATES, map_row
+from softjaw.study.ranking import distinct, passed_over, rank_values, score_of, sure, task_keys
 from softjaw.study.result.layout import DONE
 from softjaw.study.result.read import axes_of, dataset, values_of
-from softjaw.study.show.grasps import Index, at, candidate_of, forces, note, place, unravelled
-from softjaw.study.show.places import folded_text, named, short_name, spot
+from softjaw.study.show.grasps import Index, at, candidate_of, forces, index_of, judge, note, order, place
+from softjaw.study.show.places import folded_text, named, short_name, side_text, spot
 from softjaw.study.show.status import RESUME, aim, counts, largest_error, no_grasps, reasons, time_split, unfinished
-from softjaw.study.table import Column, Row, Table, as_text, number, terminal_width, with_error, wrapped
+from softjaw.study.table import Column, Row, Table, as_text, noted, number, terminal_width, with_error, wrapped
 from softjaw.study.units import GRAVITY, in_si, shown, shown_text, shown_unit
 
 NOTES_WIDTH, OTHERS_WIDTH, LABEL_WIDTH = 13, 16, 20  # characters
@@ -45,7 +33,7 @@ FINER = Flag.COARSE | Flag.NO_FIT | Flag.NO_CORNERS | Flag.NODAL | Flag.LEFT_OUT
 def best(
     ds: xr.Dataset,
     force: float | None = None,
-    top: int = 10,
+    top: int = LISTED,
     by: str | None = None,
     lines: bool = False,
     maps: Collection[str] = MAIN,
@@ -53,42 +41,37 @@ def best(
     """The ``top`` grasps (0: all) at a force [N], by default that of `study.ranking.shown_level`.
 
     Between two solved forces values lie on straight lines. ``by`` names the map that grasps are ranked by. With
-    ``lines`` images of one grasp share a row, and rows are counted.
+    ``lines`` images of one grasp share a row, and rows are counted. Where the scene names a gripper, listed grasps that
+    its hand does not reach come last.
 
     Raises `ValueError` for a force outside of the solved ones.
     """
     errors = values_of(ds, name) if (name := f"{aim(ds)[0]}_error") in ds else None
     known = errors is not None or "e_n_interval" not in ds
     mesh = ds["work_mesh"].values if "work_mesh" in ds else None
-    error = largest_error(errors, ds, axes_of(ds), ds.label.values, mesh) if known else ""
-    ds, k, why = at_level(ds, force)
-    flags, shape = judged(ds), ds.status.shape[:-1]
-    ds = ds.assign(flags=(ds.status.dims, flags, ds["flags"].attrs))
-    order, score = [int(i) for i in ranked(ds, k, by)], score_of(ds, by)
-    places = distinct(ds, order, rank_values(ds, score, k), k, top) if lines else []
-    listed = [place.best for place in places] or order[: top or None]
-    shared = common(flags[..., k].ravel()[listed]) if maps is BRIEF else 0
-    table = case_table(ds, [(*unravelled(i, shape), k) for i in listed], True, maps, shared)
-    if not order:
-        return Table(f"no candidate is solved at {forces(ds)[k]:g} N{why}{_solved_elsewhere(ds)}", table.columns, ())
+    error = largest_error(errors, ds, axes_of(ds), ds.label.values, mesh) if known else []
+    ds = judge(ds, force=force, by=by, top=top, lines=lines)
+    k, score, found = ds.attrs["level"], ds.attrs["score"], order(ds, ds.attrs["level"])
+    places = distinct(ds, [candidate_of(ds, index) for index in found], rank_values(ds, score, k), k, top)
+    listed = [index_of(ds, place.best, k) for place in places] if lines else found[: top or None]
+    marks = ds["flags"].values[tuple(np.array(listed, int).reshape(-1, ds.status.ndim).T)]
+    table = case_table(ds, listed, True, maps, common(marks) if maps is BRIEF else 0)
+    if not found:
+        return Table(f"no candidate is solved at {forces(ds)[k]:g} N{_solved_elsewhere(ds)}", table.columns, ())
     rows = [row | {"others": folded_text(ds, place)} for row, place in zip(table.rows, places, strict=False)]
     others = [Column("others", programs=False, wrap=OTHERS_WIDTH)] * any(row["others"] for row in rows)
     columns = [replace(column, drop=0) if column.name == score else column for column in table.columns]
     columns = [*columns[:-1], *others, columns[-1]]
     what = "places" if lines else "candidates"
-    title = f"best {len(listed)} {what} of {len(order)} solved candidates by {score} at {forces(ds)[k]:g} N"
-    first = (*unravelled(order[0], shape), k)
-    accuracy = "; ".join(text for text in (certainty(ds, order, score, k), error) if text)
-    unsolved = [f"not solved: {', '.join(none)}; 'softjaw status' says why"] if (
-        none := no_grasps(ds.status.values[..., k])) else []
-    notes = [*[f"accuracy: {accuracy}"] * bool(accuracy), *_legend(flags, listed, k), *unsolved]
-    facts = {"answer": {key: spoken_line(*value) for key, value in answer(ds, first, why).items()},
-              "pads": pads(ds, first), "force": float(forces(ds)[k]),
-             "ranked_by": score, "largest_error": error}  # fmt: skip
-    return Table(title, columns if lines else table.columns, rows or table.rows, notes, facts, "grasps")
+    title = f"best {len(listed)} {what} of {len(found)} solved candidates by {score} at {forces(ds)[k]:g} N"
+    notes = _notes(ds, [certainty(ds, [place.best for place in places], score, k), *error], marks)
+    facts = {"answer": {key: spoken_line(*value) for key, value in answer(ds, found[0]).items()},
+             "pads": pads(ds, found[0]), "force": float(forces(ds)[k]), "ranked_by": score,
+             "largest_error": "; ".join(error)}  # fmt: skip
+    return Table(title, columns if lines else table.columns, rows if lines else table.rows, notes, facts, "grasps")
 
 
-def best_text(ds: xr.Dataset, width: int, force: float | None = None, top: int = 10, by: str | None = None) -> str:
+def best_text(ds: xr.Dataset, width: int, force: float | None = None, top: int = LISTED, by: str | None = None) -> str:
     """The answer and the best grasps for a terminal; the choice is that of `best`."""
     table = best(ds, force, top, by, lines=True, maps=BRIEF)
     told = [wrapped(f"{name:<9}{text}", width, more=" " * 9) for name, text in table.facts.get("answer", {}).items()]
@@ -175,51 +158,20 @@ def safe_range(ds: xr.Dataset, index: Index) -> str:
 # --- notes -----------------------------------------------------------------------------------------------------------
 
 
-def certainty(ds: xr.Dataset, order: Sequence[int], score: str, k: int) -> str:
-    """Whether the best grasp is better than the others beyond the errors."""
-    flags, shape = ds["flags"].values[..., k].ravel()[order], ds.status.shape[:-1]
-    values = rank_values(ds, score, k)[order]
-    holding = [i for i, flag, value in zip(order, flags, values, strict=True) if not flag & LOST and np.isfinite(value)]
-    same = [tuple(np.delete(index, -1)) for index in np.ndindex(shape)]
-    units = ds[score].attrs.get("units", "") if score in ds else ""
-    return verdict(sure(ds, score, k), holding, same, units).replace("+-", "±")
-
-
-def verdict(found: Sure | None, order: Sequence[int], place: Sequence[tuple[int, ...]], units: str = "") -> str:
-    """One sentence on the best grasp against those that follow; empty where nothing is known of errors.
-
-    ``order``: the grasps from the best one downward; those that fail in the hand left out. ``place``: of every grasp,
-    what images by symmetry have in common. ``units``: of the values, in SI.
-    """
-    if found is None:
+def certainty(ds: xr.Dataset, places: Sequence[int], score: str, k: int) -> str:
+    """How many of some places, the best first, are equal to the first within the errors."""
+    errors = sure(ds, score, k)
+    if errors is None:
         return ""
-    grasps = _without_images(found.value, order, place)
-    if len(grasps) < 2:
+    usable = ~(ds["flags"].values[..., k].ravel() & LOST > 0) & np.isfinite(errors.value)
+    first, *others = [i for i in places if usable[i]] or [0]
+    apart = [errors.apart(first, i) for i in others]
+    if not apart:
         return ""
-    judged = [found.apart(grasps[0], other) for other in grasps[1:]]
-    if not np.isfinite(found.half_width[grasps]).any():
-        return "errors are not known: not all cases are solved yet, or not with all samples of the uncertain inputs"
-    if judged[0] is None:
-        return "whether the best grasp is better than the second is not known: one of them has no error"
-    alike = max((i for i, apart in enumerate(judged, start=1) if apart is False), default=0)
-    one, other = (_text(found, i, units) for i in (grasps[0], grasps[alike or 1]))
-    if not alike:
-        return f"the best grasp is better than the second beyond the errors ({one} against {other})"
-    between = "" if all(apart is False for apart in judged[:alike]) else ", though some between them can"
-    return f"the first {alike + 1} grasps cannot be distinguished ({one} to {other}){between}"
-
-
-def _without_images(value: np.ndarray, order: Sequence[int], place: Sequence[tuple[int, ...]]) -> list[int]:
-    kept: list[int] = []
-    for i in order:
-        if not any(place[i] == place[j] and abs(value[i] - value[j]) <= TIE * abs(value[j]) for j in kept[-4:]):
-            kept.append(i)
-    return kept
-
-
-def _text(found: Sure, i: int, units: str) -> str:
-    value = f"{shown(found.value[i], units):#.4g}".rstrip(".")
-    return f"{value} +- {shown_text(found.half_width[i], units, 2)}"
+    if apart[0] is None:
+        return "whether the first place is better than the second is not known: not all have an error yet"
+    alike = max((n for n, better in enumerate(apart, start=2) if better is False), default=0)
+    return f"places 1 to {alike} are equal within errors" if alike else "place 1 is the best beyond the errors"
 
 
 def common(marks: np.ndarray) -> int:
@@ -228,17 +180,22 @@ def common(marks: np.ndarray) -> int:
     return sum(int(flag) for flag, part in share if part > 0.5 and len(marks) > 2)
 
 
-def _legend(flags: np.ndarray, listed: Sequence[int], k: int) -> list[str]:
-    """The flags in the table by what to do about them, how many grasps have each, and what the most frequent means."""
-    marks, notes = flags[..., k].ravel()[list(listed)], []
+def _notes(ds: xr.Dataset, accuracy: Sequence[str], marks: np.ndarray) -> list[str]:
+    """At most three lines by what to do about them: how exact, which flags to look at, what is left out or last."""
     raised = flags_in(int(np.bitwise_or.reduce(marks, initial=0)))
-    count = {flag: int(np.count_nonzero(marks & flag)) for flag in sorted(raised)}
-    for remedy, some in (("solve finer", FINER), ("look at the grasp", ~FINER)):
-        known = sorted((flag for flag in raised if flag & some), key=lambda flag: -count[flag])
-        if known:
-            words = ", ".join(f"{flag.word} ({count[flag]} of {len(marks)})" for flag in known)
-            notes.append(f"{remedy}: {words}; {known[0].word}: {known[0].sentence}")
-    return notes
+    count = {flag: int(np.count_nonzero(marks & flag)) for flag in raised if flag != Flag.OUT_OF_REACH}
+
+    def counted(some: int) -> list[str]:
+        known = sorted((flag for flag in count if flag & some), key=lambda flag: (-count[flag], flag))
+        return [f"{flag.word} ({count[flag]} of {len(marks)})" for flag in known] + [f.sentence for f in known[:1]]
+
+    gone = [short_name(ds, c) for c, approach in ds.attrs["reach"].items() if approach == ()]
+    parts = {"accuracy": [*filter(None, accuracy), *counted(FINER)], "look at": counted(~FINER),
+             "left out": no_grasps(ds.status.values[..., ds.attrs["level"]])}  # fmt: skip
+    if gone:
+        hand = Path(task_keys(ds, "gripper")["preset"]).stem
+        parts["left out"] = [f"out of the reach of {hand}, so last: {', '.join(gone)}", *parts["left out"]]
+    return [noted(head, clauses) for head, clauses in parts.items() if clauses]
 
 
 def _solved_elsewhere(ds: xr.Dataset) -> str:
@@ -252,20 +209,20 @@ def _solved_elsewhere(ds: xr.Dataset) -> str:
 # --- the answer ------------------------------------------------------------------------------------------------------
 
 
-def answer(ds: xr.Dataset, index: Index, why: str = "") -> dict[str, tuple[str, str]]:
+def answer(ds: xr.Dataset, index: Index) -> dict[str, tuple[str, str]]:
     """What to do with a grasp, and more about it: where, how wide, how hard, what it holds, why it holds no more.
 
-    ``index`` is its case at the force that is shown, ``why`` says why it is that force.
+    ``index`` is its case at the force that is shown, of a dataset that `study.show.grasps.judge` gave.
     """
-    there = spot(ds, index)
-    name = place(ds, index)
-    nameless = there.sides and not named(ds)
-    words = ", ".join(text for text in (there.sides, there.beside) if text)
-    lines = {"where": (there.sides, f"{there.beside} ({name})") if nameless else (name, words)}
+    there, name = spot(ds, index), place(ds, index)
+    nameless = ds.attrs["poses"] and there.part and not named(ds)
+    words = ", ".join(text for text in (there.part, there.beside) if text)
+    lines = {"where": (there.part, f"{there.beside} ({name})") if nameless else (name, words)}
     if np.isfinite(opening := at(ds, "opening", index)):
-        lines["opening"] = (shown_text(opening, "m", 3), "at first touch")
-    lines |= {"force": _force(ds, index, why), "holds": _held(ds, index)}
-    lines["limit"] = ("", _limit(ds, index, there.lever))
+        approach = ds.attrs["reach"].get(candidate_of(ds, index))
+        hand = f", the hand comes {side_text(np.array(approach))}" if approach else ""
+        lines["opening"] = (shown_text(opening, "m", 3), f"at first touch{hand}")
+    lines |= {"force": _force(ds, index), "holds": _held(ds, index), "limit": ("", _limit(ds, index, there.lever))}
     return {key: value for key, value in lines.items() if any(value)}
 
 
@@ -294,68 +251,88 @@ def force_to_use(ds: xr.Dataset, index: Index) -> tuple[float, float]:
     return low, float(np.hypot(np.nan_to_num(error), MU_ERROR * low))
 
 
-def _force(ds: xr.Dataset, index: Index, why: str) -> tuple[str, str]:
+def _force(ds: xr.Dataset, index: Index) -> tuple[str, str]:
     """How hard to press: the least force that holds the mass, else what some forces hold and how to name a mass."""
     mass, safety = task_keys(ds, "object").get("mass_g"), task_keys(ds).get("safety", 1.0)
     pressed = f"{forces(ds)[index[-1]]:.3g} N per finger"
     if mass is None:
-        held = [f"{shown_text(float(values), 'kg', 3)} at {forces(ds)[k]:g} N" for k in _three(len(forces(ds)))
-                if k != index[-1] and np.isfinite(values := at(ds, "payload", (*index[:-1], k)))]  # fmt: skip
-        why = why.strip(", ").replace(LARGEST, "")  # which the limit says
-        return pressed, "; ".join([*[why] * bool(why), *held, "set object.mass_g for the least force"])
+        some = sorted({0, (len(forces(ds)) - 1) // 2, len(forces(ds)) - 1} - {index[-1]})
+        held = ", ".join(f"{shown_text(values, 'kg', 3)} at {forces(ds)[k]:g} N" for k in some
+                         if np.isfinite(values := at(ds, "payload", (*index[:-1], k))))  # fmt: skip
+        return pressed, "; ".join(filter(None, (ds.attrs["why"], held, "object.mass_g gives the least")))
     wanted, (low, error) = f"{safety:g} times its {shown_text(in_si('mass_g', mass), 'kg', 3)}", force_to_use(ds, index)
-    if not np.isfinite(low):
-        return pressed, f"no solved force holds {wanted}"
-    what = f"mesh, curve and {100 * MU_ERROR:g} % of mu"
-    return f"{with_error(low, error)} N per finger", f"the least that holds {wanted} (±: {what})"
-
-
-def _three(count: int) -> list[int]:
-    """Numbers of the smallest, a middle and the largest of some forces."""
-    return sorted({0, (count - 1) // 2, count - 1})
+    if np.isfinite(low):
+        covers = f"±: mesh, values between solved forces, {100 * MU_ERROR:g} % of mu"
+        return f"{with_error(low, error)} N per finger", f"the least that holds {wanted} ({covers})"
+    weak = not at(ds, "safety_factor", index) >= safety * (1 - TIE)
+    return pressed, f"no solved force holds {wanted}" if weak else f"the smallest solved force that holds {wanted}"
 
 
 def _held(ds: xr.Dataset, index: Index) -> tuple[str, str]:
     """What is held at the force shown, and what its error covers."""
     if not np.isfinite(at(ds, "payload", index)):
         return "", ""
-    aims = task_keys(ds).get("weight_direction", "worst") != "worst"
-    every = "in the direction of its weight" if aims else "in whichever direction it pulls"
+    every = "in the direction of its weight" if _aims(ds) else "pulled in any direction"
     every += f" at {forces(ds)[index[-1]]:g} N" * ("force_low" in ds)
-    known = "payload_interval" in ds, np.isfinite(at(ds, "payload_error", index))
     covers = "error not known: accuracy.meshes = 2 gives it"
-    if any(known):
-        covers = "±: uncertain inputs" if known[0] else "±: numerical, not mu or stiffness"
+    if "payload_interval" in ds:
+        covers = "±: uncertain inputs, 95 %"
+    elif np.isfinite(at(ds, "payload_error", index)):
+        covers = "±: mesh and method, not mu or stiffness"
     return value_text(ds, "payload", index, 3, unit=True), f"{every} ({covers})"
+
+
+def _aims(ds: xr.Dataset) -> bool:
+    """Whether the weight pulls in one direction."""
+    return task_keys(ds).get("weight_direction", "worst") != "worst"
 
 
 def _limit(ds: xr.Dataset, index: Index, lever: float) -> str:
     """Why a grasp holds no more: what lies beyond its force, the lever of the weight, better grasps that fail."""
     k, high = index[-1], float(ds["force_high"].values[index[:-1]]) if "force_high" in ds else np.nan
-    parts = []
     if high < forces(ds)[-1] * (1 - NEGLIGIBLE):
-        parts.append(f"the wall bears {high:.3g} N at most")
-    elif k == len(forces(ds)) - 1:
-        parts.append("no larger force is solved")
-    slide = 2 * min(at(ds, "f_x_max", index), at(ds, "f_y_max", index)) / GRAVITY
-    if lever > LEVER and at(ds, "payload", index) < slide * (1 - LEVER_SHARE):
-        free = f"{number(shown(slide, 'kg'))} g"
-        parts.append(f"the weight pulls {shown_text(lever, 'm', 2)} beside the pads, {free} without that lever")
-    if np.isfinite(lever) and ds.attrs["poses"]:  # else the object is not known, or a hand has room about its axis
-        # Imported here: they are slow to load.
-        from softjaw.study.export.cases import cases
-        from softjaw.study.export.selection import GripperFrame, holds
-
-        (hold,) = holds(ds, next(cases(ds, MODELS[0], [index])), GripperFrame(Hand(), ())).values()
-        parts += hold.unfit
+        parts = [f"the wall, which bears {high:.3g} N at most"]
+    else:
+        parts = [f"friction at {forces(ds)[k]:g} N{_beyond(ds, index)}"]
+    lost = without_lever(ds, index) - at(ds, "payload", index)
+    if lever > LEVER and lost > LEVER_SHARE * at(ds, "payload", index):
+        parts.append(f"the weight acts {shown_text(lever, 'm', 2)} beside the pads, which costs some"
+                     f" {number(shown(lost, 'kg'), 2)} {shown_unit('kg')}")  # fmt: skip
     done = np.flatnonzero(ds["status"].values[..., k].ravel() == DONE)
-    name = score_of(ds)
+    name = ds.attrs["score"] if ds.attrs["score"] != LEAST_FORCE else score_of(ds)
     values = rank_values(ds, name, k)[done]
-    better, lacks = passed_over(values, judged(ds)[..., k].ravel()[done])
+    better, lacks = passed_over(values, ds["flags"].values[..., k].ravel()[done])
     if better:
         top = f"{short_name(ds, int(done[better[0]]))} with {shown_text(values[better[0]], ds[name].units, 3)}"
         parts.append(f"{len(better)} with more {name} cannot be used ({top}): {lacks}")
     return "; ".join(parts)
+
+
+def _beyond(ds: xr.Dataset, index: Index) -> str:
+    """What a larger force would do, at the largest one that is solved."""
+    last = (*index[:-1], len(forces(ds)) - 1)
+    if last == index:
+        return ", the largest solved"
+    lost = flag_words(int(ds["flags"].values[last]) & LOST)
+    held = f"it holds {value_text(ds, 'payload', last, 3, unit=True)}" * bool(np.isfinite(at(ds, "payload", last)))
+    more = lost or held
+    return f"; at {forces(ds)[-1]:g} N {more}" if more else ""
+
+
+def without_lever(ds: xr.Dataset, index: Index) -> float:
+    """Mass [kg] that a grasp would hold without torque; NaN where the fingers do not share their force.
+
+    Along the closing direction a pull takes from one finger, whose friction then bears half of what acts across it:
+    W (t / f + |c| / F_N) = 2, with the share t of the pull across the closing direction and c along it.
+    """
+    f, F_N = np.array([at(ds, "f_x_max", index), at(ds, "f_y_max", index)]), at(ds, "F_N", index)
+    if task_keys(ds).get("drive", "shared") != "shared" or not np.isfinite([*f, F_N]).all() or not f.min() * F_N > 0:
+        return float("nan")
+    if not _aims(ds):
+        return float(2.0 / np.hypot(1.0 / f.min(), 1.0 / F_N) / GRAVITY)
+    pull = np.array(task_keys(ds)["weight_direction"], float)
+    *across, along = pull / np.linalg.norm(pull) @ ds["finger_pose_rotation"].values[index][0]
+    return float(2.0 / (np.linalg.norm(across / f) + abs(along) / F_N) / GRAVITY)
 
 
 def pads(ds: xr.Dataset, index: Index) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from softjaw.study.case.build import build_object, centre_of_mass, own_frame, surface_triangles
+from softjaw.study.case.build import body_of
 from softjaw.study.ranking import Place
 from softjaw.study.result.read import scene_of
 from softjaw.study.scene import SceneError
@@ -18,6 +18,8 @@ from softjaw.study.units import shown_text
 SAME_EXTENT = 0.05  # relative difference of extents that makes no side the longer one
 NEARBY = 1e-3  # from the centre of mass, within which a grasp is at it [m]
 SIDES = ("broad sides", "narrow sides", "ends")  # of an object, by its extent between them
+THIRD = 1 / 3  # of half an extent, beyond which a place is not in the middle
+ALONG_AXIS = math.cos(math.radians(15.0))  # between a direction and an axis that is named instead
 
 
 def folded_text(ds: xr.Dataset, place: Place) -> str:
@@ -42,9 +44,9 @@ def named(ds: xr.Dataset) -> bool:
 
 
 class Spot(NamedTuple):
-    """A grasp on its object in words, the sides of poses alone, and how far the weight is from the pads' middle [m]."""
+    """A grasp on its object in words: on which part, where from the centre of mass, and how far that is [m]."""
 
-    sides: str
+    part: str
     beside: str
     lever: float
 
@@ -54,40 +56,77 @@ def spot(ds: xr.Dataset, index: Index) -> Spot:
     origin, turn = (field(ds, f"finger_pose_{name}") for name in ("origin", "rotation"))
     try:
         scene = scene_of(ds, index)
-        centre = centre_of_mass(scene, build_object(scene.object))
-        frame, points = own_frame(scene.object), surface_triangles(scene.object)[0]
+        body = ds.attrs if "object_bounds" in ds.attrs else body_of(scene.object)
     except (SceneError, ValueError, OSError, AttributeError):
         return Spot("", "", math.nan)
     if origin is None or turn is None or not np.isfinite(turn[index]).all():
         return Spot("", "", math.nan)
-    offset = origin[index].mean(axis=0) - frame.to_object(centre)
-    closing = turn[index][0, :, 2]
+    middle, closing = origin[index].mean(axis=0), turn[index][0, :, 2]
+    given = scene.task.centre_of_mass
+    offset = middle - (body["object_centroid"] if given is None else np.array(given))
     half = 0.5 * abs(np.diff(origin[index], axis=0)[0] @ closing)
     offset -= np.clip(offset @ closing, -half, half) * closing  # between the fingers both bear along it
-    sides = _sides(np.ptp(frame.to_object(points), axis=0), closing) if ds.attrs["poses"] else ""
-    vector = ", ".join(f"{x + 0.0:.2g}" for x in np.round(closing, 2))
-    closes = f"closing along ({vector}), " * (sides == "on the sides")  # where no axis says it
-    return Spot(sides, closes + _beside(offset), float(np.linalg.norm(offset)))
+    if ds.attrs["poses"]:
+        part = _sides(body["object_bounds"], middle, closing)
+    else:
+        along = int(np.abs(ds.attrs["object_rotation"][:, 2]).argmax())
+        alike = ", any angle alike" * (scene.axis_symmetry == 0)
+        part = f"{_third(body['object_bounds'], middle, [along])} of the object{alike}"
+    return Spot(part, _beside(offset), float(np.linalg.norm(offset)))
 
 
-def _sides(extents: np.ndarray, closing: np.ndarray) -> str:
-    """Which sides of an object the pads press on."""
-    axis = int(np.abs(closing).argmax())
-    if abs(closing[axis]) < math.cos(math.radians(15.0)):
-        return "on the sides"
+def _sides(bounds: np.ndarray, middle: np.ndarray, closing: np.ndarray) -> str:
+    """On which sides of an object the pads press, and where on these."""
+    axis, extents = int(np.abs(closing).argmax()), np.ptp(bounds, axis=0)
+    if abs(closing[axis]) < ALONG_AXIS:
+        return f"on the sides, closing along ({', '.join(f'{x + 0.0:.2g}' for x in np.round(closing, 2))})"
     rank = int(np.sum(extents < extents[axis] * (1 - SAME_EXTENT)))
     alone = np.sum(np.abs(extents - extents[axis]) <= SAME_EXTENT * extents[axis]) == 1
-    return f"on the {SIDES[rank] if alone else 'sides'} facing {'xyz'[axis]}"
+    third = _third(bounds, middle, [other for other in range(3) if other != axis])
+    return f"{third} of the {SIDES[rank] if alone else 'sides'} facing {'xyz'[axis]}"
+
+
+def _third(bounds: np.ndarray, middle: np.ndarray, axes: list[int]) -> str:
+    """Where a point lies along the axis of some on which it is farthest off the middle.
+
+    >>> _third(np.array([[0.0, 0, 0], [1, 1, 3]]), np.array([0.5, 0.4, 2.5]), [1, 2])
+    'upper third'
+    """
+    share = (2 * middle - bounds.sum(axis=0)) / np.ptp(bounds, axis=0)
+    axis = max(axes, key=lambda axis: abs(share[axis]))
+    if abs(share[axis]) <= THIRD:
+        return "middle"
+    return f"{('lower', 'upper')[int(share[axis] > 0)] if axis == 2 else towards(axis, share[axis])} third"
+
+
+def towards(axis: int, sign: float) -> str:
+    """A direction along an axis."""
+    return f"{'-' if sign < 0 else '+'}{'xyz'[axis]}"
 
 
 def _beside(offset: np.ndarray) -> str:
     """Where the middle of the pads lies from the centre of mass [m].
 
-    >>> _beside(np.array([0.0, -0.012, 0.003]))
-    '12 mm towards -y and 3 mm towards +z of the centre of mass'
+    >>> _beside(np.array([0.0, -0.012, 0.003])), _beside(np.array([0.002, 0.0, 0.0]))
+    ('3 mm above (+z) and 12 mm towards -y of the centre of mass', '2 mm towards +x of the centre of mass')
     """
-    parts = [f"{shown_text(abs(d), 'm', 2)} towards {'-' if d < 0 else '+'}{axis}"
-             for axis, d in zip("xyz", offset, strict=True) if abs(d) > NEARBY]  # fmt: skip
-    return f"{' and '.join(parts)} of the centre of mass" if parts else "at the centre of mass"
+    words = [f"towards {towards(axis, offset[axis])}" for axis in range(2)]
+    words.append(f"{('below', 'above')[int(offset[2] > 0)]} ({towards(2, offset[2])})")
+    far = [axis for axis in (2, 0, 1) if abs(offset[axis]) > NEARBY]
+    parts = [f"{shown_text(abs(offset[axis]), 'm', 2)} {words[axis]}" for axis in far]
+    if not parts:
+        return "at the centre of mass"
+    return f"{' and '.join(parts)} {'of ' * (far != [2])}the centre of mass"
 
 
+def side_text(direction: np.ndarray) -> str:
+    """From where something comes that moves in a direction.
+
+    >>> side_text(np.array([0.0, 0, -1])), side_text(np.array([0.1, 1, 0])), side_text(np.array([0.8, 0.6, 0]))
+    ('from above (+z)', 'from -y', 'along (0.8, 0.6, 0)')
+    """
+    axis = int(np.abs(direction).argmax())
+    if abs(direction[axis]) < ALONG_AXIS * np.linalg.norm(direction):
+        return f"along ({', '.join(f'{x + 0.0:.2g}' for x in np.round(direction, 2))})"
+    side = towards(axis, -direction[axis])
+    return f"from {side}" if axis < 2 else f"from {('below', 'above')[int(direction[2] < 0)]} ({side})"

@@ -123,20 +123,18 @@ def largest_stated_error(result: Any) -> str:
     """The largest stated error so far of what the scene's target is for."""
     row = map_row(aim(result)[0]).of_error
     errors = result.read(f"{row.name}/{row.name}") if row in result.layout.quantities else None
-    return largest_error(errors, result, result.axes, result.labels, meshes(result))
+    return "; ".join(largest_error(errors, result, result.axes, result.labels, meshes(result)))
 
 
 def aim(cases: Any) -> tuple[str, float]:
-    """What the target of a file's scene is for, and the relative error; e_n and infinity where it names none."""
+    """What the target of a file's scene is for, and the relative error; payload and infinity where it names none."""
     accuracy = scene_table(cases.scene, "accuracy")
-    if "target" not in accuracy:
-        return "e_n", math.inf
-    return accuracy["target_of"], accuracy["target"]
+    return accuracy.get("target_of", "payload"), accuracy.get("target", math.inf)
 
 
 def largest_error(
     errors: NDArray[np.float64] | None, cases: Any, axes: Sequence[Any], labels: Any, mesh: Any = None
-) -> str:
+) -> list[str]:
     """The largest stated error, how many are above a target that the scene names, and how many solved cases have none.
 
     ``errors`` (array over the cases): relative errors; None where a file has none. ``cases`` (Result or
@@ -147,19 +145,19 @@ def largest_error(
     done = done if mesh is None else done & (np.asarray(mesh) > COARSE)
     solved = int(np.count_nonzero(done))
     if not solved or errors is None:
-        return NO_ERRORS if solved else ""
+        return [NO_ERRORS] * bool(solved)
     known = np.where(done, errors, np.nan)
     count = int(np.count_nonzero(np.isfinite(known)))
     if not count:
-        return f"errors: none of {solved} solved cases has one"
+        return [f"errors: none of {solved} solved cases has one"]
     worst = tuple(map(int, np.unravel_index(int(np.nanargmax(known)), status.shape)))
     name, target = aim(cases)
-    parts = [f"largest stated error of {name}: {100 * known[worst]:.2g} % ({place_text(axes, labels, worst)})"]
+    parts = [f"{name} errors up to {100 * known[worst]:.2g} % ({place_text(axes, labels, worst)})"]
     if above := int(np.count_nonzero(misses(known, target))):
-        parts.append(f"{above} of {count} cases above {100 * target:g} %")
+        parts.append(f"{above} of {count} above {100 * target:g} %")
     if count < solved:
-        parts.append(f"{solved - count} of {solved} cases have none")
-    return "; ".join(parts)
+        parts.append(f"{solved - count} of {solved} have none")
+    return parts
 
 
 # --- counts and reasons ----------------------------------------------------------------------------------------------

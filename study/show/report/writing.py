@@ -68,7 +68,7 @@ def the_answer(ds: xr.Dataset) -> Block | None:
     """The best grasp at a glance: where, how wide, how hard, what it holds, why no more."""
     if ds.attrs["best"] is None:
         return None
-    lines = answer_lines(ds, ds.attrs["best"], f", {ds.attrs['why']}")
+    lines = answer_lines(ds, ds.attrs["best"])
     return answer((name, *value) for name, value in lines.items())
 
 
