@@ -147,38 +147,50 @@ def centroid(points: FloatArray, triangles: IntArray, closed: bool) -> tuple[Flo
         return solid_centroid(points, triangles), 0.0
     step = float((high - low).max()) / 128  # cells along the longest side
     shape = np.maximum(np.ceil((high - low) / step).astype(int), 1)
-    inside, known = _votes(points, triangles, low, step, shape)
-    grid = low + step * (np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), axis=-1) + OFF_CENTRE)
+    lines = _inside(points, triangles, low, step, shape)
+    count = np.isfinite(lines).sum(axis=0)
+    inside = np.nansum(lines, axis=0) / np.maximum(count, 1)
     if not (inside > 0.5).any():
         a, b, c = points[triangles].transpose(1, 0, 2)
         area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
         return area @ (a + b + c) / (3 * area.sum()), float((high - low).max()) / 2
-    # what no line decides, or lines disagree about, counts half in one estimate and not at all in the other
-    sure, soft = (inside > 0.5).astype(float), np.where(known, inside, 0.5)
-    first, second = (np.einsum("ijk,ijkd->d", share, grid) / share.sum() for share in (sure, soft))
-    return first, float(np.linalg.norm(first - second)) + step / np.sqrt(sure.sum())
+    # lines along an axis know the places of both ends on it; what they do not decide others tell, and what none does
+    # counts half in one estimate and not at all in the other
+    sure, soft = (inside > 0.5).astype(float), np.where(count > 0, inside, 0.5)
+    first, second = (
+        np.array([_mean_along(np.where(np.isnan(line), share, line), d) for d, line in enumerate(lines)])
+        for share in (sure, soft)
+    )
+    # others than those along an axis take its ends to lie between two cells
+    rough = np.isnan(lines[:, sure > 0]).mean() + 2 / np.sqrt(sure.sum())
+    return low + step * (first + OFF_CENTRE), step * float(np.linalg.norm(first - second) + rough)
 
 
-def _votes(
-    points: FloatArray, triangles: IntArray, low: FloatArray, step: float, shape: IntArray
-) -> tuple[FloatArray, np.ndarray]:
-    """Share of the lines that call a grid's points inside, of those that decide, and where any decides."""
-    votes, count = np.zeros(shape), np.zeros(shape)
+def _mean_along(share: FloatArray, axis: int) -> float:
+    """Mean index of the cells of a grid along one axis, weighted by their share."""
+    sums = share.sum(axis=tuple(k for k in range(3) if k != axis))
+    return float(sums @ np.arange(len(sums)) / sums.sum())
+
+
+def _inside(points: FloatArray, triangles: IntArray, low: FloatArray, step: float, shape: IntArray) -> FloatArray:
+    """Share of each cell of a grid that lines along the axes have inside ``(3, *shape)``; NaN where one ends inside."""
+    shares = np.empty((3, *shape))
     for axis in range(3):
         order = [(axis + 1) % 3, (axis + 2) % 3, axis]
         x = np.ascontiguousarray((points[:, order] - low[order]) / step - OFF_CENTRE)
-        crossings = _crossings(x, triangles, *shape[order])
-        turns, valid = np.cumsum(crossings[..., :-1], axis=2), crossings.sum(axis=2) == 0
-        back = np.argsort(order)
-        votes += np.transpose(np.where(valid[..., None], turns > 0, 0.0), back)
-        count += np.transpose(np.broadcast_to(valid[..., None], turns.shape), back)
-    return votes / np.maximum(count, 1.0), count > 0
+        change, part = _crossings(x, triangles, *shape[order])
+        above = np.cumsum(change, axis=2)
+        valid, below = above[..., -1:] == 0, above - change
+        # where parts of an object cross, the winding number is larger than 1
+        turns = ((below + part) / np.maximum(np.maximum(below, above), 1))[..., :-1]
+        shares[axis] = np.transpose(np.where(valid, np.clip(turns, 0.0, 1.0), np.nan), np.argsort(order))
+    return shares
 
 
 @njit(cache=True)
 def _crossings(x, triangles, rows, columns, layers):
-    """Changes of the winding number along lines in z through whole numbers of x and y, at the next whole number."""
-    change = np.zeros((rows, columns, layers + 1), np.int64)
+    """Changes of the winding number along lines in z, in cells round whole z, and what of it is inside each cell."""
+    change, part = np.zeros((rows, columns, layers + 1), np.int64), np.zeros((rows, columns, layers + 1))
     for t in range(len(triangles)):
         a, b, c = x[triangles[t, 0]], x[triangles[t, 1]], x[triangles[t, 2]]
         area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
@@ -192,7 +204,10 @@ def _crossings(x, triangles, rows, columns, layers):
                 v = ((c[0] - i) * (a[1] - j) - (c[1] - j) * (a[0] - i)) / area
                 w = 1.0 - u - v
                 if u >= 0.0 and v >= 0.0 and w >= 0.0:
-                    k = int(np.ceil(u * a[2] + v * b[2] + w * c[2]))
+                    z = u * a[2] + v * b[2] + w * c[2]
+                    k = min(max(int(np.round(z)), 0), layers)
                     # a surface that looks down is where the line comes in
-                    change[i, j, min(max(k, 0), layers)] += 1 if area < 0.0 else -1
-    return change
+                    turn = 1 if area < 0.0 else -1
+                    change[i, j, k] += turn
+                    part[i, j, k] += turn * min(k + 0.5 - z, 1.0)
+    return change, part

@@ -45,6 +45,7 @@ FIRST_STEP_SHARE = 0.25  # first step of a shift, of the pad's side
 ROLL, TILT = math.radians(15.0), math.radians(5.0)  # first steps of a turn about the approach and of a tilt of it
 FINEST_STEP_SHARE = 1 / 8  # of the first step: 1.6 mm along a pad of 50 mm, 0.6 degrees of tilt
 SAME_POSE_STEPS = 0.5  # of a step, within which two poses are one
+IN_REACH = 3.0  # times the target: what an error may be that twice the elements in every direction bring below it
 POSES_PER_ROUND = 4  # poses of a round: few, so that the next ones start from the better of them
 
 
@@ -163,7 +164,7 @@ def next_cases(result: Any, scene: Scene) -> tuple[Case, ...]:
     if not chosen:
         relative = error / np.maximum(known.value, np.finfo(float).tiny)
         target, most = scene.accuracy.target, max((known.value[i] - error[i] for i in order), default=-np.inf)
-        listed = {place.best for place in places[:LISTED]}
+        listed = {place.best for place in places[:LISTED] if not target or relative[place.best] < IN_REACH * target}
         near = [i for i in order if times[i] == 1 and (i in listed or known.value[i] + error[i] > most)]
         chosen = [i for i in near if not (target and surely_below(relative[i], target))]
     # The least force that holds a mass lies between this force and the one below.
