@@ -12,9 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from softjaw.friction.patch import FloatArray
 
 
 @njit(cache=True)

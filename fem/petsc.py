@@ -29,12 +29,11 @@ from typing import Any, Protocol, TypeVar, cast
 
 import numpy as np
 import scipy.linalg
-from numpy.typing import NDArray
 
 from softjaw.fem.assembly import Pattern
 from softjaw.fem.errors import ConvergenceError, SpentError
+from softjaw.friction.patch import FloatArray
 
-FloatArray = NDArray[np.float64]
 Result = TypeVar("Result")
 ROOM = 160 * 2**20  # bytes that are free before a library is let loose: the largest work memory and what goes with it
 

@@ -7,9 +7,8 @@ direction of a twist matters. A translation has ``omega = 0``: no centre of rota
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from softjaw.friction.patch import FloatArray
 
 SLIDE_X: FloatArray = np.array([1.0, 0.0, 0.0])
 SLIDE_Y: FloatArray = np.array([0.0, 1.0, 0.0])

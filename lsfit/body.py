@@ -7,14 +7,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.spatial import ConvexHull
 
 from softjaw.lsfit.form import directions
 from softjaw.lsfit.samples import pressed, sample_rank
-from softjaw.lsfit.surface import OUT_OF_SPAN, ZERO_SHARE, rows, supported_shadow
-
-FloatArray = NDArray[np.float64]
+from softjaw.lsfit.surface import OUT_OF_SPAN, ZERO_SHARE, FloatArray, rows, supported_shadow
 
 
 def hull_volume(W: ArrayLike) -> float:

@@ -6,16 +6,13 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import nnls
 
 from softjaw.lsfit.form import exponents, monomials
 from softjaw.lsfit.samples import FLAT_RATIO, pressed, principal_frame
 from softjaw.lsfit.sos import least_in_cone, quadratic_parts
-from softjaw.lsfit.surface import ZERO_SHARE, FitFlag, LimitSurface, rows
-
-FloatArray = NDArray[np.float64]
-
+from softjaw.lsfit.surface import ZERO_SHARE, FitFlag, FloatArray, LimitSurface, rows
 
 MAX_REACH_RATIO = 10.0  # of a fitted surface to the largest sample
 WEAK = 1e-10  # share of the largest eigenvalue of normal equations, below which the fit is flagged as underdetermined

@@ -12,9 +12,8 @@ from numba import njit
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import roots_gegenbauer
 
-from softjaw.lsfit.surface import FitError
+from softjaw.lsfit.surface import FitError, FloatArray
 
-FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 

@@ -11,14 +11,11 @@ import math
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.spatial import ConvexHull
 
 from softjaw.lsfit.form import derivative, directions, exponents, half_sphere_monomials, monomials
-from softjaw.lsfit.surface import ZERO_SHARE
-
-FloatArray = NDArray[np.float64]
+from softjaw.lsfit.surface import ZERO_SHARE, FloatArray
 
 
 def lies_above(v: FloatArray, dimension: int, level: float) -> bool:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softjaw.lsfit.ellipsoid import Ellipsoid
 from softjaw.lsfit.form import (
@@ -21,9 +21,7 @@ from softjaw.lsfit.form import (
     round_frame,
     substitute,
 )
-from softjaw.lsfit.surface import FitError, FitFlag, LimitSurface, supported_shadow
-
-FloatArray = NDArray[np.float64]
+from softjaw.lsfit.surface import FitError, FitFlag, FloatArray, LimitSurface, supported_shadow
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softjaw.lsfit.ellipsoid import MAX_REACH_RATIO, full_ellipsoid, nearest_solution
 from softjaw.lsfit.form import exponents, powers
@@ -19,9 +19,7 @@ from softjaw.lsfit.lowest import lies_above
 from softjaw.lsfit.quartic import Quartic
 from softjaw.lsfit.samples import pressed, principal_frame
 from softjaw.lsfit.sos import MIN_EIGENVALUE, ball_gram, convex_least_squares, gram_matrix, smallest
-from softjaw.lsfit.surface import FitError, FitFlag
-
-FloatArray = NDArray[np.float64]
+from softjaw.lsfit.surface import FitError, FitFlag, FloatArray
 
 
 def convex_quartic(W: ArrayLike, T: ArrayLike, gamma: float = 0.01) -> tuple[Quartic, str]:

@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import ndtri
 
-from softjaw.lsfit.surface import OUT_OF_SPAN, ZERO_SHARE, FitFlag, LimitSurface
+from softjaw.lsfit.surface import OUT_OF_SPAN, ZERO_SHARE, FitFlag, FloatArray, LimitSurface
 
-FloatArray = NDArray[np.float64]
 THIN_RATIO = 1e-3  # of principal lengths of samples: below it they carry the flag THIN
 FLAT_RATIO = 1e-9  # of principal lengths: below it samples are flat
 

@@ -19,14 +19,12 @@ from functools import lru_cache
 
 import clarabel
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csc_array, csr_array, diags_array
 from scipy.special import factorial
 
 from softjaw.lsfit.form import exponents, tensor_places
-from softjaw.lsfit.surface import FitError
+from softjaw.lsfit.surface import FitError, FloatArray
 
-FloatArray = NDArray[np.float64]
 MIN_EIGENVALUE = 1e-7
 """Smallest eigenvalue asked of a Gram matrix, in coordinates where that of a ball has eigenvalues of 4 and more."""
 ENOUGH = 1e-6

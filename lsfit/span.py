@@ -23,7 +23,7 @@ from typing import NamedTuple
 
 import clarabel
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.sparse import block_array, csc_array, csr_array, diags_array, eye_array
 
 from softjaw.lsfit.ellipsoid import MAX_REACH_RATIO, Ellipsoid, full_ellipsoid
@@ -33,9 +33,8 @@ from softjaw.lsfit.quartic import Quartic
 from softjaw.lsfit.quartic_fit import convex_quartic
 from softjaw.lsfit.samples import FLAT_RATIO, THIN_RATIO, FitErrors, fit_error
 from softjaw.lsfit.sos import conic_solution, gram_map, quadratic_map, side, upper_triangle
-from softjaw.lsfit.surface import FitError, FitFlag, LimitSurface
+from softjaw.lsfit.surface import FitError, FitFlag, FloatArray, LimitSurface
 
-FloatArray = NDArray[np.float64]
 # lam, beta and gamma of Zhou's objective, those of the authors for six components. With all 1, as published for three,
 # the errors of the gradients, longer than those of P, may be worth more than all of P - 1: no surface at all is best.
 ZHOU_WEIGHTS = 1.0, 10.0, 1.0

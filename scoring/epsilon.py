@@ -35,12 +35,13 @@ from typing import NamedTuple
 
 import clarabel
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import linprog
 from scipy.sparse import block_diag, csc_array, vstack
 
 from softjaw.scoring.contact import (
     Body,
+    FloatArray,
     SoftContact,
     ball_map,
     ellipsoid_inside,
@@ -49,7 +50,6 @@ from softjaw.scoring.contact import (
     joint_support,
 )
 
-FloatArray = NDArray[np.float64]
 NO_WRENCH = 1e-9  # relative to the largest wrench of a contact: what counts as none
 MOST_FACETS = 12  # met one after the other from a start
 LORENTZ = np.array([1.0, -1.0, -1.0, -1.0])

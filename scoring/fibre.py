@@ -25,9 +25,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
-from softjaw.scoring.contact import Body, ellipsoid_matrix, fibonacci_vertices, hull_volume, vertices_of
+from softjaw.scoring.contact import Body, FloatArray, ellipsoid_matrix, fibonacci_vertices, hull_volume, vertices_of
 
-FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
 
 

@@ -25,11 +25,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from softjaw.scoring.contact import SoftContact
+from softjaw.scoring.contact import FloatArray, SoftContact
 
-FloatArray = NDArray[np.float64]
 KINDS = ("shared", "up_to", "fixed")
 BOUND_GAP = 5e-4  # of the bounds, relative, at which the search ends
 ROUNDING_FORCE = 1e-7  # of the forces of the grasp, below which a force is rounding

@@ -27,13 +27,10 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from softjaw.scoring.contact import Body, SoftContact, ball_map, vertices_of
+from softjaw.scoring.contact import Body, FloatArray, SoftContact, ball_map, vertices_of
 from softjaw.scoring.fibre import Fibre, Span, fibre_of
-
-FloatArray = NDArray[np.float64]
-
 
 DELTA_TURN = 1e-9  # [rad] keeps a direction off sides parallel to it, where the share of least force is not unique
 

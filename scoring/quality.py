@@ -8,14 +8,12 @@ from dataclasses import dataclass
 from enum import IntFlag
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softjaw.scoring.closed_form import epsilon_l1, epsilon_linf, volume_l1, volume_linf
-from softjaw.scoring.contact import ROUNDING_SHARE, Body, SoftContact, ellipsoid_matrix
+from softjaw.scoring.contact import ROUNDING_SHARE, Body, FloatArray, SoftContact, ellipsoid_matrix
 from softjaw.scoring.epsilon import epsilon
 from softjaw.scoring.pose import pose_volume
-
-FloatArray = NDArray[np.float64]
 
 
 class ScoreFlag(IntFlag):

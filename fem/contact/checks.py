@@ -8,8 +8,9 @@ import numpy as np
 
 from softjaw.fem.contact.problem import ContactPoints
 from softjaw.fem.errors import CheckError, ConvergenceError, NotReachedError
-from softjaw.fem.pad.foam import FloatArray, Foam
+from softjaw.fem.pad.foam import Foam
 from softjaw.friction.motion import fibonacci_twists
+from softjaw.friction.patch import FloatArray
 
 BALANCE = 1e-8  # of the normal force
 # of an element's size, of the largest pressure, of their product: a hundred times what the tolerance of the solve

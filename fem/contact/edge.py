@@ -17,9 +17,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from softjaw.friction.patch import NEGLIGIBLE, ContactPatch
+from softjaw.friction.patch import NEGLIGIBLE, ContactPatch, FloatArray
 
-FloatArray = NDArray[np.float64]
 RESOLVED = 0.24  # node spacing over half length at which half of the fourth moment counts (Hertz's cylinder)
 FLATTEST, STEEPEST = 1.8, 2.4  # of <y^4> / <y^2>^2: an even pressure, and more than any contact has that ends smoothly
 EVEN, POINTED = 7.0 / 6.0, 14.0 / 9.0  # bounds of <s^2> / <s>^2 from a rim on: c_0 = 0, and c_1 = -c_0 / b

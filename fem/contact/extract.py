@@ -10,14 +10,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softjaw.fem.contact.path import Pressed
 from softjaw.fem.contact.problem import ContactPoints
 from softjaw.fem.pad.mesh import Pad, along_side, face_rule
-from softjaw.friction.patch import ContactPatch
-
-FloatArray = NDArray[np.float64]
+from softjaw.friction.patch import ContactPatch, FloatArray
 
 
 def extract(pad: Pad, pressed: Pressed, rule: str = "") -> ContactPatch:

@@ -22,7 +22,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from softjaw.friction.patch import FloatArray
+
 # Stiffness of stick in units of E / thickness: three times as much moves e_n by up to 0.05 % and takes a third more
 # Newton iterations.
 STICK = 30.0

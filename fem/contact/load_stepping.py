@@ -24,15 +24,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softjaw.fem.contact.checks import ALTERNATING, BALANCE
 from softjaw.fem.contact.problem import ContactProblem, Control
 from softjaw.fem.contact.rigid import RigidProblem
 from softjaw.fem.errors import ConvergenceError, NotReachedError, SpentError
 from softjaw.fem.petsc import NonlinearSolver
+from softjaw.friction.patch import FloatArray
 
-FloatArray = NDArray[np.float64]
 State = tuple[FloatArray, float]  # unknowns and force [N]
 RESIDUAL = 1e-10  # of the normal force: where a solve ends
 SHORTEST_PART = 1.0 / 8.0  # of the step between two forces, before displacement control

@@ -21,9 +21,10 @@ from scipy.spatial import cKDTree
 
 from softjaw.fem.contact.path import Pressed
 from softjaw.fem.contact.press import Press
-from softjaw.fem.objects.gap import FloatArray, Gap, NoContactError
+from softjaw.fem.objects.gap import Gap, NoContactError
 from softjaw.fem.objects.measured_face import MeasuredFace
 from softjaw.fem.pad.mesh import Pad
+from softjaw.friction.patch import FloatArray
 
 NOISE_MARGIN = 2.0  # standard errors of the face that a contact has to stand
 LIFT, RAMP = 3.0, 2.0  # standard errors by which the face is lifted where nothing surely bears; elements of the ramp

@@ -20,13 +20,14 @@ import numpy as np
 
 from softjaw.fem.contact.checks import ALTERNATING, Checks, check
 from softjaw.fem.contact.friction import PATH_RESIDUAL, Anchor, load_steps
-from softjaw.fem.contact.load_stepping import ASTRAY, RESIDUAL, STRAY, FloatArray, Stepping, Work
+from softjaw.fem.contact.load_stepping import ASTRAY, RESIDUAL, STRAY, Stepping, Work
 from softjaw.fem.contact.problem import ContactPoints, ContactProblem
 from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.fem.objects.gap import Pose
 from softjaw.fem.pad.interpolation import interpolated
 from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.petsc import NonlinearSolver, Seconds
+from softjaw.friction.patch import FloatArray
 
 ProblemT = TypeVar("ProblemT", bound=ContactProblem)
 

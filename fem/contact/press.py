@@ -17,12 +17,13 @@ from typing import Any
 import numpy as np
 
 from softjaw.fem.contact.checks import ALTERNATING, check, explained, refuse_fall
-from softjaw.fem.contact.load_stepping import RESIDUAL, FloatArray, Following, State, Stepping, Work
+from softjaw.fem.contact.load_stepping import RESIDUAL, Following, State, Stepping, Work
 from softjaw.fem.contact.path import LoadPath, OnPath, Pressed
 from softjaw.fem.contact.problem import Control, Gap
 from softjaw.fem.contact.rigid import RigidProblem
 from softjaw.fem.errors import CheckError, ConvergenceError, NotReachedError, SpentError
 from softjaw.fem.pad.mesh import Pad
+from softjaw.friction.patch import FloatArray
 
 LONGEST_CLOSING, SHORTEST_CLOSING = 0.05, 1 / 64  # step to a given closing, of the thickness; of it, the shortest
 

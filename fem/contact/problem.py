@@ -31,9 +31,8 @@ from softjaw.fem.objects.gap import Pose
 from softjaw.fem.pad.foam import Foam
 from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.shell.facing import FAR
-from softjaw.friction.patch import NEGLIGIBLE
+from softjaw.friction.patch import NEGLIGIBLE, FloatArray
 
-FloatArray = NDArray[np.float64]
 Gap = Callable[[FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
 IN_PLACE = Pose(np.eye(3), np.zeros(3))
 

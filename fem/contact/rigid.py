@@ -7,9 +7,10 @@ from collections.abc import Callable
 import numpy as np
 
 from softjaw.fem.assembly import Pattern, add_up, gather, pairs
-from softjaw.fem.contact.problem import ContactProblem, Control, Evaluated, Finger, FloatArray, Gap
+from softjaw.fem.contact.problem import ContactProblem, Control, Evaluated, Finger, Gap
 from softjaw.fem.pad import foam as kernel
 from softjaw.fem.pad.mesh import Pad
+from softjaw.friction.patch import FloatArray
 
 NO_DIRECTIONS = np.empty((0, 3))
 

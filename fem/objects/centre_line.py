@@ -14,8 +14,9 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from softjaw.fem.errors import MeshError
-from softjaw.fem.objects.gap import FloatArray, IntArray
+from softjaw.fem.objects.gap import IntArray
 from softjaw.fem.objects.traced_outline import largest_loops, smooth_spline
+from softjaw.friction.patch import FloatArray
 
 HEIGHTS = 161  # at which sections are cut
 FEWEST = 8  # of them that enclose an area

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numba import njit
 
-from softjaw.fem.objects.gap import FloatArray
+from softjaw.friction.patch import FloatArray
 
 SMALLEST_STRETCH = 1e-3  # 1 + curvature * g never drops below: beyond it the point has passed the centre of curvature
 

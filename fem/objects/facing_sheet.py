@@ -20,10 +20,11 @@ import numpy as np
 from numba import njit
 from scipy.ndimage import distance_transform_edt, gaussian_filter
 
-from softjaw.fem.objects.gap import FloatArray, Pose
+from softjaw.fem.objects.gap import Pose
 from softjaw.fem.objects.smooth_triangles import SmoothTriangles
 from softjaw.fem.objects.splines import evaluate_grid, grid_coefficients
 from softjaw.fem.objects.triangle_tree import DEPTH, TriangleTree, first_hit
+from softjaw.friction.patch import FloatArray
 
 CONE = np.radians(30.0)
 BOX_MARGIN = 0.5  # of the box's depth: triangles so far beside the box still count
@@ -192,9 +193,7 @@ def facing_sheet(
     # share of the mesh's size: how far above a triangle a line of sight starts
     lines, lift = lines_of_sight(pose), 1e-7 * float(np.ptp(whole.points, axis=0).max())
     R = np.ascontiguousarray(pose.rotation)
-    how = _seen(
-        near, normals, 1 if closed else 2, lines, 2 * step, R, pose.origin, lower, upper, lift, whole.nodes
-    )
+    how = _seen(near, normals, 1 if closed else 2, lines, 2 * step, R, pose.origin, lower, upper, lift, whole.nodes)
     side = np.ones(len(normals))
     side[near[how < 0]] = -1.0
     straight = np.zeros(len(normals), dtype=bool)

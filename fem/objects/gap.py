@@ -13,7 +13,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from softjaw.friction.patch import FloatArray
+
 IntArray = NDArray[np.int64]
 Gap = tuple[FloatArray, FloatArray, FloatArray]
 Surface = tuple[FloatArray, IntArray]

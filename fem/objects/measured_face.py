@@ -26,7 +26,8 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import BSpline
 from scipy.linalg import eigh
 
-from softjaw.fem.objects.gap import FloatArray, Gap
+from softjaw.fem.objects.gap import Gap
+from softjaw.friction.patch import FloatArray
 
 CUBIC = 3
 STRENGTHS = np.logspace(-8.0, 8.0, 129)  # of the penalty, over that at which data and penalty weigh the same

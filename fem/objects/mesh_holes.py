@@ -14,7 +14,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from softjaw.fem.objects.gap import FloatArray, IntArray, edges_of, solid_centroid
+from softjaw.fem.objects.gap import IntArray, edges_of, solid_centroid
+from softjaw.friction.patch import FloatArray
 
 SMALL_HOLE = 0.02  # of the object's diagonal: smaller holes are filled, others stay open
 FEW_SIDES, LARGEST_GAP = 4, 0.1  # a triangle or two that are missing are filled up to this share of the diagonal

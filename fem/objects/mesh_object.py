@@ -20,13 +20,14 @@ import numpy as np
 
 from softjaw.fem.errors import MeshError
 from softjaw.fem.objects.facing_sheet import COARSE, FacingSheet, facing_sheet
-from softjaw.fem.objects.gap import FloatArray, Gap, IntArray, NoContactError, Pose, Surface
+from softjaw.fem.objects.gap import Gap, IntArray, NoContactError, Pose, Surface
 from softjaw.fem.objects.mesh_file import read_triangles
 from softjaw.fem.objects.mesh_holes import centroid
 from softjaw.fem.objects.smooth_triangles import CREASE_ANGLE, SmoothTriangles, smooth_triangles
 from softjaw.fem.objects.splines import evaluate_grid, grid_coefficients
 from softjaw.fem.objects.triangle_tree import TriangleTree
 from softjaw.fem.objects.triangles import cleaned, decimated, pieces_of
+from softjaw.friction.patch import FloatArray
 
 __all__ = ["MeshError", "MeshObject", "MeshRegion"]
 MARGIN_CELLS = 3  # least number of cells sampled beyond the box

@@ -16,10 +16,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from softjaw.fem.objects.gap import FloatArray, about_z
+from softjaw.fem.objects.gap import about_z
 from softjaw.fem.objects.profile import Curve
 from softjaw.fem.objects.revolution import Revolution
-from softjaw.friction.patch import NEGLIGIBLE
+from softjaw.friction.patch import NEGLIGIBLE, FloatArray
 
 TINY = 1e-100  # zero below a logarithm
 

@@ -14,8 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from softjaw.fem.objects.gap import FloatArray
-from softjaw.friction.patch import NEGLIGIBLE
+from softjaw.friction.patch import NEGLIGIBLE, FloatArray
 
 COLLINEAR = 1e-4  # points this close to a line, in units of their shortest step, are on it
 ARC_STEP = np.pi / 6  # a rounding is interpolated at least this finely

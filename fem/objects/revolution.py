@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from softjaw.fem.objects.gap import Analytic, FloatArray, Gap, Surface, grid_triangles
+from softjaw.fem.objects.gap import Analytic, Gap, Surface, grid_triangles
 from softjaw.fem.objects.profile import Curve, through, with_lids
-from softjaw.friction.patch import NEGLIGIBLE
+from softjaw.friction.patch import NEGLIGIBLE, FloatArray
 
 BLOCK = 8  # segments of the polyline that share one bounding circle
 TURN = np.radians(3.0)  # largest turn of the curve within one segment of the polyline

@@ -10,17 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from softjaw.fem.objects.gap import (
-    Analytic,
-    FloatArray,
-    Gap,
-    GapFunction,
-    GapObject,
-    Surface,
-    grid_triangles,
-    radial,
-)
+from softjaw.fem.objects.gap import Analytic, Gap, GapFunction, GapObject, Surface, grid_triangles, radial
 from softjaw.fem.objects.revolution import Revolution, closest
+from softjaw.friction.patch import FloatArray
 
 __all__ = ["Box", "EllipticCylinder", "GapFunction", "GapObject", "Plane", "Revolution", "Sphere"]
 

@@ -17,9 +17,10 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from softjaw.fem.objects.gap import FloatArray, IntArray, edges_of
+from softjaw.fem.objects.gap import IntArray, edges_of
 from softjaw.fem.objects.triangle_tree import corner_angles
 from softjaw.fem.objects.triangles import area_vectors, neighbours
+from softjaw.friction.patch import FloatArray
 
 CREASE_ANGLE = 30.0  # [deg]: edges that turn by less are taken for facets of a smooth surface
 STEEPEST_EDGE = 0.7  # an edge that leaves its tangent plane by more (sine) is kept straight: its normal is no use
@@ -122,9 +123,7 @@ class SmoothTriangles:
         return x.reshape(-1, 3)
 
 
-def smooth_triangles(
-    points: FloatArray, triangles: IntArray, crease_angle: float = CREASE_ANGLE
-) -> SmoothTriangles:
+def smooth_triangles(points: FloatArray, triangles: IntArray, crease_angle: float = CREASE_ANGLE) -> SmoothTriangles:
     """Smooth version of triangles; edges that turn by more than ``crease_angle`` [deg], or have no two sides, stay."""
     pairs, joined = edges_of(triangles), neighbours(points, triangles)
     paired, ends = joined.paired, joined.edges

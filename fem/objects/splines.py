@@ -17,7 +17,7 @@ from numba import njit
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import spline_filter
 
-from softjaw.fem.objects.gap import FloatArray
+from softjaw.friction.patch import FloatArray
 
 
 @dataclass(frozen=True, eq=False)

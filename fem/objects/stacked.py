@@ -8,11 +8,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from softjaw.fem.objects.gap import Analytic, FloatArray, Gap, GapFunction, Pose, Surface, grid_triangles
+from softjaw.fem.objects.gap import Analytic, Gap, GapFunction, Pose, Surface, grid_triangles
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.fem.objects.outer_surface import OuterSurface
 from softjaw.fem.objects.splines import SplineSurface, spline_surface
 from softjaw.fem.shell.facing import FAR, Wall, face
+from softjaw.friction.patch import FloatArray
 
 AROUND, ALONG = 192, 256  # samples of the surface that splines join
 RIM = 17  # samples of a rounded edge, which is short

@@ -18,10 +18,11 @@ from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
 from softjaw.fem.errors import MeshError
-from softjaw.fem.objects.gap import FloatArray, IntArray
+from softjaw.fem.objects.gap import IntArray
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.fem.objects.profile import Curve
 from softjaw.fem.objects.revolution import Revolution
+from softjaw.friction.patch import FloatArray
 
 LEVELS = 400  # heights of the first look at a mesh
 FEW = 64  # rays per height of that look

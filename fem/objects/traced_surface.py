@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
 from softjaw.fem.errors import MeshError
-from softjaw.fem.objects.gap import FloatArray
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.fem.objects.outer_surface import OuterSurface
 from softjaw.fem.objects.profile import with_lids
@@ -36,6 +35,7 @@ from softjaw.fem.objects.traced_outline import (
     smooth_spline,
 )
 from softjaw.fem.objects.triangles import area_vectors
+from softjaw.friction.patch import FloatArray
 
 PER_WAVE = 16  # heights at which rays are cast
 AROUND, MOST_ALONG = 256, 800

@@ -14,8 +14,8 @@ from functools import cached_property
 import numpy as np
 from numba import njit
 
-from softjaw.fem.objects.gap import FloatArray, IntArray, edges_of
-from softjaw.friction.patch import NEGLIGIBLE
+from softjaw.fem.objects.gap import IntArray, edges_of
+from softjaw.friction.patch import NEGLIGIBLE, FloatArray
 
 LEAF = 4  # triangles in the smallest boxes
 DEPTH = 128  # of the stack; a tree of 500 000 triangles is 18 deep

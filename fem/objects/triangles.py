@@ -17,10 +17,11 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from softjaw.fem.errors import MeshError
-from softjaw.fem.objects.gap import FloatArray, IntArray, cone_volumes, edges_of
+from softjaw.fem.objects.gap import IntArray, cone_volumes, edges_of
 from softjaw.fem.objects.mesh_file import LENGTHS
 from softjaw.fem.objects.mesh_holes import border_loops, lid_corners, with_holes_filled
 from softjaw.fem.objects.triangle_tree import TriangleTree
+from softjaw.friction.patch import FloatArray
 
 SMALLEST, LARGEST = 1e-3, 2.0  # plausible largest extent of an object that a gripper holds [m]
 HUGE_COORDINATE = 1e12  # of a coordinate, in any unit

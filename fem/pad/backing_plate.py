@@ -17,9 +17,7 @@ from scipy.linalg import cho_factor, cho_solve
 from softjaw.fem.pad.shape import BackingPlate, TiltingMount
 from softjaw.fem.shell.element import Shell, patch
 from softjaw.fem.shell.wall_model import LinearShell
-from softjaw.friction.patch import NEGLIGIBLE
-
-FloatArray = NDArray[np.float64]
+from softjaw.friction.patch import NEGLIGIBLE, FloatArray
 
 
 @dataclass(frozen=True)

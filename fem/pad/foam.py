@@ -13,14 +13,13 @@ from pathlib import Path
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from softjaw.fem import materials
 from softjaw.fem.assembly import gather, pairs
 from softjaw.fem.materials import inverted, principal, stress
 from softjaw.fem.pad.mesh import Pad
+from softjaw.friction.patch import FloatArray
 
-FloatArray = NDArray[np.float64]
 SMALLEST_DET = 0.05  # a Newton step is shortened before an element is compressed further than this
 
 

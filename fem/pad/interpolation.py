@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.fem.pad.mesh import Pad, along_side
+from softjaw.friction.patch import FloatArray
 
-FloatArray = NDArray[np.float64]
 Places = tuple[NDArray[np.int64], FloatArray]  # of points along an axis: nodes (n, k) of their element, shape functions
 UPRIGHT = np.ones(3)
 

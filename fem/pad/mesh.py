@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 from skfem import Basis, ElementHex1, ElementHex2, ElementLineP1, ElementLineP2, MeshHex
 
+from softjaw.fem.assembly import IntArray
 from softjaw.fem.materials import Material
 from softjaw.fem.pad.backing_plate import BackStiffness, back_stiffness, mount_stiffness
 from softjaw.fem.pad.shape import BackingPlate, PadShape, TiltingMount
+from softjaw.friction.patch import FloatArray
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int32]
 # these orders give 2 x 2 x 2 and 3 x 3 x 3 Gauss points
 BASES = {"hex8": (ElementHex1, 3), "hex27": (ElementHex2, 5)}  # element, order of the quadrature
 # Square of the distance of a face rule's outer points from its middle over half the side, by the number of points.

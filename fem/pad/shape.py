@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softjaw.fem.pad.halving import halved
+from softjaw.friction.patch import FloatArray
 
-FloatArray = NDArray[np.float64]
 PER_SIDE = {"hex8": 2, "hex27": 3}  # nodes along a side of each element
 
 

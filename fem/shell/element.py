@@ -19,14 +19,13 @@ from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import bsr_matrix
 
-from softjaw.fem.assembly import Pattern, pairs
+from softjaw.fem.assembly import IntArray, Pattern, pairs
 from softjaw.fem.shell import element_kernel as kernel
-from softjaw.fem.shell.element_kernel import A_0, A_G, B_0, B_G, GAUSS, N_G, STRAINS, FloatArray
+from softjaw.fem.shell.element_kernel import A_0, A_G, B_0, B_G, GAUSS, N_G, STRAINS
+from softjaw.friction.patch import FloatArray
 
-IntArray = NDArray[np.int32]
 SHEAR_CORRECTION = 5.0 / 6.0
 NO_STEP = np.empty((0, 6))
 

@@ -16,7 +16,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from softjaw.friction.patch import FloatArray
 
 CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 STRAINS = 26  # 4 x 2 membrane, 4 x 2 bending, 2 in-plane shears, 4 transverse shears, 4 thickness strains

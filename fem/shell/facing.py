@@ -20,14 +20,13 @@ from functools import cached_property
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from softjaw.fem.assembly import IntArray
 from softjaw.fem.materials import inverted
-from softjaw.fem.objects.gap import FloatArray
 from softjaw.fem.objects.splines import SplineSurface, evaluate
+from softjaw.friction.patch import FloatArray
 
-IntArray = NDArray[np.int32]
 FAR = 1.0  # gap of a point that faces no wall [m]
 LONGEST_TURN, LONGEST_SLIDE = 0.1, 0.004  # of one iteration [rad], [m]
 

@@ -16,10 +16,10 @@ from softjaw.fem.contact.load_stepping import RESIDUAL, Stepping, Work, falls
 from softjaw.fem.contact.path import LoadPath, OnPath, Pressed
 from softjaw.fem.contact.problem import Control
 from softjaw.fem.errors import CheckError, ConvergenceError, SpentError
-from softjaw.fem.objects.gap import FloatArray
 from softjaw.fem.shell.opening import Opening, creep
 from softjaw.fem.shell.wall_mesh import BodyMesh, interpolated
 from softjaw.fem.shell.wall_problem import WallProblem
+from softjaw.friction.patch import FloatArray
 
 LONGEST_STEP, SHORTEST_STEP = 5e-4, 1.0 / 16.0  # of the closing [m] while a wall snaps in; part of it, or it jumps
 JUMP = 1e-3  # change of closing displacement between two forces that may have passed over a limit [m]

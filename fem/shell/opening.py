@@ -17,10 +17,10 @@ from scipy.spatial import cKDTree
 
 from softjaw.fem.contact.problem import Control
 from softjaw.fem.errors import CheckError, ConvergenceError
-from softjaw.fem.objects.gap import FloatArray
 from softjaw.fem.petsc import NonlinearSolver
 from softjaw.fem.shell.wall_mesh import BodyMesh
 from softjaw.fem.shell.wall_problem import WallProblem
+from softjaw.friction.patch import FloatArray
 
 FIRST_STEP, SHORTEST_STEP = 0.25, 1e-5  # step of time, in units of D over the pad's modulus per thickness and area
 MOVE, FARTHEST = 4e-4, 1.2e-3  # of a node in one step: wanted, and the most that is taken [m]

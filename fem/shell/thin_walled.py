@@ -17,12 +17,12 @@ import numpy as np
 from softjaw.fem.objects.gap import Pose, about_z
 from softjaw.fem.objects.outer_surface import OuterSurface
 from softjaw.fem.objects.stacked import wall_surface
-from softjaw.fem.shell.element import FloatArray, Shell
+from softjaw.fem.shell.element import Shell
 from softjaw.fem.shell.facing import Wall
 from softjaw.fem.shell.wall_material import WallMaterial
 from softjaw.fem.shell.wall_mesh import BodyMesh, MeshSize, body_mesh
 from softjaw.fem.shell.wall_model import LinearShell, LinearWall, NonlinearWall
-from softjaw.friction.patch import NEGLIGIBLE
+from softjaw.friction.patch import NEGLIGIBLE, FloatArray
 
 HALF_TURN = np.diag([-1.0, -1.0, 1.0])
 

@@ -9,9 +9,10 @@ from itertools import pairwise
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from softjaw.fem.assembly import IntArray
 from softjaw.fem.objects.outer_surface import OuterSurface
-from softjaw.fem.shell.element import FloatArray, IntArray, ShellMesh, grid_elements
-from softjaw.friction.patch import NEGLIGIBLE
+from softjaw.fem.shell.element import ShellMesh, grid_elements
+from softjaw.friction.patch import NEGLIGIBLE, FloatArray
 
 Thickness = float | Sequence[tuple[float, float]]  # of a wall [m], or pairs (z, thickness)
 LINE_SAMPLES = 4000  # of the wanted element size along a line

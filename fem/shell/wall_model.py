@@ -17,11 +17,12 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 from scipy.sparse import csr_matrix
 
-from softjaw.fem.assembly import Pattern, add_up
+from softjaw.fem.assembly import IntArray, Pattern, add_up
 from softjaw.fem.petsc import Factors
 from softjaw.fem.shell import element_kernel as kernel
-from softjaw.fem.shell.element import FloatArray, IntArray, Shell
+from softjaw.fem.shell.element import Shell
 from softjaw.fem.shell.wall_mesh import BodyMesh
+from softjaw.friction.patch import FloatArray
 
 AT_ONCE = 192  # right-hand sides; bounds the memory
 
@@ -201,5 +202,3 @@ def _at_crossings(mesh: BodyMesh, values: FloatArray) -> FloatArray:
     grid = make_interp_spline(*around, k=1)(lines)
     # beyond the ends as between the last
     return make_interp_spline(0.5 * (mesh.s[1:] + mesh.s[:-1]), grid, k=1, axis=1)(mesh.s)
-
-

@@ -22,16 +22,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softjaw.fem.assembly import Pattern, add_up, pairs
+from softjaw.fem.assembly import IntArray, Pattern, add_up, pairs
 from softjaw.fem.contact.friction import Anchor
 from softjaw.fem.contact.problem import ContactProblem, Control, Evaluated, Finger, Gap
-from softjaw.fem.objects.gap import FloatArray, Pose
+from softjaw.fem.objects.gap import Pose
 from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.shell.facing import FAR, Facing, Wall, face
 from softjaw.fem.shell.wall_kernel import contact_tangent
 from softjaw.fem.shell.wall_model import NonlinearWall
+from softjaw.friction.patch import FloatArray
 
-IntArray = NDArray[np.int32]
 # traction of no point, its derivatives by motion, normal and pressure, and where no point stuck
 NO_FRICTION: tuple[Any, ...] = (
     *(np.empty((0, *shape)) for shape in ((3,), (3, 3), (3, 3), (3,))), np.empty((0, 4), np.int32), np.empty((0, 4)),
