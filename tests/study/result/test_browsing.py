@@ -1,4 +1,4 @@
-"""A result file opens as plots in the tools people have: silx, nexusformat, xarray, h5ls, h5web in a browser.
+"""A result file opens as plots in the tools people have: silx, nexusformat, xarray.
 
 They live in an environment of their own (``tests/browse``), made once in the user's cache and used again: minutes the
 first time. Where it cannot be had the tests that need it are skipped and say what was missing.
@@ -23,21 +23,7 @@ from tests.study.launching import ROOT, launch
 pytestmark = pytest.mark.long
 
 BROWSE = ROOT / "tests" / "browse"
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 STATIONS = ("--set", "candidates.stations_mm=[-12, 0, 12]")
-
-
-def cached(name, sources, make):
-    """A folder in the user's cache that ``make(folder)`` filled from these sources; skips where that fails."""
-    key = hashlib.sha256(b"".join((BROWSE / source).read_bytes() for source in sources)).hexdigest()[:12]
-    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "softjaw"
-    folder = cache / f"{name}-{key}"
-    if not (folder / "complete").exists():
-        shutil.rmtree(folder, ignore_errors=True)
-        folder.mkdir(parents=True)
-        make(folder)
-        (folder / "complete").touch()
-    return folder
 
 
 def or_skip(words, **options):
@@ -58,26 +44,15 @@ def answer(words, **options):
 
 @pytest.fixture(scope="module")
 def python():
-    def make(folder):
+    """The interpreter of an environment in the user's cache, by what it has to hold; skips where that cannot be had."""
+    key = hashlib.sha256((BROWSE / "requirements.txt").read_bytes()).hexdigest()[:12]
+    folder = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "softjaw" / f"viewers-{key}"
+    if not (folder / "complete").exists():
+        shutil.rmtree(folder, ignore_errors=True)
         or_skip([sys.executable, "-m", "venv", folder / "venv"])
         or_skip([folder / "venv/bin/pip", "install", "-q", "-r", BROWSE / "requirements.txt"])
-
-    return cached("viewers", ["requirements.txt"], make) / "venv/bin/python"
-
-
-@pytest.fixture(scope="module")
-def web():
-    sources = ["package.json", "vite.config.js", "index.html", "src/main.jsx", "open.mjs"]
-    npm = shutil.which("npm")
-    if npm is None:
-        pytest.skip("no npm on this machine")
-
-    def make(folder):
-        shutil.copytree(BROWSE, folder, dirs_exist_ok=True)
-        or_skip([npm, "install", "--no-audit", "--no-fund"], cwd=folder)
-        or_skip([npm, "run", "build"], cwd=folder)
-
-    return cached("h5web", sources, make)
+        (folder / "complete").touch()
+    return folder / "venv/bin/python"
 
 
 @pytest.fixture(scope="module")
@@ -110,15 +85,12 @@ def test_nexus_checks_find_no_error(result, python, tmp_path):
     assert "NXentry: /study" in told
 
 
-def test_silx_opens_at_a_drawn_map_and_takes_every_group_for_a_plot(result, python, tmp_path):
+def test_silx_opens_at_a_drawn_map_every_group_is_a_plot_and_xarray_has_coordinates(result, python, tmp_path):
     told = json.loads(answer([python, BROWSE / "silx_picture.py", result, tmp_path / "silx.png"]).splitlines()[-1])
     assert told["issues"] == {}
     assert told["plots"] > 20
     assert (told["default"], told["view"]) == ("/study/map", "Image")
     assert colours(tmp_path / "silx.png") > 20
-
-
-def test_xarray_has_coordinates_with_units(result, python):
     code = (
         "import sys, xarray; d = xarray.open_dataset(sys.argv[1], engine='h5netcdf', group='/study/e_n');"
         "print(float(d.ccm.sel(station=0.01, normal_force=1.9, angle=0, method='nearest')), d.ccm.units)"
@@ -127,13 +99,3 @@ def test_xarray_has_coordinates_with_units(result, python):
     with open_result(result) as read:
         assert float(value) == read.read("e_n/ccm")[2, 0, 1]
     assert units == "m"
-
-
-@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine")
-def test_h5web_opens_at_the_map_with_its_axes(result, web, tmp_path):
-    words = ["NX Heatmap", "grasp quality, ccm", "station along the object's axis [m]", "cylinder.hdf"]
-    command = ["node", web / "open.mjs", web / "dist/index.html", result, tmp_path / "h5web.png", *words]
-    told = json.loads(answer(command, env={**os.environ, "CHROMIUM": CHROMIUM}).splitlines()[-1])
-    assert all(word in told["seen"] for word in words), told["seen"]
-    assert told["canvases"] == 1
-    assert colours(tmp_path / "h5web.png") > 6
