@@ -5,14 +5,18 @@ import io
 import json
 import zipfile
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from softjaw.fem.errors import MeshError
+from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.study.messages import StudyError
-from softjaw.study.scene import SceneError
+from softjaw.study.patch.answer import read_patch
+from softjaw.study.patch.patch_reader import Reading
+from softjaw.study.scene import SceneError, load_scene
 from tests.fuzz.edits import BINARY, TEXTUAL
 
 
@@ -52,9 +56,8 @@ TABLE = b"""x_mm,y_mm,z_mm,area_mm2,nx,ny,nz,pressure_kpa
 2,1,0,1,0,0,1,5
 """
 POINTS = 30.0 * np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]])
-FACES = np.array(
-    [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]]
-)  # an octahedron
+FACES = np.array([[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]])  # octahedron
+ROWS = "".join([*(f"{x:g} {y:g} {z:g}\n" for x, y, z in POINTS), *(f"3 {a} {b} {c}\n" for a, b, c in FACES)])
 
 
 def stl(binary):
@@ -68,14 +71,12 @@ def stl(binary):
 
 
 def obj():
-    return "".join(
-        [*(f"v {x:g} {y:g} {z:g}\n" for x, y, z in POINTS), *(f"f {a}/1 {b} {c}\n" for a, b, c in FACES + 1)]
-    ).encode()
+    faces = (f"f {a}/1 {b} {c}\n" for a, b, c in FACES + 1)
+    return "".join([*(f"v {x:g} {y:g} {z:g}\n" for x, y, z in POINTS), *faces]).encode()
 
 
 def off():
-    rows = [*(" ".join(f"{x:g}" for x in p) for p in POINTS), *(f"3 {a} {b} {c}" for a, b, c in FACES)]
-    return ("OFF\n6 8 0\n" + "\n".join(rows) + "\n").encode()
+    return ("OFF\n6 8 0\n" + ROWS).encode()
 
 
 def ply(binary):
@@ -86,8 +87,7 @@ def ply(binary):
         faces = np.zeros(8, [("n", "u1"), ("v", "<i4", 3)])
         faces["n"], faces["v"] = 3, FACES
         return head.encode() + POINTS.astype("<f4").tobytes() + faces.tobytes()
-    rows = [*(" ".join(f"{x:g}" for x in p) for p in POINTS), *(f"3 {a} {b} {c}" for a, b, c in FACES)]
-    return (head + "\n".join(rows) + "\n").encode()
+    return (head + ROWS).encode()
 
 
 def gltf_tree(**changes):
@@ -146,20 +146,15 @@ def packed(*models, kind=zipfile.ZIP_DEFLATED):
 
 
 def _scene(path):
-    from softjaw.study.scene import load_scene
     scene = load_scene(path)
     return scene.effective_toml(), scene.digest
 
 
 def _patch(path):
-    from softjaw.study.patch.answer import read_patch
-    from softjaw.study.patch.patch_reader import Reading
     return read_patch(str(path), Reading("mm", "kpa"))
 
 
-def _mesh(path):
-    from softjaw.fem.objects.mesh_object import MeshObject
-    return MeshObject.from_file(path, "mm")
+_mesh, _metres = (partial(MeshObject.from_file, unit=unit) for unit in ("mm", "m"))
 
 
 def _model(path):
@@ -167,23 +162,6 @@ def _model(path):
     whole = path.with_name("mesh.3mf")
     whole.write_bytes(packed(path.read_bytes()))
     return _mesh(whole)
-
-
-def _metres(path):
-    from softjaw.fem.objects.mesh_object import MeshObject
-    return MeshObject.from_file(path, "m")
-
-
-def _result(path):
-    from softjaw.study.export.cases import as_csv
-    from softjaw.study.result.read import dataset
-    from softjaw.study.result.store import open_result
-    from softjaw.study.show.best_grasps import best
-    from softjaw.study.show.status import status_text
-    from softjaw.study.table import as_json
-    with open_result(path) as result:
-        ds = dataset(result)
-        return as_csv(ds), as_json(best(ds, None, 3)), status_text(result, 80)
 
 
 QUICK = {
@@ -200,9 +178,3 @@ QUICK = {
     "3MF": Reader("mesh.3mf", packed(model_3mf()), BINARY, _mesh, (MeshError,)),
     "model of a 3MF": Reader("mesh.model", model_3mf(), TEXTUAL, _model, (MeshError,)),
 }
-
-
-def slow_readers(folder: Path) -> dict[str, Reader]:
-    """Readers whose libraries have to be kept apart, with files that take a while to make."""
-    from tests.study.formula_results import make
-    return {"result": Reader("result.hdf", make(folder / "seed.hdf").read_bytes(), BINARY, _result)}

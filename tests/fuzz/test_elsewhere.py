@@ -21,7 +21,6 @@ from tests.study.sealing import sealed
 
 BALL = '[object]\nshape = "sphere"\nradius_mm = 30\n[candidates]\nstations_mm = [0]\n[load]\nnormal_force_n = [2]\n'
 MESH = BALL.replace('shape = "sphere"\nradius_mm = 30', 'shape = "mesh"\nmesh = "FILE"\nunit = "mm"')
-FAST = ("external link",)
 
 
 @pytest.fixture
@@ -115,7 +114,8 @@ def commands(path, other, page):
     yield ("view", path, "--html", page)
 
 
-@pytest.mark.parametrize("lie", [n if n in FAST else pytest.param(n, marks=pytest.mark.long) for n in LIES])
+@pytest.mark.long
+@pytest.mark.parametrize("lie", LIES)
 def test_a_result_file_that_lies_is_read_or_refused(tmp_path, told, lie):
     path, other, page = make(tmp_path / "a.hdf"), tmp_path / "other.hdf", tmp_path / "page.html"
     shutil.copy(path, other)
