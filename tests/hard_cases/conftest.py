@@ -53,17 +53,7 @@ def pytest_runtest_logreport(report):
     _rows.update({value[0]: value for key, value in report.user_properties if key == ROW})
 
 
-def rows_of(text: str) -> dict[str, list[str]]:
-    cells = [line.strip("|").split("|") for line in text.splitlines() if line.startswith("| ")]
-    rows = [[cell.strip() for cell in row] for row in cells if len(row) == len(HEAD)]
-    return {row[0]: row for row in rows if row[0] in CASES}
-
-
 def pytest_sessionfinish(session):
-    """Write the table where all cases have come; rows of cases that did not run now stay as they were."""
-    file = session.config.getoption("--table", None)
-    if not file:
-        return
-    rows = (rows_of(Path(file).read_text()) if Path(file).exists() else {}) | _rows
-    if len(rows) == len(CASES):
-        Path(file).write_text(table_text(rows))
+    """Write the table where all cases have come."""
+    if (file := session.config.getoption("--table", None)) and len(_rows) == len(CASES):
+        Path(file).write_text(table_text(_rows))

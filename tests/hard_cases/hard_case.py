@@ -25,12 +25,6 @@ WHOLE = {"object": ("shape",), "candidates": tuple(ALTERNATIVES)}  # keys that m
 CHECKS = {"force_balance": max, "adhesion": max, "penetration": max, "min_det_f": min, "ellipticity": min}
 
 
-KINDS = (  # of a source of a second number
-    "closed form", "limit", "scaling law", "other formulation", "other element", "finer mesh", "full model",
-    "invariance", "independent code", "bound", "none",
-)  # fmt: skip
-
-
 @dataclass(frozen=True)
 class Bound:
     """A bound of what is refused: a scene's dotted key, its value in closed form, one that is accepted, one refused."""
@@ -61,10 +55,6 @@ class Source:
     bound: Bound | None = None
     length: float = 1.0
     force: float = 1.0
-
-    def __post_init__(self) -> None:
-        if self.kind not in KINDS or self.within not in TOLERANCES:
-            raise ValueError(f"source: found kind '{self.kind}' and tolerance '{self.within}', expected listed ones")
 
     @property
     def tolerance(self) -> float:
@@ -98,15 +88,12 @@ class HardCase:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a case came to: by row force [N] and message, worst checks and work over all, maps and their mesh errors."""
+    """What a case came to: by row force [N] and message, worst checks over all, maps and their mesh errors."""
 
     refused: str = ""
     forces: np.ndarray = field(default_factory=lambda: np.zeros(0))
     done: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))
     messages: tuple[str, ...] = ()
-    iterations: int = 0
-    halvings: int = 0
-    seconds: float = 0.0
     checks: dict[str, float] = field(default_factory=dict)
     maps: dict[str, np.ndarray] = field(default_factory=dict)
     errors: dict[str, np.ndarray] = field(default_factory=dict)
@@ -200,12 +187,8 @@ def _outcome(forces: tuple[float, ...], results: tuple[CaseResult | CaseFailure,
         names = [name for name in MAPS if good and f"maps/{name}{suffix}" in good[0]]
         return {name: np.array([np.ravel(v[f"maps/{name}{suffix}"])[0] for v in good]) for name in names}
 
-    def total(name: str) -> float:
-        return sum(float(np.sum(v[f"work/{name}"])) for v in good)
-
     checks = {name: worst(x for v in good for x in v[f"checks/{name}"]) for name, worst in CHECKS.items() if good}
     return Outcome(
         "", np.array(forces), np.array([isinstance(r, CaseResult) for r in results]), tuple(r.message for r in results),
-        int(total("newton_iterations")), int(total("step_halvings")), total("seconds_total"), checks, maps(""),
-        maps("_error"),
+        checks, maps(""), maps("_error"),
     )  # fmt: skip

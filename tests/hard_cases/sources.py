@@ -1,7 +1,7 @@
 """The second number of a hard case: another model, a scaled scene, a formula, another code's file, a bound."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cache, partial
 from typing import Any
 from unittest import mock
@@ -13,9 +13,32 @@ from softjaw.fem.shell.wall_material import MATERIALS
 from softjaw.study.scene import Scene, parse_scene
 from softjaw.study.scene.text import toml_text
 from softjaw.study.units import split_unit
-from tests.hard_cases.closed_forms import FORMULAS
+from tests.friction.closed_forms import mean_distance
 from tests.hard_cases.hard_case import CASES, FOLDER, HardCase, Outcome, outcome, outcome_of, scene_of, tables_of
 
+
+def pressed_column(scene: Scene) -> dict[str, np.ndarray]:
+    """Closing displacement and e_n of a neo-Hookean pad with Poisson's ratio 0 between plates."""
+    g = scene.gripper
+    p = np.array(scene.load.normal_force) / (g.pad_length * g.pad_width * g.shear_modulus)
+    stretch = (np.sqrt(p**2 + 4.0) - p) / 2.0
+    return {"closing": g.pad_thickness * (1.0 - stretch)} | uniform_pressure(scene)
+
+
+def uniform_pressure(scene: Scene) -> dict[str, np.ndarray]:
+    """e_n of a uniform pressure on a rectangle: the mean distance from its centre."""
+    mean = mean_distance(scene.gripper.pad_length, scene.gripper.pad_width)
+    return {"e_n": np.full(len(scene.load.normal_force), mean)}
+
+
+def frictionless(scene: Scene) -> dict[str, np.ndarray]:
+    n = len(scene.load.normal_force)
+    return {name: np.zeros(n) for name in ("f_x_max", "f_y_max", "tau_z_max")}
+
+
+FORMULAS: dict[str, Callable[[Scene], dict[str, np.ndarray]]] = {
+    "pressed column": pressed_column, "uniform pressure": uniform_pressure, "frictionless": frictionless,
+}  # fmt: skip
 POWERS = {  # of a length and of a force, by the suffix of a scene's key; other units do not scale
     "mm": (1, 0), "n": (0, 1), "kpa": (-2, 1), "mpa": (-2, 1), "gpa": (-2, 1), "n_per_mm": (-1, 1),
 }  # fmt: skip

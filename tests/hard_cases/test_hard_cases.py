@@ -14,10 +14,9 @@ from softjaw.fem.objects.shapes import Sphere
 from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.pad.shape import PadShape
 from tests.fem import reference
-from tests.hard_cases.closed_forms import FORMULAS
 from tests.hard_cases.conftest import ROW, row
 from tests.hard_cases.hard_case import CASES, TOLERANCES, HardCase, Outcome, Source, outcome, scene_of
-from tests.hard_cases.sources import second
+from tests.hard_cases.sources import FORMULAS, second
 from tests.hard_cases.verdict import FINITE, judge
 
 GOOD = {"force_balance": 0.0, "adhesion": 0.0, "penetration": 0.0, "min_det_f": 0.9, "ellipticity": 0.9}
@@ -34,7 +33,7 @@ def test_a_hard_case_comes_to_what_is_right_for_it(name, record_property):
     assert verdict.word in ("gap" if case.gap else "ok", "no number"), verdict.wrong
 
 
-def test_there_are_cases_of_every_class_and_outcome():
+def test_there_are_cases_of_every_class_and_outcome_and_a_pressed_column_is_in_balance():
     assert len(CASES) >= 101
     kinds = {"curvature", "contact", "force", "foam", "thin wall", "candidate", "same", "mesh", "friction", "wrenches"}
     assert {c.kind for c in CASES.values()} == kinds
@@ -44,9 +43,6 @@ def test_there_are_cases_of_every_class_and_outcome():
     assert all(c.source.case in CASES for c in CASES.values() if c.source and c.source.case)
     assert all(c.hard and (c.source or c.gap) for c in CASES.values())
     assert {c.source.within for c in CASES.values() if c.source} == set(TOLERANCES)
-
-
-def test_a_pressed_column_is_in_balance_and_its_mean_arm_is_that_of_a_rectangle():
     scene = scene_of(CASES["to-79-percent-without-bulging"])
     g, found = scene.gripper, FORMULAS["pressed column"](scene)
     stretch = 1 - found["closing"] / g.pad_thickness

@@ -181,11 +181,7 @@ def convex_parts() -> dict[str, Maker]:
 
 
 def non_manifold() -> dict[str, Maker]:
-    return {
-        "bottle with a cap": capped,
-        "bricks": bricks,
-        **of(partitioned, "box L bottle bowl"),
-    }
+    return {"bottle with a cap": capped, "bricks": bricks, **of(partitioned, "box L bottle bowl")}
 
 
 def open_surfaces() -> dict[str, Maker]:

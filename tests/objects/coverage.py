@@ -1,10 +1,8 @@
 """How often stated errors cover the truth: random scenes on the default mesh against meshes finer in every direction.
 
-    python -m tests.objects.coverage SEED FIRST LAST > rows.csv     (scenes FIRST to LAST - 1 of a seed)
-    python -m tests.objects.coverage --table rows.csv
-
-A row is a quantity of a case: family, friction acting back or not, true relative error, stated one. A reference has
-twice the elements in each direction, those of a thin wall included, and its own load path.
+``python -m tests.objects.coverage SEED FIRST LAST > rows.csv`` (scenes FIRST to LAST - 1 of a seed), then
+``... --table rows.csv``. A row is a quantity of a case: family, friction acting back or not, true and stated relative
+error. A reference has twice the elements in each direction, those of a thin wall included, and its own load path.
 """
 
 import csv
@@ -20,23 +18,12 @@ from softjaw.study.case.candidates import units
 from softjaw.study.case.effects import COUPLING
 from softjaw.study.case.result import CaseFailure, CaseResult
 from softjaw.study.scene import Scene
-from tests.objects.random_scenes import (
-    ball,
-    box,
-    cone,
-    ellipse,
-    forces,
-    gripper,
-    number,
-    outline,
-    places,
-    stacked,
-    superellipse,
-)
+from tests.objects import random_scenes as made
 
 QUANTITIES = ("payload", "quality", "e_n", "f_x_max", "tau_z_max", "closing", "contact_area", "p_max")
-SHAPES = {"revolution": (outline, cone, ball), "cylinder": (ellipse, superellipse, stacked), "box": (box,)}
-FAMILIES = (*SHAPES, "mesh", "thin wall")
+SHAPES = {"revolution": (made.outline, made.cone, made.ball), "box": (made.box,),
+          "cylinder": (made.ellipse, made.superellipse, made.stacked)}  # fmt: skip
+FAMILIES = ("revolution", "cylinder", "box", "mesh", "thin wall")
 ROOT = Path(__file__).resolve().parents[2]
 HEADER = ("scene", "family", "friction", "force", "quantity", "true", "stated")
 
@@ -44,26 +31,26 @@ HEADER = ("scene", "family", "friction", "force", "quantity", "true", "stated")
 def scene_tables(seed: int, k: int) -> tuple[str, dict]:
     """Family and tables of the ``k``-th scene of a seed: one grasp at one force on a small mesh."""
     family, rng = FAMILIES[k % len(FAMILIES)], np.random.default_rng([seed, k, 31])
-    pads = gripper(rng) | {"elements": [int(2 * rng.integers(4, 6)), 6, 3]}
+    pads = made.gripper(rng) | {"elements": [int(2 * rng.integers(4, 6)), 6, 3]}
     tables = {
-        "gripper": pads, "friction": {"mu": number(rng.uniform(0.15, 1.1))}, "accuracy": {"meshes": 2},
+        "gripper": pads, "friction": {"mu": made.number(rng.uniform(0.15, 1.1))}, "accuracy": {"meshes": 2},
         "limit_surface": {"model": "three_motions"}, "run": {"patches": "none"},
     }  # fmt: skip
-    force = forces(rng, pads)[int(rng.integers(0, 3))]
+    force = made.forces(rng, pads)[int(rng.integers(0, 3))]
     if family == "mesh":
         name, low, high = (("flask", 35, 85), ("mug", 30, 80))[rng.integers(0, 2)]
         mesh = str(ROOT / "jobs" / "objects" / f"{name}.stl")
         tables["object"] = {"shape": "mesh", "mesh": mesh, "unit": "mm", "axis": "z"}
-        place = {"stations_mm": [number(rng.uniform(low, high))], "angles_deg": [number(rng.uniform(0, 90))]}
+        place = {"stations_mm": [made.number(rng.uniform(low, high))], "angles_deg": [made.number(rng.uniform(0, 90))]}
     elif family == "thin wall":
-        body = (outline, cone)[rng.integers(0, 2)](rng)
-        tables["object"] = body | {"wall_mm": number(rng.uniform(0.4, 1.0))}
+        body = (made.outline, made.cone)[rng.integers(0, 2)](rng)
+        tables["object"] = body | {"wall_mm": made.number(rng.uniform(0.4, 1.0))}
         tables["accuracy"]["wall_element_mm"] = 2.0
-        place = {"stations_mm": [number(body["profile_mm"][-1][0] * rng.uniform(0.3, 0.7))], "angles_deg": [0]}
-        force = number(min(force, rng.uniform(0.5, 3)))
+        place = {"stations_mm": [made.number(body["profile_mm"][-1][0] * rng.uniform(0.3, 0.7))], "angles_deg": [0]}
+        force = made.number(min(force, rng.uniform(0.5, 3)))
     else:
         tables["object"] = SHAPES[family][rng.integers(0, len(SHAPES[family]))](rng)
-        place = places(rng, tables["object"], pads)
+        place = made.places(rng, tables["object"], pads)
     return family, tables | {"candidates": place, "load": {"normal_force_n": [force]}}
 
 

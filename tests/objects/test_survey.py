@@ -1,4 +1,4 @@
-"""The survey of bad meshes and random scenes: what it makes, how it counts, and the parts of it that take seconds."""
+"""The survey of bad meshes, scans and random scenes: what it makes, the parts that take seconds, and stated errors."""
 
 from argparse import Namespace
 
@@ -8,10 +8,15 @@ import trimesh
 
 from softjaw.fem.objects.gap import Pose
 from softjaw.fem.objects.mesh_object import MeshObject
+from softjaw.study.case.fit import Jaws
 from softjaw.study.case.model import ROUNDED_OFF, approach
+from softjaw.study.case.sampler import antipodal_grasps
+from softjaw.study.case.task import Task
 from softjaw.study.scene import parse_scene
 from softjaw.study.scene.text import toml_text
 from tests.objects.bad_meshes import bad_meshes
+from tests.objects.bodies import SCANS, hollow_bottle, hollow_bowl, mug, punctured, scan, spoiled
+from tests.objects.coverage import rows
 from tests.objects.random_scenes import KINDS, random_scene
 from tests.objects.solve import Outcome, objects, solved, start_inside
 from tests.objects.survey import GOAL, TOUCH, by_physics, survey
@@ -20,7 +25,7 @@ SEED = 3
 LOW_POLY = [name for name, (kind, _) in bad_meshes(SEED).items() if kind == "low poly"]
 
 
-def test_random_scenes_are_valid_and_of_every_kind_and_bad_meshes_are_sixty_of_ten_kinds():
+def test_random_scenes_are_valid_bad_meshes_sixty_and_only_a_pad_behind_the_surface_starts_inside():
     made = [random_scene(SEED, k) for k in range(40)]
     assert {kind for kind, _ in made} == set(KINDS)
     assert all(len(parse_scene(toml_text(tables)).load.normal_force_n) == 3 for _, tables in made)
@@ -30,18 +35,12 @@ def test_random_scenes_are_valid_and_of_every_kind_and_bad_meshes_are_sixty_of_t
     assert sum(kinds.count(kind) >= 6 for kind in set(kinds)) >= 10
     assert len([kind for kind in kinds if "scan" not in kind]) >= 60
     assert all(len(bad_meshes(SEED)[name][1]().faces) <= 500 for name in LOW_POLY)
-
-
-def test_a_pad_behind_the_surface_starts_inside():
     body = trimesh.creation.box((0.04, 0.04, 0.04))
     mesh = MeshObject(np.array(body.vertices), np.array(body.faces, dtype=np.int64))
     for depth in (-0.003, 0.0, 0.002):
         pose = Pose(np.eye(3), np.array([0.0, 0.0, -0.02 + depth]))
         assert start_inside(mesh, pose, (0.03, 0.02, 0.01)) == pytest.approx(depth, abs=1e-12)
-
-
-def test_no_pad_starts_inside_a_spike_or_a_sharp_edge():
-    """A cone between the points of the face that are looked at, and a roof whose ridge the smooth surface rounds."""
+    # A cone between the points of the face that are looked at, and a roof whose ridge the smooth surface rounds.
     cone = trimesh.creation.cone(0.004, 0.01, sections=5)
     cone.apply_translation([0.0006, 0.0005, 0.0])
     base = trimesh.creation.box((0.06, 0.04, 0.03))
@@ -70,3 +69,38 @@ def test_random_scenes_are_solved(tmp_path):
     assert len(outcomes) == len(names)
     excused = sum(by_physics(message) for o in outcomes for _, message in o.failures)
     assert sum(o.solved for o in outcomes) + excused >= GOAL * sum(o.cases for o in outcomes)
+
+
+@pytest.mark.long
+def test_nine_of_ten_errors_are_inside_the_stated_ones_and_these_are_not_far_too_large():
+    """Ten scenes leave 0.95 uncertain by some hundredths."""
+    found = [row for k in range(200, 210) for row in rows(8, k)]
+    true, stated = np.array([row[-2:] for row in found], float).T
+    known = np.isfinite(stated)
+    assert known.mean() > 0.9
+    assert (true[known] <= stated[known]).mean() >= 0.9
+    assert stated[known].mean() < 10.0 * true[known].mean()  # 4 to 6 on 137 scenes, ten swing
+
+
+JAWS = Jaws((0.05, 0.022, 0.015), stiffness=8e6, mu=0.8, force=5.0, max_opening=0.085)
+MADE = {
+    "bottle": lambda: hollow_bottle(0.2, 0.033, 0.014, 0.003),
+    "bowl": lambda: hollow_bowl(0.06, 0.004, 0.05),
+    "mug": mug,
+    "banana with holes": lambda: punctured(scan("banana"), 3),
+    "spoiled drill": lambda: spoiled(scan("drill")),
+    **{path.stem[8:]: (lambda name=path.stem: scan(name)) for path in sorted(SCANS.glob("*.stl"))},
+}
+
+
+@pytest.mark.parametrize("name", MADE)
+def test_it_loads_and_can_be_grasped(name, tmp_path):
+    path = tmp_path / "body.stl"
+    MADE[name]().export(path)
+    obj = MeshObject.from_file(str(path), "m")
+    grasps = [g for g in antipodal_grasps(obj.surface(), JAWS, Task(obj.centroid[0]), 6, samples=80) if not g.state]
+    assert len(grasps) >= 3
+    assert all(g.opening <= JAWS.max_opening for g in grasps)
+    lower, upper = obj.bounds
+    assert all(((g.point > lower - 0.01) & (g.point < upper + 0.01)).all() for g in grasps)
+    assert obj.notes or name != "banana with holes"

@@ -2,9 +2,8 @@
 
     tests/slurm/cluster.sh LOGS python -m tests.slurm.time_limit
 
-The shipped batch script is submitted in three folders: with time enough; with a limit that the script hears of before,
-so that it stops in order and goes back into the queue; and with a limit that Slurm enforces without a word,
-after which the same command is given once more.
+The shipped batch script is submitted with time enough, with a limit that it hears of before, so that it stops in order
+and goes back into the queue, and with one that Slurm enforces without a word, after which it is submitted once more.
 """
 
 import os

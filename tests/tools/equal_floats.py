@@ -1,7 +1,7 @@
 """Where tests ask for equal floats: ``python -m tests.tools.equal_floats [FOLDER]`` prints the places and their number.
 
-Counted are comparisons of arrays, bytes and files bit by bit, and each ``==`` in a test of which a side holds a float
-literal or arithmetic, or which is true for ``all``; codes, words and counts are none.
+Counted are comparisons of arrays, bytes and files bit by bit, and each ``==`` of which a side holds a float literal or
+arithmetic, or which is true for ``all``; codes, words and counts are none.
 """
 
 import ast

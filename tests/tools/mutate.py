@@ -238,25 +238,14 @@ def run_apart(folder: Path, files: list[str], limit: float) -> tuple[str, float]
     return failure or died, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
-def interval(hits: int, count: int) -> tuple[float, float]:
-    """The 95 % interval of a share (Clopper and Pearson 1934)."""
-    share = binomtest(hits, count).proportion_ci()
-    return share.low, share.high
-
-
 def main(arguments: list[str] | None = None) -> int:
     """Try the mutants and print the share that was noticed."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--count", type=int, default=100)
     parser.add_argument("--seed", type=int, default=20260101)
     parser.add_argument("--out", type=Path, default=Path("results/mutants.jsonl"))
-    parser.add_argument("--list", action="store_true", help="only print the mutants")
     options = parser.parse_args(arguments)
     mutants = sample(options.count, options.seed)
-    if options.list:
-        for m in mutants:
-            print(f"{m.file}:{m.line}: {m.kind}: {' '.join(m.old.split())}  ->  {m.new}")
-        return 0
     options.out.parent.mkdir(parents=True, exist_ok=True)
     lines = options.out.read_text().splitlines() if options.out.exists() else []
     rows = {row["number"]: row for row in map(json.loads, lines)}
@@ -273,8 +262,9 @@ def main(arguments: list[str] | None = None) -> int:
     survivors = [row for row in rows.values() if not row["killed_by"]]
     for row in survivors:
         print(f"survivor {row['file']}:{row['line']}: {row['kind']}: {row['old']}  ->  {row['new']}")
-    low, high = interval(len(rows) - len(survivors), len(rows))
-    print(f"{len(rows) - len(survivors)} of {len(rows)} mutants were noticed: {low:.0%} to {high:.0%}")
+    hits = len(rows) - len(survivors)
+    share = binomtest(hits, len(rows)).proportion_ci()  # 95 % of Clopper and Pearson
+    print(f"{hits} of {len(rows)} mutants were noticed: {share.low:.0%} to {share.high:.0%}")
     return 0
 
 
