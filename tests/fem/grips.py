@@ -18,7 +18,7 @@ from softjaw.fem.shell.wall_mesh import MeshSize
 from softjaw.fem.shell.wall_problem import WallProblem
 from softjaw.friction.frame import contact_frame, in_frame
 from softjaw.friction.wrench import friction_limits
-from tests.fem.reference import dense
+from tests.fem.reference import dense, placed
 
 SIZE = (0.03, 0.02, 0.02)
 COARSE = MeshSize(0.003, 0.005, 0.010)
@@ -62,11 +62,7 @@ def grip(
 
 
 def gap_at(at: Pose):
-    def gap(x):
-        g, normal, hessian = can().gap(at.to_object(x))
-        return g, normal @ at.rotation, at.rotation.T @ hessian @ at.rotation
-
-    return gap
+    return placed(can(), at)
 
 
 def e_n(finger):

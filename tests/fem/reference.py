@@ -9,6 +9,8 @@ from softjaw.fem.contact.extract import extract
 from softjaw.fem.materials import material
 from softjaw.fem.objects.gap import Pose
 from softjaw.fem.objects.shapes import EllipticCylinder, Sphere
+from softjaw.fem.pad.mesh import Pad
+from softjaw.fem.pad.shape import PadShape
 from softjaw.friction.frame import contact_frame, in_frame
 from softjaw.friction.wrench import friction_limits
 
@@ -104,14 +106,6 @@ def round_gap(R, axes):
     return gap
 
 
-def sphere(R):
-    return round_gap(R, (0, 1, 2))
-
-
-def cylinder(R):
-    return round_gap(R, (1, 2))
-
-
 def placed(obj, pose):
     R = pose.rotation
 
@@ -148,5 +142,11 @@ def dense(problem, x=None, values=None):
 
 
 SIZE, FOAM = (0.050, 0.022, 0.015), material("blatz_ko", 0.040e6)  # of the usual pad
+
+
+def pad_of(elements=(8, 4, 3), symmetry=(True, True), contact="weighted", element="hex8", law=FOAM, size=SIZE, **more):
+    return Pad(PadShape(size, elements, element=element), law, symmetry, contact, more.get("back"))
+
+
 OVAL = placed(EllipticCylinder(0.025, 0.020, 0.1), facing(0.025))
 BALL = placed(Sphere(0.025), facing(0.025))

@@ -26,7 +26,7 @@ def bent(radius=0.018, bend=0.15, angle=1.0, around=48, along=80):
     return np.asarray(mesh.vertices), np.asarray(mesh.faces, dtype=np.int64)
 
 
-def test_the_line_of_a_bent_tube_is_its_arc():
+def test_the_line_of_a_bent_tube_is_its_arc_and_no_handle_or_cavity_pulls_it_aside():
     points, triangles = bent()
     line = centre_line(points, triangles, 0.025)
     for z in (-0.03, 0.0, 0.03):
@@ -39,9 +39,6 @@ def test_the_line_of_a_bent_tube_is_its_arc():
     assert line.radius(-0.03, 0.03) == pytest.approx(0.15, rel=0.1)
     remarks = [line.remark(*where) for where in ((0.0, 0.03), (0.0, 0.17), (0.2, 0.03))]
     assert [bool(remark) for remark in remarks] == [False, True, True]
-
-
-def test_a_straightened_tube_stands_about_the_axis_and_a_straight_body_has_it():
     points, triangles = bent()
     line = centre_line(points, triangles, 0.025)
     moved = line.straightened(points)
@@ -51,9 +48,6 @@ def test_a_straightened_tube_stands_about_the_axis_and_a_straight_body_has_it():
     line = centre_line(np.asarray(mesh.vertices), np.asarray(mesh.faces, dtype=np.int64), 0.025)
     assert line.straight
     np.testing.assert_allclose(line.at(0.0123)[0], [0, 0, 0.0123], atol=1e-15)
-
-
-def test_a_handle_and_a_cavity_do_not_pull_it_aside():
     body = trimesh.creation.cylinder(0.04, 0.1, sections=64)
     cavity = trimesh.creation.cylinder(0.035, 0.08, sections=64)
     cavity.apply_translation([0.003, 0, 0])
@@ -66,9 +60,6 @@ def test_a_handle_and_a_cavity_do_not_pull_it_aside():
     middle, loops = largest_loops(points, triangles, np.array([0.001, 0.045]))
     np.testing.assert_allclose(middle, 0.0, atol=1e-9)
     assert loops.tolist() == [3, 1]  # the handle is cut twice; the cavity has no material
-
-
-def test_no_closed_section_is_refused():
     sheet = np.array([[0, 0, 0], [0.1, 0, 0], [0, 0, 0.1]], float)
     with pytest.raises(MeshError):
         centre_line(sheet, np.array([[0, 1, 2]]), 0.02)

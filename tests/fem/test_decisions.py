@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import Phase, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
@@ -22,13 +22,7 @@ from softjaw.fem.objects.triangles import cleaned
 from softjaw.fem.pad.backing_plate import back_stiffness
 from softjaw.fem.pad.shape import BackingPlate
 from softjaw.fem.shell.thin_walled import ThinWalled, grasp
-from tests.turns import TURNS
-
-EPS = np.finfo(float).eps
-ULPS = EPS * np.arange(-8, 9)
-# the same examples on every rank and every day, and no folder of past failures beside the project; no seed is simpler
-tries = settings(max_examples=TURNS, deadline=None, derandomize=True, database=None, phases=[Phase.generate])
-seeds = st.integers(0, 2**32 - 1)
+from tests.turns import ULPS, seeded, seeds, tries
 
 
 def moved(values, seed):
@@ -92,8 +86,7 @@ MESHES = {  # and their volumes, 0 for what is no closed surface
 
 
 @pytest.mark.parametrize("name", MESHES)
-@tries
-@given(seed=seeds)
+@seeded
 def test_a_mesh_is_the_same_in_every_position(name, seed):
     (points, triangles), expected = MESHES[name]
     x, scale = turned(points, seed)
@@ -103,8 +96,7 @@ def test_a_mesh_is_the_same_in_every_position(name, seed):
         assert volume(mesh.points, mesh.triangles) == pytest.approx(expected * scale**3, rel=1e-6)
 
 
-@tries
-@given(seeds)
+@seeded
 def test_corners_that_rounding_of_a_file_moved_apart_are_one(seed):
     """Every triangle has corners of its own, in numbers of single precision; a slit of 1e-4 stays open."""
     x, scale = turned(CUBE[0], seed)
@@ -128,9 +120,8 @@ def travel_past(shape, place, seed, reach=20.0):
     return first_touch(body, Pose(moved(R, seed), moved(turn @ place, seed)), row, reach)
 
 
-@tries
-@given(seeds)
-def test_a_pad_that_passes_at_the_surface_itself_has_no_contact(seed):
+@seeded
+def test_a_pad_that_passes_at_the_surface_has_no_contact_and_one_that_starts_there_touches_at_once(seed):
     """Past a sphere it has none; along the side of a box it is known to graze."""
     half = np.random.default_rng(seed).uniform(0.01, 0.05)
     ball, box = Sphere(half), Box(np.full(3, 2 * half), 0.1 * half)
@@ -142,11 +133,6 @@ def test_a_pad_that_passes_at_the_surface_itself_has_no_contact(seed):
         with pytest.raises(NoContactError):
             travel_past(box, [0.0, -0.1, half + out], seed)
     assert 0.1 - half < travel_past(box, [0.0, -0.1, half - 1e-8], seed) < 0.1 - 0.8 * half
-
-
-@tries
-@given(seeds)
-def test_a_pad_that_starts_at_the_surface_touches_at_once(seed):
     rng = np.random.default_rng(seed)
     R = Rotation.random(random_state=rng).as_matrix()
     radius = rng.uniform(0.01, 0.05)
@@ -161,8 +147,7 @@ def test_a_pad_that_starts_at_the_surface_touches_at_once(seed):
         closing(-1e-8)
 
 
-@tries
-@given(seeds)
+@seeded
 def test_a_node_bears_something_or_nothing(seed):
     """What rounding leaves of a pressure is none; tension is kept for the checks, idle or not."""
     scale = np.random.default_rng(seed).uniform(1e2, 1e6)
@@ -173,13 +158,16 @@ def test_a_node_bears_something_or_nothing(seed):
     assert borne(np.zeros(9), active).tolist() == [0.0] * 9
 
 
-@tries
-@given(seeds)
-def test_a_force_falls_by_more_than_rounding(seed):
+@seeded
+def test_a_force_falls_by_more_than_rounding_and_a_closing_that_stays_is_no_fall(seed):
     """A plateau is no fall, at any force."""
     plateau = np.array([0.5, 1.0, 1.0, 1.0, 1.0, 1.5]) * np.random.default_rng(seed).uniform(1e-2, 1e3)
     assert falls(moved(plateau, seed)) is False
     assert falls(moved(plateau * [1, 1, 1, 1 - 1e-5, 1, 1], seed)) is True
+    closing = np.random.default_rng(seed).uniform(1e-4, 1e-2)
+    for share, accepted in ((1.0, True), (0.96, True), (0.94, False)):
+        before, after = moved([closing, share * closing], seed)
+        assert (outcome(refuse_fall, (1.0, before), (2.0, after)) is None) is accepted
 
 
 @tries
@@ -191,17 +179,7 @@ def test_a_force_of_the_path_is_its_last_step(seed, steps):
     assert len(load_steps(0.0, force, stiffness)) == steps
 
 
-@tries
-@given(seeds)
-def test_a_closing_that_stays_is_no_fall(seed):
-    closing = np.random.default_rng(seed).uniform(1e-4, 1e-2)
-    for share, accepted in ((1.0, True), (0.96, True), (0.94, False)):
-        before, after = moved([closing, share * closing], seed)
-        assert (outcome(refuse_fall, (1.0, before), (2.0, after)) is None) is accepted
-
-
-@tries
-@given(seeds)
+@seeded
 def test_nodes_on_the_rim_of_the_support_are_held(seed):
     x, y = np.linspace(-0.025, 0.025, 11), np.linspace(-0.011, 0.011, 5)
     scale = np.random.default_rng(seed).uniform(0.3, 3.0)
@@ -218,8 +196,7 @@ def test_nodes_on_the_rim_of_the_support_are_held(seed):
 BODY = ThinWalled(of_sections([Section(z, 0.03) for z in (0.0, 0.05, 0.1)]), 1e-3, None)
 
 
-@tries
-@given(seeds)
+@seeded
 def test_sections_are_round_up_to_rounding(seed):
     rng, n = np.random.default_rng(seed), 4
     z = np.linspace(0.0, 0.1, n) * rng.uniform(0.5, 2.0)
@@ -245,8 +222,7 @@ def test_planes_of_symmetry_turn_by_quarters(seed, quarters):
     assert even.turned(angle + 1e-8).symmetric == (True, True)
 
 
-@tries
-@given(seeds)
+@seeded
 def test_a_grasp_of_a_round_body_has_both_planes_at_every_angle(seed):
     """The pads' long sides up or down; nothing is left of a plane once a pad is off it by 1 um."""
     rng = np.random.default_rng(seed)

@@ -105,7 +105,7 @@ def test_the_mirror_image_of_a_mesh_has_the_mirror_image_of_its_gap(axis):
     assert np.abs(R.T @ hessian @ R * np.outer(flip, flip) - R.T @ other[2] @ R).max() < 1e-5
 
 
-def test_the_back_of_a_thin_plate_counts_for_nothing():
+def test_the_back_of_a_plate_counts_for_nothing_and_behind_a_small_ball_the_gap_has_no_jump():
     """A plate of 3 mm, across the approach: behind its front everything is inside, and the gap is the way to it."""
     half = np.array([0.0015, 0.03, 0.03])
     corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float) * half
@@ -114,10 +114,7 @@ def test_the_back_of_a_thin_plate_counts_for_nothing():
     region = plate.near(side(0.0, 0.0, 0.0015), *BOX, 0.002)
     y = in_box()
     assert region.gap(region.pose.to_object(y))[0] == pytest.approx(-y[:, 2], abs=1e-7)
-
-
-def test_behind_a_small_ball_the_gap_has_no_jump_and_beyond_its_sides_it_grows():
-    """A ball smaller than the pad is deep: beside it g is the distance, and no point beside it is inside."""
+    # A ball smaller than the pad is deep: beside it g is the distance, and no point beside it is inside.
     x, triangles = ball(24, 48, 0.006)
     region = MeshObject(x, triangles).near(side(0.0, 0.0, 0.006), *BOX, 0.002)
     y = in_box(3000)
@@ -136,7 +133,7 @@ def punctured(mesh, place, size):
     return x, triangles[np.linalg.norm(x[triangles].mean(axis=1) - place, axis=1) > size]
 
 
-def test_a_small_hole_is_filled_without_moving_a_point():
+def test_small_holes_are_filled_flipped_triangles_turned_and_a_large_hole_matters_only_under_a_pad():
     mesh = ball(100, 200)
     x, triangles = punctured(mesh, [0.03, 0, 0], 0.0007)
     assert len(border_loops(triangles)) == 2
@@ -148,9 +145,6 @@ def test_a_small_hole_is_filled_without_moving_a_point():
     assert (np.unique(edges, axis=0, return_counts=True)[1] == 2).all()
     a, b, c = sound.points[sound.triangles].transpose(1, 0, 2)
     assert np.einsum("ij,ij->", a, np.cross(b, c)) / 6 == pytest.approx(4 / 3 * np.pi * 0.03**3, rel=4e-3)
-
-
-def test_a_missing_triangle_is_put_back_though_it_is_large_and_a_flipped_one_is_turned():
     x, triangles = ball(16, 32)
     torn = np.delete(triangles, [100, 300], axis=0)
     torn[7] = torn[7, ::-1]
@@ -160,15 +154,9 @@ def test_a_missing_triangle_is_put_back_though_it_is_large_and_a_flipped_one_is_
     assert {tuple(sorted(map(tuple, sound.points[t]))) for t in sound.triangles} == {
         tuple(sorted(map(tuple, x[t]))) for t in triangles
     }
-
-
-def test_the_outer_wall_of_a_hollow_mesh_is_traced():
     hollow, solid = (traced(MeshObject(*turned(bottle(wall))))[0] for wall in (0.003, None))
     theta, s = np.meshgrid(np.linspace(0, 6, 20), np.linspace(*solid.wall, 30))
     assert hollow.jets(theta, s)[:, 0] == pytest.approx(solid.jets(theta, s)[:, 0], abs=1e-5)
-
-
-def test_a_large_hole_matters_only_under_a_pad():
     whole = MeshObject(*ball())
     sound = cleaned(*punctured(ball(), [0, 0.03, 0], 0.008))
     assert len(sound.lids) > 5
@@ -179,18 +167,12 @@ def test_a_large_hole_matters_only_under_a_pad():
     face = np.column_stack([*(v.ravel() for v in np.meshgrid([-0.004, 0, 0.004], [-0.004, 0, 0.004])), np.zeros(9)])
     assert torn.hole_share(side(0.0), face, 0.01) == 0.0
     assert torn.hole_share(side(0.0, np.pi / 2), face, 0.01) > 0.5
-
-
-def test_two_holes_that_share_a_point_are_two():
     _, triangles = ball(8, 12)
     beside = [k for k, t in enumerate(triangles) if set(t) <= {12, 13, 24, 25} or set(t) <= {13, 14, 1, 2}]
     loops = border_loops(np.delete(triangles, beside, axis=0))
     assert sorted(map(len, loops)) == [4, 4]
     assert sum(13 in loop for loop in loops) == 2
-
-
-def test_filling_has_the_least_area():
-    """An L of six points: four triangles inside it, though the straight fan would leave it."""
+    # An L of six points: four triangles inside it, though the straight fan would leave it.
     L = 0.01 * np.array([(0, 0, 0), (2, 0, 0), (2, 1, 0), (1, 1, 0), (1, 2, 0), (0, 2, 0)], float)
     a, b, c = L[filling(L, [1, 2, 3, 4, 5, 0], set())].transpose(1, 0, 2)
     area = np.cross(b - a, c - a)[:, 2] / 2
@@ -198,7 +180,7 @@ def test_filling_has_the_least_area():
     assert np.abs(area).sum() == pytest.approx(3e-4)
 
 
-def test_closest_points_and_rays_of_the_tree_are_those_of_all_triangles():
+def test_the_tree_finds_what_all_triangles_give_and_the_edges_of_a_coarse_cylinder_are_all_creases():
     x, triangles = turned(bottle(0.003), 12)
     tree = TriangleTree(x, triangles)
     rng = np.random.default_rng(0)
@@ -215,10 +197,7 @@ def test_closest_points_and_rays_of_the_tree_are_those_of_all_triangles():
         if hit >= 0:
             p, n = o + t * d, tree.face_normals[hit]
             assert abs((p - x[triangles[hit, 0]]) @ n) < 1e-12
-
-
-def test_the_edges_of_a_cylinder_in_single_precision_are_all_creases():
-    """They turn by the crease angle itself, which rounding must not decide edge by edge; above it they are facets."""
+    # They turn by the crease angle itself, which rounding must not decide edge by edge; above it they are facets.
     for turn in np.linspace(0.0, 0.5, 8):
         body = trimesh.creation.cylinder(30.0, 100.0, sections=12)
         body.apply_transform(trimesh.transformations.rotation_matrix(turn, [0.3, 0.2, 1.0]))
@@ -235,4 +214,3 @@ def test_wide_facets_that_stay_sharp_are_told_with_what_they_hide(sections, told
     if told:  # the arc over a chord
         np.testing.assert_allclose(off, 0.025 * (1 - np.cos(np.pi / sections)), rtol=0.02)
     assert bool(MeshObject(body.vertices, body.faces).sharp_facets(0.0055)) == told
-

@@ -53,7 +53,7 @@ def face(nx=11, ny=7, length=0.05, width=0.022):
     return np.stack([x, y, 0 * x], axis=-1).reshape(-1, 3)
 
 
-def test_normal_and_hessian_are_derivatives_of_the_gap(shape):
+def test_normal_and_hessian_are_derivatives_of_the_gap_which_is_a_distance_and_zero_on_the_surface(shape):
     x = around(shape)
     _, normal, _ = shape.gap(x)
     assert np.abs(np.linalg.norm(normal, axis=1) - 1).max() < 1e-14
@@ -65,9 +65,6 @@ def test_normal_and_hessian_are_derivatives_of_the_gap(shape):
     assert np.mean(error > 1e-5 * np.abs(H).max() + 1e-4) < 0.01
     assert np.abs(H - H.transpose(0, 2, 1)).max() < 1e-12 * max(1, np.abs(H).max())
     assert np.abs(np.einsum("nij,nj->ni", H, normal)).max() < 1e-12 * max(1, np.abs(H).max())
-
-
-def test_a_step_along_the_normal_changes_the_gap_by_its_length_and_no_value_is_nan(shape):
     x = around(shape, low=0, high=5e-3)
     g, normal, _ = shape.gap(x)
     assert shape.gap(x + 1e-3 * normal)[0] == pytest.approx(g + 1e-3, abs=1e-14)
@@ -75,9 +72,6 @@ def test_a_step_along_the_normal_changes_the_gap_by_its_length_and_no_value_is_n
     x = np.array([[0, 0, 0], [0, 0, 0.02], [1e-300, 0, 0.01], [0.01, 0, 0], [0, 0.005, 0], [0, 0, -1], [1e3, 1e3, 1e3]])
     for value in shape.gap(x):
         assert np.isfinite(value).all()
-
-
-def test_surface_lies_on_the_object_and_is_drawn_from_outside(shape):
     points, triangles = shape.surface()
     if isinstance(shape, Plane):
         inner = np.abs(points[:, 2]) < 0.999 * shape.bounds[1, 2]  # a slab's ends are only drawn
@@ -151,15 +145,12 @@ def test_ellipse_near_its_axes_and_evolute_is_finite_and_below_every_other_dista
         assert np.abs(np.abs(g) - brute).max() < 2e-3 * max(a, b)
 
 
-def test_straight_runs_of_a_profile_stay_straight():
+def test_a_profile_passes_its_points_with_continuous_curvature_and_that_of_a_circle_converges_to_the_sphere():
     z = MM * np.linspace(3, 80, 500)
     g, _, H = SHAPES["bottle"].gap(np.column_stack([np.full(500, 33 * MM), np.zeros(500), z]))
     assert np.abs(g).max() < 1e-16
     assert np.abs(H[1:-1, 2, 2]).max() == 0
     assert np.abs(H[[0, -1], 2, 2]).max() < 1e-11  # these places belong to the roundings beside the run, too
-
-
-def test_profile_passes_its_points_and_has_continuous_curvature():
     bottle = SHAPES["bottle"]
     x = np.column_stack([BOTTLE[:, 1], 0 * BOTTLE[:, 0], BOTTLE[:, 0]])
     assert np.abs(bottle.gap(x)[0]).max() < 1e-15
@@ -167,9 +158,6 @@ def test_profile_passes_its_points_and_has_continuous_curvature():
     for order, scale in ((0, 1e-12), (1, 1e-9), (2, 1e-6)):
         jump = curve.derivative(s, order) - curve.derivative(s - 1e-13, order)
         assert np.abs(jump).max() < scale
-
-
-def test_profile_of_a_circle_converges_to_the_sphere():
     radius, errors = 0.03, []
     x = around(Sphere(radius))
     for n in (8, 16, 32):
@@ -179,9 +167,6 @@ def test_profile_of_a_circle_converges_to_the_sphere():
         errors.append(np.abs(Revolution(profile).gap(x)[0] - Sphere(radius).gap(x)[0]).max())
     assert np.log2(np.array(errors[:-1]) / errors[1:]).min() > 3.5
     assert errors[-1] < 1e-7
-
-
-def test_revolution_distance_matches_a_search_along_the_profile():
     rng = np.random.default_rng(2)
     for name in ("bottle", "open tube", "spindle"):
         shape = SHAPES[name]
@@ -216,7 +201,7 @@ def test_elliptic_cylinder_ends_in_a_rounded_edge_and_a_flat_cap(ratio):
     np.testing.assert_allclose(body.gap(x * [1, 1, -1])[0], g, rtol=1e-12, atol=1e-15)
 
 
-def test_elliptic_cylinder_is_the_infinite_one_within_its_length_and_ends_as_a_tube_does():
+def test_an_elliptic_cylinder_ends_as_a_tube_does_rims_continue_curved_ends_and_corners_are_rounded():
     x = around(EllipticCylinder(0.03, 0.02, 0.1))
     inner = np.abs(x[:, 2]) <= 0.048
     for one, other in zip(*(EllipticCylinder(0.03, 0.02, n).gap(x[inner]) for n in (0.1, 10.0)), strict=True):
@@ -226,10 +211,7 @@ def test_elliptic_cylinder_is_the_infinite_one_within_its_length_and_ends_as_a_t
     x = around(round_, low=-1e-3, high=0.01)
     assert np.abs(round_.gap(x)[0] - tube.gap(x)[0]).max() < 0.1e-3  # its rounding is not quite a circle
     assert round_.bounds == pytest.approx(tube.bounds, abs=1e-9)
-
-
-def test_rim_continues_a_curved_end_smoothly_and_an_end_on_the_axis_has_no_tip():
-    """The vase's wall flares at its open ends; the rim takes over direction and curvature and stays about a circle."""
+    # The vase's wall flares at its open ends; the rim takes over direction and curvature and stays about a circle.
     z = MM * np.linspace(0, 100, 11)
     vase = Revolution(np.stack([z, 0.03 + 4 * (z - 0.05) ** 2], axis=1), rim=0.003)
     assert np.abs(vase.curve.curvature(vase.curve.inner(50))).max() < 3 / 0.003
@@ -240,9 +222,6 @@ def test_rim_continues_a_curved_end_smoothly_and_an_end_on_the_axis_has_no_tip()
     assert g == pytest.approx([0.01, 0.01], abs=1e-15)
     assert normal == pytest.approx(np.array([[0, 0, -1.0]] * 2), abs=1e-9)
     assert H[0, 0, 0] == pytest.approx(H[0, 1, 1], rel=1e-9)
-
-
-def test_corner_between_straight_runs_is_rounded():
     can = Revolution([[0, 0], [0, 0.015], [0, 0.03], [0.05, 0.03], [0.1, 0.03], [0.1, 0.015], [0.1, 0]], rim=0.004)
     x = np.array([[0.03, 0, 0.1], [0.03, 0, 0.05], [0.01, 0, 0.1], [0.03 - 0.004, 0, 0.1]])
     g = can.gap(x)[0]
@@ -259,16 +238,13 @@ def test_impossible_profiles_are_refused(profile):
         Revolution(profile)
 
 
-def test_first_touch_on_a_sphere_and_a_cylinder():
+def test_first_touch_on_a_sphere_and_a_cylinder_of_a_grazing_edge_and_where_the_pad_passes():
     """A pad's centre meets the crest; a row of points beside the crest meets R - sqrt(R^2 - y^2) later."""
     start = pose([0.2, 0, 0], -X_AXIS)
     for shape in (Sphere(0.03), EllipticCylinder(0.03, 0.03, 0.1)):
         assert first_touch(shape, start, face(), 0.5) == pytest.approx(0.17, abs=2e-12)
         off = face(ny=2)  # two rows at y = +-11 mm; on the sphere its middle point, x = 0, is first
         assert first_touch(shape, start, off, 0.5) == pytest.approx(0.2 - np.sqrt(0.03**2 - 0.011**2), abs=2e-12)
-
-
-def test_first_touch_catches_a_grazing_edge_and_fails_when_the_pad_passes():
     shape = Sphere(0.03)
     graze = pose([0.2, 0, 0.03 + 0.025 - 1e-7], -X_AXIS)  # the pad's lower edge dips 0.1 um below the pole
     expected = 0.2 - np.sqrt(0.03**2 - (0.03 - 1e-7) ** 2)

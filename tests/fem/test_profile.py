@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import BSpline
 
@@ -23,29 +23,19 @@ def rounded_frustum(n, height, low, high):
     return np.column_stack([np.round(np.linspace(0, height, n), 3), np.round(np.linspace(low, high, n), 3)]) / 1000
 
 
-@pytest.mark.parametrize(
-    "outline",
-    [(18, 134.295, 15.300, 53.740), (27, 137.462, 23.936, 59.720), (32, 187.008, 20.405, 15.484), (7, 90, 30, 20)],
-)
-def test_two_straight_runs_of_one_direction_have_no_corner(outline):
-    """Rounding cuts a long line into runs; where two of them have one direction, a corner was 0 / 0."""
-    points = rounded_frustum(*outline)
-    body = Revolution(points)
-    e = (points[-1] - points[0]) / np.linalg.norm(points[-1] - points[0])
-    z, r = (points[0] + np.linspace(0.2, 0.8, 500)[:, None] * (points[-1] - points[0])).T
-    g, normal, _ = body.gap(np.column_stack([r, 0 * r, z]))
-    assert np.abs(g).max() < 1e-6  # the points' own rounding
-    assert normal == pytest.approx(np.broadcast_to([e[0], 0, -e[1]], (500, 3)), abs=2e-3)
-
-
 @settings(max_examples=40, deadline=None, derandomize=True)
+@example(18, 134.295, 15.300, 53.740)
+@example(27, 137.462, 23.936, 59.720)
+@example(32, 187.008, 20.405, 15.484)
 @given(st.integers(3, 40), st.floats(20, 200), st.floats(5, 60), st.floats(5, 60))
 def test_every_frustum_rounded_to_a_micrometre_is_one(n, height, low, high):
+    """Rounding cuts a long line into runs; where two of them have one direction, a corner was 0 / 0."""
     points = rounded_frustum(n, height, low, high)
-    body = Revolution(points)
+    e = (points[-1] - points[0]) / np.linalg.norm(points[-1] - points[0])
     z, r = (points[0] + np.linspace(0.2, 0.8, 100)[:, None] * (points[-1] - points[0])).T
-    g, _, hessian = body.gap(np.column_stack([r, 0 * r, z]))
+    g, normal, hessian = Revolution(points).gap(np.column_stack([r, 0 * r, z]))
     assert np.abs(g).max() < 1e-5
+    assert np.abs(normal - [e[0], 0, -e[1]]).max() < 0.05  # of runs that are short and rounded
     assert np.isfinite(hessian).all()
 
 

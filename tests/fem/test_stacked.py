@@ -26,7 +26,7 @@ def off_the_wall(body, n=400, far=0.003, heights=(0.012, 0.17)):
     return x + normal * rng.uniform(-far, far, n)[:, None]
 
 
-def test_circles_make_the_body_of_revolution():
+def test_circles_make_the_body_of_revolution_ellipses_the_cylinder_and_splines_converge_with_the_fourth_order():
     rigid, stacked = Revolution(np.array(PROFILE)), Stacked(of_sections([Section(z, r) for z, r in PROFILE]))
     x = off_the_wall(rigid)
     for body in (stacked, stacked.near(HERE, np.zeros(3), np.zeros(3))):
@@ -37,9 +37,6 @@ def test_circles_make_the_body_of_revolution():
         np.testing.assert_allclose(hessian, expected[2], atol=0.05)
     np.testing.assert_allclose(stacked.bounds, rigid.bounds, atol=1e-5)
     assert stacked.outer.round
-
-
-def test_ellipses_of_one_size_make_the_elliptic_cylinder():
     a, b = 0.03, 0.024
     stacked = Stacked(of_sections([Section(z, a, b) for z in (0.0, 0.05, 0.1, 0.15)]))
     rng = np.random.default_rng(4)
@@ -51,9 +48,6 @@ def test_ellipses_of_one_size_make_the_elliptic_cylinder():
     np.testing.assert_allclose(normal, expected[1], atol=5e-6)
     np.testing.assert_allclose(hessian, expected[2], atol=0.05)
     assert (stacked.outer.round, stacked.outer.symmetric) == (False, (True, True))
-
-
-def test_far_away_and_over_the_lids_the_distance_is_still_signed():
     stacked = Stacked(of_sections([Section(z, r) for z, r in PROFILE]))
     low, high = stacked.bounds[:, 2]
     points = np.array([[0.2, 0, 0.06], [0, 0, low - 0.01], [0, 0, high + 0.02], [0, 0, 0.06]])
@@ -62,9 +56,6 @@ def test_far_away_and_over_the_lids_the_distance_is_still_signed():
     assert g[3] == pytest.approx(-0.034, abs=1e-4)
     np.testing.assert_allclose(np.linalg.norm(normal, axis=1), 1.0)
 
-
-@pytest.mark.parametrize("m", [24, 48])
-def test_splines_converge_with_the_fourth_order(m):
     def worst(m):
         theta, s = np.linspace(0, 2 * np.pi, m + 1), np.linspace(0, 0.15, m + 1)
 
@@ -76,14 +67,10 @@ def test_splines_converge_with_the_fourth_order(m):
         t, z = rng.uniform(-7, 9, 200), rng.uniform(0.02, 0.13, 200)
         return np.abs(surface.at(t, z)[:, 0] - point(t, z)).max()
 
-    assert worst(m) / worst(2 * m) > 12
-
-
-def test_lines_of_a_wall_that_rounding_doubles_are_one():
-    """Ends of the wall that fall on breaks of its outline but for rounding."""
+    assert min(worst(24) / worst(48), worst(48) / worst(96)) > 12
+    # Ends of the wall that fall on breaks of its outline but for rounding.
     outer = of_sections([Section(z, r) for z, r in PROFILE])
     breaks = outer.curve.breaks
     low, *_, high = breaks[(breaks > outer.wall[0]) & (breaks < outer.wall[1])]
     surface = wall_surface(outer, np.nextafter(low, 0.0), np.nextafter(high, 1.0))
     assert np.diff(surface.s).min() > 1e-9
-

@@ -44,25 +44,19 @@ def test_triangles_without_finite_coordinates_are_left_out(value):
     assert notes
 
 
-def test_triangles_are_turned_as_their_neighbours_and_outwards():
+def test_triangles_are_turned_outwards_specks_dropped_separate_parts_kept_and_one_side_stays_as_it_is():
     some = np.where(np.arange(len(BALL.faces))[:, None] < 5, BALL.faces[:, ::-1], BALL.faces)
     for faces in (BALL.faces[:, ::-1], some):
         mesh = cleaned(np.array(BALL.vertices), faces)
         assert trimesh.Trimesh(mesh.points, mesh.triangles, process=False).volume > 0
         assert mesh.closed
         assert len(mesh.notes) == 1
-
-
-def test_shells_inside_and_specks_are_dropped_and_separate_parts_are_kept():
     inner, speck = BALL.copy().apply_scale(0.93), trimesh.creation.icosphere(0, 2e-4).apply_translation([0.05, 0, 0])
     assert len(cleaned(*joined(BALL, inner, speck)).triangles) == 320
     assert len(cleaned(*joined(BALL, BALL.copy().apply_translation([0.07, 0, 0]))).triangles) == 640
     inner.vertices[0] *= 1.3  # comes through the outer one
     assert len(cleaned(*joined(BALL, inner)).triangles) == 320
-
-
-def test_a_surface_of_one_side_stays_as_it_is():
-    """A Klein bottle: a torus grid glued with a flip."""
+    # A Klein bottle: a torus grid glued with a flip.
     n = 12
     index = lambda i, j: (i % n) * n + (j if i < n else -j) % n  # noqa: E731
     quads = [[index(i, j), index(i + 1, j), index(i + 1, j + 1), index(i, j + 1)] for i in range(n) for j in range(n)]
@@ -72,10 +66,7 @@ def test_a_surface_of_one_side_stays_as_it_is():
     assert not mesh.closed
     assert len(mesh.triangles) == 2 * n * n
     assert np.isfinite(smooth_triangles(mesh.points, mesh.triangles).inner).all()
-
-
-def test_where_many_triangles_meet_those_that_go_on_smoothly_are_neighbours():
-    """A wall of two coplanar triangles with a shelf on either side, of any winding."""
+    # A wall of two coplanar triangles with a shelf on either side, of any winding.
     x = np.array([[0, 0, 0], [0, 0, 1], [1, 0, 0], [-1, 0, 0], [0, 1, 0.2], [0.2, -1, 0]], float)
     joint = neighbours(x, np.array([[0, 1, 2], [0, 1, 3], [1, 0, 4], [0, 1, 5]]))
     edge = int(np.flatnonzero((joint.edges == [0, 1]).all(axis=1))[0])

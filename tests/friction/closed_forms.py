@@ -96,10 +96,7 @@ def cylinder(model: str, alpha: float = ALPHA, L: float = 2.0) -> Form:
 def roof(model: str, tilt: float = 0.6, W: float = 1.0, L: float = 2.0) -> Form:
     """Two rectangles that meet in a ridge along x."""
     S, c = 2 * W * L, cos(tilt)
-    arm = {
-        "ccm": c * mean_distance(L, 2 * W),
-        "pcm": mean_distance(L, 2 * W * c),
-    }[model]
+    arm = {"ccm": c * mean_distance(L, 2 * W), "pcm": mean_distance(L, 2 * W * c)}[model]
     patch = lambda n: wedge(tilt, W, L, n, 2 * n)  # noqa: E731
     f_y = c * S if model == "ccm" else S
     return Form(patch, S, c * S, S, f_y, arm * S, 2.0, model)

@@ -4,8 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from softjaw.friction.frame import FrameFlag, contact_frame, in_frame, wound
@@ -13,13 +11,10 @@ from softjaw.friction.motion import SLIDE_X, TURN_Z
 from softjaw.friction.patch import ContactPatch, NoContactError
 from softjaw.friction.wrench import friction_limits, friction_wrench, pure_torque
 from tests.generators import cap_polar, cyl_mesh, cylinder_grid, grid_mesh, mesh_patch, points_patch
-from tests.turns import TURNS
+from tests.turns import seeded
 
 X = np.array([1.0, 0.0, 0.0])
 EPS = np.finfo(float).eps
-# The same examples on every rank and every day, and no folder of past failures beside the project.
-REPEATABLE = settings(derandomize=True, deadline=None, database=None, max_examples=TURNS)
-seeds = st.integers(0, 2**32 - 1)
 
 
 def ulps(values, rng, most=4):
@@ -107,8 +102,7 @@ KNOWN = {
 
 
 @pytest.mark.parametrize("name", KNOWN)
-@REPEATABLE
-@given(seed=seeds)
+@seeded
 def test_the_contact_frame_turns_with_the_patch_and_keeps_its_flags(name, seed):
     """Flags, counted faces, and origin and axes to 1e-9 of the patch's size."""
     make, flag, count = KNOWN[name]
@@ -122,8 +116,7 @@ def test_the_contact_frame_turns_with_the_patch_and_keeps_its_flags(name, seed):
     np.testing.assert_allclose(found.origin, R @ frame.origin + t, atol=1e-9)
 
 
-@REPEATABLE
-@given(seed=seeds)
+@seeded
 def test_the_sides_of_faces_are_decided_or_undecided_for_good(seed):
     patch = joined(with_a_sliver(), wound_the_other_way(), trough())
     # a face that stands at 90 degrees to its own normal has no side either
@@ -135,8 +128,7 @@ def test_the_sides_of_faces_are_decided_or_undecided_for_good(seed):
     assert wound(patch).tolist() == wound(shaken(patch, seed)[0]).tolist() == expected.tolist()  # -1, 0 or 1
 
 
-@REPEATABLE
-@given(seed=seeds)
+@seeded
 def test_what_has_no_frame_never_gets_one(seed):
     ring = cylinder_grid(1, np.pi, 2, 12, 3)  # pressed from all sides
     turned, R, _ = shaken(ring, seed)
@@ -147,8 +139,7 @@ def test_what_has_no_frame_never_gets_one(seed):
         contact_frame(plate, R @ [0, 0, 1])
 
 
-@REPEATABLE
-@given(seed=seeds)
+@seeded
 def test_a_face_at_the_axis_of_rotation_rests(seed):
     """The middle one of three faces on a line: the motion about it moves it by rounding alone."""
     rng = np.random.default_rng(seed)
@@ -166,8 +157,7 @@ def test_a_face_at_the_axis_of_rotation_rests(seed):
     assert np.linalg.norm(along[:3]) == pytest.approx(2 * 0.5 * 0.6, rel=1e-12)
 
 
-@REPEATABLE
-@given(seed=seeds)
+@seeded
 def test_normals_that_cancel_leave_no_normal_force_to_divide_by(seed):
     rng = np.random.default_rng(seed)
     patch = points_patch([[0, 0], [1, 0], [0, 1]], [1, 1, 1], [[0.6, 0, 0.8], [0, 0, -1], [-0.6, 0, 0.2]])
@@ -179,8 +169,7 @@ def test_normals_that_cancel_leave_no_normal_force_to_divide_by(seed):
     assert np.isfinite(limits.e_n_projected)
 
 
-@REPEATABLE
-@given(seed=seeds)
+@seeded
 def test_the_pure_torque_turns_with_the_patch(seed):
     patch = in_frame(trough(), contact_frame(trough(), X))
     again, R, _ = shaken(trough(), seed)

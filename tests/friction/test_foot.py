@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
 from scipy.spatial.transform import Rotation
 
 from softjaw.friction.foot import ContactFace, foot
 from softjaw.friction.frame import FrameFlag, contact_frame
-from tests.friction.test_decisions import REPEATABLE, seeds, shaken
+from tests.friction.test_decisions import shaken
 from tests.generators import cyl_mesh, grid_mesh, mesh_patch
+from tests.turns import seeded
 
 X = np.array([1.0, 0.0, 0.0])
 
@@ -33,7 +33,7 @@ def frames(shares):
     return [contact_frame(bridge(share), X, whole_face=True) for share in shares]
 
 
-def test_over_a_hole_the_frame_stands_on_the_face_itself():
+def test_over_a_hole_the_frame_stands_on_the_face_continuously_and_its_origin_on_the_line():
     """By symmetry in the middle, at a corner; the planes of the nearest loaded faces meet above it."""
     patch = bridge(0.5)
     frame = contact_frame(patch, X, whole_face=True)
@@ -43,11 +43,7 @@ def test_over_a_hole_the_frame_stands_on_the_face_itself():
     without = contact_frame(patch, X)
     assert without.flag == FrameFlag.HOLE
     assert without.origin[2] == pytest.approx(0.3 * (1 + 1 / 4 * 1 / 3), rel=1e-12)
-
-
-def test_the_frame_over_a_hole_is_continuous_where_that_of_loaded_faces_jumps():
-    """The largest change over a step of the share is in proportion to the step; that of a jump is not."""
-
+    # The largest change over a step of the share is in proportion to the step; that of a jump is not.
     def largest(found, count):
         places = np.array([np.concatenate([f.origin, f.axes[2]]) for f in found])
         return np.abs(np.diff(places, axis=0)).max() * count
@@ -56,9 +52,6 @@ def test_the_frame_over_a_hole_is_continuous_where_that_of_loaded_faces_jumps():
     assert largest(frames(fine), 80) == pytest.approx(largest(frames(coarse), 20), rel=0.35)
     jumps = [largest([contact_frame(bridge(share), X) for share in s], len(s) - 1) for s in (coarse, fine)]
     assert jumps[1] > 2 * jumps[0]
-
-
-def test_the_origin_lies_on_the_line_and_on_the_face():
     for share in np.linspace(0.1, 0.9, 23):
         patch = bridge(share)
         frame = contact_frame(patch, X, whole_face=True)
@@ -67,6 +60,11 @@ def test_the_origin_lies_on_the_line_and_on_the_face():
         x = patch.corners.reshape(24, 6, 4, 3)[int((frame.origin[0] + 1) * 12), 0, :2]
         along = (frame.origin[0] - x[0, 0]) / (x[1, 0] - x[0, 0])
         assert frame.origin[2] == pytest.approx(x[0, 2] + along * (x[1, 2] - x[0, 2]), abs=1e-12)
+    # The frame of the loaded faces does not feel the others; sums may end in other bits.
+    whole = bridge(0.3)
+    one, two = contact_frame(whole, X), contact_frame(whole.loaded, X)
+    np.testing.assert_allclose(one.origin, two.origin, atol=1e-14)
+    np.testing.assert_allclose(one.axes, two.axes, atol=1e-12)
 
 
 def test_the_normal_of_a_skew_cylinder_has_order_two():
@@ -80,14 +78,6 @@ def test_the_normal_of_a_skew_cylinder_has_order_two():
     assert np.polyfit(np.log([8, 16, 32, 64]), np.log(errors), 1)[0] < -1.7
 
 
-def test_faces_without_load_count_only_on_request():
-    """The frame of the loaded faces does not feel the others; sums may end in other bits."""
-    whole = bridge(0.3)
-    one, two = contact_frame(whole, X), contact_frame(whole.loaded, X)
-    np.testing.assert_allclose(one.origin, two.origin, atol=1e-14)
-    np.testing.assert_allclose(one.axes, two.axes, atol=1e-12)
-
-
 @pytest.mark.parametrize("at", [(-0.6, -0.6), (0.3, 0.2), (-0.3, 0.1), (0.6, -0.4)])
 def test_a_line_meets_a_skew_face_where_it_crosses_it(at):
     """Sides of no two directions alike: Newton's method takes several steps, of either sign."""
@@ -97,7 +87,7 @@ def test_a_line_meets_a_skew_face_where_it_crosses_it(at):
     np.testing.assert_allclose(point[:2], at, atol=1e-12)
 
 
-def test_a_line_beside_the_face_meets_the_nearest_point_of_its_rim():
+def test_a_line_beside_the_face_meets_its_rim_the_nearer_of_two_crossings_counts_and_steps_are_halved():
     face = ContactFace.of(mesh_patch(grid_mesh(4, 3, 1, 0.5, lambda x, y: -(x**2))))
     point, normal, missed = face.foot(np.array([1.5, 0.1, 3.0]), np.array([0, 0, 1.0]))
     assert missed
@@ -106,9 +96,6 @@ def test_a_line_beside_the_face_meets_the_nearest_point_of_its_rim():
     patch = mesh_patch(grid_mesh(4, 3, 1, 0.5, lambda x, y: -(x**2)))
     bent = replace(patch, normal=np.tile([2.0, 0, 1], (12, 1)), pressure=(patch.centroid[:, 0] > 0.5).astype(float))
     assert contact_frame(bent, X, whole_face=True).flag & ~FrameFlag.HOLE == 0
-
-
-def test_of_two_crossings_the_nearer_one_counts_and_of_equal_ones_that_along_the_normal():
     floors = [grid_mesh(2, 2, 1, 1, lambda x, y, h=h: h + 0 * x) for h in (-1.0, 1.0)]
     patch = mesh_patch(np.concatenate(floors))
     face, N = ContactFace.of(patch), np.array([0, 0, 1.0])
@@ -116,10 +103,7 @@ def test_of_two_crossings_the_nearer_one_counts_and_of_equal_ones_that_along_the
         start = np.array([0.3, 0.2, z])
         assert face.foot(start, N)[0][2] == pytest.approx(expected, abs=1e-12)
         assert foot(patch, start, N)[0][2] == pytest.approx(expected, abs=1e-12)
-
-
-def test_steps_that_lead_to_and_fro_are_halved():
-    """Pressed far above its ridge a roof's normal leads to the other side; half steps end on the ridge."""
+    # Pressed far above its ridge a roof's normal leads to the other side; half steps end on the ridge.
     patch = mesh_patch(grid_mesh(2, 1, 1, 1, lambda x, y: -1.5 * np.abs(x)))
     high = replace(patch, centroid=np.add(patch.centroid, [0.01, 0, 2.0]))
     frame = contact_frame(high, X, whole_face=True)
@@ -129,8 +113,7 @@ def test_steps_that_lead_to_and_fro_are_halved():
     assert np.abs(arm[:2]).max() < 1e-9
 
 
-@REPEATABLE
-@given(seed=seeds)
+@seeded
 def test_the_frame_on_the_whole_face_turns_with_the_patch(seed):
     """Corners that differ by rounding are still one corner."""
     patch = bridge(0.37, n=8)

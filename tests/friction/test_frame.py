@@ -12,24 +12,17 @@ from tests.generators import cyl_mesh, cylinder_grid, disc_polar, grid_mesh, lcg
 X = [1.0, 0.0, 0.0]
 
 
-def test_the_patch_in_its_frame_has_its_pressure_on_the_normal():
+def test_the_patch_in_its_frame_has_its_pressure_on_the_normal_and_a_cycle_ends_with_the_mean_normal():
     patch = mesh_patch(cyl_mesh(1, 1.0, 2, 16, 16), lambda r: 1 + 0.8 * r[:, 1])
     local = in_frame(patch, contact_frame(patch, X))
     cop = local.load @ local.centroid / local.load.sum()
     np.testing.assert_allclose(cop[:2], 0, atol=1e-14)
     np.testing.assert_allclose(local.corners.mean(axis=1), local.centroid, atol=1e-14)
-
-
-def test_without_corners_the_nearest_face_stands_in():
     frame = contact_frame(cylinder_grid(1, 1, 2, 17, 17), X)
     assert frame.flag == FrameFlag.NO_CORNERS
     np.testing.assert_allclose(frame.origin, 0, atol=1e-15)
     np.testing.assert_allclose(frame.axes, np.eye(3), atol=1e-15)
-
-
-def test_a_cycle_between_faces_ends_with_their_mean_normal():
-    """A roof between two raised shelves, pressed above its ridge: each side's normal leads to the other side."""
-
+    # A roof between two raised shelves, pressed above its ridge: each side's normal leads to the other side.
     def strip(x0, z0, x1, z1):
         return [[x0, -1, z0], [x1, -1, z1], [x1, 1, z1], [x0, 1, z0]]
 
@@ -68,7 +61,7 @@ def test_random_bumps_always_give_a_frame():
     assert 5 <= cycles <= 20
 
 
-def test_flipped_normals_are_found_with_and_without_corners():
+def test_flipped_normals_are_found_the_contact_length_is_the_longer_side_and_no_frame_is_an_error():
     patch = mesh_patch(cyl_mesh(1, 0.6, 2, 12, 12))
     sign = np.where(np.arange(len(patch.load)) % 5 == 0, -1, 1)[:, None]
     flipped = replace(patch, normal=sign * patch.normal)
@@ -76,15 +69,9 @@ def test_flipped_normals_are_found_with_and_without_corners():
     assert contact_frame(replace(flipped, corners=None), X).flag & FrameFlag.ORIENTATION
     rewound = mesh_patch(np.where(sign[:, None] > 0, patch.corners, patch.corners[:, ::-1]))
     assert contact_frame(rewound, X).flag & FrameFlag.ORIENTATION
-
-
-def test_contact_length_is_the_longer_side_of_the_rectangle():
     assert contact_length(mesh_patch(grid_mesh(4, 4, 1.0, 0.6))) == pytest.approx(2.0)
     assert contact_length(rect_grid(0.6, 2.0, 3, 10)) == pytest.approx(2.0)
     assert contact_length(disc_polar(1, 60, 120)) == pytest.approx(2.0, rel=0.02)
-
-
-def test_what_has_no_frame_is_an_error():
     patch = points_patch([[0, 0], [1, 0]], [1, 1], [[0, 0, 1], [0, 0, -1]])
     with pytest.raises(NoContactError):
         contact_frame(patch, X)

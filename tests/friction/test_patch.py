@@ -24,28 +24,16 @@ def test_a_bad_value_is_named_with_its_place_and_the_remedy(name, index, value, 
         replace(patch, **{name: array})
 
 
-@pytest.mark.parametrize("name", ["centroid", "area", "normal"])
-def test_a_missing_row_is_an_error(name):
+def test_corners_need_three_per_face_no_force_is_an_error_and_a_patch_cannot_be_changed():
     patch = lcg_patch(1, 10)
-    with pytest.raises(ValueError, match=name):
-        replace(patch, **{name: getattr(patch, name)[:-1]})
-
-
-def test_corners_need_three_per_face_and_no_normal_force_is_an_error_of_its_own_kind():
-    patch = lcg_patch(1, 10)
-    with pytest.raises(ValueError, match="corners"):
-        replace(patch, corners=np.zeros((10, 2, 3)))
-    with pytest.raises(ValueError, match="corners"):
-        replace(patch, corners=np.zeros((10, 12)))
-    patch = lcg_patch(1, 10)
+    wrong = {name: getattr(patch, name)[:-1] for name in ("centroid", "area", "normal")}
+    for name, values in [*wrong.items(), ("corners", np.zeros((10, 2, 3))), ("corners", np.zeros((10, 12)))]:
+        with pytest.raises(ValueError, match=name):
+            replace(patch, **{name: values})
     with pytest.raises(NoContactError):
         replace(patch, pressure=np.zeros(10))
     with pytest.raises(NoContactError):
         ContactPatch(np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3)), np.zeros(0))
-
-
-def test_a_patch_cannot_be_changed_and_unit_normals_keep_their_bits():
-    patch = lcg_patch(1, 10)
     with pytest.raises(ValueError, match="read-only"):
         patch.pressure[0] = 1.0
     source = np.ones(3)

@@ -1,19 +1,32 @@
-"""Friction wrenches: the compiled kernel, arguments, single patches, and what holds for every patch and motion."""
+"""Friction wrenches: the compiled kernel, single patches, what holds for all, six dimensions, and the pure torque."""
 
 import math
-import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from scipy.optimize import minimize
 from scipy.special import ellipe
 
+from softjaw.friction import wrench
 from softjaw.friction.motion import SLIDE_X, SLIDE_Y, fibonacci_twists
 from softjaw.friction.patch import ContactPatch
-from softjaw.friction.wrench import FrictionLimits, friction_limits, friction_sums, friction_support, friction_wrench
-from tests.generators import cap_polar, cor_grid, cor_twists, cylinder_grid, friction_sums_reference, lcg_patch, wedge
+from softjaw.friction.wrench import friction_limits, friction_sums, friction_support, friction_wrench, pure_torque
+from tests.generators import (
+    cap_polar,
+    cor_twists,
+    cylinder_grid,
+    disc_polar,
+    friction_sums_reference,
+    lcg_patch,
+    moved,
+    points_patch,
+    rect_grid,
+    wedge,
+)
 
 SEEDS = range(1, 21)
 
@@ -28,7 +41,7 @@ def test_the_compiled_kernel_is_the_textbook_formula(seed):
     np.testing.assert_allclose(out, friction_sums_reference(*columns, twist), rtol=0, atol=1e-12 * patch.load.sum())
 
 
-def test_the_wrench_is_odd_in_the_motion_deaf_to_its_speed_and_of_planar_models_in_their_plane():
+def test_the_wrench_is_odd_and_deaf_to_speed_a_translation_turns_about_infinity_and_e_n_is_free_of_mu():
     patch, twist = lcg_patch(5, 80), np.random.default_rng(0).normal(size=(50, 6))
     W = friction_wrench(patch, twist, 0.4)
     rounding = {"rtol": 0, "atol": 1e-14 * patch.load.sum()}  # of the sum over faces
@@ -39,10 +52,7 @@ def test_the_wrench_is_odd_in_the_motion_deaf_to_its_speed_and_of_planar_models_
     np.testing.assert_allclose(friction_support(patch, 1e3 * twist, 0.4), 1e3 * friction_support(patch, twist, 0.4))
     W = friction_wrench(lcg_patch(3, 30), np.random.default_rng(1).normal(size=(9, 6)), 0.5, "pcm")
     np.testing.assert_allclose(W[:, [2, 3, 4]], 0, atol=1e-15)
-
-
-def test_a_translation_is_a_rotation_about_infinity():
-    """Forces approach with order 2 in the distance, moments with order 1."""
+    # Forces approach with order 2 in the distance, moments with order 1.
     patch = cylinder_grid(1.0, np.pi / 3, 2.0, 16, 16)
     exact = friction_wrench(patch, SLIDE_Y, 1.0)[0]
     force, moment = [], []
@@ -52,19 +62,16 @@ def test_a_translation_is_a_rotation_about_infinity():
         moment.append(abs(W[5] - exact[5]))
     np.testing.assert_allclose(np.log2(np.divide(force[:-1], force[1:])), 2, atol=0.1)
     np.testing.assert_allclose(np.log2(np.divide(moment[:-1], moment[1:])), 1, atol=0.1)
-
-
-def test_e_n_does_not_depend_on_mu_not_even_on_zero():
     patch = cylinder_grid(0.02, 0.7, 0.05, 12, 12)
     with_friction, without = friction_limits(patch, 0.8), friction_limits(patch, 0.0)
     assert with_friction.e_n == without.e_n == pytest.approx(with_friction.tau_z / (0.8 * with_friction.S), rel=1e-14)
     assert with_friction.e_n_projected == pytest.approx(with_friction.tau_z / (0.8 * with_friction.F_N), rel=1e-14)
     assert (without.f_x, without.f_y, without.tau_z) == (0, 0, 0)
     assert without.per_unit_force == (0, 0, 0)
-    assert math.isnan(FrictionLimits(1.0, 1.0, 0.1, 1.0, -0.2, 0.1, 0.1).e_n_projected)
+    assert math.isnan(wrench.FrictionLimits(1.0, 1.0, 0.1, 1.0, -0.2, 0.1, 0.1).e_n_projected)
 
 
-def test_the_largest_force_of_a_turned_wedge_lies_along_its_ridge():
+def test_the_largest_force_lies_along_the_ridge_of_a_wedge_and_in_every_direction_on_a_cap():
     """Eq. (11): along the ridge a wedge resists with mu S, whichever way it lies; in the planar models all ways."""
     upright = wedge(0.6, 0.03, 0.05, 8, 8)
     for angle in (0.0, 0.3, 0.5, math.pi / 4, 2.5):
@@ -75,10 +82,7 @@ def test_the_largest_force_of_a_turned_wedge_lies_along_its_ridge():
         assert limits.e_n_ratio == pytest.approx(limits.e_n, rel=1e-8)
         assert planar.e_n_ratio == pytest.approx(planar.tau_z / (0.7 * planar.F_N), rel=1e-12)
         assert friction_limits(patch, 0.0).e_n_ratio == pytest.approx(limits.e_n_ratio, rel=1e-12)
-
-
-def test_on_a_cap_the_largest_force_is_that_in_every_direction():
-    """Eq. (11) on a spherical cap, where it differs from Eq. (12): max f_t = 4 R^2 int E(sin^2 t) sin t dt."""
+    # Eq. (11) on a spherical cap, where it differs from Eq. (12): max f_t = 4 R^2 int E(sin^2 t) sin t dt.
     limits = friction_limits(cap_polar(0.02, 1.0, 40, 160), 1.0)
     t = (np.arange(4000) + 0.5) / 4000
     force = 4 * 0.02**2 * np.mean(ellipe(np.sin(t) ** 2) * np.sin(t))
@@ -91,23 +95,11 @@ def test_on_a_cap_the_largest_force_is_that_in_every_direction():
     (lambda p: friction_wrench(p, [[1, 0, 0, 0]], 0.5), "twist has shape"),
     (lambda p: friction_wrench(p, [[np.inf, 0, 1]], 0.5), r"twist\[0\] is .*omega = 0"),
     (lambda p: friction_wrench(p, SLIDE_X, -0.5), "mu is -0.5"), (lambda p: friction_limits(p, np.nan), "mu is nan"),
+    (lambda p: wrench.pure_torque(p, -0.5), "mu is -0.5"),
 ])  # fmt: skip
 def test_bad_arguments_are_named(call, match):
     with pytest.raises(ValueError, match=match):
         call(lcg_patch(1, 10))
-
-
-@pytest.mark.long
-def test_the_kernel_is_fast():
-    """2400 faces under the paper's 441 centres of rotation; 1400 M pairs/s were measured on one core with AVX-512."""
-    patch, twist = lcg_patch(1, 2400), cor_grid(21, 2.0)
-    friction_wrench(patch, twist, 0.8)
-    seconds = []
-    for _ in range(20):
-        start = time.perf_counter()
-        friction_wrench(patch, twist, 0.8)
-        seconds.append(time.perf_counter() - start)
-    assert 2400 * 441 / min(seconds) > 400e6
 
 
 @pytest.mark.parametrize(("alpha", "left"), [(0.0, 1.0), (0.2, 1.0 - np.tan(0.2) / 0.5), (0.6, 0.0)])
@@ -171,3 +163,97 @@ def test_three_motions_give_the_largest_force_and_torque(patch):
     slack = 1e-14 * 0.6 * limits.S * np.array([1.0, 1.0, max(1.0, np.abs(patch.centroid).max())])
     assert (W <= np.array([limits.f_x, limits.f_y, limits.tau_z]) * (1 + ROUNDING) + slack).all()
     assert limits.e_n == pytest.approx(limits.tau_z / (0.6 * limits.S), rel=1e-13)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_another_reference_point_turns_motions_and_wrenches_by_the_adjoint(seed):
+    """About c: ``v' = v + omega x c``, ``tau' = tau - c x f``; forces and dissipated power stay."""
+    rng = np.random.default_rng(seed)
+    patch, c, twist = lcg_patch(seed, 50), rng.normal(size=3), rng.normal(size=(40, 6))
+    there = moved(patch, np.eye(3), -c)
+    twist_there = np.hstack([twist[:, :3] + np.cross(twist[:, 3:], c), twist[:, 3:]])
+    W, W_there = friction_wrench(patch, twist, 0.7), friction_wrench(there, twist_there, 0.7)
+    np.testing.assert_allclose(W_there[:, :3], W[:, :3], atol=1e-12)
+    np.testing.assert_allclose(W_there[:, 3:], W[:, 3:] - np.cross(c, W[:, :3]), atol=1e-12)
+    np.testing.assert_allclose(
+        friction_support(there, twist_there, 0.7), friction_support(patch, twist, 0.7), rtol=1e-12
+    )
+
+
+def slip_matrix(patch):
+    """Rows of all faces' slip ``P (v + omega x r)`` as a matrix that multiplies ``[v, omega]``, ``(3 n, 6)``."""
+    P = np.eye(3) - patch.normal[:, :, None] * patch.normal[:, None, :]
+    turn = np.stack([np.cross(e, patch.centroid) for e in np.eye(3)], axis=2)
+    return np.concatenate([P, P @ turn], axis=2).reshape(-1, 6)
+
+
+@pytest.mark.parametrize(("patch", "rank"), [
+    (rect_grid(2, 1, 8, 4), 3), (disc_polar(1, 4, 12), 3), (cylinder_grid(1, 1, 2, 8, 8), 6),
+    (cap_polar(1, 1, 6, 12), 6), (wedge(0.6, 1, 2, 4, 8), 5),
+], ids=["rectangle", "disc", "cylinder", "cap", "wedge"])  # fmt: skip
+def test_how_many_motions_a_patch_feels(patch, rank):
+    """Lifting and tilting rub nowhere on a plane patch; a wedge does not feel its own turn about the ridge; a smoothly
+    curved patch feels all. The wrenches span as many dimensions.
+    """
+    _, values, right = np.linalg.svd(slip_matrix(patch), full_matrices=True)
+    assert (values > 1e-9 * values[0]).sum() == rank
+    unfelt = right[rank:]
+    np.testing.assert_allclose(friction_support(patch, unfelt, 1.0) if len(unfelt) else 0.0, 0, atol=1e-12)
+    W = friction_wrench(patch, np.random.default_rng(0).normal(size=(60, 6)), 1.0)
+    assert np.linalg.matrix_rank(W, tol=1e-9) == rank
+
+
+TRIANGLE = [[1, 0], [-0.5, math.sqrt(0.75)], [-0.5, -math.sqrt(0.75)]]
+
+
+def centred(patch):
+    return moved(patch, np.eye(3), -(patch.load @ patch.centroid) / patch.load.sum())
+
+
+def test_pure_torque_turns_about_the_support_that_carries_most():
+    """Loads 1:1:8 at an equilateral triangle: the median is the heavy support, 2 sqrt(3) is left of the torque."""
+    patch = points_patch(TRIANGLE, [1.0, 1.0, 8.0])
+    assert pure_torque(patch, 0.5) == pytest.approx(0.5 * 2 * math.sqrt(3), rel=1e-9)
+    assert pure_torque(centred(patch), 0.5) == pytest.approx(0.5 * 2 * math.sqrt(3), rel=1e-9)
+    # ``mu F_2 d`` about the heavier point and ``2 mu d F_1 F_2 / (F_1 + F_2)`` about the centre of pressure.
+    for heavy in (0.5, 0.6, 0.9, 0.999):
+        patch = centred(points_patch([[-0.02, 0], [0.03, 0]], [heavy, 1 - heavy]))
+        about_cop = friction_limits(patch, 0.8).tau_z
+        assert about_cop == pytest.approx(0.8 * 2 * 0.05 * heavy * (1 - heavy), rel=1e-12)
+        assert about_cop / pure_torque(patch, 0.8) == pytest.approx(2 * heavy, rel=1e-8)
+    for seed in range(20):
+        patch = lcg_patch(seed, 12)
+        flat = centred(replace(patch, pressure=patch.pressure**8, normal=np.tile([0.0, 0, 1], (12, 1))))
+        ratio = friction_limits(flat, 1.0).tau_z / pure_torque(flat, 1.0)
+        assert 1 <= ratio <= 2
+
+
+@pytest.mark.parametrize("corner", [(0.2, 0.6), (0.5, 0.9), (-0.3, 0.8)])
+def test_three_equal_supports_turn_about_the_point_of_fermat(corner):
+    """Least sum of distances to the corners of a triangle, ``sqrt((a^2 + b^2 + c^2) / 2 + 2 sqrt(3) area)``."""
+    r = np.array([[0, 0], [1, 0], corner])
+    squares = sum(np.sum((r[i] - r[i - 1]) ** 2) for i in range(3))
+    exact = math.sqrt(squares / 2 + 2 * math.sqrt(3) * corner[1] / 2)
+    assert pure_torque(points_patch(r, [2.0, 2.0, 2.0]), 0.4) == pytest.approx(0.4 * 2 * exact, rel=1e-9)
+
+
+@pytest.mark.parametrize("model", ["ccm", "pcm", "pcm_projected"])
+def test_the_share_does_not_depend_on_units_or_on_friction(model):
+    patch = lcg_patch(3, 40)
+    one = pure_torque(patch, 1.0, model)
+    for unit in (1e3, 1e-6, 1e150):
+        other = replace(patch, centroid=unit * patch.centroid)
+        assert pure_torque(other, 0.3, model) == pytest.approx(0.3 * unit * one, rel=2e-9)
+
+
+@pytest.mark.parametrize("seed", range(1, 6))
+def test_at_pure_torque_the_net_force_vanishes(seed):
+    """Smooth case: minimise over the velocity with another method, where the gradient (f_x, f_y) must be zero."""
+    patch = lcg_patch(seed, 30)
+
+    def torque(v):
+        twist = [[*v, 1.0]]
+        return friction_support(patch, twist, 1.0)[0], friction_wrench(patch, twist, 1.0)[0, :2]
+
+    found = minimize(torque, [0.0, 0.0], jac=True, method="BFGS", options={"gtol": 1e-12})
+    assert pure_torque(patch, 1.0) == pytest.approx(found.fun, rel=2e-9)

@@ -8,23 +8,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
-from softjaw.friction.wrench import friction_limits, friction_wrench
+from softjaw.friction.wrench import friction_limits
+from softjaw.lsfit import sos
 from softjaw.lsfit.body import ExactSurface
 from softjaw.lsfit.ellipsoid import Ellipsoid, axis_aligned_ellipsoid, full_ellipsoid
 from softjaw.lsfit.form import directions
 from softjaw.lsfit.quartic_fit import convex_quartic
-from softjaw.lsfit.samples import fit_error, normalised_samples
-from softjaw.lsfit.sos import (
-    MIN_EIGENVALUE,
-    ball_gram,
-    convex_least_squares,
-    gram_matrix,
-    least_in_cone,
-    quadratic_parts,
-    smallest,
-)
+from softjaw.lsfit.samples import fit_error
 from softjaw.lsfit.surface import FitError, FitFlag
-from tests.generators import build, cylinder_grid, disc_polar, heightfield, lcg, lcg_patch, points_patch, rect_grid
+from tests.generators import build, cylinder_grid, disc_polar, heightfield, lcg_patch, points_patch, rect_grid
+from tests.generators import lcg_noise as noise
 from tests.oracles import body_volume, least_squares_quartic, samples, smallest_curvature, wrenches_alone
 
 HERTZ = {"gen": "disc_polar", "args": {"R": 1.0, "nr": 40, "nt": 96}, "pressure": {"kind": "hertz", "a": 1.0}}
@@ -37,24 +30,15 @@ TWO_POINTS = points_patch([[-1, 0], [1, 0]], [1, 1])
 # the three volumes over the exact one, as an independent implementation found them for 500 motions.
 PATCHES = {
     "Hertz": (build(HERTZ), 2, ".0208/.0110/8.27 .0156/.0078/6.54 .0045/.0011/1.09", 4.0, "1.110/1.027/1.000"),
-    "6:1": (
-        rect_grid(6, 1, 120, 20), 6, ".0129/.0067/9.71 .0149/.0076/9.77 .0084/.0021/5.66", 3.9, "1.091/1.071/1.011",
-    ),
+    "6:1": (rect_grid(6, 1, 120, 20), 6, ".0129/.0067/9.71 .0149/.0076/9.77 .0084/.0021/5.66", 3.9,
+            "1.091/1.071/1.011"),
     "two points": (TWO_POINTS, 2, ".0179/.0095/11.1 .0196/.0101/11.0 .0125/.0031/6.34", -2.2, "1.333/1.289/1.120"),
-    "cylinder 85": (
-        cylinder_grid(1, np.radians(85), 2, 48, 48), 2, ".0342/.0178/11.2 .0287/.0148/10.4 .0163/.0041/3.66", 2.1,
-        "1.113/1.075/1.006",
-    ),
+    "cylinder 85": (cylinder_grid(1, np.radians(85), 2, 48, 48), 2,
+                    ".0342/.0178/11.2 .0287/.0148/10.4 .0163/.0041/3.66", 2.1, "1.113/1.075/1.006"),
     "saddle": (heightfield(1, 1, 1, -1, 48, 48), 2, ".0302/.0160/8.06 .0201/.0102/6.63 .0087/.0022/2.04", 5.9,
                "1.124/1.034/1.003"),
     "Gauss": (build(GAUSS), 2, ".0093/.0048/7.88 .0076/.0038/6.70 .0044/.0011/2.68", 4.0, "1.085/1.020/1.001"),
 }  # fmt: skip
-
-
-def noisy(patch, K, amplitude, seed):
-    W, T = samples(patch, K)
-    draw = lcg(seed)
-    return W * (1 + amplitude * (2 * np.array([next(draw) for _ in W]) - 1))[:, None], T
 
 
 def objective(surface, W, T=None, gamma=0.0):
@@ -106,7 +90,8 @@ def test_only_two_points_need_the_programme(name):
     amplitude=st.sampled_from([0.0, 0.2, 0.6]), gamma=st.sampled_from([0.0, 0.01, 1.0]),
 )  # fmt: skip
 def test_every_fit_is_finite_and_every_convex_one_is_convex(seed, faces, K, amplitude, gamma):
-    W, T = noisy(lcg_patch(seed, faces), K, amplitude, seed)
+    W, T = samples(lcg_patch(seed, faces), K)
+    W = W * noise(len(W), amplitude, seed)[:, None]
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         convex = convex_quartic(W, T, gamma)[0]
@@ -123,7 +108,7 @@ def test_every_fit_is_finite_and_every_convex_one_is_convex(seed, faces, K, ampl
 @pytest.mark.long
 def test_every_convex_quartic_in_three_variables_has_a_gram_matrix():
     """Convex is sos-convex there: a curvature of 0.02 at least is enough for a proof, one of -0.02 forbids it."""
-    random, ball, freedom = np.random.default_rng(4), *np.split(ball_gram(3), [15])
+    random, ball, freedom = np.random.default_rng(4), *np.split(sos.ball_gram(3), [15])
     assert smallest_curvature(ball, 3) == pytest.approx(4, rel=1e-12)
     searched = 0
     for _ in range(10):
@@ -132,13 +117,13 @@ def test_every_convex_quartic_in_three_variables_has_a_gram_matrix():
         for curvature in (0.02, -0.02):
             share = brentq(lambda x, v=v, c=curvature: smallest_curvature(x * ball + (1 - x) * v, 3) - c, 0, 1)
             mixed = share * ball + (1 - share) * v
-            _, free = convex_least_squares(np.eye(15), mixed, 3, loose=False)
-            assert (smallest(gram_matrix(mixed, free, 3)) >= MIN_EIGENVALUE) == (curvature > 0)
-            searched += curvature > 0 and smallest(gram_matrix(mixed, freedom, 3)) < MIN_EIGENVALUE
+            _, free = sos.convex_least_squares(np.eye(15), mixed, 3, loose=False)
+            assert (sos.smallest(sos.gram_matrix(mixed, free, 3)) >= sos.MIN_EIGENVALUE) == (curvature > 0)
+            searched += curvature > 0 and sos.smallest(sos.gram_matrix(mixed, freedom, 3)) < sos.MIN_EIGENVALUE
     assert searched > 0  # the free numbers of a ball were not enough
 
 
-def test_ellipsoids_are_recovered_wherever_they_lie():
+def test_ellipsoids_are_recovered_wherever_they_lie_also_in_a_plane_and_motions_improve_directions():
     """Affine images of samples give the affine image of the fit, if wrenches alone count."""
     random = np.random.default_rng(1)
     for _ in range(10):
@@ -151,17 +136,11 @@ def test_ellipsoids_are_recovered_wherever_they_lie():
         np.testing.assert_allclose(other.support(u), one.support(u @ L), rtol=1e-9)
         one, other = wrenches_alone(W)[0], wrenches_alone(W @ L.T)[0]
         np.testing.assert_allclose(other.support(u), one.support(u @ L), rtol=1e-7)
-
-
-def test_directions_of_motion_improve_directions():
     W, T = samples(PATCHES["Gauss"][0], 60)
     far, near = (convex_quartic(W, T, gamma=g)[0] for g in (0.0, 1.0))
     test = samples(PATCHES["Gauss"][0], 333)
     assert fit_error(near, *test).Edir < fit_error(far, *test).Edir
     assert fit_error(near, *test).Erad > fit_error(far, *test).Erad
-
-
-def test_wrenches_in_a_tilted_plane_are_found():
     B = np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))[0][:, :2]
     W = directions(2, 40) * [1.0, 0.5] @ B.T
     for surface in (full_ellipsoid(W), wrenches_alone(W)[0]):
@@ -196,9 +175,9 @@ def test_few_samples_are_flagged_and_stay_bounded(K):
 
 def test_a_programme_that_is_not_solved_is_an_error():
     """``x >= 1`` and the slope to minus infinity: there is no least value."""
-    _, triangle = quadratic_parts(2)
+    _, triangle = sos.quadratic_parts(2)
     with pytest.raises(FitError):
-        least_in_cone(np.zeros((3, 3)), np.ones(3), triangle, 1.0)
+        sos.least_in_cone(np.zeros((3, 3)), np.ones(3), triangle, 1.0)
 
 
 @pytest.mark.parametrize("d", [1, 2, 4])
@@ -210,16 +189,11 @@ def test_quartics_of_other_dimensions_are_certified(d):
     assert surface.holds((a + b) / 2).all()
 
 
-def exact(patch, rho=2.0, count=2000):
-    S = friction_limits(patch, 1.0).S
-
-    def wrench(t):
-        return normalised_samples(friction_wrench(patch, t / [1, 1, rho], 1.0), t / [1, 1, rho], S, rho)[0]
-
-    return ExactSurface(wrench, count=count)
+def exact(patch, count=2000):
+    return ExactSurface(lambda t: samples(patch, rho=2.0, twist=t / [1, 1, 2.0])[0], count=count)
 
 
-def test_the_exact_surface_has_the_measures_of_its_samples():
+def test_the_exact_surface_has_the_measures_of_its_samples_and_that_of_one_face_is_flat():
     patch = disc_polar(1, 20, 48)
     body = exact(patch)
     limits = np.array(friction_limits(patch, 1.0).per_unit_force) / [1, 1, 2]
@@ -231,9 +205,6 @@ def test_the_exact_surface_has_the_measures_of_its_samples():
     assert (radius <= 1 + 1e-12).all()
     np.testing.assert_allclose(radius, 1, atol=6e-3)
     assert np.abs(radius - 1).mean() < 1e-3
-
-
-def test_the_exact_surface_of_one_face_is_flat():
     body = exact(points_patch([[0, 0]], [2.0]), count=500)
     assert (body.rank, body.volume) == (2, 0)
     assert body.shadow_area == pytest.approx(np.pi, rel=1e-12)

@@ -7,6 +7,7 @@ from scipy.optimize import minimize
 from softjaw.lsfit.form import exponents, hessian_tensor, monomial_gradients, monomials, substitute
 from softjaw.lsfit.lowest import lies_above, smallest_value
 from softjaw.lsfit.sos import ball_gram
+from tests.scoring.grasps import unit
 
 RANDOM = np.random.default_rng(3)
 
@@ -42,10 +43,6 @@ def test_monomials_are_products_of_powers_with_substitution_and_derivatives(d):
 def coefficients(P, d):
     w = np.random.default_rng(0).normal(size=(4 * len(exponents(d, 4)), d))
     return np.linalg.lstsq(monomials(w, exponents(d, 4)), P(w), rcond=None)[0]
-
-
-def unit(x):
-    return x / np.linalg.norm(x, axis=-1, keepdims=True)
 
 
 def random_form(rng, d, kind):

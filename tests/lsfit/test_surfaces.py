@@ -95,7 +95,7 @@ def test_another_unit_changes_nothing_but_the_numbers_and_supports_have_the_same
         assert supported_shadow(surface.support, 3, 4096) == pytest.approx(surface.shadow_area, rel=1e-8)
 
 
-def test_an_ellipsoid_is_the_same_in_every_form():
+def test_an_ellipsoid_is_the_same_in_every_form_and_fourth_powers_have_a_closed_form():
     A = tilted_matrix()
     t, inverse = np.random.default_rng(8).normal(size=(100, 3)), np.linalg.inv(A)
     for surface in (Ellipsoid.of_matrix(A), squared(A)):
@@ -105,24 +105,17 @@ def test_an_ellipsoid_is_the_same_in_every_form():
         np.testing.assert_allclose(surface.semi_axes, np.sqrt(inverse.diagonal()), rtol=1e-11)
     along = Ellipsoid.of_matrix(np.diag(AXES**-2))
     np.testing.assert_allclose(along.support(t), Ellipsoid.of_axes(AXES).support(t), rtol=1e-13)
-
-
-def test_fourth_powers_have_a_closed_form():
-    """Support: the dual norm, of power 4/3; volume ``8 gamma(5/4)^3 / gamma(7/4)``, ``4 gamma(5/4)^2 / gamma(3/2)``."""
+    # Support: the dual norm, of power 4/3; volume ``8 gamma(5/4)^3 / gamma(7/4)``, ``4 gamma(5/4)^2 / gamma(3/2)``.
     surface = fourth_powers()
     t = np.vstack([np.random.default_rng(9).normal(size=(100, 3)), np.eye(3), [[1, 1, 0], [1, 0, 10], [1, 1e-8, 0]]])
     np.testing.assert_allclose(surface.support(t), (np.abs(t * AXES) ** (4 / 3)).sum(axis=1) ** 0.75, rtol=1e-11)
     volume = 8 * math.gamma(1.25) ** 3 / math.gamma(1.75) * AXES.prod()
     assert surface.volume == pytest.approx(volume, rel=1e-12)
     assert surface.shadow_area == pytest.approx(4 * math.gamma(1.25) ** 2 / math.gamma(1.5) * 0.7, rel=1e-11)
-
-
-@pytest.mark.parametrize("spread", [1e-2, 1e-4])
-def test_thin_bodies_keep_their_digits(spread):
-    axes = np.array([1.0, 1.0, spread])
-    surface = fourth_powers(axes)
-    assert surface.semi_axes == pytest.approx(axes, rel=1e-11)
-    assert surface.volume == pytest.approx(fourth_powers(np.ones(3)).volume * spread, rel=1e-11)
+    for spread in (1e-2, 1e-4):  # thin bodies keep their digits
+        thin = fourth_powers(np.array([1.0, 1.0, spread]))
+        assert thin.semi_axes == pytest.approx([1.0, 1.0, spread], rel=1e-11)
+        assert thin.volume == pytest.approx(volume / AXES.prod() * spread, rel=1e-11)
 
 
 @pytest.mark.parametrize(("d", "rel"), [(1, 1e-14), (2, 1e-12), (4, 1e-6), (5, 1e-4)])
@@ -163,7 +156,7 @@ def test_errors_of_flat_bodies_are_numbers(surface):
     assert off.Erad == pytest.approx(1)
 
 
-def test_a_thin_body_is_measured_in_its_units_and_vectors_of_another_dimension_are_refused():
+def test_a_thin_body_is_measured_in_its_units_and_a_swollen_ellipsoid_has_its_errors_and_overclaims():
     """A thousandth in one direction, mixed with the others: only there have coefficients such digits."""
     thin = rounded_box().scaled([1.0, 1.0, 1e-5])
     again = Quartic.of_coefficients(thin.coefficients)
@@ -171,29 +164,17 @@ def test_a_thin_body_is_measured_in_its_units_and_vectors_of_another_dimension_a
         assert surface.volume == pytest.approx(size * rounded_box().volume, rel=1e-11)
     with pytest.raises(ValueError, match="vectors of shape"):
         fourth_powers().value([1.0, 2.0])
-
-
-def test_flags_closing_with_the_surface():
     for surface in (
         Ellipsoid.of_axes(AXES, FitFlag.BOUNDED), Ellipsoid(np.eye(3), FitFlag.BOUNDED),
         Quartic.of_coefficients(fourth_powers().coefficients, flag=FitFlag.BOUNDED),
         fourth_powers().mapped(np.eye(3), FitFlag.BOUNDED),
     ):
         assert surface.scaled([1.0, 1.0, 2.0]).flag == FitFlag.BOUNDED
-
-
-def on_the_ellipsoid(K=200):
-    """Wrenches of the ellipsoid with the semi-axes `AXES` and the unit normals there."""
-    t = fibonacci_twists(K, 1.0)
-    return t * AXES**2 / np.linalg.norm(t * AXES, axis=1, keepdims=True), t
-
-
-def test_errors_and_overclaims_of_a_swollen_ellipsoid():
-    """Radii too large by 10 %: P = 1 / 1.21 on the true surface, and P^(-1/2) = 1.1."""
-    W, T = on_the_ellipsoid()
+    # Radii too large by 10 %: P = 1 / 1.21 on the true surface, and P^(-1/2) = 1.1.
+    T = fibonacci_twists(200, 1.0)
+    W = T * AXES**2 / np.linalg.norm(T * AXES, axis=1, keepdims=True)
     errors = fit_error(Ellipsoid.of_axes(1.1 * AXES), W, T)
     np.testing.assert_allclose(errors, [1 - 1 / 1.21, 0.1, 0], atol=1e-12)
-    W, _ = on_the_ellipsoid()
     longer = Ellipsoid.of_axes(AXES * [1.0, 1.0, 1.2])
     assert overclaim(Ellipsoid.of_axes(1.1 * AXES), W) == pytest.approx(0.1, rel=1e-9)
     assert overclaim(Ellipsoid.of_axes(0.9 * AXES), W) == pytest.approx(0.0, abs=1e-12)

@@ -13,13 +13,10 @@ from softjaw.lsfit.span import FitError, SpanSamples, span_samples, zhou_ellipso
 from softjaw.lsfit.surface import FitFlag
 from tests.generators import cylinder_grid, disc_polar, lcg_patch, points_patch, rect_grid
 from tests.oracles import least_curvature, samples
+from tests.scoring.grasps import unit
 
 DISC = disc_polar(1, 40, 96)
 FITS = pytest.mark.parametrize("fit", [zhou_ellipsoid, zhou_quartic])
-
-
-def unit(x):
-    return x / np.linalg.norm(x, axis=1, keepdims=True)
 
 
 def as_they_are(W, T):
@@ -57,15 +54,12 @@ def test_no_neighbour_is_better(fit, weights):
         assert objective(beside, W, T, *weights) > value * (1 - 1e-7)
 
 
-def test_an_ellipsoid_is_found_again():
+def test_an_ellipsoid_is_found_again_and_the_quartic_is_convex_where_the_samples_are_not():
     A = np.array([[2.0, 0.3, -0.2], [0.3, 3.0, 0.5], [-0.2, 0.5, 9.0]])
     true, u = Ellipsoid.of_matrix(A), sphere_motions(80, 3)
     W = u * true.radius(u)[:, None]
     np.testing.assert_allclose(zhou_ellipsoid(span_samples(W, unit(W @ A))).A, A, rtol=1e-6, atol=1e-6)
-
-
-def test_the_quartic_is_convex_where_the_samples_are_not():
-    """Two points, noisy: the best quartic without the constraint has negative curvature."""
+    # Two points, noisy: the best quartic without the constraint has negative curvature.
     W, T = samples(points_patch([[-1, 0], [1, 0]], [1, 1]), 40)
     W = W * (1 + 0.3 * np.random.default_rng(1).uniform(-1, 1, (40, 1)))
     surface = zhou_quartic(span_samples(W, T))

@@ -35,4 +35,4 @@ def facing(first=A, second=B, d=1.3, tilt=0.0, offset=(0, 0, 0)):
 
 
 def unit(u):
-    return u / np.linalg.norm(u, axis=1, keepdims=True)
+    return u / np.linalg.norm(u, axis=-1, keepdims=True)

@@ -88,7 +88,7 @@ def test_volumes_do_not_depend_on_the_unit_of_length(unit, one, two):
     assert (other.linf, other.l1) == pytest.approx((metre.linf, metre.l1), rel=1e-9)
 
 
-def test_hulls_are_flat_or_not():
+def test_hulls_are_flat_or_not_and_epsilon_goes_to_zero_where_nothing_decides():
     """Margin 1e-12 of the longest extent."""
     rng = np.random.default_rng(0)
     for _ in range(TURNS):
@@ -96,6 +96,9 @@ def test_hulls_are_flat_or_not():
         assert hull_volume(shaken(rng, BOX * [1, 1, 0] @ R.T)) == 0
         assert hull_volume(shaken(rng, BOX @ R.T)) == pytest.approx(8 * 0.8 * 0.6 * 0.015, rel=1e-12)
     assert hull_volume(BOX * [1, 1, 1e-6]) == pytest.approx(8e-6 * 0.8 * 0.6 * 0.015, rel=1e-12)
+    # At the angle of friction 0 is on the boundary: neither side of the decision gives more than its tolerance.
+    contacts = pair((0.8, 0.6, 0.15), (0.8, 0.6, 0.15), np.arctan(0.6))
+    assert outcomes(lambda k, R, p: epsilon(k, *LENGTHS, p).upper < 1e-6, contacts, 4) == {True: 4}
 
 
 @pytest.mark.parametrize(("contacts", "closed"), [
@@ -111,9 +114,3 @@ def test_whether_some_wrench_is_not_resisted_at_all(contacts, closed):
         return separating_wrench(C[:, :, 0], D) is None
 
     assert outcomes(decide, contacts, 100) == {closed: 100}
-
-
-def test_epsilon_goes_to_zero_where_nothing_decides():
-    """At the angle of friction 0 is on the boundary: neither side of the decision gives more than its tolerance."""
-    contacts = pair((0.8, 0.6, 0.15), (0.8, 0.6, 0.15), np.arctan(0.6))
-    assert outcomes(lambda k, R, p: epsilon(k, *LENGTHS, p).upper < 1e-6, contacts, 4) == {True: 4}

@@ -56,10 +56,15 @@ def test_antipodal_contacts_have_the_closed_form(kind, closed, seed):
     assert bound.upper <= bound.lower * (1 + 1e-4)
 
 
-def test_epsilon_of_a_known_grasp():
+def test_epsilon_of_a_known_grasp_and_of_contacts_that_cannot_resist_some_wrench():
     """Computed by an independent program: 0.53813823519705 and 0.2849881999516418."""
     for kind, value in (("linf", 0.53813823519705), ("l1", 0.2849881999516418)):
         assert epsilon(facing(A, B), 0.7, 0.7, kind=kind)[:2] == pytest.approx((value, value), rel=1e-5)
+    none = (0.8, 0.6, 0.0)
+    for contacts in (facing(none, none), facing(A, B)[:1], facing((0, 1, 1), (0, 1, 1)), facing((0, 0, 0), (0, 0, 0))):
+        for kind in ("linf", "l1"):
+            assert epsilon(contacts, 1.0, 1.0, kind=kind)[:2] == (0, 0)
+    assert epsilon(facing(none, A), 1.0, 1.0).lower > 0
 
 
 @pytest.mark.parametrize("kind", ["linf", "l1"])
@@ -76,24 +81,12 @@ def test_the_bounds_meet_and_no_wrench_is_weaker(kind, n, seed):
     assert least_found(c, D, kind, rng) >= bound.lower
 
 
-def test_a_gap_that_one_proof_leaves_is_closed_by_splitting_the_wrenches():
+def test_a_gap_is_closed_by_splitting_epsilon_depends_on_no_frame_and_polytopes_reach_as_programmes_say():
     """The 42nd of these grasps; one programme proves 0.275475 and the weakest wrench found is at 0.275707."""
     rng = np.random.default_rng(7)
     contacts = [ring(2, rng, 0.12) for _ in range(42)][-1]
-    contacts = [SoftContact(k.position, k.axes, k.body) for k in contacts]
     bound = epsilon(contacts, 1.0, 1.0)
     assert bound.upper <= bound.lower * (1 + 1e-6) + 1e-9
-
-
-def test_contacts_that_cannot_resist_some_wrench_have_exactly_nothing():
-    none = (0.8, 0.6, 0.0)
-    for contacts in (facing(none, none), facing(A, B)[:1], facing((0, 1, 1), (0, 1, 1)), facing((0, 0, 0), (0, 0, 0))):
-        for kind in ("linf", "l1"):
-            assert epsilon(contacts, 1.0, 1.0, kind=kind)[:2] == (0, 0)
-    assert epsilon(facing(none, A), 1.0, 1.0).lower > 0
-
-
-def test_epsilon_depends_on_the_centre_of_mass_and_the_lengths_but_not_on_the_frame():
     contacts = ring(2, np.random.default_rng(5), 0.1)
     here = epsilon(contacts, 0.2, 2.0).upper
     assert epsilon(contacts, 0.2, 2.0, (0, 0.3, 0.2)).upper < 0.99 * here
@@ -101,9 +94,6 @@ def test_epsilon_depends_on_the_centre_of_mass_and_the_lengths_but_not_on_the_fr
     Q, shift = contact_axes([1, 2, 3], np.eye(3)[0]).T, np.array([3.0, -2, 1])
     moved = [SoftContact(Q @ k.position + shift, k.axes @ Q.T, k.body) for k in contacts]
     assert epsilon(moved, 0.2, 2.0, shift).upper == pytest.approx(here, rel=1e-5)
-
-
-def test_the_reach_of_polytopes_is_a_linear_programme():
     contacts = facing(fibonacci_vertices(A, 9), fibonacci_vertices(B, 12), tilt=0.2)
     C = np.array([k.wrench_map(1.0, 1.0) for k in contacts])
     loads = [np.vstack([np.ones(len(k.body.vertices)), k.body.vertices.T]) for k in contacts]
@@ -136,7 +126,7 @@ class Superellipsoid:
         return self.semi_axes * np.sign(s) * (np.abs(s) / h[:, None]) ** (self.p - 1)
 
 
-def test_any_body_is_bounded_by_an_ellipsoid_inside_it():
+def test_any_body_is_bounded_by_an_ellipsoid_inside_it_and_has_an_epsilon():
     t = np.random.default_rng(0).normal(size=(5000, 3)) / A
     for p in (1.7, 3.0):
         body = Superellipsoid(A, p)
@@ -144,10 +134,7 @@ def test_any_body_is_bounded_by_an_ellipsoid_inside_it():
         assert 0.93 < inside.max() <= 1
     tilted = np.random.default_rng(1).normal(size=(3, 3))
     np.testing.assert_allclose(ellipsoid_inside(Ellipsoid(tilted)), tilted.T, rtol=1e-15)
-
-
-def test_epsilon_of_any_body():
-    """A body inside the ellipsoid is weaker; the gap is that of the ellipsoid that fits inside it."""
+    # A body inside the ellipsoid is weaker; the gap is that of the ellipsoid that fits inside it.
     bound = epsilon(facing(Superellipsoid(A, 2.5), Superellipsoid(B, 2.5), tilt=0.1), 0.7, 0.7)
     assert 0.75 * bound.upper < bound.lower <= bound.upper
     assert bound.upper < epsilon(facing(A, B, tilt=0.1), 0.7, 0.7).lower

@@ -184,7 +184,7 @@ def test_no_volume_in_fewer_than_six_dimensions():
         assert pose_volume(*contacts, 1.0, 1.0) == (0, 0, 0)
 
 
-def test_mixed_areas_of_polygons():
+def test_mixed_areas_of_polygons_and_areas_of_hulls_with_the_origin():
     """V(P, P) is the area, and |P + Q| = |P| + 2 V + |Q|."""
     P, Q = np.random.default_rng(2).normal(size=(2, 9, 2))
     sums = (P[:, None] + Q).reshape(-1, 2)

@@ -121,7 +121,7 @@ def test_a_confined_pad_pressed_flat(element, symmetry):
     assert strain == pytest.approx(1 - stretch, rel=1e-12)
 
 
-def test_active_set_row_switches_between_pressure_and_gap():
+def test_a_row_switches_between_pressure_and_gap_and_steps_are_shortened_by_closing_and_by_squeezing():
     """``A l - max(0, A l - G)`` is ``A l`` where the pad is off the object, and the weighted gap where it presses."""
     problem = problem_of(reference.plane)
     pad = problem.pad
@@ -132,17 +132,10 @@ def test_active_set_row_switches_between_pressure_and_gap():
         x[pressures] = 0.3e-3
         expected = pad.node_area * (0.3e-3 if closing < 0 else -closing)
         assert problem.residual(x)[pressures] == pytest.approx(problem.finger.kappa * expected, rel=1e-12)
-
-
-def test_an_inverted_pad_has_no_residual():
     problem = problem_of(reference.plane)
     x = np.zeros(problem.size)
     x[problem.pad.dofs[problem.pad.contact_nodes, 2]] = -1.5 * SIZE[2]
     assert np.isnan(problem.residual(x)).all()
-
-
-def test_steps_are_shortened_by_closing_and_by_squeezing():
-    problem = problem_of(reference.plane)
     pad, step = problem.pad, np.zeros(problem.size)
     x = np.zeros(problem.size)
     assert problem.shorten(x, step) == 1

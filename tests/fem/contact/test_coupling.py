@@ -9,14 +9,8 @@ from softjaw.fem.contact.press import Press
 from softjaw.fem.contact.problem import Control, SpringBed
 from softjaw.fem.contact.rigid import RigidProblem
 from softjaw.fem.materials import material
-from softjaw.fem.pad.mesh import Pad
-from softjaw.fem.pad.shape import PadShape
 from tests.fem import reference
-from tests.fem.reference import BALL, FOAM, OVAL, SIZE
-
-
-def pad_of(symmetry=(True, True), elements=(8, 4, 3), law=FOAM):
-    return Pad(PadShape(SIZE, elements), law, symmetry)
+from tests.fem.reference import BALL, OVAL, pad_of
 
 
 def press(gap, mu, pad=None):
@@ -33,7 +27,7 @@ def test_the_path_leads_through_the_same_forces_to_every_force(stride):
             assert load_steps(reached, force, 100.0, stride) == [f for f in steps if f > reached]
 
 
-def test_without_friction_nothing_changes_and_a_pad_that_does_not_spread_rubs_nowhere():
+def test_without_friction_nothing_changes_a_pad_that_does_not_spread_rubs_nowhere_and_a_rough_plane_holds_the_front():
     coupled, plain = press(BALL, 0.0).load_path([2.0, 5.0]), Press(pad_of(), BALL).load_path([2.0, 5.0])
     for one, other in zip(coupled, plain, strict=True):
         assert one.closing == pytest.approx(other.closing, rel=1e-9)
@@ -43,10 +37,7 @@ def test_without_friction_nothing_changes_and_a_pad_that_does_not_spread_rubs_no
     (smooth,) = Press(pad, reference.plane).load_path([5.0])
     assert rough.closing == pytest.approx(smooth.closing, rel=1e-9)
     assert np.abs(rough.points.friction).max() < 1e-9 * rough.points.load.max()
-
-
-def test_a_rough_plane_holds_the_front():
-    """At a large friction coefficient nothing slips; what is left of the spreading is the give of the stick."""
+    # At a large friction coefficient nothing slips; what is left of the spreading is the give of the stick.
     (rough,) = press(reference.plane, 50.0).load_path([5.0])
     (smooth,) = Press(pad_of(), reference.plane).load_path([5.0])
     home = pad_of().nodes[pad_of().contact_nodes][:, :2]
@@ -58,7 +49,7 @@ def test_a_rough_plane_holds_the_front():
 @pytest.mark.parametrize("mu", [0.1, 0.8])
 def test_coulombs_law_and_balance_hold(mu):
     """``|t| <= mu p``, across the normal, against the way that the pad spreads; the checks of each state passed."""
-    (state,) = press(OVAL, mu, pad_of((False, False), (6, 4, 2))).load_path([3.0])
+    (state,) = press(OVAL, mu, pad_of((6, 4, 2), (False, False))).load_path([3.0])
     force, normal, load = state.points.friction, state.points.normal, state.points.load
     size = np.linalg.norm(force, axis=-1)
     assert (size <= mu * load * (1 + 1e-9)).all()
@@ -72,9 +63,9 @@ def test_coulombs_law_and_balance_hold(mu):
 
 def test_judging_slip_by_what_was_before_changes_iterations_and_no_state(monkeypatch):
     """The first steps of a solve are those of another system, the residual that ends it is not."""
-    (judged,) = press(OVAL, 0.4, pad_of((False, False), (8, 6, 3))).load_path([3.0])
+    (judged,) = press(OVAL, 0.4, pad_of((8, 6, 3), (False, False))).load_path([3.0])
     monkeypatch.setattr(coupling, "SHARES", ())
-    (plain,) = press(OVAL, 0.4, pad_of((False, False), (8, 6, 3))).load_path([3.0])
+    (plain,) = press(OVAL, 0.4, pad_of((8, 6, 3), (False, False))).load_path([3.0])
     assert judged.iterations != plain.iterations
     assert judged.iterations < 1.2 * plain.iterations
     assert judged.closing == pytest.approx(plain.closing, rel=1e-8)
@@ -96,7 +87,7 @@ def steeper(x):
 @pytest.mark.parametrize("control", [Control(force=3.0), Control(closing=0.003)], ids=["force", "closing"])
 def test_tangent_by_finite_differences(control, gap):
     """From a state with a history: some points stick, some slip, some are open."""
-    pad = pad_of((True, False), (6, 4, 2))
+    pad = pad_of((6, 4, 2), (True, False))
     problem = RigidProblem(pad, gap, 0.2)
     problem.control = control
     bed = SpringBed(pad, BALL)

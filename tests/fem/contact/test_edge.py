@@ -35,7 +35,7 @@ def errors(pressure, area, n):
     return np.abs(np.array(found) / [area, 1.0, area] - 1.0)
 
 
-def test_area_and_peak_of_an_elliptic_contact_converge():
+def test_area_and_peak_of_an_elliptic_contact_converge_and_a_line_contact_ends_at_its_edges_and_at_the_rims():
     """Over places of its middle, which lie anywhere between the lines; counted faces are far off and slow."""
     places = [(0.0, 0.0), (0.0007, 0.0003), (0.0013, 0.0009), (0.0004, 0.0011)]
     a, b = 0.012, 0.007
@@ -45,19 +45,13 @@ def test_area_and_peak_of_an_elliptic_contact_converge():
     assert middle[0] < 0.06  # a line at either tip is wholly counted where it bears in part only
     assert middle[1] < 0.02
     assert (fine[:2] < [0.25 * fine[2], 0.01]).all()
-
-
-def test_a_line_contact_ends_at_its_edges_and_at_the_rims():
-    """Hertz's cylinder along the pad: the sums along the length, which cross no edge, do not count."""
+    # Hertz's cylinder along the pad: the sums along the length, which cross no edge, do not count.
     for half in (0.0046, 0.0053, 0.0061):
         area, peak, counted = errors(hertz(1e9, half), 2 * half * LENGTH, (10, 10))
         assert area < 0.02
         assert peak < 0.04
         assert counted > area
-
-
-def test_a_contact_from_a_rim_ends_at_its_edge_and_one_without_an_edge_is_the_whole_face():
-    """p = sqrt(1 - s / b) (1 + s / (2 b)) from the end of the pad on, exact but for the integration over the faces."""
+    # p = sqrt(1 - s / b) (1 + s / (2 b)) from the end of the pad on, exact but for the integration over the faces.
     for b in (0.013, 0.0215):
 
         def pressure(x, y, b=b):

@@ -35,7 +35,7 @@ def test_patch_of_a_part_is_that_of_the_whole_pad(whole, symmetry):
         assert np.abs(one - other).max() < 1e-12 * np.abs(other).max(), name
 
 
-def test_a_half_of_a_pad_on_a_lopsided_object():
+def test_half_a_pad_has_the_loads_of_the_solution_and_faces_tile_the_deformed_front(whole):
     """Only y = 0 is a plane of symmetry of a cylinder that is tilted along x; the patch must not be mirrored in x."""
     tilt = 0.05
     R = np.array([[np.cos(tilt), 0, np.sin(tilt)], [0, 1, 0], [-np.sin(tilt), 0, np.cos(tilt)]])
@@ -49,10 +49,7 @@ def test_a_half_of_a_pad_on_a_lopsided_object():
     assert np.abs(half.centroid - full.centroid).max() < 1e-12
     assert np.abs(half.load - full.load).max() < 1e-12 * full.load.max()
     assert abs((full.load * full.centroid[:, 0]).sum() / full.load.sum()) > 1e-3
-
-
-def test_loads_are_those_of_the_solution(whole):
-    """``S`` is the integral of the pressure, the forces add up to the normal force, and nothing pulls aside."""
+    # ``S`` is the integral of the pressure, the forces add up to the normal force, and nothing pulls aside.
     element, pad, pressed, patch = whole
     S = pressed.pressure @ pad.node_area
     assert patch.load.sum() == pytest.approx(S, rel=1e-12)
@@ -61,10 +58,7 @@ def test_loads_are_those_of_the_solution(whole):
     assert force[2] == pytest.approx(10.0, rel=1e-12 if element == "hex8" else 1e-3)
     assert np.abs(force[:2]).max() < 1e-10
     assert (patch.pressure >= 0).all()
-
-
-def test_faces_tile_the_deformed_front(whole):
-    """Neighbours share corners, the faces cover the deformed contact face, and each holds its centre."""
+    # Neighbours share corners, the faces cover the deformed contact face, and each holds its centre.
     _, pad, pressed, patch = whole
     nx, ny = pad.shape.patch_faces
     corners = patch.corners.reshape(nx, ny, 4, 3)
@@ -78,10 +72,7 @@ def test_faces_tile_the_deformed_front(whole):
     r = patch.centroid - patch.corners[:, 0]
     for one in (np.einsum("ij,ij->i", r, e) / (e**2).sum(1), np.einsum("ij,ij->i", r, f) / (f**2).sum(1)):
         assert ((one > 0) & (one < 1)).all()
-
-
-def test_flat_patch_has_the_areas_of_the_front():
-    """On a plane the confined middle only moves along z, and the faces' areas add up to the widened contact face."""
+    # On a plane the confined middle only moves along z, and the faces' areas add up to the widened contact face.
     pad, pressed, patch = patch_of(gap=reference.plane, force=30.0)
     assert np.abs(patch.normal - [0, 0, 1]).max() < 1e-15
     assert np.abs(patch.centroid[:, 2]).max() < 1e-12

@@ -173,7 +173,7 @@ def test_where_no_state_is_found_under_force_the_path_goes_on_by_displacement_if
     assert any(closings) == by_displacement
 
 
-def test_a_fold_of_the_foam_is_a_jump():
+def test_a_fold_of_the_foam_is_a_jump_an_unstable_start_is_noted_and_a_maximum_of_the_force_named():
     """The strain grows by 0.8 at once; a growth of 0.8 along with the force is no fold."""
     sudden = following(StrainedCurve(lambda x: 0.8 if force(x) > 1.5 else 0.0))
     steady = following(StrainedCurve(lambda x: 0.8 * force(x) / 2.4))
@@ -181,17 +181,11 @@ def test_a_fold_of_the_foam_is_a_jump():
         steps.step_to(np.array([0.01 * MM]), force(0.01), 2.4, Work())
     assert sudden.jumped
     assert not steady.jumped
-
-
-def test_an_unstable_start_is_noted():
     steps = following(StrainedCurve(lambda x: 0.6))
     steps.problem.symmetric_tangent = lambda x: (x, 0)
     steps.step_to(np.array([0.01 * MM]), force(0.01), 1.0, Work())
     assert steps.jumped
-
-
-def test_a_maximum_of_the_force_is_named_and_the_plate_stays_out_of_the_object():
-    """The force has a maximum of 2.5 N at 1 mm; the object's nearest point is 2.1 mm from the backing plate."""
+    # The force has a maximum of 2.5 N at 1 mm; the object's nearest point is 2.1 mm from the backing plate.
     steps = following(StrainedCurve())
     steps.deepest = 2.1 * MM
     with pytest.raises(NotReachedError, match=r"2\.(49\d*|5) N"):

@@ -1,5 +1,7 @@
 """The pad from its measured face: the solid it is taken for, the smoothing, and round trips from solved pads."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from scipy.interpolate import RegularGridInterpolator
@@ -10,18 +12,15 @@ from softjaw.fem.contact.press import Press
 from softjaw.fem.objects.gap import NoContactError
 from softjaw.fem.objects.measured_face import cell_of, measured_face
 from softjaw.fem.objects.shapes import EllipticCylinder
-from softjaw.fem.pad.mesh import Pad
-from softjaw.fem.pad.shape import PadShape
 from softjaw.study.case.contact import Contact
 from tests.fem import reference
-from tests.fem.reference import FOAM, SIZE
+from tests.fem.reference import SIZE
 
 NOISE = 1e-4
 CYLINDER = reference.placed(EllipticCylinder(0.025, 0.025, 0.2), reference.facing(0.025))
 
 
-def pad_of(elements, contact="blended"):
-    return Pad(PadShape(SIZE, elements), FOAM, (False, False), contact)
+pad_of = partial(reference.pad_of, symmetry=(False, False), contact="blended")
 
 
 def pressed(gap, force, elements):
@@ -38,7 +37,7 @@ def seen(pad, state):
 
 
 def solved_again(points, elements):
-    pads = [pad_of(elements, contact) for contact in ("blended", "weighted", "nodal")]
+    pads = [pad_of(elements, contact=contact) for contact in ("blended", "weighted", "nodal")]
     return MeasuredPress(pads[0], pads[1:]).solve(measured_face(points, cell_of(SIZE, elements)))
 
 
@@ -94,31 +93,22 @@ def test_points_that_are_no_face_are_refused(points):
         measured_face(points, 2e-3)
 
 
-def test_a_face_that_is_pressed_in_nowhere_touches_nothing():
+def test_an_exact_face_gives_back_its_pressures_and_one_that_is_pressed_in_nowhere_is_not_judged():
     y = np.linspace(-0.011, 0.011, 41)
     with pytest.raises(NoContactError):
         MeasuredPress(pad_of((4, 4, 2))).solve(measured_face(np.column_stack([y, 1e-4 + y**2]), 2e-3))
-
-
-def test_an_exact_face_gives_back_its_pressures():
-    """On the same mesh, without noise: what is left is the spline's own error."""
-    pad, state = pressed(CYLINDER, 5.0, (6, 6, 2))
-    again = solved_again(seen(pad, state), (6, 6, 2))
-    assert again.judged
-    assert of_contact(again.state.pad, again.state) == pytest.approx(of_contact(pad, state), rel=0.02)
-    assert again.state.closing == pytest.approx(state.closing, rel=0.03)
-
-
-def test_a_face_pressed_in_by_less_than_its_error_is_not_judged():
     y = np.random.default_rng(5).uniform(-0.011, 0.011, 60)
     z = -2e-5 + 0.05 * y**2 + NOISE * np.random.default_rng(6).normal(size=60)
     face = measured_face(np.column_stack([y, z]), 2e-3)
     found = MeasuredPress(pad_of((4, 4, 2))).solve(face)
     assert not found.judged
     assert found.margin == pytest.approx(NOISE_MARGIN * face.doubt)
-
-
-def test_a_lifted_face_has_the_derivatives_of_what_it_adds():
+    # On the same mesh, without noise: what is left is the spline's own error.
+    pad, state = pressed(CYLINDER, 5.0, (6, 6, 2))
+    again = solved_again(seen(pad, state), (6, 6, 2))
+    assert again.judged
+    assert of_contact(again.state.pad, again.state) == pytest.approx(of_contact(pad, state), rel=0.02)
+    assert again.state.closing == pytest.approx(state.closing, rel=0.03)
     from scipy.interpolate import RectBivariateSpline
     x, y = np.linspace(-0.04, 0.04, 21), np.linspace(-0.02, 0.02, 21)
     lift = RectBivariateSpline(x, y, 1e-4 * np.sin(100.0 * x)[:, None] * np.cos(150.0 * y))

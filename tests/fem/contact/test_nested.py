@@ -13,7 +13,8 @@ from softjaw.fem.pad.interpolation import interpolated
 from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.pad.shape import PadShape
 from softjaw.fem.petsc import NonlinearSolver, unknown_options
-from tests.fem.contact.test_press import BALL, FOAM, OVAL, SIZE, pad_of, relative
+from tests.fem.contact.test_press import relative
+from tests.fem.reference import BALL, FOAM, OVAL, SIZE, pad_of
 
 FORCES = [1.0, 3.0, 10.0]
 

@@ -1,6 +1,6 @@
 """Press: two solvers, symmetry, path, units and repeats give one answer, and wrong answers are refused."""
 
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 import pytest
@@ -9,19 +9,16 @@ from softjaw.fem.contact.press import Press
 from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.fem.materials import material
 from softjaw.fem.objects.shapes import EllipticCylinder
-from softjaw.fem.pad.mesh import Pad
-from softjaw.fem.pad.shape import PadShape
 from softjaw.fem.petsc import PETSc
 from tests.fem import reference
-from tests.fem.reference import BALL, FOAM, OVAL, SIZE
+from tests.fem.reference import BALL, OVAL, SIZE
 
 G = 0.040e6
 FORCES = [1.0, 3.0, 10.0, 20.0]
 VI = {"contact_snes_type": "vinewtonrsls"}
 
 
-def pad_of(elements=(12, 6, 4), symmetry=(True, True), contact="weighted", element="hex8", law=FOAM, size=SIZE):
-    return Pad(PadShape(size, elements, element=element), law, symmetry, contact)
+pad_of = partial(reference.pad_of, (12, 6, 4))
 
 
 @cache
@@ -37,7 +34,7 @@ def relative(a, b):
 @pytest.mark.parametrize("element", ["hex8", "hex27"])
 @pytest.mark.parametrize("gap", [OVAL, BALL], ids=["cylinder", "sphere"])
 def test_active_set_and_bounds_agree(gap, element, contact):
-    pad = pad_of((8, 4, 2) if element == "hex27" else (12, 6, 4), contact=contact, element=element)
+    pad = reference.pad_of((8, 4, 2) if element == "hex27" else (12, 6, 4), contact=contact, element=element)
     for one, other in zip(Press(pad, gap).load_path(FORCES), Press(pad, gap, VI).load_path(FORCES), strict=True):
         assert one.closing == pytest.approx(other.closing, rel=3e-9)
         assert relative(one.pressure, other.pressure) < 3e-9
@@ -107,17 +104,14 @@ def test_wrong_states_are_refused_whatever_the_solver_says(tamper, law):
     assert error.value.law == law
 
 
-def test_checks_of_a_right_state_are_small():
+def test_checks_of_a_right_state_are_small_and_a_step_that_fails_is_cut_to_the_same_answer():
     for pressed in solved():
         checks = pressed.checks
         assert max(checks.force_balance, checks.adhesion, checks.penetration, checks.complementarity) < 1e-11
         assert 0 < checks.min_det_f < 1
         assert 0 < checks.max_strain < 0.5
         assert 0 < checks.ellipticity < 1
-
-
-def test_a_step_that_fails_is_cut_and_the_answer_is_the_same():
-    """Three iterations per step do not reach 20 N at once."""
+    # Three iterations per step do not reach 20 N at once.
     pad = pad_of()
     (free,) = solved(forces=(20.0,))
     first, last = Press(pad, OVAL).load_path([1.0, 20.0])
@@ -140,20 +134,16 @@ def test_a_step_that_fails_is_cut_and_the_answer_is_the_same():
     ({}, 0.5, "MatLUFactorNum"),
 ], ids=["symmetric", "on demand", "bounds", "friction"])  # fmt: skip
 def test_symmetric_tangents_have_symmetric_factors(options, mu, count):
+    set_before = dict(PETSc.Options().getAll())
     press = Press(pad_of(), OVAL, options, mu=mu)
     before = factorisations()
     list(press.load_path([1.0]))
     assert {name for name, number in factorisations().items() if number > before[name]} == {count}
+    assert dict(PETSc.Options().getAll()) == set_before  # options are taken back
 
 
 def factorisations():
     return {name: PETSc.Log.Event(name).getPerfInfo()["count"] for name in ("MatLUFactorNum", "MatCholFctrNum")}
-
-
-def test_petsc_options_are_taken_back():
-    before = dict(PETSc.Options().getAll())
-    Press(pad_of((4, 2, 2)), OVAL, VI | {"contact_snes_max_it": 7})
-    assert dict(PETSc.Options().getAll()) == before
 
 
 def test_the_ladder_goes_on_with_the_fallback_where_the_pad_has_no_solution():

@@ -7,18 +7,13 @@ from softjaw.fem.contact.press import Press
 from softjaw.fem.contact.problem import Control, SpringBed
 from softjaw.fem.contact.rigid import RigidProblem
 from softjaw.fem.pad.backing_plate import back_stiffness, relative_compliance
-from softjaw.fem.pad.mesh import Pad
-from softjaw.fem.pad.shape import BackingPlate, PadShape
+from softjaw.fem.pad.shape import BackingPlate
 from tests.fem import reference
-from tests.fem.reference import BALL, FOAM, OVAL, SIZE
+from tests.fem.reference import BALL, FOAM, OVAL, SIZE, pad_of
 
 PLASTIC = BackingPlate(0.001, 2e9, 0.35, (0.02, 0.011))
 X, Y = tuple(np.linspace(-0.025, 0.025, 21)), tuple(np.linspace(-0.011, 0.011, 5))
 WHOLE = (False, False)
-
-
-def pad_of(sheet, symmetry=(True, True), elements=(8, 4, 3), law=FOAM, contact="weighted"):
-    return Pad(PadShape(SIZE, elements), law, symmetry, contact, sheet)
 
 
 def wings(modulus):
@@ -26,7 +21,7 @@ def wings(modulus):
     return BackingPlate(0.001, modulus, 0.0, (0.010, 0.022))
 
 
-def test_wings_bend_as_beams():
+def test_wings_bend_as_beams_a_plate_by_its_mean_deflection_and_one_no_larger_than_its_support_is_rigid():
     """``w = F L^3 / (3 E I)`` under a force at the end of a wing; the held part does not move."""
     E, L, b, t = 70e9, 0.020, 0.022, 0.001
     back = back_stiffness(X, Y, WHOLE, wings(E))
@@ -37,19 +32,13 @@ def test_wings_bend_as_beams():
     assert u[0, :, 2].mean() == pytest.approx(L**3 / (3 * E * b * t**3 / 12), rel=0.005)
     assert not back.free[8:13].any()
     assert back.free[:8].all()
-
-
-def test_mean_deflection_under_even_pressure():
-    """``p L^5 / (20 E I)`` for the area under each wing's line, over the whole length and the foam's ``T / E``."""
+    # ``p L^5 / (20 E I)`` for the area under each wing's line, over the whole length and the foam's ``T / E``.
     E, L, t = 5e9, 0.020, 0.001
     mean = 2 * L**5 / (20 * E * t**3 / 12) / SIZE[0]
     assert relative_compliance(X, Y, WHOLE, wings(E), 0.015 / 1e5) == pytest.approx(mean / (0.015 / 1e5), rel=0.01)
     half, quarter = X[10:], Y[2:]
     whole = relative_compliance(X, Y, WHOLE, PLASTIC, 1e-7)
     assert relative_compliance(half, quarter, (True, True), PLASTIC, 1e-7) == pytest.approx(whole, rel=1e-9)
-
-
-def test_travelling_takes_no_force_and_bending_does():
     K = back_stiffness(X, Y, WHOLE, PLASTIC).K
     approach = np.append(np.tile([0.0, 0.0, 1.0], (len(K) - 1) // 3), 1.0)
     assert np.abs(K @ approach).max() < 1e-9 * np.abs(K).max()
@@ -57,21 +46,18 @@ def test_travelling_takes_no_force_and_bending_does():
     values = np.linalg.eigvalsh(K)
     assert abs(values[0]) < 1e-12 * values[-1]  # the approach itself
     assert values[1] > 0
-
-
-def test_a_sheet_that_is_no_larger_than_its_support_is_rigid():
-    """The finger holds all of it: nothing bends, and the pad is that on a rigid backing plate."""
+    # The finger holds all of it: nothing bends, and the pad is that on a rigid backing plate.
     held, half = BackingPlate(0.001, 2e9, 0.35, (0.050, 0.022)), BackingPlate(0.001, 2e9, 0.35, (0.050, 0.020))
     assert relative_compliance(X, Y, WHOLE, held, 1e-7) == pytest.approx(0.0, abs=1e-12)
     assert relative_compliance(X[10:], Y[2:], (True, True), held, 1e-7) == pytest.approx(0.0, abs=1e-12)
     assert relative_compliance(X, Y, WHOLE, half, 1e-7) > 0.0
-    (rigid,), (one,) = (Press(pad_of(sheet), OVAL).load_path([5.0]) for sheet in (None, held))
+    (rigid,), (one,) = (Press(pad_of(back=sheet), OVAL).load_path([5.0]) for sheet in (None, held))
     assert one.pressure == pytest.approx(rigid.pressure, abs=1e-9 * rigid.pressure.max())
 
 
 @pytest.mark.parametrize("gap", [OVAL, BALL], ids=["cylinder", "sphere"])
 def test_quarter_and_full_pads_on_a_sheet_are_the_same(gap):
-    full, quarter = pad_of(PLASTIC, WHOLE), pad_of(PLASTIC)
+    full, quarter = pad_of(symmetry=WHOLE, back=PLASTIC), pad_of(back=PLASTIC)
     where = {tuple(np.round(x * 1e9).astype(int)): i for i, x in enumerate(full.nodes[full.contact_nodes])}
     same = [where[tuple(np.round(x * 1e9).astype(int))] for x in quarter.nodes[quarter.contact_nodes]]
     for one, other in zip(*(Press(pad, gap).load_path([2.0, 8.0]) for pad in (quarter, full)), strict=True):
@@ -81,7 +67,7 @@ def test_quarter_and_full_pads_on_a_sheet_are_the_same(gap):
 
 @pytest.mark.parametrize("control", [Control(force=3.0), Control(closing=0.002)], ids=["force", "closing"])
 def test_tangent_by_finite_differences(control):
-    pad = pad_of(PLASTIC, (True, False), (4, 2, 2))
+    pad = pad_of((4, 2, 2), (True, False), back=PLASTIC)
     problem = RigidProblem(pad, BALL)
     problem.control = control
     x = SpringBed(pad, BALL).guess(0.003)
@@ -94,12 +80,12 @@ def test_tangent_by_finite_differences(control):
 def test_what_a_rigid_sheet_neglects_stays_below_eight_tenths_of_its_relative_compliance(gap):
     """What `study.case.effects` chooses by, up to 13 N."""
     forces = [1.0, 5.0, 13.0]
-    rigid = [reference.e_n(state) for state in Press(pad_of(None, elements=(16, 8, 5)), gap).load_path(forces)]
+    rigid = [reference.e_n(state) for state in Press(pad_of((16, 8, 5)), gap).load_path(forces)]
     lines = (tuple(np.linspace(0.0, side / 2, n // 2 + 1)) for side, n in zip(SIZE, (16, 8), strict=False))
     x, y = lines
     for modulus in (3e10, 5e9):
         sheet = BackingPlate(0.001, modulus, 0.3, (0.02, 0.01))
         compliance = relative_compliance(x, y, (True, True), sheet, SIZE[2] / FOAM.young_modulus)
-        bending = Press(pad_of(sheet, elements=(16, 8, 5)), gap).load_path(forces)
+        bending = Press(pad_of((16, 8, 5), back=sheet), gap).load_path(forces)
         for expected, state in zip(rigid, bending, strict=True):
             assert abs(reference.e_n(state) / expected - 1.0) <= 0.8 * compliance

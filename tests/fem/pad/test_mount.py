@@ -53,7 +53,7 @@ def test_the_mount_bears_the_moment_of_the_contact(stiffness):
     assert abs(none) < 1e-6
 
 
-def test_a_stiff_mount_is_a_rigid_plate_and_a_soft_one_turns_until_it_bears_no_moment():
+def test_a_stiff_mount_is_a_rigid_plate_a_soft_one_bears_no_moment_and_a_pad_pressed_in_its_middle_stays():
     rigid, stiff, soft = (pressed(beside(0.003), k) for k in (None, 1e4, 1e-3))
     assert stiff[1].closing == pytest.approx(rigid[1].closing, rel=1e-3)
     assert stiff[1].pressure == pytest.approx(rigid[1].pressure, abs=2e-3 * rigid[1].pressure.max())
@@ -62,18 +62,12 @@ def test_a_stiff_mount_is_a_rigid_plate_and_a_soft_one_turns_until_it_bears_no_m
     left, before = (moment(state.points, tilt(pad, state)[2]) for pad, state in (soft, rigid))
     assert abs(left) < 0.15 * abs(before)
     assert tilt(*soft)[0] * before > 0
-
-
-def test_a_pad_that_is_pressed_in_its_middle_does_not_tilt_and_half_of_it_says_the_same():
     whole, half = (pressed(beside(0.0), 0.5, symmetry=own) for own in ((False, False), (True, False)))
     assert np.abs(tilt(*whole)[:2]).max() < 1e-9
     assert half[1].closing == pytest.approx(whole[1].closing, rel=1e-9)
     aside = [pressed(beside(0.002), 0.5, symmetry=own) for own in ((False, False), (True, False))]
     assert tilt(*aside[1])[0] == pytest.approx(tilt(*aside[0])[0], rel=1e-6)  # fitted to other nodes
     assert aside[1][1].closing == pytest.approx(aside[0][1].closing, rel=1e-9)
-
-
-def test_the_tangent_is_that_of_differences():
     pad = Pad(PadShape(SIZE, (4, 2, 2)), FOAM, (False, False), "weighted", TiltingMount(0.5, GLUE))
     problem = RigidProblem(pad, beside(0.002))
     problem.control = Control(force=2.0)

@@ -102,3 +102,17 @@ def test_shape_functions_of_a_side(n):
     for power in range(n):
         assert along_side(n, np.array([0.3]))[0] @ np.linspace(0, 1, n) ** power == pytest.approx(0.3**power)
 
+
+def test_pressures_at_nodes_are_those_of_a_smooth_pressure():
+    """Forces ``int N_i p`` of p = cos(2 x), in closed form, to fourth order; to second with Gauss points or nodes."""
+
+    def wrong(rule, n):
+        pad = Pad(PadShape((2.0, 1.0, 1.0), (n, 1, 1)), FOAM, contact=rule)
+        p = np.cos(2 * pad.nodes[pad.face_nodes, 0])
+        forces = np.bincount(pad.face_nodes.ravel(), ((pad.face_area * (p @ pad.face_N.T)) @ pad.face_N).ravel())
+        h, x = 2.0 / n, pad.nodes[pad.contact_nodes, 0]
+        exact = 0.5 * h * np.cos(2 * x) * (np.sin(h) / h) ** 2
+        return np.abs(forces[pad.contact_nodes] - exact)[np.abs(x) < 0.99].max() / h
+
+    for rule, order in (("weighted", 2), ("nodal", 2), ("blended", 4)):
+        assert np.log2(wrong(rule, 16) / wrong(rule, 32)) == pytest.approx(order, abs=0.1)

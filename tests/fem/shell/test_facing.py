@@ -36,7 +36,7 @@ def still(wall):
     return np.zeros((840, 3)), np.zeros((840, 3))
 
 
-def test_the_undeformed_cylinder_is_faced_along_its_radius(wall, points):
+def test_a_cylinder_is_faced_along_its_radius_also_where_it_swells_or_moves_and_nothing_beyond_its_ends(wall, points):
     found = face(wall, points, wall.places(points), *still(wall))
     r = np.hypot(points[:, 0], points[:, 1])
     radial = np.column_stack([points[:, :2] / r[:, None], 0 * r])
@@ -46,9 +46,6 @@ def test_the_undeformed_cylinder_is_faced_along_its_radius(wall, points):
     np.testing.assert_allclose(found.e, radial, atol=5e-6)
     around = np.column_stack([-radial[:, 1], radial[:, 0], 0 * r])
     np.testing.assert_allclose(found.H, around[:, :, None] * around[:, None, :] / r[:, None, None], atol=2e-2)
-
-
-def test_a_wall_that_swells_or_moves_is_faced_along_and_points_beyond_the_ends_face_nothing(wall, points):
     _, normal = nodes(wall)
     grown = face(wall, points, wall.places(points), 1e-3 * normal, np.zeros_like(normal))
     start = face(wall, points, wall.places(points), *still(wall))

@@ -29,9 +29,12 @@ def states(allowed=(True, True), level="nonlinear", thickness=4e-4, z=0.075, sup
     return tuple(grip(body, z, allowed=allowed, level=level, theta=theta, mu=mu).load_path(FORCES))
 
 
+FORCE = Control(force=2.0)
+
+
 @pytest.mark.parametrize(("allowed", "level", "control"), [
-    ((True, True), "nonlinear", Control(force=2.0)), ((True, True), "linear", Control(force=2.0)),
-    ((False, False), "nonlinear", Control(force=2.0)), ((True, True), "nonlinear", Control(closing=1e-3)),
+    ((True, True), "nonlinear", FORCE), ((True, True), "linear", FORCE), ((False, False), "nonlinear", FORCE),
+    ((True, True), "nonlinear", Control(closing=1e-3)),
 ])  # fmt: skip
 def test_the_tangent_is_the_derivative_of_the_residual(allowed, level, control):
     problem = grip(thin(), elements=(4, 2, 2), allowed=allowed, level=level).problem
@@ -75,7 +78,7 @@ def test_a_very_stiff_wall_is_a_rigid_object():
 
 
 @pytest.mark.parametrize(("allowed", "level", "control"), [
-    ((True, True), "nonlinear", Control(force=2.0)), ((True, False), "linear", Control(force=2.0)),
+    ((True, True), "nonlinear", FORCE), ((True, False), "linear", FORCE),
     ((False, False), "nonlinear", Control(closing=1.5e-3)),
 ])  # fmt: skip
 def test_so_is_that_of_a_grasp_with_friction(allowed, level, control):
@@ -98,7 +101,7 @@ def test_so_is_that_of_a_grasp_with_friction(allowed, level, control):
     check_tangent(problem, x, 1e-10, 1e-7)
 
 
-def test_where_one_kind_of_gaps_has_no_state_the_path_goes_on_with_the_next(monkeypatch):
+def test_where_gaps_have_no_state_the_path_goes_on_with_the_next_kind_and_without_friction_nothing_changes(monkeypatch):
     expected = [s.fingers[0].closing for s in grip(thin(), elements=(4, 2, 2)).load_path(FORCES)]
     problem, level, failed = grip(thin(), elements=(4, 2, 2)).problem, Grip._level, []
 
@@ -111,9 +114,6 @@ def test_where_one_kind_of_gaps_has_no_state_the_path_goes_on_with_the_next(monk
     monkeypatch.setattr(Grip, "_level", fails_once)
     found = [s.fingers[0].closing for s in Grip([lambda: problem] * 2).load_path(FORCES)]
     assert (found, failed) == (pytest.approx(expected, rel=1e-8), [FORCES[1]])
-
-
-def test_without_friction_nothing_changes():
     for a, b in zip(states(mu=0.0), states(), strict=True):
         assert a.fingers[0].closing == pytest.approx(b.fingers[0].closing, rel=1e-8)
         assert e_n(a.fingers[0]) == pytest.approx(e_n(b.fingers[0]), rel=1e-6)

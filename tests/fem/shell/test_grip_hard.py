@@ -56,13 +56,10 @@ def test_a_wall_as_soft_as_foam_collapses_before_the_force_is_reached():
         next(path)
 
 
-def test_a_wall_that_gives_way_is_flagged():
+def test_a_wall_that_gives_way_is_flagged_and_a_long_side_that_points_down_gives_the_same_patch_turned():
     states = grip(thin(2e-4), elements=(6, 4, 2), mesh=ROUGH).load_path([0.3, 1.5])
     assert [s.wall.snapped for s in states] == [False, True]
-
-
-def test_a_long_side_that_points_down_gives_the_same_patch_turned():
-    """On a slope the patch differs between the ends of the pad."""
+    # On a slope the patch differs between the ends of the pad.
     up = pose(0.0, 0.142), pose(np.pi, 0.142)
     turn = np.diag([-1.0, -1.0, 1.0])
     down = tuple(Pose(p.rotation @ turn, p.origin) for p in up)
@@ -93,7 +90,7 @@ def still(wall):
     return none, none.copy()
 
 
-def test_a_part_of_a_wall_is_not_faced_from_beyond_its_edges_but_from_the_wrong_end(quarter):
+def test_a_part_of_a_wall_is_not_faced_from_beyond_its_edges_nor_a_flat_bottom_but_the_rim_above_it(quarter):
     assert not quarter.closed
     assert grip(thin(), elements=(4, 2, 2), mesh=ROUGH, allowed=(False, False)).problem.fingers[0].wall.closed
     theta = np.array([-0.02, 0.02, 0.5 * np.pi - 0.02, 0.5 * np.pi + 0.02])
@@ -107,9 +104,6 @@ def test_a_part_of_a_wall_is_not_faced_from_beyond_its_edges_but_from_the_wrong_
     there = face(quarter, points, bad, *still(quarter))
     np.testing.assert_allclose(there.gap, here.gap, atol=1e-12)
     np.testing.assert_allclose(bad, good, atol=1e-9)
-
-
-def test_flat_bottoms_are_not_faced_but_the_rim_above_them_is(quarter):
     flat = thin().surface.flat[0]
     assert quarter.ends[0] == pytest.approx(flat, abs=1e-12)
     s = np.array([flat - 0.01, 0.5 * (flat + thin().surface.wall[0])])
@@ -117,10 +111,7 @@ def test_flat_bottoms_are_not_faced_but_the_rim_above_them_is(quarter):
     gap = face(quarter, X + 1e-3 * n, quarter.places(X), *still(quarter)).gap
     assert gap[0] == FAR
     assert gap[1] == pytest.approx(1e-3, abs=2e-6)
-
-
-def test_a_pad_over_the_rim_is_carried_up_to_the_rim():
-    """The can ends open at z = 205 mm; a pad at 198 mm stands over by 8 mm."""
+    # The can ends open at z = 205 mm; a pad at 198 mm stands over by 8 mm.
     finger = next(grip(thin(), z=0.198, elements=(12, 4, 2), mesh=ROUGH, radius=0.013).load_path([0.5])).fingers[0]
     patch = extract(finger.pad, finger)
     height = 0.198 + patch.centroid[:, 0]

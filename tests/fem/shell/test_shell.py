@@ -42,30 +42,23 @@ def dense(shell, q=None, before=None):
 
 
 @pytest.mark.parametrize("mesh", [warped(1), warped(3), disc(2, 1.0, THICKNESS)[0]], ids=["element", "patch", "disc"])
-def test_exactly_six_motions_need_no_force(mesh):
+def test_exactly_six_motions_need_no_force_small_ones_and_rotations(mesh):
     K = dense(Shell(mesh, E, NU))
     assert np.abs(K - K.T).max() < 1e-15 * np.abs(K).max()
     values = np.linalg.eigvalsh(K)
     assert np.abs(values[:6]).max() < 1e-14 * values[-1]
     assert values[6] > 1e-9 * values[-1]
-
-
-@pytest.mark.parametrize("mesh", [warped(), disc(3, 1.0, THICKNESS)[0]], ids=["patch", "disc"])
-def test_rigid_motions_need_no_force(mesh):
     q = np.hstack([mesh.X @ (TURN - np.eye(3)).T + [1, 2, 3], mesh.D @ (TURN - np.eye(3)).T]).ravel()
     assert np.abs(Shell(mesh, E, NU).residual(q)).max() < 2e-13 * E * THICKNESS
 
 
-def test_tangent_is_the_derivative_of_the_force():
+def test_the_tangent_is_the_derivative_of_the_force_the_mixed_one_with_the_stress_of_the_last_linear_step():
     shell = Shell(warped(), E, NU, springs=np.linspace(1e5, 1e6, 6 * 16))
     q, p, h = 1e-2 * RNG.normal(size=shell.size), RNG.normal(size=shell.size), 1e-5
     near, far = (shell.residual(q + k * h * p) - shell.residual(q - k * h * p) for k in (1, 2))
     expected = (8 * near - far) / (12 * h)
     assert np.abs(dense(shell, q) @ p - expected).max() < 1e-9 * np.abs(expected).max()
-
-
-def test_mixed_tangent_uses_the_stress_that_the_last_linear_step_predicted():
-    """It lacks the quadratic share of the step's strain, which is even in the step and grows as its square."""
+    # It lacks the quadratic share of the step's strain, which is even in the step and grows as its square.
     shell = Shell(warped(), E, NU)
     start, step = np.zeros(shell.size), 1e-2 * RNG.normal(size=shell.size)
     one, other, double = (dense(shell, k * step, start) - dense(shell, k * step) for k in (1, -1, 2))
@@ -91,7 +84,7 @@ def solved_patch(prescribed):
     return shell, q, exact.ravel()
 
 
-def test_membrane_patch():
+def test_membrane_and_bending_patches_are_exact():
     """Constant stresses 1333, 1333, 400 from u = 1e-3 (x + y/2), v = 1e-3 (y + x/2)."""
 
     def stretched(x, y):
@@ -104,11 +97,7 @@ def test_membrane_patch():
     middle, half = 0.5 * (stress[..., 0] + stress[..., 1]), 0.5 * (stress[..., 0] - stress[..., 1])
     assert middle == pytest.approx(1e3 / 0.75, rel=1e-6)
     assert half**2 + stress[..., 2] ** 2 == pytest.approx(400**2, rel=1e-6)
-
-
-def test_bending_patch():
-    """Constant moments from w = 1e-3 (x^2 + x y + y^2) / 2; directors stay at right angles."""
-
+    # Constant moments from w = 1e-3 (x^2 + x y + y^2) / 2; directors stay at right angles.
     def bent(x, y):
         z = 0 * x
         slope = 5e-4 * 1e-3 * np.stack([x + y / 2, y + x / 2], 1)
@@ -144,7 +133,7 @@ def test_clamped_disc_with_triangles_in_the_middle():
     assert errors[0] / errors[1] == pytest.approx(4, rel=0.3)
 
 
-def test_tapered_strip():
+def test_a_tapered_strip_bends_as_a_beam_and_elements_that_are_none_are_refused():
     """Tip of a cantilever whose thickness grows evenly to twice: w = int P x^2 / (E I(x)) dx."""
     n, L, t, P = 40, 0.2, 0.001, 0.01
     x, y = np.meshgrid(np.linspace(0, L, n + 1), [0, 0.01], indexing="ij")
@@ -160,9 +149,6 @@ def test_tapered_strip():
     # int x^2 / (1 + x/L)^3 dx = L^3 (ln 2 - 5/8)
     exact = 12 * P * L**3 * (np.log(2) - 0.625) / (E * 0.01 * t**3)
     assert q[0, 2] == pytest.approx(exact, rel=2e-3)
-
-
-def test_elements_that_are_none_are_refused():
     x = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], dtype=float)
     up = np.tile([0, 0, 0.01], (4, 1))
     with pytest.raises(ValueError, match="element 0"):

@@ -81,7 +81,7 @@ def test_the_outer_face_lies_on_the_surface_and_the_middle_half_a_wall_inside(na
     assert mesh.D[low] == pytest.approx([0, 0, -4e-4], abs=1e-12)
 
 
-def test_grid_lines_are_fine_where_asked():
+def test_grid_lines_are_fine_where_asked_miss_no_step_of_the_thickness_and_values_between_are_bilinear():
     mesh = body_mesh(SURFACES["flask"], 4e-4, MeshSize(heights=(0.03, 0.05), half_width=0.01))
     arc, z = 0.03 * np.diff(mesh.theta), mesh.outer[mesh.number[0]][:, 2]
     middle = 0.5 * (mesh.theta[1:] + mesh.theta[:-1])
@@ -94,9 +94,6 @@ def test_grid_lines_are_fine_where_asked():
     assert np.abs(np.diff(np.log(steps))).max() < 0.5
     assert mesh.s[np.abs(mesh.s - mesh.surface.flat[0]).argmin()] == mesh.surface.flat[0]
     assert mesh.outer[mesh.foot, 2] == pytest.approx(mesh.outer[:, 2].min(), abs=1e-12)
-
-
-def test_a_step_of_the_thickness_is_not_missed_and_sizes_grow_no_faster_than_asked():
     steps = [(0.0, 5e-4), (0.121, 5e-4), (0.123, 1.2e-3), (0.135, 1.2e-3)]
     mesh = body_mesh(SURFACES["flask"], steps, COARSE, QUARTER)
     z = SURFACES["flask"].curve.derivative(mesh.s)[:, 0]
@@ -108,9 +105,6 @@ def test_a_step_of_the_thickness_is_not_missed_and_sizes_grow_no_faster_than_ask
     assert limited(x, np.where(np.abs(x - 1) < 1e-9, 0.1, 9.0), 0.25) == pytest.approx(0.1 + 0.25 * np.abs(x - 1))
     assert divided(1.0, 3.0, x, np.full(201, 0.25)) == pytest.approx(np.linspace(1, 3, 9), abs=1e-12)
     assert len(divided(1.0, 3.0, x, np.full(201, 0.25), 3)) == 10
-
-
-def test_values_between_nodes_are_bilinear_in_the_parameters():
     mesh = body_mesh(SURFACES["square"], 4e-4, COARSE)
     theta, s = RNG.uniform(-9, 9, 100), RNG.uniform(mesh.s[1], mesh.s[-1], 100)
     nodes, N = mesh.locate(theta, s)
