@@ -64,13 +64,10 @@ def test_links_lead_somewhere(file):
     assert not wrong
 
 
-def test_the_navigation_names_every_generated_page_and_none_that_is_not_there():
+def test_the_navigation_names_every_page_and_none_that_is_not_there_and_the_tutorial_its_scene():
     listed = re.findall(r"^ +- (\S+\.md)$", (ROOT / "mkdocs.yml").read_text(), re.M)
     assert len(listed) == len(set(listed)) > 30
     assert set(PAGES) < set(listed) <= {file.name for file in DOCS.glob("*.md")} | set(PAGES)
-
-
-def test_the_tutorial_shows_the_scene_that_it_runs():
     (shown,) = re.findall(r"^```toml\n(.*?)^```$", (DOCS / "tutorial.md").read_text(), re.M | re.S)
     assert tomllib.loads(shown) == tomllib.loads((ROOT / "jobs" / "flask-mesh.toml").read_text())
 

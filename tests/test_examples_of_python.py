@@ -2,8 +2,6 @@
 
 import re
 import runpy
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -11,7 +9,7 @@ import pytest
 import softjaw as sj
 from softjaw.study.doctor import launch_environment
 from softjaw.study.quantities import DONE
-from tests.study.launching import ROOT
+from tests.study.launching import ROOT, launch
 
 FOLDER = ROOT / "jobs" / "examples"
 SOLVING = {"first_map": 6 * 2, "planner": 12 * 4 * 3, "stiffer_pad": 0, "lift": 1}  # and the cases in their files
@@ -30,18 +28,12 @@ def here(tmp_path, monkeypatch):
     plt.close("all")
 
 
-def test_all_are_tested():
+def test_all_are_tested_friction_alone_falls_as_the_formula_says_and_a_measured_field_is_judged(here):
     assert {path.stem for path in FOLDER.glob("*.py")} == {*SOLVING, "friction_alone", "measured_pressure", "data_set"}
-
-
-def test_friction_alone_falls_as_the_formula_says(here):
     across, formula, e_n = np.transpose(runpy.run_path(str(FOLDER / "friction_alone.py"))["curves"])
     assert across == pytest.approx(formula, rel=1e-3)
     assert (np.diff(e_n) < 0).all()
     assert picture(here, "friction_alone") > 10_000
-
-
-def test_a_measured_field_is_judged(here):
     found = runpy.run_path(str(FOLDER / "measured_pressure.py"))
     assert found["held"].tolist() == [True, False]
     errors = [found["fits"][kind].fit_error.Erad for kind in ("quartic", "full", "three_motions")]
@@ -55,12 +47,9 @@ def test_a_measured_field_is_judged(here):
 def test_scripts_that_solve(name, tmp_path):
     if name == "lift":
         pytest.importorskip("mujoco", reason="MuJoCo is not installed: pip install mujoco")
-    done = subprocess.run(
-        [sys.executable, FOLDER / f"{name}.py"], env={**launch_environment(), "MPLBACKEND": "Agg"}, cwd=tmp_path,
-        capture_output=True, text=True, timeout=300, check=False, stdin=subprocess.DEVNULL,
-    )  # fmt: skip
-    output = done.stdout
-    assert (done.returncode, done.stderr) == (0, "")
+    env = {**launch_environment(), "MPLBACKEND": "Agg"}
+    code, output, errors = launch(0, FOLDER / f"{name}.py", env=env, cwd=tmp_path, timeout=300)
+    assert (code, errors) == (0, "")
     assert picture(tmp_path, name) > 10_000
     if cases := SOLVING[name]:
         ds = sj.open(tmp_path / "results" / f"{name.replace('_', '-')}.hdf")

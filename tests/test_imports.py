@@ -1,5 +1,4 @@
-"""Who may import whom, read from the sources: study -> fem -> friction, inside study only downward, and one door to
-each foreign library.
+"""Who may import whom: study -> fem -> friction, inside study only downward, and one door to each foreign library.
 
 Everything is imported as ``softjaw.*``: under a second name a module would be loaded, and compiled, twice.
 """
@@ -25,15 +24,11 @@ ALLOWED = {
     | NUMERICS,
 }
 ALLOWED["study"] |= {f"softjaw.{name}" for name in OWN}
-PICTURES = {
-    "fem/objects/triangles.py", "study/show/view/solids.py",
-}
+PICTURES = {"fem/objects/triangles.py", "study/show/view/solids.py"}
 DOORS = {
     "petsc4py": {"fem/petsc.py"},
     "(computed)": {"study/cli/__init__.py"},
-    "h5py": {
-        "study/result/skeleton.py", "study/result/write.py", "study/result/hdf5.py", "study/result/index.py",
-    },
+    "h5py": {f"study/result/{name}.py" for name in ("skeleton", "write", "hdf5", "index")},
     "pyvista": PICTURES | {"study/patch/vtk_faces.py"},
     "vtkmodules": PICTURES | {"study/patch/vtk_faces.py"},
 }
@@ -96,16 +91,13 @@ def outside_world(source: str) -> set[str]:
     return names & set(map(ast.unparse, used))
 
 
-def test_every_file_imports_only_what_its_folder_and_its_level_may():
+def test_every_file_imports_only_what_its_folder_may_and_only_study_talks_to_the_session():
     wrong = {path: forbidden(path, (ROOT / path).read_text(encoding="utf-8")) for path in SOURCES}
     bare = re.compile(rf"^ *(?:from|import) (?:{'|'.join(OWN)})\b", re.M)
     wrong |= {path: set(bare.findall((ROOT / path).read_text())) for path in USERS}
     assert {path: names for path, names in wrong.items() if names} == {}
     assert not (ROOT / "study/__init__.py").read_text(encoding="utf-8")  # or every module would import what it does
-
-
-def test_only_study_talks_to_the_session_it_runs_in():
-    """The other packages take what they need as arguments, and return what there is to say."""
+    # The other packages take what they need as arguments, and return what there is to say.
     used = {path: outside_world((ROOT / path).read_text()) for path in SOURCES if not path.startswith("study/")}
     assert {path: names for path, names in used.items() if names} == {}
 

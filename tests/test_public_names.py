@@ -6,15 +6,13 @@ import importlib
 import inspect
 import json
 import os
-import subprocess
-import sys
 
 import pytest
 
 import softjaw as sj
 from softjaw.study.messages import StudyError
 from tests.study.formula_results import grid_axes, make
-from tests.study.launching import ROOT
+from tests.study.launching import ROOT, launch
 
 STUB = ast.parse((ROOT / "softjaw" / "__init__.pyi").read_text(encoding="utf-8"))
 EXAMPLES = ("Scene.from_file", "Scene.from_dict", "Scene.with_values", "press", "open", "GraspMap", "ContactPatch",
@@ -105,10 +103,9 @@ def test_the_examples_of_a_module_are_true(path):
 def test_all_but_solving_works_anywhere_without_petsc_and_mpi(tmp_path):
     path = make(tmp_path / "a.hdf")
     outside = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_", "PMIX_", "PMI_", "H5PY_"))}
-    command = [sys.executable, "-W", "ignore", "-c", BLOCKED, str(ROOT), str(path)]
-    done = subprocess.run(command, cwd="/", env=outside, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    early, (turned, ellipsoid, quartic, quality), e_n, largest, refused = json.loads(done.stdout)
+    code, output, errors = launch(0, "-W", "ignore", "-c", BLOCKED, ROOT, path, cwd="/", env=outside)
+    assert code == 0, errors
+    early, (turned, ellipsoid, quartic, quality), e_n, largest, refused = json.loads(output)
     assert early == []
     assert turned == pytest.approx(1.0)
     assert quartic < ellipsoid < 0.04
@@ -144,10 +141,8 @@ sj.fit_quartic(case.patch, mu="0.8")
 @pytest.mark.long
 def test_a_type_checker_knows_them(tmp_path):
     (tmp_path / "user.py").write_text(USER)
-    done = subprocess.run(
-        [sys.executable, "-m", "mypy", "--config-file", ROOT / "pyproject.toml", "user.py"], cwd=tmp_path,
-        env={**os.environ, "MYPYPATH": str(ROOT)}, capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    wrong = [line.partition(": ")[0] for line in done.stdout.splitlines() if line.startswith("user.py")]
-    assert wrong == ["user.py:12", "user.py:13"], done.stdout
+    words = ("-m", "mypy", "--config-file", ROOT / "pyproject.toml", "user.py")
+    _, output, _ = launch(0, *words, cwd=tmp_path, env={**os.environ, "MYPYPATH": str(ROOT)})
+    wrong = [line.partition(": ")[0] for line in output.splitlines() if line.startswith("user.py")]
+    assert wrong == ["user.py:12", "user.py:13"], output
     assert (ROOT / "softjaw" / "py.typed").exists()

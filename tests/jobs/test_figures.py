@@ -36,13 +36,10 @@ def test_every_figure_has_scenes_and_a_picture_in_the_docs(figure):
     assert len(picture) <= MOST
 
 
-def test_balls_are_drawn_in_their_colour():
+def test_balls_are_drawn_in_their_colour_and_figures_go_by_number_and_letters():
     image = drawing.rendered(lambda p: drawing.dots(p, np.eye(3), 0.2, "red"), (1, 1, 1), (0, 0, 1), (60, 60))
     red = (image[..., 0] > 100) & (image[..., 1] < 60)
     assert 0.05 < red.mean() < 0.6
-
-
-def test_figures_go_by_number_and_letters():
     names = {"4": "4ab 4c", "4a": "4ab", "6ab": "6ab", "6c": "6c", "7d": "7", "8b": "8", "4c 4 8": "4c 4ab 8"}
     for words, known in names.items():
         assert [f.name for f in figures_of(words.split())] == known.split()
@@ -56,15 +53,11 @@ def test_unknown_figures_and_one_picture_for_two_are_refused(words):
     assert figures.main(words) == USAGE
 
 
-def force_file(path):
-    """One place over four forces: the curved model has seven eighths of the flat one's friction across."""
+def test_the_force_study_is_drawn_with_the_paper_s_normalisation_and_not_where_some_cases_failed(tmp_path):
+    # One place over four forces: the curved model has seven eighths of the flat one's friction across.
     F = np.array([1.0, 2.0, 4.0, 8.0])
     known = {"S__S": F, "f_y_max__ccm": 0.7 * F, "f_y_max__pcm": 0.8 * F, "f_y_max__pcm_projected": 0.75 * F}
-    return make(path, axes=grid_axes([0.0], [0.0], F), **known)
-
-
-def test_the_force_study_is_drawn_with_the_paper_s_normalisation(tmp_path):
-    path = force_file(tmp_path / "force.hdf")
+    path = make(tmp_path / "force.hdf", axes=grid_axes([0.0], [0.0], F), **known)
     with open_result(path) as result:
         lines = studies.over_force(judge(dataset(result)))
         e_n = 1e3 * result.read("e_n/ccm")[0, 0]
@@ -76,14 +69,11 @@ def test_the_force_study_is_drawn_with_the_paper_s_normalisation(tmp_path):
     assert torque["ccm"] == pytest.approx(e_n / 50)  # tau_z / (F l) of a torque e_n F
     draw(Figure("7", ("x",), studies.force_study), {"x": path}, tmp_path / "7.png")
     assert (tmp_path / "7.png").read_bytes().startswith(PNG)
-
-
-def test_a_figure_that_needs_all_cases_is_not_drawn_where_some_failed(tmp_path):
     path = make(tmp_path / "lost.hdf", axes=grid_axes([0.0], [0.0], [1.0, 2.0]), status__code=[[[1, 2]]])
     with pytest.raises(StudyError) as error:
-        draw(Figure("7", ("x",), studies.force_study), {"x": path}, tmp_path / "7.png")
+        draw(Figure("7", ("x",), studies.force_study), {"x": path}, tmp_path / "8.png")
     assert error.value.code == SOME_FAILED
-    assert not (tmp_path / "7.png").exists()
+    assert not (tmp_path / "8.png").exists()
 
 
 @pytest.mark.parametrize("code", [OTHER_FILE, CANNOT_WRITE])

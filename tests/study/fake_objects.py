@@ -1,7 +1,6 @@
-"""A folder of objects whose cases are a formula, to be started under mpirun: ``fake_objects.py SCENE OUT [options]``.
+"""Objects whose cases are a formula, to be started under mpirun: ``fake_objects.py SCENE OUT [options]``.
 
-An object called ``none`` has no grasp, one called ``bug`` fails while it is planned and ``late`` when it is finished,
-``grows`` gets further stations.
+``none`` has no grasp, ``bug`` fails while it is planned and ``late`` when it is finished, ``grows`` gets more stations.
 """
 
 import os
@@ -12,32 +11,17 @@ import argparse
 import signal
 import sys
 import time
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parent.parent.parent))
 
 from tests.study import fake_run
 
 
-@dataclass(frozen=True)
-class FakeUnit:
-    index: int
-    rows: Any
-    cost: float
-    first: int
-    state: int
-    reason: str
-    apart: bool
-    finest: tuple
-
-
 def plan_of(name, rounds=()):
-    plan = fake_run.fake_plan(name, 2 + len(name), rounds=rounds, apart=True)
-    units = (FakeUnit(**{**vars(unit), "first": unit.first + 1000 * len(name)}) for unit in plan.units)
-    return replace(plan, units=tuple(units))
+    return fake_run.fake_plan(name, 2 + len(name), rounds=rounds, apart=True, shift=1000 * len(name))
 
 
 def study(scene, _overrides):

@@ -11,9 +11,10 @@ import signal
 import sys
 import time
 import traceback
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parent.parent.parent))
 
@@ -22,7 +23,19 @@ import numpy as np
 FACES, FORCES = 6, 3
 
 
-def fake_plan(digest="scene", stations=6, derived=True, wide=-1, rounds=(), apart=False):
+@dataclass(frozen=True)
+class FakeUnit:
+    index: int
+    rows: Any
+    cost: float
+    first: int
+    apart: bool
+    state: int = 0
+    reason: str = ""
+    finest: tuple = ()
+
+
+def fake_plan(digest="scene", stations=6, derived=True, wide=-1, rounds=(), apart=False, shift=0):
     """Stations x two angles x three forces; both angles of an even station are one unit, one of them is too wide."""
     from softjaw.study.quantities import WIDE, Axis, Quantity
     from softjaw.study.result.layout import Header, Layout
@@ -41,13 +54,9 @@ def fake_plan(digest="scene", stations=6, derived=True, wide=-1, rounds=(), apar
         name = own.index(place) if place in own else 1000 + round(1e6 * place)
         rows = [tuple(range((2 * s + a) * FORCES, (2 * s + a + 1) * FORCES)) for a in range(2)]
         for a in [(0, 1)] if name % 2 == 0 else [(0,), (1,)]:
-            served = tuple(rows[i] for i in a)
-            unit = SimpleNamespace(index=len(units), rows=served, cost=float(1 + name % 3))
-            unit.first, unit.state, unit.reason = (2 * name + a[0]) * FORCES, 0, ""
-            unit.apart, unit.finest = apart, ()
-            units.append(unit)
-    if wide >= 0:
-        units[wide].state, units[wide].reason = WIDE, "needs more"
+            served, first = tuple(rows[i] for i in a), (2 * name + a[0]) * FORCES + shift
+            no_grasp = (WIDE, "needs more") if len(units) == wide else ()
+            units.append(FakeUnit(len(units), served, float(1 + name % 3), first, apart, *no_grasp))
     labels = tuple(f"candidate {i}" for i in range(2 * len(places)))
     header = Header(digest, "a = 1\n", "fake", "fake.toml", labels=labels)
     return Plan(Layout(axes, FACES, derived=slope, rounds=rounds), header, tuple(units))
@@ -112,15 +121,11 @@ def finalise(writer):
 def main(arguments=None):
     parser = argparse.ArgumentParser()
     parser.add_argument("file", type=Path)
-    parser.add_argument("--digest", default="scene")
-    parser.add_argument("--delay", type=float, default=0.0)
-    parser.add_argument("--file-limit", type=int, default=0)
-    parser.add_argument("--retry-failed", action="store_true")
-    parser.add_argument("--limit", type=float, default=600.0)
-    parser.add_argument("--memory", type=float, default=0.5)
-    parser.add_argument("--stations", type=int, default=6)
-    parser.add_argument("--grow", action="store_true")
-    parser.add_argument("--apart", action="store_true")  # forces that do not depend on each other
+    values = {"digest": "scene", "delay": 0.0, "file-limit": 0, "limit": 600.0, "memory": 0.5, "stations": 6}
+    for name, value in values.items():
+        parser.add_argument(f"--{name}", type=type(value), default=value)
+    for name in ("retry-failed", "grow", "apart"):  # apart: forces that do not depend on each other
+        parser.add_argument(f"--{name}", action="store_true")
     for name in ("fail", "raises", "kill", "hang", "stuck", "greedy", "unplug", "remove", "bug", "wide"):
         parser.add_argument(f"--{name}", type=int, default=-1)
     options = parser.parse_args(arguments)

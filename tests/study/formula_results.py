@@ -9,23 +9,11 @@ from softjaw.study.quantities import Axis, Quantity
 from softjaw.study.result.layout import Header, Layout
 from softjaw.study.result.skeleton import create
 from softjaw.study.result.write import ResultWriter, record
+from tests.study.scenes import OVAL
 from tests.study.sealing import sealed
 
-OBJECT = """
-[object]
-shape = "elliptic_cylinder"
-semi_axis_a_mm = 25
-semi_axis_b_mm = 20
-length_mm = 100
-"""
-SCENE = (
-    OBJECT
-    + """[candidates]
-stations_mm = [0, 10]
-[load]
-normal_force_n = [1, 5]
-"""
-)
+OBJECT = f"[object]\n{OVAL.replace('120', '100')}\n"
+SCENE = f"{OBJECT}[candidates]\nstations_mm = [0, 10]\n[load]\nnormal_force_n = [1, 5]\n"
 SKELETONS: dict[str, bytes] = {}  # files without values: to copy one is ten times faster than to make it
 STATIONS, ANGLES, FORCES = np.linspace(0, 0.04, 5), np.arange(6) * np.pi / 6, np.array([1.0, 2.0, 4.0, 8.0])
 
@@ -80,8 +68,7 @@ def make(
 ) -> Path:
     """A file with ``e_n`` of all models and friction limits by ``formula(*coordinates)``, everything done.
 
-    ``datasets`` are put in last, by their path below ``/study`` with ``__`` for ``/``: arrays, or functions that change
-    what is there.
+    ``datasets`` come last, by their path below ``/study`` with ``__`` for ``/``: arrays, or functions of what is there.
     """
     axes = axes or grid_axes()
     layout = Layout(axes, 0, meshes, derived=derived, rounds=added)

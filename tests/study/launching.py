@@ -27,11 +27,9 @@ def command(ranks, *words):
     return [*(start if ranks else []), sys.executable, *(str(word) for word in words)]
 
 
-def launch(ranks, *words):
-    done = subprocess.run(
-        command(ranks, *words), env=launch_environment(), cwd=ROOT, capture_output=True, text=True,
-        timeout=130, stdin=subprocess.DEVNULL,
-    )  # fmt: skip
+def launch(ranks, *words, **options):
+    options = {"env": launch_environment(), "cwd": ROOT, "timeout": 130} | options
+    done = subprocess.run(command(ranks, *words), capture_output=True, text=True, stdin=subprocess.DEVNULL, **options)
     return done.returncode, done.stdout, done.stderr
 
 

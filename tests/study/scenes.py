@@ -1,7 +1,7 @@
 """Scenes of tests: an object, a place, coarse pads; and their cases, solved as a study solves them."""
 
 from softjaw.study import pipeline
-from softjaw.study.case.candidates import units
+from softjaw.study.case.candidates import units as units_of
 from softjaw.study.scene import parse_scene
 
 BALL = 'shape = "sphere"\nradius_mm = 30'
@@ -33,10 +33,6 @@ def text_of(shape, where=None, *, stations="[0]", angles="[0]", forces="[2]", el
 
 def scene_of(shape, *changes, **choices):
     return parse_scene(text_of(shape, **choices), "scene.toml", changes)
-
-
-def units_of(scene):
-    return units(scene)
 
 
 def results_of(scene):

@@ -1,75 +1,22 @@
 """Bad input through the program itself: one clear sentence, the right exit code, nothing started, nothing left."""
 
-import shutil
 import subprocess
 import sys
 
 import numpy as np
 import pytest
-import trimesh
 
-from softjaw.study.cli import main
 from softjaw.study.doctor import launch_environment
 from softjaw.study.quantities import DONE, FAILED
 from softjaw.study.result.store import open_result
 from tests.study.launching import ROOT, softjaw
-from tests.study.scenes import BALL, QUICK, mesh_of, text_of
-
-SCENE = text_of(BALL, elements="[4, 4, 2]")
-MESH = text_of(mesh_of("body.stl"), stations="[50]", elements="[4, 4, 2]")
-FLASK = ROOT / "jobs" / "objects" / "flask.stl"
+from tests.study.scenes import BALL, QUICK, text_of
 
 
 @pytest.fixture
 def folder(tmp_path):
-    """A folder with a scene of a ball and one of a mesh that is the shipped flask."""
-    (tmp_path / "scene.toml").write_text(SCENE)
-    (tmp_path / "mesh.toml").write_text(MESH)
-    shutil.copy(FLASK, tmp_path / "body.stl")
+    (tmp_path / "scene.toml").write_text(text_of(BALL, elements="[4, 4, 2]"))
     return tmp_path
-
-
-def run(ranks, folder, *words, scene="scene.toml"):
-    return softjaw(ranks, "run", folder / scene, "-o", folder / "out.hdf", *words)
-
-
-def refused(answer, folder, code, *words, sentences=1):
-    """Assert so many sentences on stderr, this exit code, nothing on stdout, no file and no traceback."""
-    found, output, errors = answer
-    assert found == code, errors
-    assert errors.count("error: ") == sentences, errors
-    assert "Traceback" not in errors
-    for word in words:
-        assert word in errors, errors
-    assert output == ""
-    assert not list(folder.glob("out.hdf*"))
-
-
-def test_a_wrong_scene_starts_nothing(folder):
-    """All errors at once, out of the program; tests/study/scene has each of them."""
-    text = SCENE
-    for old, new in (
-        ("radius_mm = 30", "colour = 3"), ("[4, 4, 2]", "[4, 4, 2]\npad_thickness_mm = 0.01"),
-        ("stations_mm = [0]", 'stations_mm = "top"'), ("normal_force_n = [2]", "normal_force_n = [-2]"),
-    ):  # fmt: skip
-        text = text.replace(old, new)
-    (folder / "scene.toml").write_text(text)
-    keys = ("object.colour", "object.radius_mm", "pad_thickness_mm", "stations_mm", "normal_force_n")
-    refused(run(0, folder), folder, 2, *keys, sentences=len(keys))
-
-
-@pytest.mark.parametrize(("scale", "key"), [
-    (1e3 * 200 / 120, "object.mesh"), (1e-3, "object.mesh"), (0.3, "candidates"), (None, "object.mesh"),
-], ids=["200 m", "metres", "too short", "missing"])  # fmt: skip
-def test_a_mesh_that_is_no_object_is_refused_by_check(folder, scale, key, capsys):
-    path = folder / "body.stl"
-    if scale is None:
-        path.unlink()
-    else:
-        trimesh.load(path).apply_scale(scale).export(path)
-    code = main(["check", str(folder / "mesh.toml")])
-    told = capsys.readouterr()
-    refused((code, told.out, told.err), folder, 2, key)
 
 
 def every_rank(folder, *words):
@@ -85,12 +32,14 @@ def every_rank(folder, *words):
 
 
 @pytest.mark.ranks
-@pytest.mark.parametrize(("words", "code"), [(("--set", "friction.mu=-1"), 2), ((), 3)], ids=["scene", "file"])
-def test_all_ranks_leave_a_wrong_scene_or_a_file_of_others_with_the_same_code(folder, words, code):
+@pytest.mark.parametrize(("words", "code", "sentences"), [
+    (("--set", "friction.mu=-1", "--set", "object.colour=3"), 2, 2), ((), 3, 1),
+], ids=["scene", "file"])  # fmt: skip
+def test_all_ranks_leave_a_wrong_scene_or_a_file_of_others_with_the_same_code(folder, words, code, sentences):
     (folder / "out.hdf").write_text("my notes")
     codes, errors = every_rank(folder, *words)
     assert codes == [code, code]
-    assert errors.count("error: ") == 1
+    assert errors.count("error: ") == sentences
     assert (folder / "out.hdf").read_text() == "my notes"
 
 
@@ -100,7 +49,8 @@ def test_cases_that_cannot_be_solved_fail_with_their_reasons_and_the_others_go_o
         "sweep.object.radius_mm=[5, 30]", 'effects.model_size="quarter"', "candidates.stations_mm=[0, 3]",
         "load.normal_force_n=[2, 20, 30]", "gripper.elements=[8, 4, 2]", *QUICK,
     )  # fmt: skip
-    code, _, errors = run(0, folder, *[word for value in study for word in ("--set", value)])
+    changes = [word for value in study for word in ("--set", value)]
+    code, _, errors = softjaw(0, "run", folder / "scene.toml", "-o", folder / "out.hdf", *changes)
     assert code == 6, errors
     assert "Traceback" not in errors
     with open_result(folder / "out.hdf") as result:

@@ -2,13 +2,12 @@
 
 import pathlib
 import re
-import subprocess
-import sys
 
 import numpy as np
 import pytest
 
 from softjaw.study.scene import load_scene
+from tests.study.launching import launch
 from tests.study.scenes import results_of
 
 BOTTLE = "jobs/bottle-rigid.toml"
@@ -45,7 +44,6 @@ def test_claims_of_the_lookup_hold(tmp_path):
     curvature shows it, the error of the case that leaves it out does.
     """
     import softjaw
-    from softjaw.study.doctor import launch_environment
     from softjaw.study.lookup import GraspMap
     from softjaw.study.quantities import MAIN
     own = np.linspace(25, 175, 35)
@@ -55,8 +53,8 @@ def test_claims_of_the_lookup_hold(tmp_path):
     for name, stations, forces in (("map", own.tolist(), [1, 2, 4, 7, 10, 13]), ("held", between[::2], [1.5, 3, 8.5])):
         scene = re.sub(r"stations = 35.*", f"stations_mm = {stations}", text)
         (tmp_path / f"{name}.toml").write_text(scene.replace("[load]", f"[load]\nnormal_force_n = {forces}"))
-        words = [sys.executable, "-m", "softjaw", "run", tmp_path / f"{name}.toml", "-o", tmp_path / f"{name}.hdf"]
-        subprocess.run(words, env=launch_environment(), check=True, stdout=subprocess.DEVNULL, timeout=1200)
+        words = ("-m", "softjaw", "run", tmp_path / f"{name}.toml", "-o", tmp_path / f"{name}.hdf")
+        assert launch(0, *words, timeout=1200)[0] == 0
     held = softjaw.open(tmp_path / "held.hdf").isel(angle=0)
     whole = softjaw.open(tmp_path / "map.hdf")
     table = GraspMap(whole)

@@ -4,9 +4,7 @@ import argparse
 import csv
 import io
 import json
-import re
 import shlex
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -59,7 +57,8 @@ def test_bad_usage_is_code_2(words, capsys):
 
 def test_petsc_options_belong_to_run_and_have_a_prefix(scene, capsys):
     assert petsc_overrides(["-contact_ksp_rtol", "-1", "-contact_view"]) == [
-        "petsc.contact_ksp_rtol=-1", "petsc.contact_view=true",
+        "petsc.contact_ksp_rtol=-1",
+        "petsc.contact_view=true",
     ]
     assert main(["check", str(scene), "--", "-contact_snes_monitor"]) == 2
     for words in (["-snes_monitor"], ["1e-3"], ["-contact_snes_rtol", "1", "2"]):
@@ -105,10 +104,9 @@ def test_status_tells_programs_the_state_of_every_case(finished, capsys):
 
 
 def loaded(*words):
-    command = [sys.executable, "-X", "importtime", "-m", "softjaw", *map(str, words)]
-    told = subprocess.run(command, capture_output=True, text=True, cwd=ROOT)
-    lines = [line.rpartition("|")[2].strip() for line in told.stderr.splitlines() if line.startswith("import time:")]
-    return {line.partition(".")[0] for line in lines}, told.returncode
+    code, _, errors = launch(0, "-X", "importtime", "-m", "softjaw", *words)
+    lines = [line.rpartition("|")[2].strip() for line in errors.splitlines() if line.startswith("import time:")]
+    return {line.partition(".")[0] for line in lines}, code
 
 
 @pytest.mark.parametrize("command", QUICK)
@@ -134,41 +132,3 @@ def test_a_run_outlives_the_reader_of_its_output(tmp_path):
         env={**launch_environment(), "PYTHONPATH": str(ROOT)}, capture_output=True, text=True,
     )  # fmt: skip
     assert (done.returncode, done.stderr) == (0, "")
-
-
-RUNNABLE = [  # all but those that take minutes and are tested elsewhere
-    line.strip()
-    for name, made in PARSERS.items()
-    if name != "cost"
-    for line in str(made.epilog).partition("\n\n")[0].splitlines()[1:]
-]
-
-
-@pytest.fixture(scope="module")
-def solved(tmp_path_factory):
-    """A finished study of seconds, which stands in for all results that the examples name."""
-    path = tmp_path_factory.mktemp("solved") / "smoke.hdf"
-    code, output, errors = launch(
-        0, "-m", "softjaw", "run", ROOT / "jobs" / "smoke.toml", "-o", path, "--set", "load.normal_force_n=[2, 4]"
-    )
-    assert code == 0, output + errors
-    return path
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("example", RUNNABLE)
-def test_an_example_does_what_it_says(example, solved, tmp_path):
-    (tmp_path / "jobs").symlink_to(ROOT / "jobs")
-    (tmp_path / "results").mkdir()
-    made = re.findall(r"(?:-o|>|--screenshot) (\S+)", example)
-    for name in set(re.findall(r"results/\S+\.hdf", example)) - set(made):
-        shutil.copy(solved, tmp_path / name)
-    command = example.replace("mpirun -n 8 ", "").replace("softjaw ", f"{sys.executable} -m softjaw ", 1)
-    done = subprocess.run(
-        ["bash", "-c", command], cwd=tmp_path, env={**launch_environment(), "PYTHONPATH": str(ROOT)},
-        capture_output=True, text=True, timeout=300, check=False, stdin=subprocess.DEVNULL,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stdout + done.stderr
-    for name in made:
-        found = tmp_path / (f"{name}.toml" if command.split()[3] == "init" else name)
-        assert found.stat().st_size > 100, name

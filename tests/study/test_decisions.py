@@ -6,15 +6,22 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import xarray as xr
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from tests.turns import TURNS
+from softjaw.friction.frame import FrameFlag
+from softjaw.study.case import wall
+from softjaw.study.case.contact import ANTIPODAL, pose_flags
+from softjaw.study.case.effects import DOUBT, STEPS, STIFF_PLATE, decided
+from softjaw.study.case.pressing import OBLIQUE_EXCESS, state_flags
+from softjaw.study.case.result import TIE
+from softjaw.study.flags import Flag
+from softjaw.study.lookup.interpolation import CLOSING_GAP_RATIO, circle
+from softjaw.study.ranking import Sure, falling, judged, largest, nearest, ranking
+from softjaw.study.result.derived import first_crossing
+from tests.turns import ULPS, seeded, seeds, tries
 
-ULPS = np.finfo(float).eps * np.arange(-8, 9)
-tries = settings(max_examples=TURNS, deadline=None)
-seeds = st.integers(0, 2**32 - 1)
 scores = st.lists(st.sampled_from([0.0, 1e-3, 0.1, 0.1, 0.25, 3.0, math.nan]), min_size=1, max_size=12)
 
 
@@ -26,7 +33,6 @@ def moved(values, seed):
 @tries
 @given(scores, seeds)
 def test_equal_grasps_keep_their_order(values, seed):
-    from softjaw.study.ranking import falling, largest, ranking
     flags = np.random.default_rng(seed).choice([0, 1024], len(values))
     assert ranking(moved(values, seed), flags).tolist() == ranking(np.array(values), flags).tolist()
     assert falling(moved(values, seed)).tolist() == falling(np.array(values)).tolist()
@@ -37,8 +43,6 @@ def test_equal_grasps_keep_their_order(values, seed):
 @given(st.lists(st.floats(0.01, 10.0), min_size=1, max_size=12))
 def test_a_ranking_is_one(values):
     """What differs by more than a tie stands in falling order, and nothing is lost."""
-    from softjaw.study.case.result import TIE
-    from softjaw.study.ranking import falling
     order = falling(np.array(values))
     assert sorted(order.tolist()) == list(range(len(values)))
     ranked = np.array(values)[order]
@@ -48,7 +52,6 @@ def test_a_ranking_is_one(values):
 @tries
 @given(st.floats(0.1, 50.0), st.floats(1e-3, 10.0), seeds)
 def test_of_two_equally_near_forces_the_lower_is_taken(low, step, seed):
-    from softjaw.study.ranking import nearest
     forces = low + step * np.arange(4)
     assert nearest(moved(forces, seed), moved([low + 1.5 * step], seed)[0]) == 1
     assert nearest(forces, low + 1.51 * step) == 2
@@ -57,7 +60,6 @@ def test_of_two_equally_near_forces_the_lower_is_taken(low, step, seed):
 @tries
 @given(scores, seeds)
 def test_rounding_is_no_difference_of_two_grasps(values, seed):
-    from softjaw.study.ranking import Sure
     one, other = values[0], moved(values, seed)[0]
     pair = Sure(np.array([one, other]), np.zeros(2), np.empty((2, 0)))
     assert pair.apart(0, 1) is False
@@ -69,18 +71,14 @@ def test_rounding_is_no_difference_of_two_grasps(values, seed):
 @given(st.lists(st.sampled_from([0.5, 1.0, 1.5]), min_size=1, max_size=5), seeds)
 def test_a_window_ends_at_the_same_force(values, seed):
     """Values that just reach the limit, also where they fall again or the forces end."""
-    from softjaw.study.result.derived import first_crossing
     forces = 1.0 + np.arange(len(values))
     one = first_crossing(forces, values, 1.0)
     other = first_crossing(forces, moved(values, seed), 1.0)
     assert other == pytest.approx(one, rel=1e-9, nan_ok=True)
 
 
-@tries
-@given(seeds)
+@seeded
 def test_a_grasp_that_just_holds_is_not_too_weak(seed):
-    from softjaw.study.flags import Flag
-    from softjaw.study.ranking import judged
     factor = moved([[2.0, 2.0, 1.8, 2.2]], seed)
     over = ("angle", "normal_force")
     known = {"flags": (over, np.zeros((1, 4), np.int64)), "force_low": ("angle", [1.0])}
@@ -92,7 +90,6 @@ def test_a_grasp_that_just_holds_is_not_too_weak(seed):
 @pytest.mark.parametrize("ulp", ULPS[::4])
 def test_an_indicator_on_its_limit_takes_the_dearer_level(ulp):
     """On the bound below which nothing is measured it is measured; on the target it is taken."""
-    from softjaw.study.case.effects import DOUBT, STEPS, STIFF_PLATE, decided
     on, [step] = 1.0 + ulp, STEPS["sheet"]
     for change, level in ((0.01 / (1 + DOUBT) * on, "elastic plate"), (0.0099 / (1 + DOUBT), "rigid")):
         assert decided("sheet", step, STIFF_PLATE * on, lambda: (change, 0.0, 0.0), 0.01).level == level  # noqa: B023
@@ -100,7 +97,6 @@ def test_an_indicator_on_its_limit_takes_the_dearer_level(ulp):
 
 def facing(turn, lean, mu, distance=0.06, free=0.0, excess=0.0):
     """Two contacts on one line whose normals lean by an angle to it, turned as a whole."""
-    from softjaw.friction.frame import FrameFlag
     made = []
     for side, angle in ((1.0, lean), (-1.0, np.pi)):
         R = (turn * Rotation.from_rotvec([0.0, angle, 0.0])).as_matrix()
@@ -115,13 +111,9 @@ def facing(turn, lean, mu, distance=0.06, free=0.0, excess=0.0):
     return made
 
 
-@tries
-@given(seeds)
+@seeded
 def test_flags_of_a_pair_do_not_hang_on_its_rotation(seed):
     """Contacts that face each other without friction, and some that lean by just the angle that is too much."""
-    from softjaw.study.case.contact import ANTIPODAL, pose_flags
-    from softjaw.study.case.pressing import OBLIQUE_EXCESS, state_flags
-    from softjaw.study.flags import Flag
     turn = Rotation.random(random_state=seed)
     assert pose_flags(facing(turn, 0.0, 0.0)) == 0
     assert pose_flags(facing(turn, ANTIPODAL, 1.0)) == Flag.NOT_ANTIPODAL
@@ -131,12 +123,9 @@ def test_flags_of_a_pair_do_not_hang_on_its_rotation(seed):
     assert state_flags(facing(turn, 0.0, 1.0, excess=0.9999 * OBLIQUE_EXCESS)) == 0
 
 
-@tries
-@given(seeds)
+@seeded
 def test_a_wall_that_pushes_along_nothing_does_not_slide(seed):
     """Without friction the force on a straight wall's support is rounding; a newton is not."""
-    from softjaw.study.case import wall
-    from softjaw.study.flags import Flag
     random = np.random.default_rng(seed)
     scene = SimpleNamespace(friction=SimpleNamespace(mu=0.0), object=None)
     body = SimpleNamespace(material=SimpleNamespace(yield_strength=5e7))
@@ -158,7 +147,6 @@ def test_a_wall_that_pushes_along_nothing_does_not_slide(seed):
 @given(st.floats(-3.0, 3.0), seeds)
 def test_a_circle_is_closed_or_not_whatever_its_first_angle(first, seed):
     """The gap that closes it is just as wide as is allowed."""
-    from softjaw.study.lookup.interpolation import CLOSING_GAP_RATIO, circle
     step = math.pi / (1 + CLOSING_GAP_RATIO)
     angles = np.array([first, first + step])
     assert len(circle("angle", "rad", moved(angles, seed), math.pi, True).x) == 3

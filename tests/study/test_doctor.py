@@ -2,7 +2,6 @@
 
 import os
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -10,6 +9,7 @@ import pytest
 from softjaw.study import doctor
 from softjaw.study.doctor import COMPILED, NOT_IN_TIME, ask, launch_environment, trouble
 from softjaw.study.messages import CANNOT_WRITE, USAGE
+from tests.study.launching import launch
 
 
 def answering(code, output="", errors=""):
@@ -91,27 +91,15 @@ def test_the_variables_of_a_surrounding_mpirun_are_left_out_and_threads_are_pinn
     assert os.environ["OPENBLAS_NUM_THREADS"] == "4"
 
 
-def test_the_doctor_loads_no_mpi_itself():
+def test_the_doctor_loads_no_mpi_itself_and_the_folder_goes_with_the_process_without_numba():
     foreign = {"mpi4py", "petsc4py", "h5py", "pyvista", "numpy"}
     assert ask(f"import sys, softjaw.study.doctor; print({foreign} & set(sys.modules))").stdout == "set()"
-
-
-CODE = """
-import os, sys
-from softjaw.study.doctor import keep_compiled_loops
-keep_compiled_loops()
-print(os.environ.get("NUMBA_CACHE_DIR", ""), "numba" in sys.modules)
-"""
-
-
-def test_the_folder_goes_with_the_process_and_numba_is_not_needed():
-    code = "import softjaw.study.doctor as e\ne.ROOT = e.Path('/dev/null')\n" + CODE
+    code = (
+        "import os, sys, softjaw.study.doctor as e; e.ROOT = e.Path('/dev/null'); e.keep_compiled_loops();"
+        "print(os.environ.get('NUMBA_CACHE_DIR', ''), 'numba' in sys.modules)"
+    )
     surroundings = {k: v for k, v in os.environ.items() if k not in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME")}
-    command = [sys.executable, "-c", code]
-    done = subprocess.run(
-        command, capture_output=True, text=True, env={**surroundings, "HOME": "/dev/null"}, cwd=doctor.ROOT, check=True,
-    )  # fmt: skip
-    folder, loaded = done.stdout.split()
+    folder, loaded = launch(0, "-c", code, env={**surroundings, "HOME": "/dev/null"})[1].split()
     assert Path(folder).name.startswith(doctor.PASSING)
     assert not Path(folder).exists()
     assert loaded == "False"

@@ -107,7 +107,7 @@ def levels_of(choice):
     return [choice.level(COUPLING, k) for k in range(choice.count)]
 
 
-def test_the_level_at_a_force_does_not_depend_on_other_forces(choice):
+def test_the_level_at_a_force_depends_on_no_other_and_what_is_left_out_is_a_part_of_the_error(choice):
     """As measured at 175 mm of the bottle: e_n changes by 8 %, -0.4 % and -29 %, the payload in the middle by 5 %."""
     levels = levels_of(choice([0.077, -0.0042, -0.292], [0.1, 0.05, -0.3]))
     assert [level.reason for level in levels] == [effects.MUCH] * 3
@@ -119,16 +119,10 @@ def test_the_level_at_a_force_does_not_depend_on_other_forces(choice):
     [level] = levels_of(choice([np.nan]))
     assert (level.reason, level.indicator) == (effects.UNDECIDED, 0.1)
     assert np.isnan(level.change)
-
-
-def test_what_is_left_out_because_it_changes_little_is_a_part_of_the_error_and_nothing_else(choice):
     found = choice([0.0042, 0.2])
     found.solver.case = lambda k, levels, *_: Solved([levels, levels])  # on two meshes
     pairs = [found.case(k).pairs for k in range(2)]
     assert [len(pair) for pair in pairs] == [1, 0]
-
-
-def test_friction_is_left_out_on_a_wall_whose_coarse_path_with_it_has_ended(choice):
     found = choice([0.2, 0.2, 0.2], lost=[1])
     found.solver.walled, found.levels = True, found.levels._replace(object="nonlinear_shell")
     solved = [found.case(k) for k in range(3)]
@@ -137,8 +131,6 @@ def test_friction_is_left_out_on_a_wall_whose_coarse_path_with_it_has_ended(choi
     assert [level.level for level in levels_of(found)] == [TAKEN, FREE, TAKEN]
     assert [found.flags_at(k) for k in range(3)] == [Flag(0), Flag.LEFT_OUT, Flag(0)]
 
-
-def test_friction_that_cannot_be_solved_on_the_scenes_mesh_is_left_out(choice, monkeypatch):
     def case(k, levels, left_out):
         if levels.friction_pressure_coupling == "tangential":
             raise ConvergenceError("no state")
@@ -209,7 +201,7 @@ def sheet_level(*overrides):
     return found[0], found[1], REASONS[found[2]]
 
 
-def test_a_steel_sheet_is_rigid_and_a_plastic_one_bends():
+def test_a_steel_sheet_is_rigid_a_plastic_one_bends_and_what_is_neglected_stays_below_the_target():
     name, compliance, reason = sheet_level(*STEEL)
     assert (name, reason) == ("rigid", "indicator below the target")
     assert compliance < 0.2 * STIFF
@@ -218,10 +210,7 @@ def test_a_steel_sheet_is_rigid_and_a_plastic_one_bends():
     assert compliance > STIFF
     assert sheet_level(*PLASTIC, RIGID) == ("rigid", compliance, "forced by the scene")
     assert sheet_level(*STEEL, 'effects.sheet="elastic"')[::2] == ("elastic plate", "forced by the scene")
-
-
-def test_what_is_neglected_stays_below_the_target():
-    """The rigid sheet_level of steel is good to far less than 2 % of e_n, that of the plastic sheet is not."""
+    # The rigid sheet_level of steel is good to far less than 2 % of e_n, that of the plastic sheet is not.
     np.testing.assert_allclose(e_n(OVAL, *STEEL), e_n(OVAL, *STEEL, RIGID), rtol=1e-9)  # of the contact solve
     off = {name: e_n(OVAL, *own, 'effects.sheet="elastic"') / e_n(OVAL, RIGID) - 1.0
            for name, own in (("steel", STEEL), ("plastic", PLASTIC))}  # fmt: skip
@@ -265,7 +254,7 @@ def coupling_levels(*overrides):
     return [(own.level, own.reason) for own in found]
 
 
-def test_levels_and_what_they_change():
+def test_levels_what_they_change_and_that_auto_takes_or_leaves_what_the_scene_could_ask_for():
     """A pad that cannot slide freely is stiffer; without friction nothing changes; e_n moves by a few per cent."""
     assert set(coupling_levels(UNCOUPLED)) == {("none", FORCED)}
     assert set(coupling_levels(COUPLED)) == {("tangential traction", FORCED)}
@@ -278,10 +267,7 @@ def test_levels_and_what_they_change():
     smooth = ("friction.mu=0", COUPLED)
     closing = [[v["maps/closing"] for v in cases(OVAL, *own)] for own in (smooth, ("friction.mu=0", UNCOUPLED))]
     np.testing.assert_allclose(*closing, rtol=1e-9)
-
-
-def test_what_auto_takes_or_leaves_is_what_the_scene_could_ask_for():
-    """At every force by itself, to the solver's tolerance; which cases take it follows from the measured change."""
+    # At every force by itself, to the solver's tolerance; which cases take it follows from the measured change.
     auto, taken, free = (e_n(OVAL, *own) for own in ((AUTO,), (COUPLED,), (UNCOUPLED,)))
     found = [result.effects[COUPLING] for _, path in solved(OVAL, AUTO) for result in path]
     with_it = np.array([own.level == "tangential traction" for own in found]).reshape(auto.shape)

@@ -19,15 +19,12 @@ TABLE = sum(Flag)  # all bits that have a row
 OF_LOWER = {member.name for kind in (FrameFlag, ScoreFlag) for member in kind if member}
 
 
-def test_flags_of_lower_packages_have_rows_of_the_same_names_and_every_row_is_reachable():
+def test_flags_of_lower_packages_have_rows_of_the_same_names_and_words_fit_where_they_stand():
     for kind in (FrameFlag, ScoreFlag):
         members = [member for member in kind if member]
         assert raised(kind(sum(members))) == sum(Flag[member.name] for member in members)
     used = "".join(file.read_text() for file in (ROOT / "study").rglob("*.py") if file.name != "flags.py")
     assert [flag.name for flag in Flag if flag.name not in OF_LOWER and f"Flag.{flag.name}" not in used] == []
-
-
-def test_words_fit_their_column_sentences_their_message_and_the_definition_tells_every_bit_of_a_file():
     assert len({flag.word for flag in Flag}) == len({flag.sentence for flag in Flag}) == len(Flag)
     for flag in Flag:
         assert flag.value.bit_count() == 1

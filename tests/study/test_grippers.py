@@ -12,22 +12,11 @@ from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.scene import Scene, SceneError, load_scene
 from tests.study.launching import ROOT
 
-SCENE = """
-[object]
-shape = "sphere"
-radius_mm = 10
-[gripper]
-preset = "{name}"
-{more}
-[candidates]
-stations_mm = [0]
-[load]
-normal_force_n = [{force}]
-"""
-
 
 def loaded(tmp_path, name, force=30, more=""):
-    (tmp_path / "scene.toml").write_text(SCENE.format(name=name, force=force, more=more))
+    text = f'[object]\nshape = "sphere"\nradius_mm = 10\n[gripper]\npreset = "{name}"\n{more}\n'
+    text += f"[candidates]\nstations_mm = [0]\n[load]\nnormal_force_n = [{force}]\n"
+    (tmp_path / "scene.toml").write_text(text)
     return load_scene(tmp_path / "scene.toml").gripper
 
 
@@ -62,16 +51,13 @@ def test_what_a_gripper_cannot_do_is_refused_with_its_key_and_line(tmp_path, nam
     assert problem.line is not None
 
 
-def test_joints_of_a_parallel_hand_are_half_the_gap_within_the_stroke():
+def test_joints_are_half_the_gap_within_the_stroke_or_the_angle_of_a_linkage():
     _, hand = gripper_file("franka_hand")
     assert hand.values(0.05) == pytest.approx({"fr3_finger_joint1": 0.025, "fr3_finger_joint2": 0.025})
     assert max(hand.values(1.0).values()) == pytest.approx(0.04)
     _, hand = gripper_file("wsg50")
     assert sorted(hand.values(0.05).values()) == pytest.approx([-0.025, 0.025])
-
-
-def test_the_joint_of_robotiq_is_the_angle_of_its_linkage():
-    """The crank turned by the angle brings the pad to half the gap, and as far ahead as the depth says."""
+    # The crank turned by the angle brings the pad to half the gap, and as far ahead as the depth says.
     _, hand = gripper_file("robotiq_2f85")
     link = hand.linkage_mm
     for gap in (0.005, 0.03, 0.06, 0.085):

@@ -20,6 +20,7 @@ ONE = {
     "cup": (("candidates.stations_mm=[55]", "load.normal_force_n=[0.5, 2]"), (1.0, 4.0)),
     "fig5-candidate": ((), (0.2, 0.5)),
     "fig7-force-study": (("load.normal_force_n=[1, 4]",), (0.2, 0.6)),
+    "fig4-curvature": (("gripper.elements=[8, 20, 4]", 'effects.friction_pressure_coupling="none"'), None),
     "snap-in": (("load.normal_force_n=[1, 2]",), (0.7, 1.0)),
 }  # fmt: skip
 
@@ -72,28 +73,24 @@ def test_a_coarse_variant_of_every_scene_is_solved(tmp_path, name):
             assert (np.diff(indentation, axis=-1) > 0).all()  # every newton more dents the wall deeper
             assert indentations[0] < indentation.max() < indentations[1]
             assert (result.read("wall_stress/wall_stress") > 0).all()
+        if name == "fig4-curvature":  # curvature costs, and against what to draw it
+            curvature_costs(result)
 
 
-@pytest.mark.long
-def test_the_curvature_study_shows_that_curvature_costs_and_against_what_to_draw_it(tmp_path):
-    path = tmp_path / "fig4.hdf"
-    words = "--set", "gripper.elements=[8, 20, 4]", "--set", 'effects.friction_pressure_coupling="none"'
-    code, output, errors = run("fig4-curvature", path, *words)
-    assert (code, errors) == (0, ""), output
-    with open_result(path) as result:
-        b = result.axes[0].values
-        assert result.read("derived/b_over_a") == pytest.approx(b / 0.025, rel=1e-12)
-        curvature = result.read("derived/apex_curvature")
-        assert curvature == pytest.approx(0.025 / b**2, rel=1e-12)
-        order = np.argsort(curvature)
-        for name in ("curvature_loss", "f_y_overestimate", "tau_z_overestimate"):
-            lost = result.read(f"{name}/{name}")[order, 0, 0, :]
-            assert (lost > 0).all(), name
-            assert (np.diff(lost, axis=0) > 0).all(), name
-        # along the cylinder sliding is in every face's plane: the paper's planar model is exact there
-        assert result.read("f_x_overestimate/f_x_overestimate") == pytest.approx(0.0, abs=1e-9)
-        for name in ("f_x", "tau_z"):
-            claimed = result.read(f"{name}_overestimate_pcm_projected/{name}_overestimate_pcm_projected")
-            assert (claimed <= 1e-12).all(), name
-        for name in ("e_n", "tau_z_max", "f_y_overestimate"):
-            assert np.isfinite(result.read(f"{name}_error/{name}_error")).all()
+def curvature_costs(result):
+    b = result.axes[0].values
+    assert result.read("derived/b_over_a") == pytest.approx(b / 0.025, rel=1e-12)
+    curvature = result.read("derived/apex_curvature")
+    assert curvature == pytest.approx(0.025 / b**2, rel=1e-12)
+    order = np.argsort(curvature)
+    for name in ("curvature_loss", "f_y_overestimate", "tau_z_overestimate"):
+        lost = result.read(f"{name}/{name}")[order, 0, 0, :]
+        assert (lost > 0).all(), name
+        assert (np.diff(lost, axis=0) > 0).all(), name
+    # along the cylinder sliding is in every face's plane: the paper's planar model is exact there
+    assert result.read("f_x_overestimate/f_x_overestimate") == pytest.approx(0.0, abs=1e-9)
+    for name in ("f_x", "tau_z"):
+        claimed = result.read(f"{name}_overestimate_pcm_projected/{name}_overestimate_pcm_projected")
+        assert (claimed <= 1e-12).all(), name
+    for name in ("e_n", "tau_z_max", "f_y_overestimate"):
+        assert np.isfinite(result.read(f"{name}_error/{name}_error")).all()

@@ -131,7 +131,7 @@ def split():
     return errors, target, refined(*aim(target))
 
 
-def test_a_third_mesh_is_taken_where_the_error_is_not_surely_below_the_target(split):
+def test_a_third_mesh_is_taken_where_the_error_is_not_surely_below_the_target_with_its_state(split):
     errors, target, found = split
     count = {k: result.values["maps/pad_elements"] for k, result in found.items()}
     # the error that is the target is undecided
@@ -140,9 +140,6 @@ def test_a_third_mesh_is_taken_where_the_error_is_not_surely_below_the_target(sp
     errors, _, found = split
     k = min(errors, key=errors.__getitem__)
     assert without_count(found[k]) == bits(whole(())[k])
-
-
-def test_a_refined_case_has_the_error_of_its_two_finest_meshes_and_the_work_of_all(split):
     errors, target, found = split
     finer = {math.prod(m): refined(f"gripper.elements={list(m)}") for m in (FINER, FINEST)}
     for k in (k for k, error in errors.items() if error >= target):
@@ -154,7 +151,7 @@ def test_a_refined_case_has_the_error_of_its_two_finest_meshes_and_the_work_of_a
         assert flagged or not misses(values["maps/e_n_error"], target)
 
 
-def test_a_refined_patch_has_the_faces_of_the_scene_and_the_sums_of_the_finer_mesh(split):
+def test_a_refined_patch_has_the_scenes_faces_the_finer_sums_and_is_joined_by_load_else_by_area(split):
     *_, found = split
     for k, result in found.items():
         patch, case = result.patch, result.contacts
@@ -165,9 +162,6 @@ def test_a_refined_patch_has_the_faces_of_the_scene_and_the_sums_of_the_finer_me
         whole_arm = [(c.patch.pressure * c.patch.area) @ c.patch.centroid / s for c, s in zip(case, S, strict=True)]
         assert arm == pytest.approx(np.array(whole_arm), abs=1e-12)
         assert np.linalg.norm(patch["normal"], axis=2) == pytest.approx(1.0, abs=1e-12)
-
-
-def test_faces_are_joined_by_load_else_by_area():
     # three faces along and two across on two by one, so that those in the middle are cut in halves
     centroid = np.array([[x, y, 0.0] for x in (1.0, 3.0, 5.0) for y in (0.5, 1.5)])
     up, pressure = np.tile([0.0, 0.0, 1.0], (6, 1)), np.array([0.0, 2.0, 0.0, 0.0, 0.0, 0.0])
@@ -201,12 +195,17 @@ def test_a_finer_mesh_without_a_state_loses_nothing(monkeypatch, split):
         assert result.values["maps/pad_elements"] == 64
 
 
-def test_friction_that_acts_back_has_a_third_mesh_too():
+def test_friction_that_acts_back_has_a_third_mesh_too_and_one_mesh_and_two_give_the_same_case():
     changes = ("effects.friction_pressure_coupling='tangential'", "load.normal_force_n=[2]")
     two, three = (refined(*changes, *more)[0].values for more in ((), aim(1e-3)))
     assert three["maps/pad_elements"] > math.prod(OWN)
     assert three["maps/e_n_error"] != two["maps/e_n_error"]
     assert three["maps/e_n"][0] == pytest.approx(two["maps/e_n"][0], rel=2 * two["maps/e_n_error"])
+    # Each mesh walks its own load path, and no force of the list leaves a trace in another.
+    one, two = (dict(pipeline.solve_unit(unit_of(*ROUGH, *keys))) for keys in
+                (("accuracy.meshes=1", "load.normal_force_n=[2]"), ()))  # fmt: skip
+    for key in ("maps/payload", "maps/quality", "maps/e_n", "maps/S", "maps/closing"):
+        np.testing.assert_allclose(one[0].values[key], two[1].values[key], rtol=1e-9)  # of the contact solve
 
 
 @pytest.mark.long
@@ -236,7 +235,7 @@ def test_the_target_may_be_for_another_quantity(of):
     assert finer[f"maps/{of}_error"] != two
 
 
-def test_a_fourth_mesh_follows_where_the_third_leaves_the_error_above_the_target_and_no_fifth():
+def test_a_fourth_mesh_follows_where_the_error_is_above_the_target_no_fifth_and_steps_are_part_of_errors():
     values = refined(*aim(2e-4), wanted=[0])[0].values
     assert values["maps/e_n_error"] > 2e-4
     assert values["maps/pad_elements"] == math.prod(FINEST)
@@ -244,18 +243,7 @@ def test_a_fourth_mesh_follows_where_the_third_leaves_the_error_above_the_target
     difference = abs(values["maps/e_n"][0] - third["maps/e_n"][0]) / values["maps/e_n"][0]
     # the smaller target also lets the backing plate bend, which moves e_n by 3e-4 of the difference
     assert difference <= values["maps/e_n_error"] * 1.01
-
-
-def test_with_friction_acting_back_one_mesh_and_two_give_the_same_case():
-    """Each mesh walks its own load path, and no force of the list leaves a trace in another."""
-    one, two = (dict(pipeline.solve_unit(unit_of(*ROUGH, *keys))) for keys in
-                (("accuracy.meshes=1", "load.normal_force_n=[2]"), ()))  # fmt: skip
-    for key in ("maps/payload", "maps/quality", "maps/e_n", "maps/S", "maps/closing"):
-        np.testing.assert_allclose(one[0].values[key], two[1].values[key], rtol=1e-9)  # of the contact solve
-
-
-def test_the_steps_of_the_load_path_are_part_of_the_errors():
-    """In steps of twice the length the same mesh differs by about what its own steps leave."""
+    # In steps of twice the length the same mesh differs by about what its own steps leave.
     unit = unit_of(*ROUGH)
     solver = CandidateSolver(unit.scene, unit.candidate.poses)
     solved = solver.case(1, Levels("rigid", "rigid", "tangential"))

@@ -108,7 +108,7 @@ def soft_contacts(values, m):
         yield SoftContact(position, values["fingers/frame_axes"][f] @ R.T, body)
 
 
-def test_contacts_that_do_not_face_each_other_are_scored_as_they_stand():
+def test_contacts_that_do_not_face_each_other_are_scored_as_they_stand_and_epsilon_on_demand():
     """Arms over the object's extents, torques over the pad's length; the closed form would be off by some percent."""
     for values in cases(OVAL, angles="[30]"):
         assert values["maps/misalignment"] > np.radians(5)
@@ -123,10 +123,7 @@ def test_contacts_that_do_not_face_each_other_are_scored_as_they_stand():
         / (np.array(near["maps/quality_fitted"]) / near["maps/quality"])
     )
     assert gain == pytest.approx(1.0, abs=0.05)
-
-
-def test_fitted_quartics_in_any_pose_have_the_volume_of_their_surfaces():
-    """The pose enters by ellipsoids near the quartics; the division of the quartics' own surfaces is exact to 1e-4."""
+    # The pose enters by ellipsoids near the quartics; the division of the quartics' own surfaces is exact to 1e-4.
     [values] = cases(OVAL, angles="[30]", forces="[5]")
     contacts = list(soft_contacts(values, CURVED))
     for f, contact in enumerate(contacts):
@@ -135,9 +132,6 @@ def test_fitted_quartics_in_any_pose_have_the_volume_of_their_surfaces():
         contacts[f] = SoftContact(contact.position, contact.axes, body)
     expected = pose_volume(*contacts, EXTENTS, 0.05, relative_error=1e-4, with_l1=False).linf
     assert values["maps/quality_fitted"][CURVED] == pytest.approx(expected, rel=2e-3)
-
-
-def test_epsilon_in_any_pose_is_computed_on_demand():
     [facing] = cases(OVAL, "score.object_length_mm=longest", forces="[5]")
     [askew] = cases(OVAL, "score.object_length_mm=longest", "score.epsilon=everywhere", angles="[30]", forces="[5]")
     assert (np.array(facing["maps/epsilon"]) > 0).all()
@@ -158,7 +152,7 @@ def test_a_plane_contact_resists_three_directions_and_a_curved_one_six(shape, ra
     assert (dropped > 1e-4) == (rank == 6)
 
 
-def test_the_payload_is_friction_over_gravity_where_the_weight_hangs_between_the_pads():
+def test_the_payload_is_friction_over_gravity_and_a_quartic_of_six_components_predicts_all_friction():
     """Two pads hold mu F each along the plate; beside the centre of mass the weight turns the plate as well."""
     few, down = "limit_surface.samples=100", "task.weight_direction=[0, 0, -1]"
     [above] = cases(PLATE, few, down, "object.mass_g=500", forces="[5]")
@@ -175,10 +169,7 @@ def test_the_payload_is_friction_over_gravity_where_the_weight_hangs_between_the
     [worst] = cases(PLATE, few, forces="[5]")
     assert 0.95 * expected / np.hypot(1, MU) < worst["maps/payload"][CURVED] <= expected / np.hypot(1, MU)
     assert not above["maps/flags"] & Flag.NOT_BORNE
-
-
-def test_a_quartic_of_six_components_predicts_all_of_the_friction():
-    """Power of the friction for motions that it was not fitted to; a curved patch resists all six."""
+    # Power of the friction for motions that it was not fitted to; a curved patch resists all six.
     patch = sj.read_pressure("jobs/cylinder-pressure.csv")
     fit = sj.fit_quartic(patch, mu=0.8, samples=1000, wrench="6-D")
     twist = sphere_motions(3000)[2000:] * np.repeat([1.0, 100.0], 3)

@@ -5,8 +5,6 @@ import gc
 import os
 import resource
 import signal
-import subprocess
-import sys
 import time
 from types import SimpleNamespace
 
@@ -17,12 +15,11 @@ import scipy.sparse as sp
 from softjaw.fem.assembly import Pattern
 from softjaw.fem.petsc import NonlinearSolver, take_buffers
 from softjaw.study.case.result import TimeLimitError
-from softjaw.study.doctor import launch_environment
 from softjaw.study.messages import CANNOT_WRITE, USAGE, StudyError
 from softjaw.study.result.lock import OpenedFile
 from softjaw.study.run import limits
 from softjaw.study.run.limits import GRACE, AbandonedError, Stopper, available, limited_memory
-from tests.study.launching import ROOT
+from tests.study.launching import launch
 
 
 def wait():
@@ -31,7 +28,7 @@ def wait():
         time.sleep(0.01)
 
 
-def test_a_signal_of_a_batch_system_after_the_end_does_not_fail_the_run():
+def test_a_signal_after_the_end_fails_no_run_and_what_takes_too_long_is_interrupted_but_not_the_next():
     before = signal.getsignal(signal.SIGUSR1)
     signal.signal(signal.SIGUSR1, signal.SIG_DFL)
     try:
@@ -41,9 +38,6 @@ def test_a_signal_of_a_batch_system_after_the_end_does_not_fail_the_run():
         assert signal.getsignal(signal.SIGUSR1) != signal.SIG_IGN  # which children would inherit
     finally:
         signal.signal(signal.SIGUSR1, before)
-
-
-def test_a_case_that_takes_too_long_is_interrupted_and_the_next_one_is_not():
     with Stopper(lambda: None, 0.1) as stopper:
         with pytest.raises(TimeLimitError), stopper.case():
             wait()
@@ -55,7 +49,7 @@ def test_a_case_that_takes_too_long_is_interrupted_and_the_next_one_is_not():
     assert signal.getsignal(signal.SIGALRM) == signal.SIG_DFL
 
 
-def test_an_interruption_that_was_swallowed_comes_again(monkeypatch):
+def test_an_interruption_that_was_swallowed_comes_again_and_a_signal_stops_before_the_time_limit(monkeypatch):
     monkeypatch.setattr("softjaw.study.run.limits.RAISE_AGAIN_S", 0.05)
 
     def deaf():
@@ -65,9 +59,6 @@ def test_an_interruption_that_was_swallowed_comes_again(monkeypatch):
 
     with Stopper(lambda: None, 0.05) as stopper, pytest.raises(TimeLimitError), stopper.case():
         deaf()
-
-
-def test_a_signal_stops_before_the_time_limit_does(monkeypatch):
     monkeypatch.setitem(GRACE, signal.SIGUSR1, 0.05)
     told = []
 
@@ -80,7 +71,7 @@ def test_a_signal_stops_before_the_time_limit_does(monkeypatch):
     assert (told, stopper.name) == (["stop"], "SIGUSR1")
 
 
-def test_memory_is_bounded_and_the_bound_goes_away():
+def test_memory_is_bounded_the_bound_goes_away_and_linear_algebra_is_not_let_loose_without_room():
     before = resource.getrlimit(resource.RLIMIT_AS)
     gc.collect()  # what earlier tests left would make room
     with limited_memory(0.3, 1):
@@ -89,28 +80,22 @@ def test_memory_is_bounded_and_the_bound_goes_away():
             np.empty(4 * 10**8)  # more than this process can have given back meanwhile
     assert resource.getrlimit(resource.RLIMIT_AS) == before
     np.empty(4 * 10**8)
+    called = []
+    with limited_memory(0.05, 1), pytest.raises(MemoryError):
+        take_buffers(lambda: called.append(1))
+    take_buffers(lambda: called.append(2))
+    assert called == [2]
 
 
 @pytest.mark.parametrize("kilobytes", [300_000, 850_000, pytest.param(1_100_000, marks=pytest.mark.long)])
 def test_a_run_with_too_few_addresses_says_so_at_once(tmp_path, kilobytes):
     """From 0.8 to 0.92 GB the run's first product in BLAS asked for memory for ever; below, and above, it crashed."""
     bytes_ = 1024 * kilobytes
-    done = subprocess.run(
-        [sys.executable, "-m", "softjaw", "run", "jobs/smoke.toml", "-o", tmp_path / "out.hdf"], cwd=ROOT,
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (bytes_, bytes_)), env=launch_environment(),
-        capture_output=True, text=True, timeout=60, stdin=subprocess.DEVNULL,
-    )  # fmt: skip
-    assert done.returncode == USAGE
-    assert len(done.stderr.splitlines()) == 1
+    words = ("-m", "softjaw", "run", "jobs/smoke.toml", "-o", tmp_path / "out.hdf")
+    code, _, errors = launch(0, *words, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (bytes_, bytes_)))
+    assert code == USAGE
+    assert len(errors.splitlines()) == 1
     assert not list(tmp_path.iterdir())
-
-
-def test_libraries_of_linear_algebra_are_not_let_loose_without_room():
-    called = []
-    with limited_memory(0.05, 1), pytest.raises(MemoryError):
-        take_buffers(lambda: called.append(1))
-    take_buffers(lambda: called.append(2))
-    assert called == [2]
 
 
 @pytest.mark.long
@@ -133,7 +118,7 @@ def test_factors_that_find_no_memory_say_so_and_the_next_solve_works():
     solver.destroy()
 
 
-def test_the_share_of_a_rank_follows_the_machine_and_its_control_group(tmp_path, monkeypatch):
+def test_the_share_of_a_rank_follows_its_control_group_and_a_file_that_was_moved_is_noticed(tmp_path, monkeypatch):
     files = {"memory.max": "8000000000", "memory.current": "7000000000", "memory.stat": "inactive_file 3000000000\n"}
     for name, text in files.items():
         (tmp_path / name).write_text(text)
@@ -144,9 +129,6 @@ def test_the_share_of_a_rank_follows_the_machine_and_its_control_group(tmp_path,
     assert available() == pytest.approx(4e9)  # 8 - 7 + 3 GB; the machine itself would have 9.2
     (tmp_path / "memory.max").write_text("max\n")
     assert available() == pytest.approx(1024 * 9e6)
-
-
-def test_a_file_that_was_moved_or_replaced_is_noticed(tmp_path):
     path = tmp_path / "out.hdf"
     path.write_text("1")
     standing = OpenedFile(path)

@@ -13,19 +13,11 @@ from softjaw.study.run.object_folder import folder_of
 from tests.study import fake_objects
 from tests.study.launching import contents, differing, here, launch
 from tests.study.launching import softjaw as command
+from tests.study.scenes import mesh_of
 
 SCRIPT = Path(__file__).parent / "fake_objects.py"
 NAMES = ("a", "bug", "grows", "late", "longest", "none")
-SCENE = """
-[object]
-shape = "mesh"
-mesh = "meshes/*.stl"
-unit = "m"
-[candidates]
-sampled = 2
-[load]
-normal_force_n = [2]
-"""
+SCENE = f"[object]\n{mesh_of('meshes/*.stl', 'm')}\n[candidates]\nsampled = 2\n[load]\nnormal_force_n = [2]\n"
 
 
 @pytest.fixture(scope="module")
@@ -90,7 +82,7 @@ def test_the_command_line_names_meshes_from_where_it_is(scene, objects, monkeypa
     assert command(0, "check", "sub/scene.toml", "--objects", "nothing/*.stl")[0] == USAGE
 
 
-def test_every_object_is_a_row_and_none_stops_the_others(solved):
+def test_every_object_is_a_row_of_the_index_and_its_page_and_none_stops_the_others(solved, tmp_path):
     found = rows(solved)
     states = {name: str(row.state.values) for name, row in found.items()}
     assert states == {"a": "complete", "bug": "failed", "empty": "refused", "grows": "complete",
@@ -103,9 +95,18 @@ def test_every_object_is_a_row_and_none_stops_the_others(solved):
         assert float(found[name].payload) == held.max()
         assert int(found[name].cases) == ds.status.size
         assert ds.attrs["provenance"][-1]["reason"] == "complete"
+    assert command(0, "status", solved)[0] == DONE
+    code, text, _ = command(0, "show", solved, "--csv")
+    assert (code, len(text.splitlines())) == (DONE, len(NAMES) + 2)
+    assert command(0, "watch", solved / "index.hdf")[0] == SOME_FAILED
+    assert command(0, "report", solved, "-o", tmp_path / "page.html")[0] == DONE
+    html = (tmp_path / "page.html").read_text()
+    assert [name for name in (*NAMES, "empty") if f'"#object-{name}"' in html] == ["a", "grows", "longest"]
+    assert html.count("<tr><td>") == len(NAMES) + 1
+    assert html.count("<button") > 5
 
 
-def test_again_nothing_is_solved_and_another_mesh_is_refused(scene, solved):
+def test_again_nothing_is_solved_another_mesh_is_refused_and_a_signal_stops_in_order_and_the_run_resumes(scene, solved):
     before = {path: path.stat().st_mtime_ns for path in solved.glob("*.hdf") if path.stem != "index"}
     assert here(fake_objects.main, scene, solved)[0] == SOME_FAILED
     assert {path: path.stat().st_mtime_ns for path in before} == before
@@ -116,26 +117,11 @@ def test_again_nothing_is_solved_and_another_mesh_is_refused(scene, solved):
         assert here(fake_objects.main, scene, solved)[0] == OTHER_FILE
     finally:
         mesh.write_bytes(content)
-
-
-def test_a_signal_stops_in_order_and_the_run_resumes(scene, solved):
     out = scene.parent / "stopped"
     assert here(fake_objects.main, scene, out, "--stop-after", 40)[0] == STOPPED
     assert "not complete" in open_index(out / "index.hdf").state.values
     assert here(fake_objects.main, scene, out)[0] == SOME_FAILED
     same(out, solved)
-
-
-def test_index_answers_commands_and_its_page_has_a_row_for_every_object(solved, tmp_path):
-    assert command(0, "status", solved)[0] == DONE
-    code, text, _ = command(0, "show", solved, "--csv")
-    assert (code, len(text.splitlines())) == (DONE, len(NAMES) + 2)
-    assert command(0, "watch", solved / "index.hdf")[0] == SOME_FAILED
-    assert command(0, "report", solved, "-o", tmp_path / "page.html")[0] == DONE
-    html = (tmp_path / "page.html").read_text()
-    assert [name for name in (*NAMES, "empty") if f'"#object-{name}"' in html] == ["a", "grows", "longest"]
-    assert html.count("<tr><td>") == len(NAMES) + 1
-    assert html.count("<button") > 5
 
 
 @pytest.mark.ranks

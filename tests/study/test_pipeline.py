@@ -2,10 +2,7 @@
 
 import re
 import shutil
-import subprocess
-import sys
 from functools import lru_cache
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,6 +19,7 @@ from softjaw.study.doctor import launch_environment
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import MODELS
 from softjaw.study.scene import parse_scene
+from tests.study.launching import ROOT, launch
 from tests.study.scenes import BALL, CONE, OVAL, QUICK, results_of, scene_of, units_of
 
 CURVED, FLAT, PROJECTED = range(len(MODELS))
@@ -66,7 +64,7 @@ SCALES = {
 }  # fmt: skip
 
 
-def test_on_a_plane_all_models_are_one_and_nothing_is_overestimated():
+def test_on_a_plane_all_models_are_one_and_torques_without_a_force_are_the_largest_unlike_elsewhere():
     for values, force in zip(cases(PLATE), (2.0, 5.0), strict=True):
         for name in ("quality", "epsilon", "e_n", "e_n_projected", "f_x_max", "f_y_max", "tau_z_max"):
             assert values[f"maps/{name}"] == pytest.approx([values[f"maps/{name}"][CURVED]] * 3, rel=1e-12), name
@@ -78,9 +76,6 @@ def test_on_a_plane_all_models_are_one_and_nothing_is_overestimated():
         assert values["maps/f_x_max"][FLAT] == pytest.approx(MU * force, rel=1e-8)
         assert values["maps/contact_distance"] == pytest.approx(0.04, rel=1e-9)
         assert values["maps/flags"] == 0
-
-
-def test_the_torque_without_a_force_is_the_largest_one_on_symmetric_patches_and_less_elsewhere():
     for values in cases(PLATE):
         assert values["fingers/tau_pure"] == pytest.approx(values["fingers/tau_z_max"][:, CURVED], rel=1e-8)
     lower = [v["maps/tau_pure"] / v["maps/tau_z_max"][CURVED] for v in cases(CONE, stations="[75]")]
@@ -107,7 +102,7 @@ def test_the_curved_limits_lie_between_the_planar_ones(angle):
         assert values["maps/curvature_loss"] == pytest.approx(1 - F_N.sum() / S.sum())
 
 
-def test_both_definitions_of_e_n_say_the_same_torque():
+def test_definitions_of_e_n_say_the_same_torque_and_on_a_slope_the_force_is_the_commanded_over_the_cosine():
     oval, cone = cases(OVAL, angles="[0, 30]"), cases(CONE, stations="[75]")
     for values, force in zip(oval + cone, (2.0, 5.0) * 3, strict=True):
         tau = values["fingers/tau_z_max"]
@@ -126,10 +121,7 @@ def test_both_definitions_of_e_n_say_the_same_torque():
         assert (values["fingers/e_n_ratio"] >= tau / (MU * S[:, None]) * (1.0 - 1e-12)).all()
         assert values["maps/e_n_commanded"] == pytest.approx((tau / (MU * force)).min(axis=0), rel=1e-12)
         assert values["fingers/force_excess"] == pytest.approx(F_N / force - 1.0)
-
-
-def test_on_a_slope_the_force_along_the_normal_is_the_commanded_one_over_the_cosine():
-    """Where the resultant of the pressure lies along the contact normal, as on one straight side of a cone it does."""
+    # Where the resultant of the pressure lies along the contact normal, as on one straight side of a cone it does.
     for slope, flagged in ((8.0, False), (25.0, True)):
         rise = 60.0 * np.tan(np.radians(slope))
         outline = [[z, float(25.0 + rise * (1.0 - z / 60.0))] for z in (0, 20, 40, 60)]
@@ -170,7 +162,7 @@ def test_images_under_the_objects_symmetry_are_what_solving_them_gives(shape, st
         assert differing(pipeline.image(result, unit, 0).values, result.values, 1e-12, SCALES) == []
 
 
-def test_the_part_of_the_pad_that_is_meshed_does_not_matter():
+def test_the_part_of_the_pad_that_is_meshed_does_not_matter_and_without_friction_nothing_is_held():
     shapes = {size: cases(OVAL, f'effects.model_size="{size}"') for size in ("full", "half", "quarter", "auto")}
     for size in ("half", "quarter", "auto"):
         for found, expected in zip(shapes[size], shapes["full"], strict=True):
@@ -181,9 +173,6 @@ def test_the_part_of_the_pad_that_is_meshed_does_not_matter():
     assert [path[0].effects["model_size"][0], solved(BALL, stations="[5]")[0][1][0].effects["model_size"][0]] == [
         "quarter", "half",
     ]
-
-
-def test_without_friction_nothing_is_held_and_a_flag_says_so():
     [(_, path)] = solved(OVAL, "friction.mu=0")
     for result, held in zip(path, cases(OVAL), strict=True):
         values = result.values
@@ -264,7 +253,7 @@ def test_a_solver_that_is_cut_short_takes_more_steps_to_the_same_answer():
 
 
 def bottle(*changes):
-    path = Path(__file__).parents[2] / "jobs" / "bottle-rigid.toml"
+    path = ROOT / "jobs" / "bottle-rigid.toml"
     return results_of(parse_scene(path.read_text(), path, ["candidates.angles_deg=[0]", *changes]))
 
 
@@ -319,16 +308,13 @@ print(state.closing)
 @pytest.mark.long
 def test_a_changed_material_takes_effect_although_its_callers_were_compiled_before(tmp_path):
     """A foam twice as stiff yields less, also with the machine code of the last run at hand."""
-    root = Path(__file__).parents[2]
     (tmp_path / "softjaw").mkdir()
     for package in ("fem", "friction"):
-        shutil.copytree(root / package, tmp_path / "softjaw" / package, ignore=shutil.ignore_patterns("__pycache__"))
+        shutil.copytree(ROOT / package, tmp_path / "softjaw" / package, ignore=shutil.ignore_patterns("__pycache__"))
 
     def closing():
-        program = [sys.executable, "-c", PRESSED_FLAT]
         environment = {k: v for k, v in launch_environment().items() if k != "NUMBA_CACHE_DIR"}
-        told = subprocess.run(program, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True)
-        return float(told.stdout)
+        return float(launch(0, "-c", PRESSED_FLAT, cwd=tmp_path, env=environment)[1])
 
     soft = closing()
     law = tmp_path / "softjaw" / "fem" / "materials.py"

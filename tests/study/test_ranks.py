@@ -16,6 +16,7 @@ from softjaw.study.run.plan import make_plan
 from softjaw.study.run.shares import shares
 from tests.study.launching import ROOT, begin, contents, differing, launch, softjaw, wait_for
 from tests.study.scenes import BOX, NO_COUPLING, scene_of
+from tests.study.test_walls import CUP
 
 pytestmark = pytest.mark.ranks
 
@@ -26,10 +27,7 @@ CHANGES = ("limit_surface.samples=80", "accuracy.target=0.01",
 PLACES = {"stations": "[0, 30]", "angles": "[0, 5, 185]", "forces": "[1, 3]"}
 SCENE = scene_of(ROUNDED, *CHANGES, **PLACES)
 CASES = 12
-CUP = '''shape = "revolution"
-profile_mm = [[0, 24], [4, 28], [30, 30], [60, 32], [80, 34]]
-wall_mm = 0.4
-wall_material = "PP"'''
+THIN_CUP = CUP.replace("0.6", "0.4")
 # The same program with a pause before every case, so that there is time to interrupt it.
 SLOWLY = """
 import os, sys, time
@@ -51,7 +49,7 @@ sys.exit(main())
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory):
     path = tmp_path_factory.mktemp("scene") / "box.toml"
-    for shape, file in ((ROUNDED, path), (CUP, path.with_name("cup.toml"))):
+    for shape, file in ((ROUNDED, path), (THIN_CUP, path.with_name("cup.toml"))):
         file.write_text(scene_of(shape, *CHANGES, **PLACES).effective_toml())
     return path
 
@@ -86,8 +84,7 @@ def test_one_candidate_of_many_forces_is_divided_to_the_same_bits(tmp_path, scen
     changes = ("candidates.stations_mm=[30]", "candidates.angles_deg=[5]", "load.normal_force_n=[0.5, 1, 2, 3, 4, 6]",
                "effects.friction_pressure_coupling='auto'")  # fmt: skip
     if name == "cup":
-        changes += ("accuracy.wall_element_mm=4",
-                    "gripper.pad_length_mm=30")  # fmt: skip
+        changes += ("accuracy.wall_element_mm=4", "gripper.pad_length_mm=30")
     place = [word for change in changes for word in ("--set", change)]
     whole, path = tmp_path / "whole.hdf", tmp_path / "divided.hdf"
     for where, count in ((whole, 0), (path, ranks)):

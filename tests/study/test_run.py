@@ -2,8 +2,6 @@
 
 import shutil
 import signal
-import subprocess
-import sys
 import time
 
 import numpy as np
@@ -11,7 +9,7 @@ import pytest
 
 from softjaw.study.quantities import DONE, FAILED, MISSING, WIDE
 from softjaw.study.result.store import open_result, torn_rows
-from tests.study.launching import ROOT, contents, differing, start, study, wait_for
+from tests.study.launching import contents, differing, softjaw, start, study, wait_for
 
 pytestmark = pytest.mark.ranks
 
@@ -37,7 +35,7 @@ def uninterrupted(whole):
     return contents(whole)
 
 
-def test_a_rank_that_is_killed_loses_nothing_and_another_number_of_ranks_goes_on(tmp_path, uninterrupted):
+def test_a_killed_rank_loses_nothing_others_go_on_and_what_is_no_grasp_is_never_solved(tmp_path, uninterrupted):
     path = tmp_path / "killed.hdf"
     code, _, _ = study(2, path, "--kill", 20)
     assert code not in (0, 6, 75)
@@ -50,10 +48,7 @@ def test_a_rank_that_is_killed_loses_nothing_and_another_number_of_ranks_goes_on
     assert differing(path, uninterrupted) == []
     assert not list(tmp_path.glob("*.lock"))
     assert not list(tmp_path.glob("*.part"))
-
-
-def test_what_is_no_grasp_is_never_solved_and_no_failure(tmp_path):
-    """A unit of two candidates: alike on any number of ranks, when it is resumed, and when failures are tried again."""
+    # A unit of two candidates: alike on any number of ranks, when it is resumed, and when failures are tried again.
     path = tmp_path / "wide.hdf"
     code, _, errors = study(2, path, "--wide", 3)
     assert code == 0, errors
@@ -85,7 +80,7 @@ def test_a_case_that_kills_the_process_twice_is_given_up(tmp_path, uninterrupted
     assert differing(path, uninterrupted) == []
 
 
-def test_a_failed_case_has_its_reason_and_stops_nobody(tmp_path, uninterrupted):
+def test_a_failed_case_has_its_reason_and_stops_nobody_nor_other_forces_that_are_apart(tmp_path, uninterrupted):
     path = tmp_path / "failed.hdf"
     code, _, errors = study(2, path, "--fail", 9, "--raises", 25)
     assert code == 6, errors
@@ -98,10 +93,7 @@ def test_a_failed_case_has_its_reason_and_stops_nobody(tmp_path, uninterrupted):
     assert study(0, path)[0] == 6
     assert study(0, path, "--retry-failed")[0] == 0
     assert differing(path, uninterrupted) == []
-
-
-def test_forces_that_are_apart_fail_alone(tmp_path):
-    """Divided among ranks; the exception is that of one force, for both candidates of its unit."""
+    # Divided among ranks; the exception is that of one force, for both candidates of its unit.
     path = tmp_path / "apart.hdf"
     code, _, errors = study(2, path, "--apart", "--fail", 9, "--raises", 25)
     assert code == 6, errors
@@ -125,7 +117,7 @@ def test_a_signal_stops_in_order_and_the_same_command_goes_on(tmp_path, uninterr
     assert differing(path, uninterrupted) == []
 
 
-def test_a_case_that_takes_too_long_is_abandoned_when_there_is_no_time(tmp_path):
+def test_a_case_that_takes_too_long_is_abandoned_without_time_and_another_scene_refused(tmp_path, whole, uninterrupted):
     path = tmp_path / "hangs.hdf"
     process = start(0, path, "--hang", 14)
     wait_for(lambda: begun(path) and states(path)[13] == DONE)
@@ -137,9 +129,6 @@ def test_a_case_that_takes_too_long_is_abandoned_when_there_is_no_time(tmp_path)
     with open_result(path) as result:
         assert result.status.ravel()[14] == MISSING
         assert result.read("status/attempts").ravel()[14] == 0
-
-
-def test_another_scene_is_refused(tmp_path, whole, uninterrupted):
     path = tmp_path / "scene.hdf"
     shutil.copy(whole, path)
     code, _, errors = study(0, path, "--digest", "other")
@@ -153,13 +142,11 @@ def test_a_second_run_at_the_same_time_is_refused_and_status_can_be_asked(tmp_pa
     path = tmp_path / "busy.hdf"
     process = start(ranks, path, "--delay", 1.0)
     wait_for(lambda: begun(path))
-    told = subprocess.run(
-        [sys.executable, "-m", "softjaw", "status", str(path)], cwd=ROOT, capture_output=True, text=True
-    )
+    told = softjaw(0, "status", path)
     code, _, _ = study(0, path)
     process.send_signal(signal.SIGUSR1)
     process.communicate(timeout=60)
-    assert (told.returncode, code, process.returncode) == (0, 4, 75)
+    assert (told[0], code, process.returncode) == (0, 4, 75)
 
 
 @pytest.mark.parametrize(("place", "ranks"), [
@@ -192,16 +179,13 @@ def test_a_torn_row_is_solved_again(tmp_path, whole, uninterrupted, ranks):
     assert differing(path, uninterrupted) == []
 
 
-def test_a_bug_outside_a_case_ends_all_ranks_and_keeps_what_is_done(tmp_path, uninterrupted):
+def test_a_bug_outside_a_case_ends_all_ranks_what_is_done_stays_and_a_finished_file_too(tmp_path, uninterrupted, whole):
     path = tmp_path / "bug.hdf"
     code, _, errors = study(2, path, "--bug", 2)
     assert code == 70
     assert "ZeroDivisionError" in errors
     assert study(0, path)[0] == 0
     assert differing(path, uninterrupted) == []
-
-
-def test_a_finished_file_is_left_as_it_is(tmp_path, whole, uninterrupted):
     path = tmp_path / "twice.hdf"
     shutil.copy(whole, path)
     code, _, _ = study(0, path, "--fail", 3)

@@ -44,16 +44,13 @@ def test_a_narrow_text_leaves_out_the_least_important_columns(width, hidden):
     assert [name for name in ("opening", "force") if (name.replace("opening", "open")) not in heads] == hidden
 
 
-def test_the_page_has_the_cells_of_the_text():
+def test_the_page_has_the_cells_of_the_text_and_programs_every_column_in_si_units_none_to_be_computed():
     block = block_of(TABLE, first=True)
     assert block["head"] == ["grasp", "e_n [mm]", "open [mm]", "force [N]", "range"]
     cells = ["1", "17.10 ± 0.17", "60.00 ± 0.20", "2", "a, b"]
     assert [cell.replace("\N{NO-BREAK SPACE}", " ") for cell in block["rows"][0]] == cells
     assert block["looks"] == ["n", "n", "n", "n", "wide"]
     assert block["first"]
-
-
-def test_programs_get_every_column_and_note_in_si_units():
     record = json.loads(as_json(TABLE))
     assert record["best"] == 1.5
     assert record["notes"] == list(TABLE.notes)
@@ -65,9 +62,6 @@ def test_programs_get_every_column_and_note_in_si_units():
     assert head == ["grasp", "e_n [m]", "e_n_error", "opening [m]", "opening_error [m]", "force [N]"]
     assert [float(cell) for cell in first] == [1, 0.0171, 0.01, 0.06, 2e-4, 2.0]
     assert second == ["2", "", "", "0.06", "0.0002", ""]
-
-
-def test_no_cell_of_a_csv_is_computed_by_a_spreadsheet():
     cells = ["=1+1", "+A1", "-A1", "@x", "\tx", "-3.5", "+2e-3", "at 0 mm", None]
     table = Table("", [Column("a"), Column("b")], [{"a": cell, "b": 1} for cell in cells])
     _, *found = csv.reader(io.StringIO(as_csv(table)))

@@ -35,7 +35,7 @@ def file(tmp_path_factory):
     return path
 
 
-def test_every_input_takes_the_middles_of_intervals_of_equal_probability_once():
+def test_inputs_take_the_middles_of_equal_intervals_once_and_a_scene_is_solved_as_given_and_with_each():
     uncertain, means = Uncertainty(samples=16, spread={"a": 0.2, "b": 3.0}), {"a": 1.0, "b": -5.0}
     samples = uncertain.inputs(means)
     expected = norm.ppf((np.arange(16) + 0.5) / 16) / norm.ppf(0.975)
@@ -44,9 +44,6 @@ def test_every_input_takes_the_middles_of_intervals_of_equal_probability_once():
     # the inputs are independent
     assert abs(np.corrcoef([[s["a"], s["b"]] for s in samples], rowvar=False)[0, 1]) < 0.3
     assert uncertain.inputs(means) == samples
-
-
-def test_a_scene_is_solved_as_given_and_with_every_sample():
     swept = scene("sweep.score.object_length_mm=['longest', 'per_axis']")
     assert [len(axis.values) for axis in axes(swept)] == [2, 9, 2, 1, 1]
     assert len(axes(swept)[1].options) == 9
@@ -58,9 +55,6 @@ def test_a_scene_is_solved_as_given_and_with_every_sample():
     units = make_plan(scene()).units
     assert [u.scene.friction.mu for u in units[::2]] == [0.8, *(p["friction.mu"] for p in scene().points[1:])]
     assert {u.scene.gripper.shear_modulus_kpa for u in units[:2]} == {40.0}
-
-
-def test_other_inputs_are_another_study_and_no_inputs_none():
     assert plain().points == [{}]
     assert [a.name for a in axes(plain())] == ["station", "angle", "normal_force"]
     digests = {plain().digest, scene().digest, scene("uncertainty.samples=9").digest,
@@ -78,13 +72,10 @@ def test_only_a_single_number_can_be_uncertain(key):
     assert key in str(error.value)
 
 
-def test_a_sample_out_of_range_is_refused_before_any_work(tmp_path):
+def test_a_sample_out_of_range_is_refused_and_moved_pads_face_each_other(tmp_path):
     with pytest.raises(SceneError, match="mu"):
         softjaw.run(scene("friction.mu=0.05"), tmp_path / "never.hdf")
     assert not list(tmp_path.iterdir())
-
-
-def test_moved_pads_still_face_each_other():
     before = axis_poses(0.03, 0.4, 0.2)
     one, two = moved(before, 0.002, 0.1)
     for pose, old in zip((one, two), before, strict=True):
@@ -93,9 +84,6 @@ def test_moved_pads_still_face_each_other():
         assert pose.origin - old.origin == pytest.approx(0.002 * pose.rotation[:, 0], abs=1e-12)
     assert one.rotation[:, 0] == pytest.approx(two.rotation[:, 0])
     assert np.cross(before[0].rotation[:, 0], one.rotation[:, 0]) @ one.rotation[:, 2] == pytest.approx(np.sin(0.1))
-
-
-def test_a_shift_along_the_axis_is_another_station_and_poses_are_turned_too():
     shifted, there = (candidates(scene(f"candidates.{key}"))[0] for key in ("shift_mm=10", "stations_mm=[10, 20]"))
     for one, other in zip(shifted.poses, there.poses, strict=True):
         assert one.origin == pytest.approx(other.origin, abs=1e-15)
@@ -113,7 +101,7 @@ def test_the_interval_of_an_input_is_its_spread(count):
     assert np.isnan(half_width(xr.DataArray([*values[1:], np.nan], dims="realisation")))
 
 
-def test_maps_are_those_of_the_scene_as_given_with_what_the_samples_say(file, tmp_path):
+def test_maps_have_what_the_samples_say_and_grasps_that_inputs_move_alike_are_told_apart(file, tmp_path):
     ds = softjaw.open(file)
     assert softjaw.run(plain(), tmp_path / "plain.hdf") == 0
     given = softjaw.open(tmp_path / "plain.hdf")
@@ -133,10 +121,7 @@ def test_maps_are_those_of_the_scene_as_given_with_what_the_samples_say(file, tm
     assert (np.diff(ds.e_n_samples.values[0, 0, 0, order]) < 0).all()  # a stiffer pad has a smaller contact
     scaled = ds.quality_samples.values[0, 0, 0] / mu**5
     assert (np.diff(scaled[order]) < 0).all()
-
-
-def test_grasps_that_inputs_move_alike_are_told_apart():
-    """Values of 1.1 and 1.0 that are both uncertain by a half, by one input, and by one input each."""
+    # Values of 1.1 and 1.0 that are both uncertain by a half, by one input, and by one input each.
     x = np.linspace(-0.5, 0.5, 40)
     value, error = np.array([1.1, 1.0]), np.zeros(2)
     assert Sure(value, error, np.array([1.1 + x, 1.0 + x])).apart(0, 1) is True

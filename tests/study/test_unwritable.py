@@ -68,7 +68,7 @@ def test_an_output_that_cannot_be_written_has_the_same_code(file, command):
     assert len(done.stderr.splitlines()) == 1
 
 
-def test_a_file_is_whole_or_not_there(tmp_path):
+def test_a_file_is_whole_or_not_there_a_device_is_written_to_and_a_file_in_the_way_of_a_folder_named(tmp_path):
     path = tmp_path / "a.txt"
     write_file(path, "old")
     with suppress(ZeroDivisionError), beside(path) as part:
@@ -76,9 +76,6 @@ def test_a_file_is_whole_or_not_there(tmp_path):
     assert path.read_text() == "old"
     assert [p.name for p in tmp_path.iterdir()] == ["a.txt"]
     assert write_file(tmp_path / "b" / "c.txt", b"new", folders=True).read_bytes() == b"new"
-
-
-def test_a_device_is_written_to_and_not_replaced(tmp_path):
     assert write_file(Path("/dev/null"), "gone") == Path("/dev/null")
     assert Path("/dev/null").is_char_device()
     pipe = tmp_path / "pipe"
@@ -87,9 +84,6 @@ def test_a_device_is_written_to_and_not_replaced(tmp_path):
         write_file(pipe, "through")
         assert reader.communicate(timeout=30)[0] == b"through"
     assert pipe.is_fifo()
-
-
-def test_a_file_in_the_way_of_a_folder_is_named_as_such(tmp_path):
     (tmp_path / "a").write_text("")
     for folder in (tmp_path / "a", tmp_path / "a" / "b"):
         with pytest.raises(NotADirectoryError):

@@ -84,7 +84,7 @@ def test_a_tilted_approach_keeps_one_plane_and_one_along_the_axis_is_refused():
         solved(CUP, where=pose_of((0, 0, 50), [0, 0, 1], [1, 0, 0]))
 
 
-def test_images_of_a_grasp_are_what_their_own_solution_would_be():
+def test_images_of_a_grasp_are_what_their_own_solution_would_be_whatever_was_solved_before():
     where = "stations_mm = [40]\nangles_deg = [0, 37]"
     unit = walled(CUP, where=where)[0]
     assert len(unit.rows) == 2
@@ -93,9 +93,6 @@ def test_images_of_a_grasp_are_what_their_own_solution_would_be():
     np.testing.assert_allclose(image.values["wall/place"], own.values["wall/place"], atol=1e-9)
     np.testing.assert_allclose(image.values["fingers/pose_origin"], own.values["fingers/pose_origin"], atol=1e-9)
     assert image.values["maps/indentation"] == pytest.approx(own.values["maps/indentation"], rel=1e-6)
-
-
-def test_results_do_not_depend_on_what_was_solved_before():
     where = "stations_mm = [25, 40]\nangles_deg = [0]"
     one, two = walled(CUP, "effects.object='linear_shell'", where=where)
 
@@ -109,15 +106,12 @@ def test_results_do_not_depend_on_what_was_solved_before():
             assert not differing(a, b, 0.0)
 
 
-def test_two_meshes_tell_the_error_and_a_sweep_reaches_the_wall():
+def test_two_meshes_tell_the_error_a_tube_gives_way_more_than_a_cup_and_a_collapse_fails_the_case(monkeypatch):
     result = solved(CUP, "accuracy.meshes=2", forces="[2]", elements="[8, 8, 4]")[0]
     assert 0 < result.values["maps/e_n_error"] < 0.3
     one, two = walled(CUP, "sweep.object.wall_mm=[0.4, 0.8]", forces="[1]")
     indentations = [next(iter(pipeline.solve_unit(u)))[1].values["maps/indentation"] for u in (one, two)]
     assert indentations[0] > 2 * indentations[1]
-
-
-def test_a_tube_gives_way_more_than_a_cup_and_less_where_its_rims_are_held():
     straight = CUP.replace("[0, 24], [4, 28]", "[0, 30]").replace("[60, 32], [80, 34]", "[60, 30], [80, 30]")
     found = [
         solved(straight, *own, forces="[1]")[0].values["maps/indentation"]
@@ -129,18 +123,13 @@ def test_a_tube_gives_way_more_than_a_cup_and_less_where_its_rims_are_held():
     assert values["maps/flags"] & Flag.DENTED
     with pytest.raises(Exception, match="base_wall_mm"):
         solved(straight, "object.open_ends='both'", "object.base_wall_mm=0.8")
-
-
-def test_a_collapse_fails_the_case_and_those_above_with_the_reason(monkeypatch):
     from softjaw.fem.shell.opening import Opening
-    monkeypatch.setattr(Opening, "__call__", lambda self, q: 1.0 - 1e3 * float(np.abs(q).max()))
-    path = [r for _, r in pipeline.solve_unit(walled(CUP, forces="[0.2, 3, 4]")[0])]
+    with monkeypatch.context() as changed:
+        changed.setattr(Opening, "__call__", lambda self, q: 1.0 - 1e3 * float(np.abs(q).max()))
+        path = [r for _, r in pipeline.solve_unit(walled(CUP, forces="[0.2, 3, 4]")[0])]
     assert not isinstance(path[0], CaseFailure)
     assert all(isinstance(result, CaseFailure) for result in path[1:])
     assert "0.2 N" in path[1].message
-
-
-def test_a_grasp_whose_support_bears_more_than_friction_slides_out():
     funnel = CUP.replace("[[0, 24], [4, 28], [30, 30], [60, 32], [80, 34]]", "[[0, 14], [10, 15], [60, 35], [70, 39]]")
     for mu, slides in ((0.8, False), (0.1, True)):
         result = solved(funnel, f"friction.mu={mu}", forces="[1]")[0]

@@ -5,33 +5,16 @@ import math
 import numpy as np
 
 from softjaw.study.case.result import CaseResult
-from softjaw.study.quantities import Axis
 from softjaw.study.result.layout import Layout
-from tests.study.formula_results import OBJECT, written
+from tests.study.formula_results import OBJECT, grid_axes, written
 
 GRID = (4, 4)  # faces of a pad's front: elements = [2, 2, 2] of eight nodes
 SIZE = (0.05, 0.022, 0.015)
 CLOSING, PRESSURE = 2e-3, 3e4
-SCENE = (
-    OBJECT
-    + """[gripper]
-elements = [2, 2, 2]
-[candidates]
-stations_mm = [-20, 0, 20]
-angles_deg = [0, 90]
-[load]
-normal_force_n = [1, 5]
-"""
-)
+SCENE = f"{OBJECT}[gripper]\nelements = [2, 2, 2]\n[candidates]\nstations_mm = [-20, 0, 20]\nangles_deg = [0, 90]\n"
+SCENE += "[load]\nnormal_force_n = [1, 5]\n"
 FAILED = (2, 1, 1)
-
-
-def axes():
-    return (
-        Axis("station", np.array([-0.02, 0.0, 0.02]), "m", "station"),
-        Axis("angle", np.array([0, math.pi / 2]), "rad", "angle"),
-        Axis("normal_force", np.array([1.0, 5.0]), "N", "normal force"),
-    )
+AXES = grid_axes([-0.02, 0.0, 0.02], [0, math.pi / 2], [1.0, 5.0])
 
 
 def quality(index):
@@ -40,7 +23,7 @@ def quality(index):
 
 
 def poses(index):
-    station, angle = axes()[0].values[index[0]], axes()[1].values[index[1]]
+    station, angle = AXES[0].values[index[0]], AXES[1].values[index[1]]
     reach = (0.025, 0.02)[index[1]]
     found = []
     for sign in (-1.0, 1.0):
@@ -80,7 +63,7 @@ def solved(layout, index):
 
 def make(path, scene=SCENE, patches=True, failed=FAILED):
     """A file of 3 stations x 2 angles x 2 forces; one case has failed, (0, 0, 1) is missing."""
-    layout = Layout(axes(), int(np.prod(GRID)) * patches)
+    layout = Layout(AXES, int(np.prod(GRID)) * patches)
 
     def case(index):
         if index == failed:

@@ -28,7 +28,7 @@ def file(tmp_path_factory):
     return folder / "c.hdf"
 
 
-def test_a_few_cases_are_solved_on_coarser_and_finer_meshes_of_both_kinds():
+def test_a_few_cases_are_solved_on_meshes_of_both_kinds_of_walls_too_without_what_makes_a_study_long():
     scene = cost_scene(parse_scene(SCENE))
     assert scene.sweep == {
         "gripper.elements": ((4, 2, 2), (6, 2, 2), (8, 4, 2), (12, 6, 3)), "gripper.element": ("hex8", "hex27"),
@@ -42,9 +42,6 @@ def test_a_few_cases_are_solved_on_coarser_and_finer_meshes_of_both_kinds():
         (n, kind) for n in scene.sweep["gripper.elements"] for kind in scene.sweep["gripper.element"]
     }
     assert parse_scene(scene.effective_toml()) == scene
-
-
-def test_a_wall_has_meshes_too_what_makes_a_study_long_is_left_out_and_an_own_sweep_stays():
     bottle = Scene.from_file(JOBS / "bottle.toml")
     assert mesh_sweep(bottle)["accuracy.wall_element_mm"] == pytest.approx([3, 1.5, 1.05])
     assert "gripper.element" in mesh_sweep(bottle.with_values({"effects.object": "rigid"}))
@@ -74,7 +71,7 @@ def test_meshes_are_swept_only_where_no_faces_are_stored():
     assert axes(scene)[0].options == ("4 x 2 x 2", "8 x 4 x 2")
 
 
-def test_errors_are_distances_from_the_last_point(file):
+def test_errors_are_distances_from_the_last_or_smallest_point_and_failed_cases_count_and_leave_the_others(file):
     ds = softjaw.open(file)
     settings = settings_in(ds)
     assert [(s.values["gripper.elements"], s.values["gripper.element"]) for s in settings] == [
@@ -90,9 +87,6 @@ def test_errors_are_distances_from_the_last_point(file):
     assert settings[2].seconds == pytest.approx(seconds.mean())
     # of triquadratic elements the finer mesh is nearer to the finest
     assert settings[1].worst["e_n"] > settings[3].worst["e_n"] > 0
-
-
-def test_of_some_keys_the_smallest_value_is_the_reference(file):
     ds = softjaw.open(file).isel(element=slice(0, 1))
     ds.elements.attrs |= {"long_name": "accuracy.wall_element_mm", "options": ()}
     text = ds.attrs["scene"].replace('"gripper.elements"', '"accuracy.wall_element_mm"')
@@ -102,9 +96,6 @@ def test_of_some_keys_the_smallest_value_is_the_reference(file):
     found = settings_in(ds.assign_attrs(scene=scene.replace('["hex8", "hex27"]', '["hex8"]')))
     assert [s.reference for s in found] == [True, False, False]
     assert [s.given for s in found] == [False, True, False]
-
-
-def test_failed_cases_count_and_leave_the_others(file):
     ds = softjaw.open(file).copy(deep=True)
     for name in ("e_n", "payload", "quality", "work_seconds_total"):
         ds[name].values[0, 0, 0, 0, 0] = np.nan

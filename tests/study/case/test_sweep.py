@@ -5,6 +5,7 @@ from itertools import chain
 import numpy as np
 import pytest
 import trimesh
+from scipy.spatial.transform import Rotation
 
 from softjaw.study.case import candidates, poses
 from softjaw.study.case.build import build_object
@@ -19,11 +20,6 @@ CYLINDER = text_of(OVAL, stations="[-10, 0, 30]", angles="[0, 30, 90, 180, 210, 
 
 def posed(*given):
     return scene_of(OVAL, where="".join(pose_of(*pose) for pose in given))
-
-
-def about_z(angle):
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
 
 
 @pytest.mark.parametrize("roll", [0, 25, -90, 180])
@@ -44,15 +40,12 @@ def test_both_pads_face_each_other_with_the_same_long_side(angle, roll):
             assert aimed == pytest.approx([0, 0, place.station], abs=1e-14)
 
 
-def test_roll_turns_the_gripper_about_the_approach_of_finger_1():
+def test_roll_turns_the_gripper_about_an_approach_and_an_explicit_pose_is_the_station_it_describes():
     """Rodrigues: the long side z turned by 90 degrees about the approach -x of finger 1 is (-x) x z = y."""
     flat, turned = (poses.axis_poses(0.0, 0.0, roll) for roll in (0.0, np.pi / 2))
     assert flat[0].rotation[:, 0] == pytest.approx(Z)
     for pose in turned:
         assert pose.rotation[:, 0] == pytest.approx([0, 1, 0], abs=1e-15)
-
-
-def test_an_explicit_pose_equals_the_station_that_it_describes():
     theta = np.radians(30)
     approach = (-np.cos(theta), -np.sin(theta), 0.0)
     (place,) = candidates.candidates(posed(((0, 0, 30), [3 * a for a in approach], (approach[0], approach[1], 2.0))))
@@ -68,7 +61,7 @@ def mesh_scene(mesh, tmp_path, stations):
     return scene_of(mesh_of(tmp_path / "body.stl", "m"), *pad, stations=stations, angles="[0, 90]", forces="[5]")
 
 
-def test_stations_of_a_bent_mesh_follow_its_centre_line(tmp_path):
+def test_stations_of_a_bent_mesh_follow_its_centre_line_and_those_of_a_straight_one_stay_on_the_axis(tmp_path):
     """A tube along an arc of 150 mm: pads are aimed at the arc, across it, with their long side along it."""
     scene = mesh_scene(trimesh.Trimesh(*bent(), process=False), tmp_path, [50, 90])
     high = build_object(scene.object).bounds[1]
@@ -84,9 +77,6 @@ def test_stations_of_a_bent_mesh_follow_its_centre_line(tmp_path):
             aimed = pose.to_object(np.array([[0, 0, poses.STANDOFF]]))[0]
             assert aimed == pytest.approx([middle, 0, place.station], abs=1.5 * 0.018**2 / 0.15)
         assert not place.note
-
-
-def test_stations_of_a_straight_mesh_stay_on_the_axis(tmp_path):
     body = trimesh.creation.cylinder(0.03, 0.2, sections=48)
     body.vertices += 1e-5 * np.random.default_rng(0).normal(size=body.vertices.shape)
     for place in candidates.candidates(mesh_scene(body, tmp_path, [60, 100])):
@@ -130,11 +120,12 @@ def test_the_turn_takes_one_pair_of_pads_into_the_other(changed, roll):
         assert unit.served[0] is unit.candidate
         for place, turn in zip(unit.served, unit.turns, strict=True):
             for pose, image in zip(unit.candidate.poses, place.poses, strict=True):
-                assert about_z(turn) @ pose.rotation == pytest.approx(image.rotation, abs=1e-12)
-                assert about_z(turn) @ pose.origin == pytest.approx(image.origin, abs=1e-12)
+                R = Rotation.from_euler("z", turn).as_matrix()
+                assert R @ pose.rotation == pytest.approx(image.rotation, abs=1e-12)
+                assert R @ pose.origin == pytest.approx(image.origin, abs=1e-12)
 
 
-def test_explicit_poses_are_grouped_whatever_point_of_the_line_was_given():
+def test_explicit_poses_are_grouped_whatever_point_was_given_and_nothing_that_is_no_image():
     given = [
         ((0, 0, 20), (1, 0, 0), (0, 0, 1)),
         ((40, 0, 20), (2, 0, 0), (0, 0, 3)),  # the same line
@@ -151,10 +142,7 @@ def test_explicit_poses_are_grouped_whatever_point_of_the_line_was_given():
     assert found[0] == [[0, 1, 2, 3], [4], [5], [6], [7, 8]]
     assert found[1] == [[0, 1], [2], [3], [4], [5], [6], [7], [8]]
     assert found[2] == [[0, 1, 3], [2], [4], [5], [6], [7], [8]]
-
-
-def test_nothing_is_grouped_that_is_not_an_image_at_random():
-    """Candidates at random angles and rolls, each with a copy that only a symmetry of order 3 makes its image."""
+    # Candidates at random angles and rolls, each with a copy that only a symmetry of order 3 makes its image.
     rng = np.random.default_rng(1)
     places = []
     for angle, roll, station in rng.uniform(-3, 3, (40, 3)):
@@ -187,16 +175,13 @@ def test_every_row_is_filled_exactly_once_and_stands_for_its_axis_values(swept):
                 assert at.get("semi_axis_b", scene.object.semi_axis_b) == unit.scene.object.semi_axis_b
 
 
-def test_the_symmetry_is_asked_for_at_every_point_of_the_sweep_and_a_swept_roll_turns_the_pads():
+def test_the_symmetry_is_asked_for_at_every_point_of_the_sweep_and_finer_meshes_cost_more():
     scene = parse_scene(CYLINDER, overrides=["sweep.object.semi_axis_b_mm=[20, 25]"])
     round_or_not = [u.scene.object.semi_axis_b for u in candidates.units(scene)]
     assert (round_or_not.count(0.02), round_or_not.count(0.025)) == (9, 3)
     scene = parse_scene(CYLINDER, overrides=["object.semi_axis_b_mm=25", "sweep.candidates.roll_deg=[0, 90]"])
     sides = [u.candidate.poses[0].rotation[2, 0] for u in candidates.units(scene)]
     assert sides == pytest.approx([1, 1, 1, 0, 0, 0], abs=1e-15)
-
-
-def test_finer_meshes_more_forces_and_better_elements_cost_more():
     base = parse_scene(CYLINDER)
     assert candidates.path_cost(base) == pytest.approx(3 * (20 * 10 * 6 + 10 * 6 * 3))
     one, triquadratic = ({"accuracy.meshes": 1}, {"gripper.element": "hex27"})

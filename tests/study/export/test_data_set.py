@@ -55,7 +55,7 @@ def read_shards(out):
     return found
 
 
-def test_arrays_are_those_of_the_file(folder):
+def test_arrays_are_those_of_the_file_and_what_the_sampler_rejected_is_unsuccessful_and_says_why(folder):
     ds = opened(folder / "cup.hdf")
     arrays = grasp_arrays(ds, GripperFrame(closing="x"))
     assert {len(values) for values in arrays.values()} == {COUNT}
@@ -70,9 +70,6 @@ def test_arrays_are_those_of_the_file(folder):
         assert matrix[:3, 0] == pytest.approx(R[0][:, 2])  # and closes along x, from finger 1
         assert matrix[:3, 3] == pytest.approx(o.mean(axis=0))
     assert arrays["semi_axes"].shape == (COUNT, 2, 3)
-
-
-def test_what_the_sampler_rejected_is_unsuccessful_and_says_why(folder):
     ds = opened(folder / "cup.hdf")
     ds.attrs["rejected"] = np.array([[10, 20, 30, 1, 0, 0, 0, 0, 1, SLIPPING], [0, 0, 5, 0, 1, 0, 0, 0, 1, WIDE]], "f4")
     arrays = grasp_arrays(ds, GripperFrame(closing="x"))
@@ -86,7 +83,7 @@ def test_what_the_sampler_rejected_is_unsuccessful_and_says_why(folder):
     assert first[:3, 2] == pytest.approx([0, 0, -1])
 
 
-def test_graspgen_has_its_fields_and_splits_with_relative_paths(sets):
+def test_graspgen_has_its_fields_and_splits_acronym_its_datasets_and_shards_both_files_of_an_object(sets):
     out = sets / "graspgen"
     listed = {split: (out / f"splits/{split}.txt").read_text().split() for split in ("train", "valid")}
     assert sorted([*listed["train"], *listed["valid"]]) == [f"{name}.stl" for name in NAMES]
@@ -98,18 +95,12 @@ def test_graspgen_has_its_fields_and_splits_with_relative_paths(sets):
         assert sum(found["grasps"]["object_in_gripper"]) == COUNT - len(FORCES)
     about = json.loads((out / "data-set.json").read_text())
     assert (about["grasps"], about["successful"]) == (4 * COUNT, 4 * (COUNT - len(FORCES)))
-
-
-def test_acronym_has_its_datasets(sets):
     with h5py.File(sets / "acronym/grasps/cup_1.0.h5") as file:
         assert (sets / "acronym" / file["object/file"][()].decode()).read_bytes() == b"cup"
         assert file["object/scale"][()] == 1.0
         assert file["grasps/transforms"].shape == (COUNT, 4, 4)
         assert int(file["grasps/qualities/flex/object_in_gripper"][()].sum()) == COUNT - len(FORCES)
         assert file["grasps/qualities/softjaw/payload"].shape == (COUNT,)
-
-
-def test_shards_hold_both_files_of_an_object_side_by_side(sets):
     found = read_shards(sets / "webdataset")
     keys = [name.partition(".")[0] for name in found]
     assert sorted(set(keys)) == ["bowl", "cup", "mug_old", "vase"]
@@ -118,7 +109,7 @@ def test_shards_hold_both_files_of_an_object_side_by_side(sets):
     assert len(json.loads(found["cup.json"])["grasps"]["force"]) == COUNT
 
 
-def test_the_example_loads_every_object(sets, capsys, monkeypatch):
+def test_the_example_loads_every_object_and_a_single_file_is_no_data_set(sets, capsys, monkeypatch, folder, tmp_path):
     out = sets / "graspgen"
     loader = runpy.run_path(str(ROOT / "jobs/examples/data_set.py"))["Grasps"]
     count = {split: len(loader(str(out), split)) for split in ("train", "valid")}
@@ -127,15 +118,5 @@ def test_the_example_loads_every_object(sets, capsys, monkeypatch):
     monkeypatch.setattr("sys.argv", ["data_set.py", str(out)])
     runpy.run_path(str(ROOT / "jobs/examples/data_set.py"), run_name="__main__")
     assert f"of {count['train'] * COUNT} grasps" in capsys.readouterr().out
-
-
-def test_batches_of_torch_hold_single_grasps(sets):
-    data = pytest.importorskip("torch.utils.data", reason="PyTorch is not installed")
-    loader = runpy.run_path(str(ROOT / "jobs/examples/data_set.py"))["Grasps"]
-    batch = next(iter(data.DataLoader(loader(str(sets / "graspgen")), batch_size=1)))
-    assert tuple(batch["transforms"].shape) == (1, COUNT, 4, 4)
-
-
-def test_a_single_file_is_no_data_set(folder, tmp_path):
     assert main(["export", str(folder / "cup.hdf"), "--format", "acronym", "-o", str(tmp_path / "set")]) == 2
     assert main(["export", str(folder), "--format", "mjcf", "-o", str(tmp_path / "set")]) == 2

@@ -29,29 +29,17 @@ ISAAC = {"confidence", "position", "orientation", "cspace_position", "pregrasp_c
 # moveit_msgs/Grasp and what it is made of, field by field, as the .msg files of ROS 2 have them.
 STAMP = {"sec": int, "nanosec": int}
 HEADER = {"stamp": STAMP, "frame_id": str}
-WAY = {
-    "direction": {"header": HEADER, "vector": dict.fromkeys("xyz", float)},
-    "desired_distance": float,
-    "min_distance": float,
-}
+WAY = {"direction": {"header": HEADER, "vector": dict.fromkeys("xyz", float)}, "desired_distance": float,
+       "min_distance": float}  # fmt: skip
 POINT = {"positions": [float], "velocities": [float], "accelerations": [float], "effort": [float],
          "time_from_start": STAMP}  # fmt: skip
 POSTURE = {"header": HEADER, "joint_names": [str], "points": [POINT]}
+POSE = {"position": dict.fromkeys("xyz", float), "orientation": dict.fromkeys("xyzw", float)}
 MOVEIT = {
-    "id": str,
-    "pre_grasp_posture": POSTURE,
-    "grasp_posture": POSTURE,
-    "grasp_pose": {
-        "header": HEADER,
-        "pose": {"position": dict.fromkeys("xyz", float), "orientation": dict.fromkeys("xyzw", float)},
-    },
-    "grasp_quality": float,
-    "pre_grasp_approach": WAY,
-    "post_grasp_retreat": WAY,
-    "post_place_retreat": WAY,
-    "max_contact_force": float,
-    "allowed_touch_objects": [str],
-}
+    "id": str, "pre_grasp_posture": POSTURE, "grasp_posture": POSTURE, "grasp_pose": {"header": HEADER, "pose": POSE},
+    "grasp_quality": float, "pre_grasp_approach": WAY, "post_grasp_retreat": WAY, "post_place_retreat": WAY,
+    "max_contact_force": float, "allowed_touch_objects": [str],
+}  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -170,7 +158,7 @@ def test_moveit_grasps_have_the_fields_of_their_messages(said, gripper):
         assert grasp["post_grasp_retreat"]["direction"]["vector"] == pytest.approx({"x": 0.0, "y": 0.0, "z": -1.0})
 
 
-def test_graspgen_has_its_keys_and_a_mask_of_the_grasps_that_hold(said):
+def test_graspgen_has_its_keys_a_mask_of_the_grasps_that_hold_and_the_mesh_from_its_own_folder(said, path, tmp_path):
     """Read as its documentation reads it."""
     found = json.loads(said("--format", "graspgen", "--force", 4))
     assert set(found["object"]) == {"file", "scale"}
@@ -190,21 +178,15 @@ def test_graspgen_has_its_keys_and_a_mask_of_the_grasps_that_hold(said):
         assert case["maps"]["epsilon"] is None
     assert all(len(values) == 5 for values in found["grasps"].values())
     assert found["grasps"]["warnings"][found["grasps"]["object_in_gripper"].index(False)] == ["slips"]
-
-
-def test_graspgen_names_the_mesh_from_its_own_folder(path):
     ds = opened(path).assign_attrs(scene='[object]\nmesh = "/work/meshes/mug.stl"\nunit = "mm"')
     made = json.loads(as_graspgen([], GripperFrame(), ds, "/work/sets/first"))
     assert made["object"] == {"file": "../../meshes/mug.stl", "scale": 1e-3}
-
-
-def test_grasps_that_hold_nothing_are_no_grasps(tmp_path):
-    path = write(tmp_path / "empty.hdf", **{"payload/ccm": np.zeros((5, 1, 3))})
-    found = grasps(opened(path), GripperFrame(approach=("x",)), force=4.0)
+    empty = write(tmp_path / "empty.hdf", **{"payload/ccm": np.zeros((5, 1, 3))})
+    found = grasps(opened(empty), GripperFrame(approach=("x",)), force=4.0)
     assert {grasp.reasons for grasp in found} == {("payload 0",)}
 
 
-def test_grasps_are_chosen_by_rank_force_and_least_values(path, said):
+def test_grasps_are_chosen_by_rank_force_and_least_values_and_simulators_get_a_file_for_each(path, said, tmp_path):
     def stations(*words):
         return [float(row["station [m]"]) for row in csv.DictReader(io.StringIO(said("--csv", *words)))]
 
@@ -220,9 +202,6 @@ def test_grasps_are_chosen_by_rank_force_and_least_values(path, said):
     assert stations("--force", 4, "--by", "payload") == pytest.approx([*held, STATIONS[LOST]])
     each = json.loads(said("--format", "graspgen", "--top", 2, "--approach", "x", "--approach", "minus-y"))
     assert each["grasps"]["names"] == ["grasp_0_x", "grasp_0_minus_y", "grasp_1_x", "grasp_1_minus_y"]
-
-
-def test_simulators_get_a_file_for_each_grasp(path, said, tmp_path):
     for name in SIMULATORS:
         assert re.search(r'"grasp(_0)?"', said("--format", name))
     out = tmp_path / "grasp.xml"

@@ -30,7 +30,7 @@ def taken(path, hand, force=4.0):
     return sorted(found, key=lambda grasp: grasp.case["place"]["station"])
 
 
-def test_a_hand_comes_from_above_only_where_its_palm_stays_over_the_object(path):
+def test_a_hand_comes_from_above_where_its_palm_stays_over_the_object_and_opens_no_wider_than_its_stroke(path):
     """The palm of Franka's hand is 37.65 mm behind the pads' middle; the cylinder's top is 50 mm above its own."""
     found = taken(path, FRANKA)
     room = (FRANKA.depth_mm - FRANKA.palm_mm[1][2]) / 1e3
@@ -39,9 +39,6 @@ def test_a_hand_comes_from_above_only_where_its_palm_stays_over_the_object(path)
     assert abs(found[0].rotation[2, 2]) < 0.1
     assert found[4].rotation[2, 2] == pytest.approx(-1.0)
     assert not any(grasp.hold.unfit for grasp in found)
-
-
-def test_without_a_palm_grasps_are_taken_from_above_and_fingers_open_no_wider_than_the_stroke(path):
     assert all(grasp.rotation[2, 2] < -0.99 for grasp in taken(path, Hand()))
     hand = Hand(stroke_mm=80)
     for grasp in taken(path, hand):
@@ -61,7 +58,7 @@ def test_what_the_gripper_cannot_take_is_left_out_with_the_reason(path, hand, wh
     assert said.startswith("5 of 5 ")
 
 
-def test_clearance_of_a_sphere_from_boxes():
+def test_boxes_clear_a_sphere_points_lie_on_its_surface_and_boxes_stand_beside_the_pads(path):
     ball = np.random.default_rng(1).normal(size=(20_000, 3))
     ball *= 0.03 / np.linalg.norm(ball, axis=1)[:, None]
     beside, corner = np.array([[0.05, -1, -1], [1, 1, 1]]), np.array([[0.03, 0.03, 0.03], [1, 1, 1]])
@@ -69,18 +66,12 @@ def test_clearance_of_a_sphere_from_boxes():
     assert clearance(ball, corner[None]) == pytest.approx(0.03 * (np.sqrt(3) - 1), abs=1e-4)
     assert clearance(ball, np.stack([beside, corner])) == pytest.approx(0.02, abs=1e-4)
     assert clearance(ball, beside[None] - [0.03, 0, 0]) == pytest.approx(-0.01, abs=1e-4)
-
-
-def test_points_lie_on_the_surface_and_close_together(path):
     points = surface_points(scene_of(opened(path), taken(path, Hand())[0].case).object)
     inside = np.abs(points[:, 2]) < TOP - 1e-6
     assert np.hypot(points[inside, 0] / 0.025, points[inside, 1] / 0.020).max() == pytest.approx(1.0, abs=1e-5)
     assert np.abs(points[:, 2]).max() == pytest.approx(TOP)
     grid = np.array([[0.025, 0.0, z] for z in np.linspace(-TOP, TOP, 50)])
     assert np.linalg.norm(points[None] - grid[:, None], axis=-1).min(axis=1).max() < 2e-3
-
-
-def test_boxes_stand_beside_the_pads_and_behind_them():
     parts = boxes(FRANKA, "y", np.array([0.02, 0.018, 0.005]), 0.06, 0.10365)
     foam, fingers, palm = parts[:2], parts[2:4], parts[4]
     assert foam[1] == pytest.approx(np.array([[-0.009, 0.030, 0.09365 - WAY], [0.009, 0.035, 0.11365]]))

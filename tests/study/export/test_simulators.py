@@ -34,7 +34,7 @@ def numbers(text):
     return [float(word) for word in text.split()]
 
 
-def test_a_cell_has_the_contact_frames_of_the_file(path):
+def test_a_cell_has_the_contact_frames_of_the_file_with_tangents_as_in_mujoco(path):
     """Through the frame of the closed pads and back into that of the object."""
     for i, grasp in enumerate(all_grasps(path, 4.0)):
         R, o, frames = geometry(i)
@@ -52,9 +52,6 @@ def test_a_cell_has_the_contact_frames_of_the_file(path):
         assert np.abs(found.rotation @ R[0]).max(axis=0) == pytest.approx([1, 1, 1], abs=ONE)
         assert found.closing == pytest.approx(found.rotation @ R[0][:, 2], abs=ONE)
         assert found.rotation[2, 2] > 1 / math.sqrt(3)
-
-
-def test_tangents_are_those_of_mujoco_and_other_axes_get_the_smaller_slide(path):
     assert tangents(np.array([0.0, 1.0, 0.0])) == pytest.approx(np.array([[0, 0, 1.0], [1, 0, 0]]))
     pad = geometry(0)[0][0]  # its long side is y of a cell in which its short side is z
     contact = cell(all_grasps(path, 4.0)[0], -np.cross(pad[:, 2], pad[:, 0])).contacts[0]
@@ -94,41 +91,26 @@ def test_gazebo_slips_at_the_torque_of_the_file_by_its_own_formula(path):
             assert rail == pytest.approx(cell(grasp).closing * (1 if f == 1 else -1), abs=1e-9)
 
 
-def test_the_surface_beside_a_model_of_gazebo_is_the_object(path, tmp_path):
+def test_the_surface_beside_a_model_of_gazebo_is_the_object_and_physx_slips_at_the_torque_of_the_file(path, tmp_path):
     (tmp_path / "object.stl").write_bytes(as_stl(body(path)))
     mesh = trimesh.load(tmp_path / "object.stl")
     assert mesh.volume * 1000 == pytest.approx(body(path).mass, rel=1e-4)
     assert mesh.bounds == pytest.approx(np.stack([body(path).points.min(axis=0), body(path).points.max(axis=0)]))
-
-
-def test_physx_slips_at_the_torque_of_the_file_by_its_own_formula(path):
-    """T = mu N max(r_min, sqrt(r d)), whatever the penetration d."""
+    grasp = deepcopy(all_grasps(path, 4.0)[0])
+    grasp.case["fingers"][1]["F_N"] = np.float64(0.0)
+    with pytest.raises(StudyError, match="0 N"):
+        as_mjcf(grasp, body(path))
+    # T = mu N max(r_min, sqrt(r d)), whatever the penetration d.
     for i, grasp in enumerate(all_grasps(path, 16.0)):
         text = as_usd(grasp, body(path))
         values = {line.split(" = ")[0].split()[-1]: line.split(" = ")[1] for line in text.splitlines() if " = " in line}
-        mu, r_min, r = (
-            float(values[name])
-            for name in (
-                "physics:staticFriction", "physxCollision:minTorsionalPatchRadius",
-                "physxCollision:torsionalPatchRadius",
-            )
-        )
+        names = ("minTorsionalPatchRadius", "torsionalPatchRadius")
+        r_min, r = (float(values[f"physxCollision:{name}"]) for name in names)
+        mu = float(values["physics:staticFriction"])
         assert mu == float(values["physics:dynamicFriction"]) == min(MU_X[i], MU_Y[i])
         for depth in (0.0, 1e-3):
             assert mu * 16.0 * max(r_min, math.sqrt(r * depth)) == pytest.approx(E_N[i] * mu * 16.0)
         assert values["physxScene:solverType"] == '"TGS"'
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("force", FORCES)
-def test_physx_carries_what_the_file_says_and_both_at_once(path, force):
-    """In the program itself; slide and torque are independent there."""
-    pytest.importorskip("sapien", reason="PhysX is not installed: pip install sapien")
-    module = slipping("physx")
-    for grasp in all_grasps(path, force):
-        found = module.ratios(cell(grasp).contacts[0])
-        for name, shares in module.LOADS.items():
-            assert found[name] == pytest.approx(shares, abs=0.005)
 
 
 def turned(q):
@@ -165,13 +147,6 @@ def test_usd_reads_the_stage(path):
         world = UsdGeom.Xformable(stage.GetPrimAtPath(f"/grasp/finger{f}")).ComputeLocalToWorldTransform(0)
         assert list(world.TransformDir(Gf.Vec3d(0, 0, 1))) == pytest.approx(contact.rotation[:, 2].tolist())
         assert list(world.ExtractTranslation()) == pytest.approx(contact.origin.tolist())
-
-
-def test_a_finger_without_load_has_no_ratio(path):
-    grasp = deepcopy(all_grasps(path, 4.0)[0])
-    grasp.case["fingers"][1]["F_N"] = np.float64(0.0)
-    with pytest.raises(StudyError, match="0 N"):
-        as_mjcf(grasp, body(path))
 
 
 @pytest.mark.parametrize(("i", "force"), [(1, 1.0), (4, 16.0)])

@@ -7,18 +7,10 @@ from scipy.spatial.transform import Rotation
 from softjaw.study.lookup import GraspMap
 from softjaw.study.lookup.point import INSIDE, JUMP, NO_RESULT, OUTSIDE, SNAP
 from softjaw.study.quantities import Axis
-from tests.study.formula_results import (
-    ANGLES,
-    FORCES,
-    SCENE,
-    STATIONS,
-    grid_axes,
-    linear,
-    make,
-    quartic,
-    window,
-    without_result,
-)
+from softjaw.study.result.read import open as open_dataset
+from softjaw.study.show.best_grasps import best
+from tests.study import formula_results as known
+from tests.study.formula_results import ANGLES, FORCES, SCENE, STATIONS, grid_axes, linear, make
 
 MESH = '[object]\nshape = "mesh"\nmesh = "x.stl"\nunit = "mm"\n[candidates]' + SCENE.partition("[candidates]")[2]
 ROUND = SCENE.replace("semi_axis_b_mm = 20", "semi_axis_b_mm = 25")
@@ -38,15 +30,12 @@ def points(count, seed=1):
     return random.uniform(0, 0.04, count), random.uniform(-7, 7, count), random.uniform(1, 8, count)
 
 
-def test_what_is_linear_between_the_cases_is_met_and_says_so(straight):
+def test_what_is_linear_is_met_and_the_error_of_a_point_holds_that_of_the_cases(straight, tmp_path):
     found = straight.at(*points(300))
     assert found.ok.all()
     assert found.e_n == pytest.approx(linear(*points(300)), rel=1e-12)
     assert found.error("e_n") == pytest.approx(np.zeros(300), abs=1e-15)
     assert found.value("e_n", "pcm") == pytest.approx(1.1 * found.e_n, rel=1e-12)
-
-
-def test_the_error_of_a_point_holds_that_of_the_cases_in_the_unit_of_the_value(tmp_path, straight):
     errors = {"e_n_error__e_n_error": 0.02, "opening_loaded_error__opening_loaded_error": 1e-4}
     path = make(tmp_path / "two.hdf", meshes=2, opening_loaded__opening_loaded=0.03, **errors)
     point = GraspMap(path).at(0.02, 0.0, 3.0)
@@ -70,19 +59,15 @@ def test_the_estimate_covers_the_true_error_of_cases_left_out(tmp_path, along):
     assert np.median(estimate[left_out]) < 6 * np.median(true[left_out])  # covers without crying wolf
 
 
-def test_one_point_is_the_same_as_an_array_of_points(straight):
+def test_one_point_is_the_same_as_an_array_of_points_and_units_are_those_of_people(straight):
     place = points(200)
     together = straight.value("tau_z_max", *place)
     assert together.shape == (200,)
-    assert [straight.value("tau_z_max", *map(float, p)) for p in zip(*place, strict=True)] == pytest.approx(
-        together, rel=1e-12
-    )
+    alone = [straight.value("tau_z_max", *map(float, p)) for p in zip(*place, strict=True)]
+    assert alone == pytest.approx(together, rel=1e-12)
     grid = straight.at(STATIONS[:, None], 0.3, FORCES)
     assert grid.e_n.shape == grid.state.shape == (5, 4)
     assert grid.semi_axes().shape == (5, 4, 2, 3)
-
-
-def test_units_of_people_and_missing_coordinates(straight):
     found = straight.at(station_mm=15, angle_deg=40, force=3).e_n
     assert found == pytest.approx(straight.at(0.015, np.radians(40), 3).e_n, rel=1e-14)
     for named, given in (
@@ -113,7 +98,7 @@ def test_nothing_is_extrapolated(straight, place, word):
 
 @pytest.mark.parametrize(("code", "word"), [(2, "failed: the contact slid off"), (0, "is not solved yet")])
 def test_beside_a_case_without_result_there_is_no_value(tmp_path, code, word):
-    there = GraspMap(make(tmp_path / "a.hdf", **without_result(code, "the contact slid off")))
+    there = GraspMap(make(tmp_path / "a.hdf", **known.without_result(code, "the contact slid off")))
     beside = there.at(0.019, 0.5, 1.9)
     assert beside.state == NO_RESULT
     assert np.isnan([beside.e_n, there.value("e_n", 0.019, 0.5, 1.9)]).all()
@@ -179,19 +164,14 @@ def test_where_the_contact_changes_its_kind_there_is_no_smooth_value(tmp_path):
     assert there.at(0.01, 0.1, 2).nearest.e_n == pytest.approx(there.at(0.01, 0.1, 2).e_n)
 
 
-def test_angles_repeat_with_the_objects_symmetry(tmp_path):
+def test_angles_repeat_with_the_objects_symmetry_and_a_gap_is_bridged_for_round_objects_alone(tmp_path):
     around = GraspMap(make(tmp_path / "a.hdf", smooth))  # 0 to 150 deg; an elliptic cylinder repeats after 180
     last, first = (smooth(0.01, a, 2.0) for a in (ANGLES[5], ANGLES[0]))
     assert around.at(0.01, np.radians(165), 2).e_n == pytest.approx((last + first) / 2)
-    assert around.at(0.01, np.radians([20, 200, -160, 380]), 2).e_n == pytest.approx(
-        around.at(0.01, np.radians(20), 2).e_n
-    )
-    assert around.at(0.01, np.radians(185), 2).error("e_n") == pytest.approx(
-        around.at(0.01, np.radians(5), 2).error("e_n")
-    )
-
-
-def test_a_gap_that_was_not_solved_is_not_bridged_but_of_round_objects(tmp_path):
+    same, one = (around.at(0.01, np.radians(a), 2).e_n for a in ([20, 200, -160, 380], 20))
+    assert same == pytest.approx(one)
+    turned, here = (around.at(0.01, np.radians(a), 2).error("e_n") for a in (185, 5))
+    assert turned == pytest.approx(here)
     part = GraspMap(make(tmp_path / "a.hdf", axes=grid_axes(angles=[0, 0.1, 0.2])))
     assert part.at(0.01, 0.15, 2).ok
     assert "angle 90 deg, solved: 0 deg to 11.459 deg" in part.at(0.01, np.pi / 2, 2).reason
@@ -204,7 +184,7 @@ def test_a_gap_that_was_not_solved_is_not_bridged_but_of_round_objects(tmp_path)
     assert bottle.at(0.01, force=2).ok
 
 
-def test_half_a_turn_of_the_gripper_exchanges_the_fingers(tmp_path):
+def test_half_a_turn_of_the_gripper_exchanges_the_fingers_and_explicit_poses_go_by_number_and_force(tmp_path):
     def second_finger(values):
         values[..., 1, :] *= 2
         return values
@@ -215,9 +195,6 @@ def test_half_a_turn_of_the_gripper_exchanges_the_fingers(tmp_path):
     assert other == pytest.approx([3.2, 1.6])
     # between 150 deg and 180 deg, where 180 deg is 0 deg with the fingers exchanged
     assert there.at(0.01, np.radians(165), 2).fingers("f_x_max") == pytest.approx([2.4, 2.4])
-
-
-def test_explicit_poses_go_by_number_and_force(tmp_path):
     layout = grid_axes([0, 1, 2], [0], FORCES, poses=True)
     poses = GraspMap(make(tmp_path / "a.hdf", axes=layout, labels=("lid", "neck", "belly")))
     assert poses.at(candidate=1, force=3).e_n == pytest.approx(linear(1, 0, 3))
@@ -254,9 +231,9 @@ def test_a_sweep_is_asked_at_one_of_its_points(tmp_path):
             GraspMap(path, where=where)
 
 
-def test_limit_surfaces_come_between_those_of_the_cases_around(tmp_path):
-    def growing(values):
-        values[..., 3, :, :, :] = quartic(16.0, 16.0, 16.0)  # at 8 N: half as far along every axis, in units of mu S
+def test_limit_surfaces_come_between_those_of_the_cases_around_and_bounds_of_the_force_are_maps_too(tmp_path):
+    def growing(values):  # in units of mu S
+        values[..., 3, :, :, :] = known.quartic(16.0, 16.0, 16.0)  # at 8 N: half as far along every axis
         return values
 
     there = GraspMap(make(tmp_path / "a.hdf", limit_surface__coefficients=growing))
@@ -275,21 +252,15 @@ def test_limit_surfaces_come_between_those_of_the_cases_around(tmp_path):
         between.limit_surface(0)
     with pytest.raises(ValueError, match="one point"):
         there.at(0.01, [0.1, 0.2], 6).limit_surface(1)
-
-
-def test_bounds_of_the_force_are_maps_too(tmp_path):
     layout = grid_axes()
     bound = np.broadcast_to(3 + 100 * STATIONS[:, None], (5, 6))
-    there = GraspMap(make(tmp_path / "a.hdf", axes=layout, derived=window(layout), derived__force_high=bound))
+    there = GraspMap(make(tmp_path / "a.hdf", axes=layout, derived=known.window(layout), derived__force_high=bound))
     assert there.at(0.015, 0.1, 2).value("force_high") == pytest.approx(4.5)
     assert "force_high" in str(there.at(0.015, 0.1, 2))
     assert there.quantities["force_high"][0] == "N"
 
 
-def test_the_best_grasps_are_those_of_show_as_points_of_the_map(tmp_path):
-    from softjaw.study.result.read import open as open_dataset
-    from softjaw.study.show.best_grasps import best
-
+def test_the_best_grasps_are_those_of_show_as_points_which_know_the_poses_of_their_pads(tmp_path):
     held = np.random.default_rng(2).permutation(np.arange(float(len(STATIONS) * len(ANGLES) * len(FORCES))))
     held = 0.01 * held.reshape(len(STATIONS), len(ANGLES), len(FORCES))
     path = make(tmp_path / "a.hdf", smooth, payload__ccm=held)
@@ -303,9 +274,6 @@ def test_the_best_grasps_are_those_of_show_as_points_of_the_map(tmp_path):
     assert len(found.best(10_000)) == len(STATIONS) * len(ANGLES)
     with pytest.raises(ValueError, match=r"force is 1\.5"):
         found.best(force=1.5)
-
-
-def test_a_point_knows_the_poses_of_its_pads_between_solved_angles_only(tmp_path):
     turns = Rotation.from_euler("z", np.reshape(ANGLES, (-1, 1))).as_matrix()[None, :, None, None]
     turns = np.broadcast_to(turns, (len(STATIONS), len(ANGLES), len(FORCES), 2, 3, 3))
     found = GraspMap(make(tmp_path / "a.hdf", fingers__pose_rotation=lambda old: turns.reshape(old.shape)))

@@ -16,7 +16,7 @@ PATCH = sj.read_pressure(EXAMPLE)
 FLAT = sj.ContactPatch([[0.01, 0, 0], [-0.01, 0, 0]], [1e-4] * 2, [[0, 0, 1]] * 2, [1e4] * 2)
 
 
-def test_they_are_the_numbers_of_the_command():
+def test_they_are_the_numbers_of_the_command_and_do_not_depend_on_the_coordinates():
     [patch] = as_record([EvaluatedPatch(read_patch(str(EXAMPLE), Reading()), 0.8)], None)["patches"]
     for model, limits in sj.friction_limits(PATCH, mu=0.8).items():
         found = patch["friction"][model]
@@ -27,9 +27,6 @@ def test_they_are_the_numbers_of_the_command():
         known = patch["limit_surface"]["ccm"][kind]
         assert fit.surface.semi_axes == pytest.approx(patch["S"] * known["semi_axes"], rel=1e-12)
         assert fit.fit_error.Erad == known["E_rad"]
-
-
-def test_they_do_not_depend_on_the_coordinates():
     turn = Rotation.from_euler("xyz", [0.4, -1.1, 2.0])
     places = turn.apply(PATCH.centroid.copy()) + np.array([0.3, -0.2, 0.1])
     moved = replace(PATCH, centroid=places, normal=turn.apply(PATCH.normal.copy()))

@@ -68,16 +68,13 @@ def test_every_kind_of_file_gives_the_same_friction(tmp_path, told, triangles):
         assert np.allclose(answer["patches"][0]["frame"]["origin"], by_corners["patches"][0]["frame"]["origin"])
 
 
-def test_pressure_at_points_is_averaged_over_each_face_and_said(tmp_path, told):
+def test_pressure_at_points_is_averaged_over_each_face_and_triangles_leave_their_last_corner_empty(tmp_path, told):
     points, cells, patch = faceted(n=16)
     at_points = 1e4 + 1e5 * np.abs(points[:, 1])
     file = vtk(tmp_path / "p.vtu", points, cells, on_points=[("pressure", at_points)])
     answer = told(file, "--unit", "m", "--pressure-unit", "pa")
     assert answer["patches"][0]["S"] == pytest.approx(at_points[cells].mean(axis=1) @ patch.area, rel=1e-12)
-
-
-def test_triangles_among_quadrilaterals_leave_their_last_corner_empty(tmp_path, told):
-    """Unit square of a quadrilateral of half its area and two triangles: S = p, f = mu p."""
+    # Unit square of a quadrilateral of half its area and two triangles: S = p, f = mu p.
     rows = ["0,0,0,.5,0,0,.5,1,0,0,1,0,2", ".5,0,0,1,0,0,1,1,0,,,,2", ".5,0,0,1,1,0,.5,1,0,,,,2"]
     names = [f"{c}{k}" for k in (1, 2, 3, 4) for c in "xyz"]
     file = tmp_path / "mixed.csv"
@@ -104,16 +101,13 @@ def test_spellings_of_names_units_and_separators(tmp_path, told, head, row):
     assert patch["frame"]["axes"][2] == pytest.approx([0, 0, -1])
 
 
-def test_unused_columns_are_named_and_the_pressure_can_be_chosen(tmp_path, told):
+def test_unused_columns_are_named_pressure_and_x_can_be_chosen_and_surfaces_that_know_more_fit_better(tmp_path, told):
     file = tmp_path / "abaqus.csv"
     file.write_text("node,x_m,y_m,z_m,area_m2,nx,ny,nz,CPRESS,pressure_pa\n7,0,0,0,1e-4,0,0,1,100,9\n")
     chosen = told(file, "--pressure-name", "CPRESS", "--pressure-unit", "kpa")
     assert chosen["patches"][0]["S"] == pytest.approx(10.0)
     assert f"not used of {file}: node, pressure_pa" in chosen["notes"]
     assert f"not used of {file}: node, CPRESS" in told(file)["notes"]
-
-
-def test_x_follows_the_long_direction_unless_it_is_given(tmp_path, told):
     patch = replace(cylinder_grid(0.03, 0.3, 0.06, 9, 12), pressure=np.full(108, 1e4))
     long = told(file := centres(tmp_path / "long.csv", patch))
     given = told(file, "--long-side=0,1,0")
@@ -122,9 +116,6 @@ def test_x_follows_the_long_direction_unless_it_is_given(tmp_path, told):
     curved, turned = (a["patches"][0]["friction"]["ccm"] for a in (long, given))
     assert turned["f_y_max"] == pytest.approx(curved["f_x_max"], rel=1e-12)
     assert not any("--long-side" in text for text in given["notes"])
-
-
-def test_surfaces_that_know_more_fit_better(told):
     surfaces = told(EXAMPLE)["patches"][0]["limit_surface"]["ccm"]
     assert list(surfaces) == ["exact", *SURFACES]
     three, full, quartic = (surfaces[name] for name in ("three_motions", "full", "quartic"))
@@ -157,7 +148,7 @@ def opposite(patch, distance):
     return replace(patch, centroid=patch.centroid @ turn + [0, 0, distance], normal=patch.normal @ turn)
 
 
-def test_two_files_score_as_one_whose_copy_faces_it(tmp_path, told):
+def test_two_files_score_as_one_whose_copy_faces_it_and_given_normals_outrank_the_corners(tmp_path, told):
     _, _, patch = faceted(n=9, m=8)
     patch = replace(patch, pressure=np.full(72, 1e4))
     one = centres(tmp_path / "one.csv", patch)
@@ -172,10 +163,7 @@ def test_two_files_score_as_one_whose_copy_faces_it(tmp_path, told):
     two = centres(tmp_path / "aside.csv", replace(aside, centroid=np.add(aside.centroid, [0.05, 0, 0])))
     assert not both["grasp"]["slips"]
     assert told(one, "--other", two, *quick)["grasp"]["slips"]
-
-
-def test_given_normals_outrank_the_order_of_the_corners(tmp_path, told):
-    """One cell wound the other way changes nothing but a note, which names it; without normals it is refused."""
+    # One cell wound the other way changes nothing but a note, which names it; without normals it is refused.
     points, cells, patch = faceted()
     arrays = [("pressure", patch.pressure), ("Normals", patch.normal)]
     right = vtk(tmp_path / "right.vtu", points, cells, arrays)

@@ -65,13 +65,17 @@ def test_a_table_that_is_no_patch(tmp_path, refused, text, place, key):
     assert key in errors
 
 
-def test_problems_are_told_together_but_not_by_the_thousand(tmp_path, refused):
+def test_problems_are_told_together_but_not_by_the_thousand_and_a_file_that_is_cut_short_not_read(tmp_path, refused):
     file = tmp_path / "bad.csv"
     file.write_text("\n".join([HEAD, *["0,0,0,1,0,0,x,y"] * 1000]))
     code, errors = refused(file)
     assert code == USAGE
     assert 5 < len(errors.splitlines()) < 15
     assert "1990" in errors
+    file = vtk(tmp_path / "cut.vtu", POINTS, CELLS, PRESSED)
+    file.write_bytes(file.read_bytes()[:-2000])
+    code, errors = refused(file, *SI)
+    assert (code, len(errors.splitlines())) == (OTHER_FILE, 1)
 
 
 @pytest.mark.parametrize("name", ["none.csv", "none.vtu", "a.csv", "a.vtu", "a.vtp"])
@@ -102,13 +106,6 @@ def test_a_grid_that_is_no_patch(tmp_path, refused, name, grid, words, code, key
     found, errors = refused(vtk(tmp_path / name, *grid), *words)
     assert found == code
     assert key in errors
-
-
-def test_a_file_that_is_cut_short_cannot_be_read(tmp_path, refused):
-    file = vtk(tmp_path / "cut.vtu", POINTS, CELLS, PRESSED)
-    file.write_bytes(file.read_bytes()[:-2000])
-    code, errors = refused(file, *SI)
-    assert (code, len(errors.splitlines())) == (OTHER_FILE, 1)
 
 
 @pytest.mark.parametrize(

@@ -22,14 +22,8 @@ from softjaw.study.show.report.verdict import plain_report
 from tests.study.scenes import OVAL, text_of, units_of
 
 SCENE = text_of(f"{OVAL}\nmass_g = 50", stations="[-5, 0]", forces="[1, 2]", elements="[4, 4, 2]")
-COMMANDS = {
-    "status": ("status",),
-    "status --json": ("status", "--json"),
-    "show": ("show",),
-    "show --csv": ("show", "--csv", "--force", "1"),
-    "export --csv": ("export", "--csv"),
-    "export --json": ("export", "--json"),
-}
+PLAIN = ("status", "status --json", "show", "export --csv", "export --json")
+COMMANDS = {line: tuple(line.split()) for line in PLAIN} | {"show --csv": ("show", "--csv", "--force", "1")}
 
 
 @pytest.fixture(scope="module")
@@ -208,7 +202,7 @@ def test_a_file_that_was_cut_off_is_refused_by_every_reader(copy, answers, share
     all_refuse(copy, answers)
 
 
-def test_what_a_killed_run_leaves_is_missing_and_no_damage(copy):
+def test_what_a_killed_run_leaves_or_one_begins_anew_while_somebody_reads_is_missing_and_no_damage(copy):
     """Stored, but not yet marked: the one moment in which state and checksum may differ."""
     with h5py.File(copy, "r+") as file:
         file["study/status/code"][0, 0, 0] = MISSING
@@ -221,9 +215,6 @@ def test_what_a_killed_run_leaves_is_missing_and_no_damage(copy):
     with open_result(copy) as result:
         assert result.status.ravel().tolist() == [MISSING, DONE, DONE, DONE]
     assert torn_rows(copy, layout) == []
-
-
-def test_a_row_that_is_begun_anew_while_somebody_reads_is_missing(copy):
     with open_result(copy) as result:
         codes = result.status.copy()
     with h5py.File(copy, "r+") as file:

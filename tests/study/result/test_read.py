@@ -1,7 +1,5 @@
 """A result file as a dataset: dimensions, coordinates and attributes; no value where a case has none."""
 
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -16,6 +14,7 @@ from softjaw.study.result.read import FIELDS, read_field
 from softjaw.study.result.store import open_result
 from tests.study.fake_run import fake_plan, fake_result
 from tests.study.formula_results import ANGLES, FORCES, STATIONS, make, written
+from tests.study.launching import launch
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +42,7 @@ def test_maps_stand_over_their_coordinates_with_units_and_definitions(tmp_path):
     assert "elliptic_cylinder" in ds.attrs["scene"]
 
 
-def test_every_dataset_of_the_file_is_reached_and_has_its_numbers(half):
+def test_every_dataset_has_its_numbers_and_cases_without_a_result_a_state_and_a_message(half):
     ds = softjaw.open(half)
     with open_result(half) as result:
         done = result.status == DONE
@@ -60,9 +59,6 @@ def test_every_dataset_of_the_file_is_reached_and_has_its_numbers(half):
             values = result.read(path)
             assert np.array_equal(found.values[done], np.nan_to_num(values)[done] if name == "flags" else values[done],
                                   equal_nan=True), path  # fmt: skip
-
-
-def test_cases_without_a_result_have_no_values_but_a_state_and_a_message(half):
     ds = softjaw.open(half)
     status = ds.status.values.ravel()
     assert status.tolist() == [DONE] * 10 + [FAILED] + [MISSING] * (status.size - 11)
@@ -75,13 +71,10 @@ def test_cases_without_a_result_have_no_values_but_a_state_and_a_message(half):
     assert (ds.flags.values.ravel()[10:] == 0).all()
 
 
-def test_flags_are_bits_that_the_attributes_name(tmp_path):
+def test_flags_are_bits_that_attributes_name_patches_are_read_on_demand_and_status_needs_no_xarray(tmp_path, half):
     ds = softjaw.open(make(tmp_path / "a.hdf", flags__flags=float(Flag.SLIPS | Flag.COARSE)))
     words = dict(zip(ds.flags.attrs["flag_masks"], ds.flags.attrs["flag_meanings"], strict=True))
     assert {words[m] for m in words if int(ds.flags[0, 0, 0]) & m} == {"slips", "coarse"}
-
-
-def test_patches_are_read_on_demand_at_positions(half):
     one = softjaw.read_patch(half, station=1, angle=0, normal_force=1)
     with open_result(half) as result:
         stored = result.patch(int(np.ravel_multi_index((1, 0, 1), result.layout.shape)))
@@ -95,14 +88,11 @@ def test_patches_are_read_on_demand_at_positions(half):
     assert some.pressure.units == "Pa"
     with pytest.raises(KeyError):
         read_field(half, "wall/place")
-
-
-def test_status_and_the_import_of_softjaw_do_not_wait_for_xarray(half):
     code = (
         "import sys, softjaw; from softjaw.study.cli import main; main(['status', sys.argv[1]]);"
         "sys.exit(bool({'xarray', 'pandas', 'mpi4py', 'petsc4py'} & set(sys.modules)))"
     )
-    assert subprocess.run([sys.executable, "-c", code, half], check=False, capture_output=True).returncode == 0
+    assert launch(0, "-c", code, half)[0] == 0
 
 
 @pytest.mark.parametrize(("values", "limit", "force"), [

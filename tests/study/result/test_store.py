@@ -82,7 +82,7 @@ def test_a_fresh_file_is_empty_everywhere(path):
     assert layout.nbytes >= path.stat().st_size > 0.5 * layout.nbytes - 2**17
 
 
-def test_viewers_find_a_plot_from_the_root_down(path):
+def test_viewers_find_a_plot_from_the_root_down_the_map_at_the_largest_force(path):
     with h5py.File(path) as file:
         assert file.attrs["NX_class"] == "NXroot"
         entry = file[file.attrs["default"]]
@@ -104,9 +104,6 @@ def test_viewers_find_a_plot_from_the_root_down(path):
         assert list(whole.attrs["default_slice"]) == [".", ".", "2"]
         assert entry["e_n/ccm"].attrs["units"] == "m"
         assert entry["patch/normal"].dims[5][0].shape == (3,)
-
-
-def test_the_map_that_viewers_open_at_is_the_one_at_the_largest_force(path):
     layout = small()
     for row in (16, 17):  # the second and third force at station 2, angle 1
         put(path, layout, row, record(layout, CaseResult({"maps/quality": [row, 0.0, 0.0]})))
@@ -185,15 +182,12 @@ def test_viewers_open_at_stations_and_angles_at_the_highest_force(sizes, expecte
     assert view_slice(small(sizes=sizes)) == expected
 
 
-def test_an_axis_of_two_values_has_a_name_only_beside_an_uneven_one():
+def test_an_axis_of_two_values_has_a_name_only_beside_an_uneven_one_and_a_sweep_comes_first(tmp_path):
     even = small()
     uneven = Layout((*even.axes[:-1], replace(even.axes[-1], values=np.array([1.0, 2.0, 5.0]))), 4)
     assert axes_of(even, range(3)) == ["station", ".", "normal_force"]
     assert axes_of(uneven, range(3)) == ["station", "angle", "normal_force"]
     assert axes_of(uneven, (0, 1)) == ["station", "."]
-
-
-def test_a_sweep_comes_first(tmp_path):
     axes = (axis("object_radius", 3, "m"), *small().axes)
     layout = Layout(axes, 0, 2, (Quantity("slope", ("object_radius",), "1", "slope", "a slope", "derived"),))
     create(tmp_path / "s.hdf", layout, HEADER)
@@ -234,36 +228,24 @@ def test_a_file_of_an_earlier_version_is_read_or_says_why_not(tmp_path):
         layout_from_options(layout.axes, layout.options().replace("{", '{"sampled": [3, 8], ', 1))
 
 
-def test_a_result_that_does_not_fit_the_tables_is_a_bug():
-    layout = small()
-    with pytest.raises(ValueError, match="maps/nonsense"):
-        record(layout, CaseResult({"maps/nonsense": 1.0}))
-    with pytest.raises(ValueError, match="fingers/S"):
-        record(layout, CaseResult({"fingers/S": [1, 2, 3]}))
-    with pytest.raises(ValueError, match="maps/e_n"):
-        record(layout, CaseResult({"maps/e_n": 1.0}))
-    with pytest.raises(ValueError, match="patch/pressure"):
-        record(layout, CaseResult({}, {"pressure": np.zeros((2, 5))}))
-
-
-def test_messages_are_cut_between_words():
+def test_a_result_that_does_not_fit_is_a_bug_a_full_disk_told_and_only_an_own_file_resumed(tmp_path, monkeypatch, path):
+    wrong = {name: CaseResult({name: 1.0}) for name in ("maps/nonsense", "maps/e_n")}
+    wrong |= {"fingers/S": CaseResult({"fingers/S": [1, 2, 3]})}
+    wrong |= {"patch/pressure": CaseResult({}, {"pressure": np.zeros((2, 5))})}
+    for name, result in wrong.items():
+        with pytest.raises(ValueError, match=name):
+            record(small(), result)
     assert text_bytes("a\n b", 9) == b"a b"
     assert text_bytes("ä" * 5, 8).decode() == "ää ..."
     assert text_bytes("the pad leaves", 14) == b"the pad leaves"
     assert text_bytes("the pad leaves", 13) == b"the pad ..."
     assert blank(small(), "no contact")[-1] == b"no contact"
-
-
-def test_a_full_disk_is_told_with_numbers(tmp_path, monkeypatch):
     usage = namedtuple("usage", "total used free")
     monkeypatch.setattr(shutil, "disk_usage", lambda _: usage(0, 0, 12345))
     with pytest.raises(StudyError) as caught:
         create(tmp_path / "x.hdf", small(), HEADER)
     assert caught.value.code == CANNOT_WRITE
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_only_the_file_of_this_scene_is_resumed(path):
+    assert list(tmp_path.iterdir()) == [path]
     verify(path, small(), HEADER)
     with pytest.raises(StudyError) as caught:
         verify(path, small(), replace(HEADER, digest="xyz"))
@@ -324,7 +306,7 @@ def test_data_from_elsewhere_are_not_read(path, tmp_path, put):
     assert caught.value.code == OTHER_FILE
 
 
-def test_a_lock_keeps_a_second_run_away_and_goes_with_its_holder(tmp_path):
+def test_a_lock_keeps_a_second_run_away_goes_with_its_holder_and_withdraws_when_overtaken(tmp_path):
     first, second = Lock(tmp_path / "x.hdf", "first"), Lock(tmp_path / "x.hdf", "second")
     first.take_first()
     first.confirm()
@@ -337,9 +319,6 @@ def test_a_lock_keeps_a_second_run_away_and_goes_with_its_holder(tmp_path):
     second.take_first()
     second.confirm()
     second.release()
-
-
-def test_a_run_that_was_overtaken_while_it_locked_withdraws(tmp_path):
     lock = Lock(tmp_path / "x.hdf", "first")
     lock.take_first()
     lock.path.write_text("second")  # between the exclusive and the shared lock

@@ -2,9 +2,6 @@
 
 import json
 import math
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,8 +11,8 @@ from softjaw.study.scene import Scene, SceneError, load_scene, parse_scene
 from softjaw.study.scene.model import tables_of
 from softjaw.study.scene.objects import SHAPES
 from softjaw.study.scene.section import RENAMED
+from tests.study.launching import ROOT, launch
 
-ROOT = Path(__file__).parents[3]
 JOBS = sorted((ROOT / "jobs").glob("*.toml"))
 SPHERE = 'shape = "sphere"\nradius_mm = 30'
 BALL = f"[object]\n{SPHERE}\n\n[candidates]\nstations_mm = [0]\n\n[load]\nnormal_force_n = [1]\n"
@@ -145,6 +142,8 @@ def test_a_text_that_is_no_toml_is_named_by_its_line(old, new, line):
      "object.wall_material"),
     (body('shape = "box"\nsize_mm = [60, 40, 120]\nedge_radius_mm = 21'), 4, "object.edge_radius_mm"),
     (body('shape = "plane"\nthickness_mm = 20'), 5, "candidates.angles_deg"),
+    (BALL.replace("stations_mm = [0]", "angles_deg = [0, 30]\n[[candidates.poses]]\npoint_mm = [0, 0, 0]\n"
+                  "approach = [1, 0, 0]\nlong_side = [0, 0, 1]"), 6, "candidates.angles_deg"),
 ])  # fmt: skip
 def test_an_object_that_makes_no_body_is_named_by_its_key(text, line, key):
     p = problem(text)
@@ -161,12 +160,6 @@ def test_an_explicit_pose_must_fix_a_frame(pose, key, found):
     p = problem(BALL.replace("stations_mm = [0]", f"[[candidates.poses]]\n{pose}"))
     assert (p.key, p.found) == (f"candidates.poses[0].{key}", found)
     assert p.line in (6, 7, 8, 9)
-
-
-def test_angles_beside_explicit_poses_are_refused():
-    pose = "[[candidates.poses]]\npoint_mm = [0, 0, 0]\napproach = [1, 0, 0]\nlong_side = [0, 0, 1]"
-    p = problem(BALL.replace("stations_mm = [0]", f"angles_deg = [0, 30]\n{pose}"))
-    assert (p.key, p.line) == ("candidates.angles_deg", 6)
 
 
 def test_every_problem_is_found_at_once_and_in_the_order_of_the_file():
@@ -199,21 +192,15 @@ def test_a_shape_without_dimensions_lists_all_that_it_needs(shape):
 def test_an_override_is_named_as_a_line_is(override, key, found):
     p = problem(BALL, override)
     assert (p.file, p.line, p.key, p.found) == (f"--set {override}", None, key, found)
+    assert problem(BALL, "friction.mu=1\n[x]").line is None  # which a terminal would obey
 
 
-def test_an_override_that_a_terminal_would_obey_is_refused():
-    assert problem(BALL, "friction.mu=1\n[x]").line is None
-
-
-def test_overrides_replace_values_and_the_other_way_of_giving_stations():
+def test_overrides_replace_values_which_are_in_si_units_and_hyperfoam_fills_in_its_terms():
     given = ["object.radius_mm=40", "gripper.material=linear", 'object.name="a ball"', "candidates.stations=3"]
     scene = parse_scene(BALL, overrides=[*given, "candidates.stations_mm=[-9, 9]", "sweep.friction.mu=[0.5, 1]"])
     assert (scene.object.radius_mm, scene.gripper.material, scene.object.name) == (40, "linear", "a ball")
     assert scene.candidates.station_values_mm == (-9, 0, 9)
     assert scene.sweep == {"friction.mu": (0.5, 1.0)}
-
-
-def test_values_are_in_si_units_and_lists_rise():
     scene = parse_scene(
         BOTTLE, overrides=["load.normal_force_n=[7, 2, 4]", "candidates.angles_deg=[90, 0]", "gripper.pad_width_mm=22"]
     )
@@ -227,9 +214,6 @@ def test_values_are_in_si_units_and_lists_rise():
     assert parse_scene(body('shape = "plane"\nthickness_mm = 20'), overrides=["candidates.angles_deg=[0]"])
     massive = parse_scene(BALL, "ball.toml", ["object.mass_g=250", "task.centre_of_mass_mm=[0, 0, 5]"])
     assert (massive.object.mass, massive.task.centre_of_mass) == (0.25, (0.0, 0.0, 0.005))
-
-
-def test_hyperfoam_fills_in_its_terms_and_its_modulus():
     one = parse_scene(BALL, overrides=["gripper.material=hyperfoam", "gripper.shear_modulus_kpa=30"])
     assert one.gripper.hyperfoam_terms == ((-2,), (30e3,))
     two = parse_scene(BALL, overrides=["gripper.material=hyperfoam", "gripper.terms_kpa=[[8, 10], [-2, 20]]"])
@@ -247,7 +231,7 @@ def test_values_that_are_seldom_meant_are_allowed_with_a_warning(overrides):
     assert not parse_scene(BALL).warnings
 
 
-def test_combinations_of_a_sweep_that_make_no_scene_are_named():
+def test_combinations_of_a_sweep_that_make_no_scene_are_named_and_too_many_refused():
     text = body('shape = "elliptic_cylinder"\nsemi_axis_a_mm = 20')
     text += '[sweep]\n"object.semi_axis_b_mm" = [20, 10]\n"object.length_mm" = [80, 3000]\n'
     p = problem(text)
@@ -258,9 +242,6 @@ def test_combinations_of_a_sweep_that_make_no_scene_are_named():
     # Each value fits the scene alone; together they make elements of 0.2 x 5 mm.
     p = problem(BALL, "sweep.gripper.pad_width_mm=[22, 2]", "sweep.gripper.pad_thickness_mm=[15, 30]")
     assert (p.key, p.found) == ("sweep", '"gripper.pad_width_mm = 2, gripper.pad_thickness_mm = 30"')
-
-
-def test_too_many_cases_are_refused():
     many = (
         "candidates.stations=10000", "candidates.stations_mm=[-30, 30]",
         "load.normal_force_n=" + str(list(range(1, 60))),
@@ -321,7 +302,7 @@ def test_shipped_scenes_load_without_warnings_and_survive_being_written_out(path
     assert again.effective_toml() == scene.effective_toml()
 
 
-def test_the_digest_follows_results_only():
+def test_the_digest_follows_results_only_rules_hold_in_python_and_the_schema_knows_every_key():
     digest = parse_scene(BALL).digest
     same = ["object.name=x", "run.patches=none", "petsc.contact_snes_monitor=true",
             "run.time_limit_s=5", "run.memory_gb=none"]  # fmt: skip
@@ -334,9 +315,6 @@ def test_the_digest_follows_results_only():
     listed = parse_scene(BALL, overrides=["candidates.stations_mm=[0, 5, 10]"])
     spread = parse_scene(BALL, overrides=["candidates.stations=3", "candidates.stations_mm=[0, 10]"])
     assert listed.digest == spread.digest
-
-
-def test_texts_survive_being_written_out_and_a_scene_holds_its_rules_in_python_too():
     name = 'a "b" \\ é 😀'
     scene = parse_scene(BALL).with_values({"object.name": name})
     assert parse_scene(scene.effective_toml()).object.name == name
@@ -350,17 +328,11 @@ def test_texts_survive_being_written_out_and_a_scene_holds_its_rules_in_python_t
     with pytest.raises(SceneError, match=r"friction\.mu"):
         scene.with_values({"friction.mu": -1.0})
     assert scene.with_values({"friction.mu": 0.5}).friction.mu == 0.5
-
-
-def test_the_schema_knows_every_key_and_its_range():
     schema = Scene.model_json_schema()
     json.dumps(schema)
     assert schema["$defs"]["Gripper"]["properties"]["pad_length_mm"]["maximum"] == 500
     assert all("description" in p for d in schema["$defs"].values() for k, p in d["properties"].items() if k != "shape")
     assert set(schema["required"]) == {"object", "candidates", "load"}
-
-
-def test_lines_of_keys_are_those_of_their_tables():
     text = (
         'candidates.stations_mm = [ # [not] = "this"\n 0, # }\n  "x" ]\nload = { normal_force_n = [1,\n 2, 0] }\n'
         "[object]\nshape = 'sphere'\n\"radius_mm\" = 0\n"
@@ -374,18 +346,14 @@ def test_lines_of_keys_are_those_of_their_tables():
     assert lines["petsc.contact_a"] == 11
 
 
-def test_checking_a_scene_starts_no_heavy_machinery():
+def test_a_scene_starts_no_heavy_machinery_is_that_of_tables_and_what_is_wrong_is_named_by_its_key(tmp_path):
     code = (
         "import sys; from softjaw.study.scene import load_scene, Scene; load_scene(sys.argv[1]);"
         "Scene.model_json_schema();"
         "heavy = {'numpy', 'scipy', 'numba', 'mpi4py', 'petsc4py', 'h5py', 'pyvista', 'skfem', 'matplotlib'};"
         "sys.exit(' '.join(heavy & set(sys.modules)) or 0)"
     )
-    done = subprocess.run([sys.executable, "-c", code, JOBS[0]], cwd=ROOT, capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stderr) == (0, "")
-
-
-def test_a_scene_from_tables_is_that_of_a_file_and_takes_numpy(tmp_path):
+    assert launch(0, "-c", code, JOBS[0]) == (0, "", "")
     ball = {"shape": "sphere", "radius_mm": np.float64(30)}
     made = Scene.from_dict({
         "object": ball, "candidates": {"stations_mm": np.array([0, 10])}, "load": {"normal_force_n": [np.int64(1), 2]},
@@ -396,15 +364,9 @@ def test_a_scene_from_tables_is_that_of_a_file_and_takes_numpy(tmp_path):
     assert Scene.from_file(file) == made == load_scene(str(file))
     assert Scene.from_file(file, ["object.radius_mm=20"]).object.radius == 0.02
     assert made.with_values(**{"gripper.elements": np.array([8, 4, 2])}).gripper.elements == (8, 4, 2)
-
-
-@pytest.mark.parametrize("tables", [5, {5: {}}])
-def test_tables_that_are_none_are_refused(tables):
-    with pytest.raises(TypeError):
-        Scene.from_dict(tables)
-
-
-def test_what_is_wrong_with_tables_is_named_by_its_key():
     with pytest.raises(SceneError) as refused:
         Scene.from_dict({"object": {"shape": "mesh", "mesh": "none.stl", "unit": "mm"}, "load": 5})
     assert {p.key for p in refused.value.problems} == {"candidates", "load", "object.mesh"}
+    for tables in (5, {5: {}}):
+        with pytest.raises(TypeError):
+            Scene.from_dict(tables)

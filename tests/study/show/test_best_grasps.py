@@ -57,7 +57,7 @@ def test_images_of_a_grasp_share_a_line_and_count_as_one(top):
     assert len(as_csv(best(pairs, top=top)).splitlines()) == 1 + (top or 6)
 
 
-def test_flags_are_counted_words_for_people_and_bits_for_programs():
+def test_flags_are_counted_words_or_bits_and_messages_that_differ_in_numbers_are_one_kind():
     both = float(Flag.HOLE | Flag.COARSE)
     table = best(study([[3.0], [2.0], [1.0]], flags=[0.0, float(Flag.HOLE), both]))
     assert cells(table, "notes") == ["", Flag.HOLE.word, f"{Flag.HOLE.word}, {Flag.COARSE.word}"]
@@ -67,9 +67,6 @@ def test_flags_are_counted_words_for_people_and_bits_for_programs():
     assert any(Flag.HOLE.sentence in note for note in table.notes)
     assert len(table.notes) <= MOST_NOTES
     assert max(map(len, table.notes)) <= NOTE
-
-
-def test_messages_that_differ_in_numbers_are_one_kind_and_failures_come_first():
     status = np.array([FAILED, DONE, FAILED, DONE])
     messages = np.array(["residual 1e-3", f"{Flag.HOLE.sentence}; slow", "residual 2.5", Flag.HOLE.sentence])
     kinds = grouped(status, messages, lambda: np.full(4, int(Flag.HOLE)))
@@ -104,7 +101,7 @@ def stations(table):
     return [row["station"] for row in table.rows]
 
 
-def test_a_force_between_two_solved_ones_lies_on_straight_lines():
+def test_a_force_between_two_solved_ones_lies_on_straight_lines_needs_both_and_carries_their_flags():
     columns = best(rising()).columns
     for force, held in ((1.0, 0.2), (2.5, 0.5), (5.0, 1.0)):
         table = best(rising(), force=force, by="payload")
@@ -114,9 +111,6 @@ def test_a_force_between_two_solved_ones_lies_on_straight_lines():
     for force in (0.9, 5.1):
         with pytest.raises(ValueError, match=f"{force:g} N"):
             best(rising(), force=force)
-
-
-def test_between_forces_a_case_needs_both_and_carries_the_flags_of_both():
     ds = rising()
     ds.status.values[0, 0, 1] = FAILED
     ds.flags.values[1, 0, 0], ds.flags.values[1, 0, 1] = Flag.HOLE, Flag.COARSE
@@ -127,17 +121,14 @@ def test_between_forces_a_case_needs_both_and_carries_the_flags_of_both():
     assert not best(ds, force=2.0).rows
 
 
-def test_grasps_are_ranked_by_payload_or_by_what_is_named():
+def test_grasps_are_ranked_by_payload_or_what_is_named_and_of_those_alike_the_simpler_comes_first():
     assert stations(best(rising())) == [1.0, 0.0]
     assert stations(best(rising(), by="quality")) == [0.0, 1.0]
     assert stations(best(rising(0.3))) == [1.0, 0.0]
     assert stations(best(rising(0.3), by="quality", force=5.0)) == [1.0, 0.0]  # the other is too weak there
     assert stations(best(rising(0.1), by="quality")) == [1.0, 0.0]
     assert stations(best(rising(0.1), by="quality", force=5.0)) == [0.0, 1.0]
-
-
-def test_grasps_are_ranked_by_the_least_force_where_a_mass_is_named():
-    """At 5 N the second holds more, but the first needs less force to hold 150 g twice over."""
+    # At 5 N the second holds more, but the first needs less force to hold 150 g twice over.
     ds = rising(0.15)
     ds.payload.values[0, 0], ds.payload.values[1, 0] = [[0.12], [0.45]], [[0.11], [0.9]]
     ds["force_low"].values[:] = [[3.2], [3.5]]
@@ -148,10 +139,7 @@ def test_grasps_are_ranked_by_the_least_force_where_a_mass_is_named():
     assert stations(best(ds, by="force")) == [1.0, 0.0]
     with pytest.raises(ValueError, match="mass_g"):
         best(rising(), by="force")
-
-
-def test_of_grasps_that_errors_cannot_tell_apart_the_simpler_comes_first():
-    """Payloads 1.00, 0.99, 0.985 with 2 % each cannot be told apart, 0.9 can."""
+    # Payloads 1.00, 0.99, 0.985 with 2 % each cannot be told apart, 0.9 can.
     ds = study([[1.0], [0.99], [0.985], [0.9]], flags=[float(Flag.NOT_ANTIPODAL), float(Flag.COARSE), 0.0, 0.0])
     assert stations(best(ds)) == [0.0, 1.0, 2.0, 3.0]
     ds["payload_error"] = (ds.status.dims, np.full(ds.status.shape, 0.02), {"units": ""})
@@ -165,7 +153,7 @@ def test_of_grasps_that_errors_cannot_tell_apart_the_simpler_comes_first():
     assert stations(best(ds)) == [0.0, 1.0]
 
 
-def test_without_a_mass_the_force_is_the_largest_that_most_share_and_with_one_the_lowest_that_holds():
+def test_the_force_is_the_largest_that_most_share_or_the_lowest_that_holds_a_mass_and_payload_in_grams():
     assert best(rising()).facts["force"] == 5.0
     some = rising()
     some.status.values[0, 0, 1] = FAILED
@@ -173,9 +161,6 @@ def test_without_a_mass_the_force_is_the_largest_that_most_share_and_with_one_th
     assert best(rising(0.3)).facts["force"] == 5.0
     assert best(rising(0.1)).facts["force"] == 1.0
     assert best(rising(3.0)).facts["force"] == 5.0  # none holds it
-
-
-def test_the_payload_is_shown_in_grams_and_stored_in_kilograms():
     table = best(study([[0.2], [0.1]]))
     assert cells(table, "payload") == ["200", "100"]
     assert [row["payload"] for row in table.rows] == [0.2, 0.1]
@@ -185,7 +170,7 @@ def test_the_payload_is_shown_in_grams_and_stored_in_kilograms():
 WIDE = ("mass", "wall", "two meshes")
 
 
-def test_errors_stand_with_what_they_belong_to():
+def test_errors_stand_with_what_they_belong_to_and_the_largest_is_found_with_its_place():
     table = best(study([[0.04]], needs=WIDE))
     for name in ("quality", "e_n", "f_x_max", "f_y_max", "tau_z_max"):
         column = next(c for c in table.columns if c.name == name)
@@ -195,9 +180,6 @@ def test_errors_stand_with_what_they_belong_to():
     assert cells(table, "opening_loaded") == ["40 ± 40"]  # its error is absolute
     assert table.facts["largest_error"]
     assert not any(c.error for c in best(study([[4.0]])).columns)
-
-
-def test_the_largest_error_is_found_with_its_place_and_how_many_have_none():
     known = study([[0.5, 0.5], [0.5, 0.5]], needs=WIDE)
     errors = np.array([[[0.01, 0.002], [np.nan, np.nan]], [[0.018, np.nan], [0.5, 0.001]]])
     over, states = known.status.dims, np.full((2, 2, 2), DONE)

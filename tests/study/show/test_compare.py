@@ -46,7 +46,7 @@ def column(table, name):
     return np.array([np.nan if row[name] is None else row[name] for row in table.rows], float)
 
 
-def test_common_places_are_found_by_value_and_the_others_named(pair):
+def test_common_places_are_found_by_value_and_differences_judged_by_the_errors_of_both_files(pair):
     found = compared(*pair)
     assert len(found.rows) == 3 * 6 * 2
     station = found.facts["axes"]["station"]
@@ -55,10 +55,7 @@ def test_common_places_are_found_by_value_and_the_others_named(pair):
     assert [*found.facts["states"].values()] == [35, 1, 0, 0]
     assert found.facts["axes"]["normal_force"]["only_a"].tolist() == [1.0, 8.0]
     assert found.facts["settings"] == [{"key": "friction.mu", "a": None, "b": 0.5}]
-
-
-def test_differences_are_judged_by_the_errors_of_both_files(pair):
-    """0.5 % stays within 1 % + 1 %, 10 % does not; a failed case has no difference."""
+    # 0.5 % stays within 1 % + 1 %, 10 % does not; a failed case has no difference.
     found = compared(*pair)
     change, relative = column(found, "difference"), column(found, "relative")
     beyond = [row["beyond_error"] for row in found.rows]
@@ -91,7 +88,7 @@ def test_rounding_is_no_difference_and_errors_of_one_file_alone_are_unknown(pair
     assert found.facts["settings"] == []
 
 
-def test_the_text_fits_a_terminal_and_lists_the_largest_first(pair):
+def test_the_text_fits_a_terminal_largest_first_and_programs_get_every_common_case_in_si(pair):
     found = compared(*pair)
     lines = compare_text(found, top=3).splitlines()
     assert max(map(len, lines[2:])) <= 80
@@ -102,9 +99,6 @@ def test_the_text_fits_a_terminal_and_lists_the_largest_first(pair):
     assert changes[0] == pytest.approx(1e3 * np.nanmax(column(found, "difference")), rel=1e-3)
     assert all(line.split()[-1] == "yes" for line in rows)
     assert len(compare_text(found, top=0).splitlines()) == len(lines) + 32
-
-
-def test_programs_get_every_common_case_in_si(pair):
     found = compared(*pair, quantity="quality", model="pcm")
     data = json.loads(as_json(found))
     assert data["axes"]["station"]["only_b"] == [0.1]
@@ -131,7 +125,7 @@ def test_maps_that_share_nothing_are_refused(pair, tmp_path, axes, name):
     assert error.value.code == USAGE
 
 
-def test_poses_are_shown_by_label_and_sweeps_of_words_by_word(tmp_path):
+def test_poses_are_shown_by_label_sweeps_by_word_and_commands_give_the_usual_codes(tmp_path, pair, capsys, monkeypatch):
     poses = make(tmp_path / "a.hdf", axes=grid_axes([0, 1], [0], poses=True), labels=("lid", "neck"))
     found = compared(poses, poses)
     assert [row["label"] for row in found.rows[::4]] == ["lid", "neck"]
@@ -144,9 +138,6 @@ def test_poses_are_shown_by_label_and_sweeps_of_words_by_word(tmp_path):
 
     found = compared(swept(["blatz_ko", "linear"]), swept(["blatz_ko", "hyperfoam"]))
     assert {row["material"] for row in found.rows} == {0.0}
-
-
-def test_commands_give_the_usual_exit_codes(pair, tmp_path, capsys, monkeypatch):
     a, b = pair
     assert told(["compare", a, b, "--top", 2], monkeypatch) == 0
     assert "2 of 35" in capsys.readouterr().out

@@ -24,28 +24,16 @@ from softjaw.study.show.best_grasps import best
 from softjaw.study.show.grasps import at, judge, order
 from softjaw.study.show.report import curves, tables, verdict
 from softjaw.study.show.report.writing import build, write_report
-from tests.study.formula_results import OBJECT, written
+from tests.study.formula_results import OBJECT, grid_axes, written
 
 FACES = (6, 4)
-SCENE = (
-    OBJECT
-    + """[candidates]
-stations_mm = [0, 10, 20, 30]
-[load]
-normal_force_n = [1, 5]
-"""
-)
+SCENE = f"{OBJECT}[candidates]\nstations_mm = [0, 10, 20, 30]\n[load]\nnormal_force_n = [1, 5]\n"
 SWEEP = SCENE + '[sweep]\n"object.semi_axis_b_mm" = [10, 25, 50]\n'
 VOID = {"meta", "img", "br", "link", "input", "hr"}
 
 
-def axis(name, values, units, long_name=""):
-    return Axis(name, np.asarray(values, float), units, long_name or f"the {name}")
-
-
-def axes(stations=(0, 0.01, 0.02, 0.03), angles=(0, 0.5, 1.0), forces=(1.0, 5.0), sweep=(), station_units="m"):
-    place = [axis("station", stations, station_units), axis("angle", angles, "rad"), axis("normal_force", forces, "N")]
-    return (*sweep, *place)
+def axes(stations=(0, 0.01, 0.02, 0.03), angles=(0, 0.5, 1.0), forces=(1.0, 5.0), **more):
+    return grid_axes(stations, angles, forces, **more)
 
 
 def patch():
@@ -129,7 +117,7 @@ def ordinary(tmp_path_factory):
     return path, written, Page(written.read_text())
 
 
-def test_the_page_needs_nothing_from_outside_and_runs_its_own_scripts_alone(ordinary):
+def test_the_page_is_well_formed_needs_nothing_from_outside_and_runs_its_own_scripts_alone(ordinary):
     _, written, page = ordinary
     html = written.read_text()
     scripts = re.findall(r"<script>(.*?)</script>", html, re.DOTALL)
@@ -144,10 +132,6 @@ def test_the_page_needs_nothing_from_outside_and_runs_its_own_scripts_alone(ordi
     assert all(link["href"].startswith("#") for link in page.tags("a"))
     assert not any(key.startswith("on") or key == "src" for _, attributes in page.found for key in attributes)
     assert not re.search(r"https?://", html.replace(scripts[0], ""))
-
-
-def test_the_page_is_well_formed_and_accessible(ordinary):
-    _, _, page = ordinary
     assert page.balanced
     assert page.tags("html")[0]["lang"] == "en"
     assert len(page.tags("h1")) == 1
@@ -175,7 +159,7 @@ def test_texts_of_the_file_are_escaped_in_the_page_and_in_its_figures(ordinary):
     assert "<b>3" not in re.sub(r'"words": {[^}]*}', "", notes)  # the script sets these as text
 
 
-def test_the_verdict_has_the_numbers_of_the_best_grasp_and_of_the_states(ordinary):
+def test_the_verdict_and_tables_have_the_numbers_of_the_best_grasps_and_of_the_states(ordinary):
     path, _, page = ordinary
     with open_result(path) as result:
         data = judge(dataset(result))
@@ -188,10 +172,7 @@ def test_the_verdict_has_the_numbers_of_the_best_grasp_and_of_the_states(ordinar
     assert any("10 % more quality" in sentence for sentence in sentences)
     assert [int(n) for n in re.findall(r"\d+", sentences[-1])] == [17, 24, 6, 1]
     assert all(sentence in page.text for sentence in sentences)
-
-
-def test_tables_of_the_page_have_the_best_grasps_and_the_best_one_at_each_force(ordinary):
-    with open_result(ordinary[0]) as result:
+    with open_result(path) as result:
         ranked, by_force = (block for block in tables.best_grasps(judge(dataset(result))) if block["kind"] == "table")
     assert ranked["first"]
     column = [row[ranked["head"].index("f_x_max [N]")] for row in ranked["rows"]]
@@ -220,7 +201,7 @@ def test_maps_show_every_case_in_both_models_with_crosses_for_failed_ones(ordina
     assert len(names) == len(set(names)) >= 5
 
 
-def test_values_have_their_error_where_the_file_has_it(tmp_path):
+def test_values_have_their_error_and_a_chosen_candidate_stands_beside_the_best_one(tmp_path):
     layout = Layout(axes(), 0, meshes=2)
     path = make(tmp_path / "two.hdf", layout, **{"maps/e_n_error": 0.0042, "maps/tau_z_max_error": 0.011})
     with open_result(path) as result:
@@ -229,11 +210,7 @@ def test_values_have_their_error_where_the_file_has_it(tmp_path):
     assert len(block["rows"]) == 24
     assert all("\N{NO-BREAK SPACE}±" in row[block["head"].index("e_n [mm]")] for row in block["rows"])
     assert not any("±" in row[block["head"].index("quality")] for row in block["rows"])
-
-
-def test_a_chosen_candidate_stands_beside_the_best_one(tmp_path):
-    """Case (3, 0, 1) has quality 5 / 4."""
-
+    # Case (3, 0, 1) has quality 5 / 4.
     def state(index):
         return "it slipped away" if index[:2] == (3, 2) else "done"
 
@@ -251,8 +228,8 @@ def test_a_chosen_candidate_stands_beside_the_best_one(tmp_path):
 
 
 SMALL = axes(stations=(0.01,), angles=(0.0,), forces=(3.0,))
-POSES = axes(stations=(0, 1), angles=(0.0,), forces=(1.0, 2.0), station_units="")
-TEXTS = (replace(axis("material", (0, 1), "", "gripper.material"), options=("blatz_ko", "neo_hookean")),)
+POSES = axes(stations=(0, 1), angles=(0.0,), forces=(1.0, 2.0), poses=True)
+TEXTS = (Axis("material", np.array([0.0, 1.0]), "", "gripper.material", ("blatz_ko", "neo_hookean")),)
 
 
 @pytest.mark.parametrize(("layout", "options", "expected"), [
@@ -280,7 +257,7 @@ def test_the_verdict_warns_of_what_the_best_case_lacks(tmp_path, layout, values,
         assert expected in " ".join([*lines, *verdict.verdict(data), *verdict.warnings(data)])
 
 
-def test_the_verdict_says_why_a_higher_score_is_not_the_best_grasp(tmp_path):
+def test_the_verdict_says_why_a_higher_score_is_not_the_best_grasp_and_the_same_file_gives_the_same_page(tmp_path):
     with open_result(make(tmp_path / "two.hdf", Layout(axes((0, 0.02), (0.0,), (1.0,)), 0))) as result:
         data = judge(dataset(result))
         worse, better = sorted(order(data, 0), key=lambda i: at(data, "quality", i))
@@ -290,17 +267,21 @@ def test_the_verdict_says_why_a_higher_score_is_not_the_best_grasp(tmp_path):
         data = judge(marked)
         assert data.attrs["best"] == worse
         assert Flag.TOO_STRONG.word in best_grasps.answer(data, worse)["limit"][1]
-
-
-def test_the_same_file_gives_the_same_bytes(tmp_path):
     path = make(tmp_path / "small.hdf", Layout(SMALL, 24))
     one, two = (write_report(path, tmp_path / name) for name in ("one.html", "two.html"))
     assert one.read_bytes() == two.read_bytes()
+    with pytest.raises(StudyError, match="html") as error:
+        write_report(path, path)
+    assert error.value.code == CANNOT_WRITE
+    with pytest.raises(StudyError) as error:
+        write_report(tmp_path / "none.hdf", tmp_path / "r.html")
+    assert error.value.code == OTHER_FILE
+    assert {p.name for p in tmp_path.iterdir()} == {"two.hdf", "small.hdf", "one.html", "two.html"}
 
 
-def test_differences_are_drawn_over_the_ratio_of_the_axes_and_the_curvature(tmp_path):
+def test_differences_are_drawn_over_the_ratio_of_the_axes_and_a_page_escapes_every_kind_of_block(tmp_path):
     """Pressed along a = 25 mm: a / b = 2.5, 1, 0.5 and a / b^2 = 250, 40, 10 per metre."""
-    sweep = (axis("semi_axis_b", (0.01, 0.025, 0.05), "m", "object.semi_axis_b_mm"),)
+    sweep = (Axis("semi_axis_b", np.array([0.01, 0.025, 0.05]), "m", "object.semi_axis_b_mm"),)
     layout = Layout(axes((0.0,), (0.0,), (1.0, 5.0), sweep=sweep), 0)
     path = make(tmp_path / "sweep.hdf", layout, scene=SWEEP, **{"maps/f_y_overestimate": 0.04})
     with open_result(path) as result:
@@ -311,21 +292,7 @@ def test_differences_are_drawn_over_the_ratio_of_the_axes_and_the_curvature(tmp_
     assert ratio.x == pytest.approx([0.5, 1, 2.5])
     assert curvature.x == pytest.approx([10, 40, 250])
     assert ratio.y == pytest.approx([4, 4, 4])
-
-
-def test_files_that_must_not_be_overwritten_or_cannot_be_written(tmp_path):
-    path = make(tmp_path / "study.hdf", Layout(SMALL, 0))
-    with pytest.raises(StudyError, match="html") as error:
-        write_report(path, path)
-    assert error.value.code == CANNOT_WRITE
-    with pytest.raises(StudyError) as error:
-        write_report(tmp_path / "none.hdf", tmp_path / "r.html")
-    assert error.value.code == OTHER_FILE
-    assert [p.name for p in tmp_path.iterdir()] == ["study.hdf"]
-
-
-def test_a_page_escapes_every_kind_of_block():
-    """Also where a reader's attributes are made of it."""
+    # Also where a reader's attributes are made of it.
     evil = "</script><script>x</script>'\"&<b>"
     blocks = [text(evil), text("a", evil), heading(evil), box([evil], evil), answer([(evil, evil, evil)]),
               bullets([evil]), verbatim(evil), table(evil, [evil], [[evil]], texts=(0,)),

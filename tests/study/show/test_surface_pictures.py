@@ -14,28 +14,22 @@ from softjaw.study.show.grasps import field, judge
 from softjaw.study.show.report.contact import limit_surfaces
 from softjaw.study.show.stored_surface import circle, shadow_outline, stored_surface
 from softjaw.study.show.view.model import View
+from tests.lsfit.test_form import coefficients
 from tests.study.show.test_report import axes, make, patch
 
 MU, RHO = 0.5, 0.02
+S = float((patch()["pressure"] * patch()["area"])[0].sum())
 SEMI = np.array([1.0, 0.9, 0.3])
 
 
 def squared_ellipsoid(semi):
-    """Coefficients of ``(w A w)^2`` with ``A = diag(1 / semi^2)``, from the expansion of the square."""
-    E, found = exponents(3, 4).tolist(), np.zeros(15)
-    for i in range(3):
-        for j in range(3):
-            power = [0, 0, 0]
-            power[i] += 2
-            power[j] += 2
-            found[E.index(power)] += (semi[i] * semi[j]) ** -2.0
-    return found
+    """Coefficients of ``(w A w)^2`` with ``A = diag(1 / semi^2)``."""
+    return coefficients(lambda w: ((w / semi) ** 2).sum(axis=1) ** 2, 3)
 
 
 @pytest.fixture(scope="module")
 def file(tmp_path_factory):
     """Two stations whose contacts carry the patch of the report's tests, and a quartic that is an ellipsoid."""
-    S = float((patch()["pressure"] * patch()["area"])[0].sum())
     scale = np.array([1.0, 1.0, RHO])
     values = {
         "limit_surface/semi_axes": np.broadcast_to(MU * SEMI * scale, (2, 3, 3)),
@@ -66,12 +60,12 @@ def test_shadows_of_ellipsoids_are_ellipses(i, j):
         assert ((outline / SEMI[[i, j]]) ** 2).sum(axis=1) == pytest.approx(1.0, rel=1e-7)
 
 
-def test_surfaces_and_exact_wrenches_are_rebuilt_from_the_file(file):
+def test_surfaces_and_exact_wrenches_are_rebuilt_from_the_file_and_shown(file):
     with open_result(file) as result:
         data = judge(dataset(result))
         faces = View(data).faces((1, 0, 0))
         flat, curved = (stored_surface(data, (1, 0, 0), 1, model, faces) for model in ("pcm", "ccm"))
-    assert flat.unit == pytest.approx(MU * patch_S() * np.array([1.0, 1.0, 1e3 * RHO]))
+    assert flat.unit == pytest.approx(MU * S * np.array([1.0, 1.0, 1e3 * RHO]))
     assert flat.ellipsoid.semi_axes == pytest.approx(SEMI)
     assert flat.chosen.radius(np.eye(3)) == pytest.approx(SEMI)
     # a plane contact slides alike in every direction, and turning it takes no more than all its load at the rim
@@ -81,18 +75,11 @@ def test_surfaces_and_exact_wrenches_are_rebuilt_from_the_file(file):
     assert 0 < flat.wrenches(np.array([[0.0, 0.0, 1.0]]))[0, 2] * RHO < 0.01 * np.sqrt(2)
     assert curved.samples(50).sum(axis=0) == pytest.approx(0.0, abs=1e-12)
     assert len(curved.samples(50)) == 100
-
-
-def patch_S():
-    return float((patch()["pressure"] * patch()["area"])[0].sum())
-
-
-def test_figures_show_both_models_with_their_exact_wrenches(file):
     with open_result(file) as result:
         shown = limit_surfaces(View(judge(dataset(result))), (0, 0, 0))["figure"].data
     surfaces = [trace for trace in shown if trace.type == "surface"]
     assert len(surfaces) == 2  # CCM and PCM
-    reach = MU * patch_S() * SEMI * [1, 1, 1e3 * RHO]
+    reach = MU * S * SEMI * [1, 1, 1e3 * RHO]
     for trace in surfaces:
         assert [np.abs(a).max() for a in (trace.x, trace.y, trace.z)] == pytest.approx(reach, rel=1e-6)
     assert sum(trace.type == "scatter" and trace.mode == "markers" for trace in shown) == 2 * 3

@@ -1,4 +1,4 @@
-"""The three-dimensional views: which triangle belongs to which candidate, where pads stand, and what a reader sees."""
+"""Views in three dimensions: which triangle belongs to which candidate, where pads stand; and the report as text."""
 
 import base64
 import json
@@ -6,6 +6,7 @@ import math
 import re
 import shutil
 
+import h5py
 import matplotlib
 import numpy as np
 import pytest
@@ -16,14 +17,17 @@ from softjaw.fem.objects.shapes import EllipticCylinder
 from softjaw.study.cli import main
 from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, USAGE, StudyError
 from softjaw.study.quantities import ALONG, AROUND
+from softjaw.study.result.layout import REPORT_BYTES
 from softjaw.study.result.read import dataset
 from softjaw.study.result.store import open_result
 from softjaw.study.show.grasps import judge, order
 from softjaw.study.show.object_surface import NOBODY, Cells, areas, between, coloured, cut, moved, pressed
+from softjaw.study.show.report.verdict import plain_report
 from softjaw.study.show.view.model import View, quantity_of, view_of
 from softjaw.study.show.view.object3d import object_block, payload, view_page
 from softjaw.study.show.view.pads import pads_of
 from tests.study.scenes import mesh_of, text_of
+from tests.study.sealing import sealed
 from tests.study.view_files import CLOSING, FAILED, PRESSURE, SIZE, make, quality
 
 
@@ -43,7 +47,7 @@ def corners_on(body):
     return np.asarray(points, float)[triangles]
 
 
-def test_cutting_keeps_the_area_and_leaves_no_triangle_on_both_sides():
+def test_cutting_keeps_the_area_and_each_candidate_owns_its_interval_and_what_its_pads_meet():
     corners = corners_on(EllipticCylinder(0.03, 0.02, 0.1))
     whole = areas(corners).sum()
     for normal, offset in (((0, 0, 1.0), 0.0123), ((0.6, 0.8, 0), 0.004), ((0, 1.0, 0), 0.0)):
@@ -51,19 +55,13 @@ def test_cutting_keeps_the_area_and_leaves_no_triangle_on_both_sides():
         d = corners @ normal - offset
         assert not ((d.min(axis=1) < -1e-9) & (d.max(axis=1) > 1e-9)).any()
     assert areas(corners).sum() == pytest.approx(whole, rel=1e-12)
-
-
-def test_a_grasp_owns_what_its_pads_meet_and_the_first_has_what_two_do():
-    """Two pads of 50 mm x 22 mm on a plate of two triangles, the second 30 mm further; a third one passes."""
+    # Two pads of 50 mm x 22 mm on a plate of two triangles, the second 30 mm further; a third one passes.
     corners = np.array([[[-1, -1, 0], [1, -1, 0], [1, 1, 0]], [[-1, -1, 0], [1, 1, 0], [-1, 1, 0]]]) * 0.1
     places = [(0.0, 0.0, 0.0), (0.03, 0.0, -1e-3), (0.0, 0.0, 2e-3)]
     feet = [(n, Pose(np.eye(3), np.array(x)), 2e-3) for n, x in enumerate(places)]
     cut_up, cell = pressed(corners, feet, (0.05, 0.022))
     area = [areas(cut_up[cell == n]).sum() for n in (0, 1, 2, NOBODY)]
     assert area == pytest.approx([50e-3 * 22e-3, 30e-3 * 22e-3, 0.0, 0.04 - 80e-3 * 22e-3], rel=1e-9)
-
-
-def test_each_candidate_owns_its_interval_under_both_fingers():
     cells = Cells(np.array([0.03, -0.01, 0.01]), np.radians([0, 90]), 2, 0.05, 0.022)
     corners, cell = coloured(corners_on(EllipticCylinder(0.03, 0.03, 0.2)), cells)
     area = areas(corners)
@@ -89,20 +87,17 @@ def test_cells_repeat_as_the_object_does(symmetry, share):
     assert (at == 1).mean() == pytest.approx(1 / 2 if symmetry == 4 else 1 / 4, abs=1e-3)
 
 
-def test_a_lone_angle_claims_what_its_pads_cover_unless_all_angles_are_alike():
+def test_a_lone_angle_claims_what_its_pads_cover_and_a_wall_moves_bilinearly_between_its_places():
     phi = np.radians(np.arange(0, 360, 0.1))
     x = 0.03 * np.stack([np.cos(phi), np.sin(phi), 0 * phi], axis=1)
     alone = Cells(np.array([0.0]), np.array([0.0]), 2, 0.05, 0.02).at(x)
     assert (alone == 0).mean() == pytest.approx(2 * math.asin(1 / 3) / math.pi, abs=2e-3)
     assert (Cells(np.array([0.0]), np.array([0.0]), 0, 0.05, 0.02).at(x) == 0).all()
-
-
-def test_a_wall_moves_bilinearly_between_the_places_of_its_grid_that_begins_at_finger_one():
     i, j = np.meshgrid(np.arange(AROUND), np.arange(ALONG), indexing="ij")
     grid = np.stack([np.cos(2 * np.pi * i / AROUND), 1.0 * j, 0.0 * j], axis=-1)
     assert between(grid, np.array([3.0, 3.5]), np.array([7.25, ALONG - 1.0]))[:, 1] == pytest.approx([7.25, ALONG - 1])
-    one, other = between(grid, np.array([AROUND - 0.5, -0.5]), np.array([0.0, 0.0]))[:, 0]
-    assert one == other == pytest.approx(0.5 * (1 + math.cos(2 * math.pi / AROUND)))
+    both = between(grid, np.array([AROUND - 0.5, -0.5]), np.array([0.0, 0.0]))[:, 0]
+    assert both == pytest.approx([0.5 * (1 + math.cos(2 * math.pi / AROUND))] * 2)
     u = np.zeros((AROUND, ALONG, 3))
     u[0] = (-1e-3, 0, 0)  # under finger 1
     shifts = moved(np.array([[12.0, 5.0], [0.0, 5.0], [np.nan, 5.0]]), u, angle=math.pi / 2)
@@ -110,7 +105,7 @@ def test_a_wall_moves_bilinearly_between_the_places_of_its_grid_that_begins_at_f
     assert not shifts[1:].any()
 
 
-def test_pads_stand_where_the_file_says(shown):
+def test_pads_stand_where_the_file_says_and_arrows_add_up_to_the_friction_of_the_whole(shown):
     view, index = shown
     assert index == (1, 0, 1)
     one, two = view.pads(index)
@@ -124,11 +119,7 @@ def test_pads_stand_where_the_file_says(shown):
         np.cross(*np.diff(one.quads()[:, [0, 2, 1, 3]].reshape(-1, 2, 2, 3), axis=2)[:, :, 0].swapaxes(0, 1)), axis=1
     )
     assert area == pytest.approx(one.area.ravel())
-
-
-def test_arrows_add_up_to_the_friction_of_the_whole(shown):
-    """Flat front, slip along x: every force along x, mu left out; a turn about the middle gives no net force."""
-    view, index = shown
+    # Flat front, slip along x: every force along x, mu left out; a turn about the middle gives no net force.
     pad = view.pads(index)[0]
     places, forces = pad.friction("x")
     assert len(places) == pad.loaded.sum() == 4
@@ -152,7 +143,7 @@ def test_a_mesh_is_drawn_in_the_frame_of_its_file(tmp_path, axis):
     np.testing.assert_allclose(1e3 * drawn.max(axis=0), box.bounds[1], atol=1e-3)
 
 
-def test_no_pads_are_invented(file, tmp_path, shown):
+def test_no_pads_are_invented_and_a_case_is_chosen_by_number_place_or_score(file, tmp_path, shown):
     view, _ = shown
     assert view.pads(FAILED) == []
     assert view.pads((0, 0, 1)) == []
@@ -163,9 +154,6 @@ def test_no_pads_are_invented(file, tmp_path, shown):
         assert one.pressure.size == 0
         assert one.face.shape == (2, 2, 3)
         assert len(one.friction("x")[0]) == 0
-
-
-def test_a_case_is_chosen_by_number_place_or_score(shown):
     data = shown[0].ds
     chosen = {
         (None, None, None, 1.0): (1, 0, 0),
@@ -191,7 +179,7 @@ def every(view):
     return [i for k in (1, 0) for i in order(view.ds, k)]
 
 
-def test_the_page_holds_every_solved_case(shown):
+def test_the_page_holds_every_solved_case_with_pads_friction_and_limit_surface_where_the_file_says(shown):
     view, index = shown
     told, left_out = payload(view, index, "quality", every(view), "x", whole=True)
     assert left_out == 0
@@ -206,9 +194,6 @@ def test_the_page_holds_every_solved_case(shown):
     assert points == pytest.approx(1e3 * view.surface.points, rel=1e-6)
     assert (owner == view.owner).all()
     assert (unpacked(told["triangles"], "<i4").reshape(-1, 3) == view.surface.triangles).all()
-
-
-def test_pads_friction_and_limit_surface_of_a_case_are_where_the_file_says(shown):
     view, index = shown
     one = payload(view, index, "quality", [index], "x", whole=True)[0]["cases"]["1 2"]
     both = view.pads(index)
@@ -223,7 +208,7 @@ def test_pads_friction_and_limit_surface_of_a_case_are_where_the_file_says(shown
     assert "limit" not in payload(view, index, "quality", [index], "x", whole=False)[0]["cases"]["1 2"]
 
 
-def test_the_page_is_well_formed_and_needs_nothing(shown):
+def test_the_page_is_well_formed_needs_nothing_and_says_what_it_leaves_out_to_stay_small(shown, monkeypatch):
     html = view_page(*shown, "quality", "turn")
     own = re.sub(r"<script>.*?</script>", "", html, flags=re.S)
     assert not re.search(r"""(?:src|href)=["'](?!data:)|https?://""", own)
@@ -232,9 +217,6 @@ def test_the_page_is_well_formed_and_needs_nothing(shown):
     assert json.loads(text)["layout"]["meta"]["object3d"]["start"]["candidate"] == 2
     assert "<title>&lt;b&gt;thing&lt;/b&gt;</title>" in own
     assert html.count("</script>") == 3
-
-
-def test_a_page_that_would_grow_too_large_says_what_it_leaves_out(shown, monkeypatch):
     monkeypatch.setattr("softjaw.study.show.view.object3d.MOST", 0)
     view, index = shown
     told, left_out = payload(view, index, "quality", [index, *every(view)], "x", whole=False)
@@ -243,7 +225,7 @@ def test_a_page_that_would_grow_too_large_says_what_it_leaves_out(shown, monkeyp
     assert "10" in object_block(view, index, "quality", "x", [index, *every(view)])["caption"]
 
 
-def test_the_command_refuses_names_that_nothing_would_open(file, tmp_path, capsys):
+def test_the_command_writes_the_page_and_refuses_names_that_nothing_would_open(file, tmp_path, capsys):
     for words, code in (
         (["--screenshot", tmp_path / "a.jpg"], USAGE), (["--html", tmp_path / "no" / "a.html"], CANNOT_WRITE),
         (["--candidate", "17", "--html", tmp_path / "a.html"], USAGE),
@@ -255,9 +237,6 @@ def test_the_command_refuses_names_that_nothing_would_open(file, tmp_path, capsy
     assert all(line.startswith("error: ") for line in errors)
     assert main(["view", str(tmp_path / "no.hdf"), "--html", str(tmp_path / "a.html")]) == OTHER_FILE
     assert not list(tmp_path.iterdir())
-
-
-def test_the_command_writes_the_page(file, tmp_path, capsys):
     assert main(["view", str(file), "--at", "20", "--force", "1", "--html", str(tmp_path / "a.html")]) == 0
     assert capsys.readouterr().out == f"written: {tmp_path / 'a.html'}\n"
     html = (tmp_path / "a.html").read_text()
@@ -289,3 +268,20 @@ def test_a_picture_without_a_screen_shows_object_pads_and_limit_surface(file, tm
     assert (below[0].min(axis=-1) < 200).mean() > 4 * (below[1].min(axis=-1) < 200).mean()
     changed = (found["best"] != found["turn"]).any(axis=-1)
     assert 1e-4 < changed[:, :930].mean() < 0.05  # the arrows, and nothing else on the left
+
+
+def test_it_counts_the_cases_tells_their_reasons_and_names_no_folder(tmp_path):
+    path = make(tmp_path / "thing.hdf")
+    with open_result(path) as result:
+        text = plain_report(dataset(result))
+    for words in ("<b>thing</b>", "station 0 mm, angle 0 deg", "1 x failed", "no </script> convergence", "10 of 12"):
+        assert words in text
+    assert str(tmp_path) not in text  # the same bits wherever it is solved
+    assert max(map(len, text.splitlines())) <= 120
+    assert len(text.encode()) < REPORT_BYTES
+    with h5py.File(path, "r+") as file:
+        file["study/status/code"][...] = 2
+    with open_result(sealed(path)) as result:
+        text = plain_report(dataset(result))
+    assert "0 of 12" in text
+    assert "11 x failed" in text

@@ -18,7 +18,7 @@ def blocks(tmp_path_factory):
     return pv.read(folder / "seen.vtm")
 
 
-def test_the_object_has_the_maps_of_each_candidate_on_its_cell(blocks):
+def test_the_object_has_the_maps_of_each_candidate_and_pads_stand_where_the_poses_put_them(blocks, tmp_path):
     body = blocks["object"]
     cell, status = body["candidate"], body["status, 5 N"]
     for candidate, index in enumerate(np.ndindex(3, 2)):
@@ -28,9 +28,6 @@ def test_the_object_has_the_maps_of_each_candidate_on_its_cell(blocks):
     assert np.isnan(body["quality, 1 N"][cell == -1]).all()
     assert {int(code) for code in status[cell == 5]} == {2}
     assert body.compute_cell_sizes()["Area"][cell >= 0].sum() == pytest.approx(0.06 * RING, rel=1e-3)
-
-
-def test_pads_stand_where_the_poses_put_them_with_their_pressure(blocks):
     assert blocks.keys() == ["object", "pads, 1 N", "pads, 5 N"]
     for force, missing in ((1, ()), (5, (0, 5))):  # candidates 0 and 5 have no result at 5 N
         pads = blocks[f"pads, {force} N"]
@@ -48,9 +45,6 @@ def test_pads_stand_where_the_poses_put_them_with_their_pressure(blocks):
                 at = side * (0.025, 0.02)[angle] * away + [0, 0, (-0.02, 0.0, 0.02)[station]]
                 assert np.asarray(face.cell_centers().points).mean(axis=0) == pytest.approx(at, abs=1e-7)
                 assert face["normal"] @ away == pytest.approx(np.full(face.n_cells, -side))
-
-
-def test_the_object_alone_and_a_name_that_is_no_vtk_file(tmp_path):
     file = make(tmp_path / "thing.hdf", patches=False)
     assert main(["export", str(file), "--format", "vtk", "-o", str(tmp_path / "body.vtp")]) == 0
     assert "quality, 5 N" in pv.read(tmp_path / "body.vtp").cell_data

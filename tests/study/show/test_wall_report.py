@@ -75,7 +75,7 @@ def changed(path, folder, name, values, index=...):
     return sealed(other)
 
 
-def test_the_size_of_a_shell_is_that_of_the_mesh_that_is_solved(solved):
+def test_the_size_of_a_shell_is_that_of_its_mesh_and_show_has_indentations_stress_and_the_window(solved, can):
     scene = solved[0].with_values({"accuracy.wall_element_mm": 4.0})
     size = wall_unknowns(scene)[1]
     for roll in (0.0, 90.0, 30.0):
@@ -88,9 +88,6 @@ def test_the_size_of_a_shell_is_that_of_the_mesh_that_is_solved(solved):
     assert wall_unknowns(fine)[1] > 2.5 * size
     assert memory(fine) > memory(scene)
     assert memory(scene) > memory(scene.with_values({"effects.object": "rigid"}))
-
-
-def test_show_has_indentations_stress_and_the_window_of_forces(can):
     with open_result(can) as result:
         table, strong = best(dataset(result)), best(dataset(result), force=3.0)
         low, high = result.derived("force_low"), result.derived("force_high")
@@ -129,7 +126,7 @@ def test_cases_outside_their_window_are_judged_by_the_force():
     assert ranking(np.array([4.0, 1, 2, 5]), flags[0]).tolist() == [2, 1, 3, 0]
 
 
-def test_the_report_answers_at_a_force_that_the_wall_bears(can, solved):
+def test_the_report_answers_at_a_force_that_the_wall_bears_and_shows_the_wall_as_it_is_deformed(can, solved):
     """3 N indentation the can by more than is allowed; at 1 N both stations are safe."""
     with open_result(can) as result:
         data = judge(dataset(result))
@@ -146,10 +143,7 @@ def test_the_report_answers_at_a_force_that_the_wall_bears(can, solved):
     assert np.add(bars.base, bars.y) == pytest.approx(bars.customdata)
     level = over_force["figure"].layout.updatemenus[0].buttons[-1]
     assert level.args[0]["z"][0] == [[2.0, 2.0]] * 2  # nonlinear shell at both forces
-
-
-def test_sections_and_the_object_show_the_wall_as_it_is_deformed(can, solved):
-    """The can's radius is 30 mm; its wall comes nearer to the axis by the indentation, less the motion as a whole."""
+    # The can's radius is 30 mm; its wall comes nearer to the axis by the indentation, less the motion as a whole.
     with open_result(can) as result:
         data, scene = judge(dataset(result)), solved[0]
         place = result.read("wall/place")[0, 0, 1].reshape(48, 40, 3)

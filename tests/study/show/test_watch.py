@@ -47,7 +47,7 @@ def watched(run, stream):
     return watch(file_look(run.path), 3.0, stream, run.sleep), stream.getvalue()
 
 
-def test_a_round_of_further_stations_is_another_file_with_more_cases(tmp_path, monkeypatch):
+def test_a_round_is_another_file_with_more_cases_and_a_finished_run_ends_the_view_with_its_code(tmp_path, monkeypatch):
     path, steps = tmp_path / "a.hdf", [1]
     make(path, axes=grid_axes(np.arange(4) * 0.01))
     monkeypatch.setattr(view, "holder", lambda _: "host node7, 8 ranks" if steps else "")
@@ -60,9 +60,6 @@ def test_a_round_of_further_stations_is_another_file_with_more_cases(tmp_path, m
     assert watch(file_look(path), 3.0, stream, grow) == 0
     assert "96/96 done" in stream.getvalue()
     assert "120/120 done, round 1 of further grasps" in stream.getvalue()
-
-
-def test_a_finished_run_ends_the_view_with_its_exit_code(tmp_path, monkeypatch):
     run = Run(tmp_path / "a.hdf", [(40, DONE), (0, DONE), (SIZE - 40, DONE)], monkeypatch)
     code, text = watched(run, io.StringIO())
     assert code == 0
@@ -70,6 +67,12 @@ def test_a_finished_run_ends_the_view_with_its_exit_code(tmp_path, monkeypatch):
     lines = [line.partition("] ")[2] for line in text.splitlines() if line.startswith("[")]
     assert lines == ["0/96 done", "40/96 done", "96/96 done"]  # what has not changed is not told again
     assert "\x1b" not in text
+    run = Run(tmp_path / "a.hdf", [(8, DONE)], monkeypatch)
+
+    def interrupted(_):
+        raise KeyboardInterrupt
+
+    assert watch(file_look(run.path), 1.0, io.StringIO(), interrupted) == INTERRUPTED
 
 
 @pytest.mark.parametrize(("last", "code"), [((8, FAILED), 6), ((4, DONE), 75)])
@@ -90,15 +93,6 @@ def test_a_terminal_is_drawn_over_itself(tmp_path, monkeypatch):
     assert "payload" in begun  # the best so far
     assert "no contact at this force" in failing
     assert "\x1b[1A\x1b[2K" in begun  # what was drawn is wiped
-
-
-def test_ctrl_c_ends_the_view_and_not_the_run(tmp_path, monkeypatch):
-    run = Run(tmp_path / "a.hdf", [(8, DONE)], monkeypatch)
-
-    def interrupted(_):
-        raise KeyboardInterrupt
-
-    assert watch(file_look(run.path), 1.0, io.StringIO(), interrupted) == INTERRUPTED
 
 
 @pytest.mark.parametrize("words", [["watch", "no.hdf"], ["watch", "a.hdf", "--every", "0"]])
