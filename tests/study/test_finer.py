@@ -42,7 +42,7 @@ def test_rivals_are_those_that_may_be_better_than_the_last_of_the_list_or_than_t
 
 
 def test_a_case_keeps_its_coarse_values_until_finer_ones_replace_them(scene, tmp_path):
-    made = with_sampled_grasps(load_scene(scene))
+    made = with_sampled_grasps(load_scene(scene, ["candidates.sampled=4"]))
     first, path = make_plan(made), tmp_path / "a.hdf"
     create(path, first.layout, first.header)
     row = (0, 3, 1)

@@ -97,7 +97,7 @@ def test_a_bowl_is_held_from_outside_or_by_its_bottom_and_springs_on_a_face_hold
     assert max((g for g in grasps if not g.state), key=lambda g: g.payload).opening > 0.07
     # [mm]; a few millimetres off the middle a pad bears on the wall and holds a third.
     bowl = revolved(1e-3 * np.array([(0, 0), (25, 0), (45, 12), (68, 52), (64.5, 52), (42.5, 15.5), (24, 4), (0, 4)]))
-    best = antipodal_grasps(surface(bowl), NARROW, Task(np.array([0, 0, 0.02])), 4)[0]
+    best = antipodal_grasps(surface(bowl), NARROW, Task(np.array([0, 0, 0.02])), 4, samples=150)[0]
     assert np.abs(best.point[:2]).max() < 1e-3
     assert abs(best.approach[2]) > 0.999
     # A pad on a large plate: the nearest side of two friction cones, and less for a load that stands beside it.
@@ -126,11 +126,11 @@ def test_no_pad_is_put_over_a_hole_and_grasps_are_spread_over_the_places_of_an_o
     assert grip.over(at(0.028, 0.0))
     assert not grip.over(at(0.031, 0.0))
     assert not grip.over(at(0.0, 0.02))  # in between, out of reach
-    assert len(antipodal_grasps(body, NARROW, TASK, 20, samples=80)) > 3
+    assert len(antipodal_grasps(body, NARROW, TASK, 6, samples=40)) > 3
     corners = body[0][body[1]]
     all_over = corners[np.ptp(corners[..., 2], axis=1) == 0.0]  # both large faces
     # where there is no other place a pad is put over a hole all the same
-    assert [g for g in antipodal_grasps(body, NARROW, TASK, 20, samples=80, lids=all_over) if not g.state]
+    assert [g for g in antipodal_grasps(body, NARROW, TASK, 4, samples=40, lids=all_over) if not g.state]
     can = surface(trimesh.creation.cylinder(0.03, 0.2, sections=96))
     heights = sorted(g.point[2] for g in antipodal_grasps(can, NARROW, TASK, 8, samples=150) if not g.state)
     assert len(heights) == 8
