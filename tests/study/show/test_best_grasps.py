@@ -18,6 +18,7 @@ from softjaw.study.show.grasps import judge
 from softjaw.study.show.status import grouped
 from softjaw.study.table import MOST_NOTES, NOTE, as_csv, as_json
 from tests.study import formula_results
+from tests.study.scenes import pose_of
 
 FORCES = np.array([1.0, 5.0])
 
@@ -216,21 +217,8 @@ def test_grasps_less_than_half_a_pad_apart_share_a_line_unless_they_are_rolled()
     assert len(distinct(ds, order, np.array([5.0, 4, 3, 2]), 0, top=2)) == 2
 
 
-WALL = """
-[object]
-shape = "box"
-size_mm = [300, 40, 300]
-edge_radius_mm = 2
-[gripper]
-preset = "franka_hand"
-[candidates]
-poses = [
-  { point_mm = [0, 0, 0], approach = [0, 1, 0], long_side = [1, 0, 0] },
-  { point_mm = [140, 0, 0], approach = [0, 1, 0], long_side = [1, 0, 0] },
-]
-[load]
-normal_force_n = [1, 5]
-"""
+WALL = '[object]\nshape = "box"\nsize_mm = [300, 40, 300]\nedge_radius_mm = 2\n[gripper]\npreset = "franka_hand"\n'
+WALL += "[load]\nnormal_force_n = [1, 5]\n" + "".join(pose_of((x, 0, 0), (0, 1, 0), (1, 0, 0)) for x in (0, 140))
 
 
 @pytest.mark.parametrize(("scene", "order"), [(WALL, [1.0, 0.0]), (WALL.replace("preset", "# preset"), [0.0, 1.0])])
