@@ -25,7 +25,9 @@ ROOT = Path(__file__).parents[2]  # where the package softjaw lies
 COMPILED = ("fem", "fem/objects", "fem/pad", "fem/shell", "friction", "lsfit", "scoring", "study/case")
 PASSING = "softjaw-numba-"  # how temporary folders of compiled loops begin
 LAUNCHED = ("OMPI_", "PMIX_", "PMI_", "PRTE_", "HYDRA_")  # variables by which a rank finds the mpirun above it
-NOT_IN_TIME = 124  # exit code, as of timeout(1)
+ALLOWED = {"OMPI_MCA_rmaps_base_oversubscribe": "1", "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe"}
+AS_ROOT = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+NOT_IN_TIME = 124  # exit code of timeout(1)
 NEEDED_SPACE = 1e9  # bytes; the largest shipped study writes about 0.2 GB
 SYSTEM_PACKAGES = "python3-petsc4py python3-h5py python3-h5py-mpi python3-mpi4py openmpi-bin"
 USE_MUMPS = "use a PETSc that was configured with MUMPS; Debian's and conda-forge's are"
@@ -66,24 +68,12 @@ def _writable(folder: Path) -> bool:
 
 
 def launch_environment() -> dict[str, str]:
-    """Variables for starting mpirun: this process's own, one thread per rank, and leave to run as root if it is root.
+    """Variables for starting mpirun: this process's own, one thread per rank, and leave for what Open MPI refuses.
 
-    Open MPI refuses root unless two variables allow it; inside a container there is often no other user.
+    That is more ranks than cores, and root: inside a container there is often no other user.
     """
-    allowed = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"} if os.geteuid() == 0 else {}
     outside_mpi = {name: value for name, value in os.environ.items() if not name.startswith(LAUNCHED)}
-    return {**dict.fromkeys(THREADS, "1"), **outside_mpi, **allowed}
-
-
-def mpirun(ranks: int) -> list[str]:
-    """First words of the command line that starts so many ranks, more than there are cores if need be.
-
-    Raises `FileNotFoundError`: there is no ``mpirun`` on the search path.
-    """
-    command = ["mpirun", "-n", str(ranks)]
-    trial = subprocess.run([*command, "true"], env=launch_environment(), stdin=subprocess.DEVNULL, capture_output=True,
-                           timeout=60, check=False)  # fmt: skip
-    return command if trial.returncode == 0 else f"mpirun -n {ranks} --oversubscribe".split()
+    return {**dict.fromkeys(THREADS, "1"), **outside_mpi, **ALLOWED, **({} if os.geteuid() else AS_ROOT)}
 
 
 def trouble(answer: CompletedProcess[str]) -> str:
@@ -96,25 +86,12 @@ def trouble(answer: CompletedProcess[str]) -> str:
 
 def ask(code: str, *, prefix: tuple[str, ...] = (), limit: float = 60.0) -> CompletedProcess[str]:
     """Run a piece of Python in a process of its own, behind ``prefix`` (mpirun), for at most ``limit`` seconds."""
-    with subprocess.Popen(
-        [*prefix, sys.executable, "-c", code],
-        env={**launch_environment(), "H5PY_ALWAYS_USE_MPI": "1"},
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        cwd=ROOT,
-    ) as process:
-        try:
-            output, errors = process.communicate(timeout=limit)
-        except subprocess.TimeoutExpired:
-            process.terminate()  # mpirun ends its ranks when asked to, not when killed
-            try:
-                process.communicate(timeout=10.0)
-            except subprocess.TimeoutExpired:
-                process.kill()
-            return CompletedProcess(process.args, NOT_IN_TIME, "", "")
-    return CompletedProcess(process.args, process.returncode, output.strip(), errors)
+    # timeout(1), because mpirun ends its ranks when it is asked to, not when it is killed
+    return subprocess.run(
+        ["timeout", "--kill-after=10", str(limit), *prefix, sys.executable, "-c", code],
+        env={**launch_environment(), "H5PY_ALWAYS_USE_MPI": "1"}, stdin=subprocess.DEVNULL, capture_output=True,
+        text=True, cwd=ROOT, check=False,
+    )  # fmt: skip
 
 
 # --- checks -----------------------------------------------------------------------------------------------------------
@@ -177,10 +154,7 @@ Finding = tuple[str, str, int]  # what a check found; its cure, empty when all i
 def probed(name: str) -> Finding:
     """What a probe prints last, or its error with the cure of it."""
     code, cures = PROBES[name]
-    try:
-        answer = ask(code, prefix=tuple(mpirun(2)) if name == "mpi" else (), limit=90.0)
-    except FileNotFoundError:
-        return "mpirun is not on the search path", INSTALL, USAGE
+    answer = ask(code, prefix=("mpirun", "-n", "2") if name == "mpi" else (), limit=90.0)
     if answer.returncode == 0:
         return answer.stdout.splitlines()[-1], "", DONE
     mark = next(mark for mark in cures if mark in answer.stderr)
@@ -189,35 +163,22 @@ def probed(name: str) -> Finding:
     return line.strip(), cures[mark], USAGE
 
 
-def check_blas() -> Finding:
-    """The BLAS beneath PETSc is an optimised one; only Debian's way of choosing it is looked at."""
-    link = Path("/etc/alternatives").glob("libblas.so.3-*")
-    chosen = next((path.resolve() for path in link), None)
-    if chosen and "/blas/libblas" in str(chosen):
-        return f"{chosen} makes factorisations four times slower", "apt-get install libopenblas0-serial", USAGE
-    return chosen.parent.name if chosen else "not chosen by Debian's alternatives", "", DONE
-
-
-def check_threads() -> Finding:
-    """One thread per rank: ranks slow each other, and last digits depend on the number."""
-    wrong = [f"{name}={os.environ[name]}" for name in THREADS if os.environ.get(name, "1") != "1"]
-    return (", ".join(wrong), "export OMP_NUM_THREADS=1", USAGE) if wrong else ("one per rank", "", DONE)
-
-
-def check_cache() -> Finding:
-    """Compiled loops can be kept from one start to the next."""
-    folder = os.environ.get("NUMBA_CACHE_DIR", "")
-    if Path(folder).name.startswith(PASSING) or (folder and not _writable(Path(folder))):
-        return "every start compiles anew", "export NUMBA_CACHE_DIR=<a folder you may write to>", CANNOT_WRITE
-    return f"compiled loops are kept in {folder or 'the sources or your cache folder'}", "", DONE
+def check_speed() -> Finding:
+    """One thread per rank, an optimised BLAS beneath PETSc (as Debian chooses it), and compiled loops that are kept."""
+    slow = {f"export {name}=1": f"{name}={os.environ.get(name)}: threads slow other ranks" for name in THREADS
+            if os.environ.get(name, "1") != "1"}  # fmt: skip
+    if any("/blas/libblas" in str(path.resolve()) for path in Path("/etc/alternatives").glob("libblas.so.3-*")):
+        slow["apt-get install libopenblas0-serial"] = "this BLAS makes factorisations four times slower"
+    folder = Path(os.environ.get("NUMBA_CACHE_DIR", tempfile.gettempdir()))
+    if folder.name.startswith(PASSING) or not _writable(folder):
+        slow["export NUMBA_CACHE_DIR=<a folder you may write to>"] = "every start compiles anew"
+    return "; ".join(slow.values()) or "one thread per rank, fast BLAS, kept loops", "; ".join(slow), USAGE * bool(slow)
 
 
 def check_disk() -> Finding:
     """Results can be written here, and there is room for them."""
     folder = Path.cwd()
-    try:
-        tempfile.TemporaryFile(dir=folder).close()
-    except OSError:
+    if not _writable(folder):
         return f"{folder} is not writable", "start softjaw in a folder of your own", CANNOT_WRITE
     free = shutil.disk_usage(folder).free
     cure = f"free at least {NEEDED_SPACE / 1e9:.0f} GB" if free < NEEDED_SPACE else ""
@@ -226,9 +187,7 @@ def check_disk() -> Finding:
 
 CHECKS: dict[str, Callable[[], Finding]] = {
     **{name: partial(probed, name) for name in PROBES},
-    "blas": check_blas,
-    "threads": check_threads,
-    "cache": check_cache,
+    "speed": check_speed,
     "disk": check_disk,
 }
 

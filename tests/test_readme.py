@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from softjaw.study.cli import main
-from softjaw.study.doctor import launch_environment, mpirun
+from softjaw.study.doctor import launch_environment
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -32,10 +32,6 @@ def slow(block: list[str]) -> bool:
     return any(("softjaw run " in line and FIRST not in line) or SOLVES.search(line) for line in block)
 
 
-def as_typed(line: str) -> str:
-    return re.sub(r"^mpirun -n (\d+)", lambda found: shlex.join(mpirun(int(found[1]))), line)
-
-
 def shell(line: str, folder: Path) -> None:
     programs = folder / "bin"
     programs.mkdir(exist_ok=True)
@@ -44,7 +40,7 @@ def shell(line: str, folder: Path) -> None:
     path = f"{programs}:{os.environ['PATH']}"
     env = {**launch_environment(), "PYTHONPATH": str(ROOT), "PATH": path, "HOME": str(folder)}
     done = subprocess.run(
-        ["bash", "-c", as_typed(line)], cwd=folder, env=env, stdin=subprocess.DEVNULL, capture_output=True,
+        ["bash", "-c", line], cwd=folder, env=env, stdin=subprocess.DEVNULL, capture_output=True,
         text=True, timeout=900, check=False,
     )  # fmt: skip
     assert done.returncode == 0, f"{line}\n{done.stdout}\n{done.stderr}"

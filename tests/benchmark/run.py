@@ -22,7 +22,7 @@ from softjaw.fem.pad import foam as element_kernel
 from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.pad.shape import PadShape
 from softjaw.study.case.model import Finger, touching
-from softjaw.study.doctor import launch_environment, mpirun
+from softjaw.study.doctor import launch_environment
 from tests.benchmark import kernels
 from tests.benchmark.kernels import fastest, line, title
 
@@ -80,7 +80,7 @@ def whole_map(scene: Path) -> None:
     with tempfile.TemporaryDirectory() as folder:
         for ranks in (1, 2):
             result = str(Path(folder) / f"{ranks}.hdf")
-            words = [*mpirun(ranks), sys.executable, "-m", "softjaw", "run", str(scene), "-o", result]
+            words = ["mpirun", "-n", str(ranks), sys.executable, "-m", "softjaw", "run", str(scene), "-o", result]
             start = time.perf_counter()
             subprocess.run(words, check=True, cwd=ROOT, env=launch_environment(), stdout=subprocess.DEVNULL)
             seconds[ranks] = time.perf_counter() - start
