@@ -21,8 +21,6 @@ from softjaw.study.result.hdf5 import StoredFile
 from softjaw.study.result.layout import ATTEMPTS, ROOT, Layout
 
 OF_STATE = {state: zlib.crc32(bytes([state])) for state in range(len(STATES))}
-ABOUT = {"axes": ("units", "long_name", "scene_key"), "scene": ("digest", "file", "overrides", "petsc_options")}
-ABOUT_OBJECT = ("object_rotation", "object_origin", "rejected", "object_centroid", "object_bounds")
 
 
 def of_array(values: Any) -> int:
@@ -76,18 +74,8 @@ def of_session(session: np.void) -> int:
 
 
 def of_header(file: StoredFile, layout: Layout) -> int:
-    """Checksum of what is written once, when the file is made: axes, options, scene, definitions, labels."""
-    axes = [f"axes/{name}" for name in layout.names]
-    study = file.attributes(ROOT)
-    # Lists of texts: the repr of an array is shortened and depends on the version of numpy.
-    parts = [study.get("options"), study.get("title"), [str(name) for name in study.get("axes", ())]]
-    for name in ("scene", *axes):
-        attributes = file.attributes(f"{ROOT}/{name}")
-        parts.append([attributes.get(key) for key in ABOUT[name.partition("/")[0]]])
-        parts += [np.asarray(attributes[key]).tolist() for key in ABOUT_OBJECT if key in attributes]
-        parts += [[str(text) for text in attributes["options"]]] if "options" in attributes else []
-    crc = zlib.crc32(repr(parts).encode())
-    arrays = ["scene", "definitions", "candidates/label", *axes]
-    for name in arrays:
+    """Checksum of what is written once, when the file is made: axes, layout, header, scene, definitions."""
+    crc = 0
+    for name in ("layout", "header", "scene", "definitions", *(f"axes/{name}" for name in layout.names)):
         crc = zlib.crc32(np.asarray(file.values(file.plain(f"{ROOT}/{name}"))).tobytes(), crc)
     return crc

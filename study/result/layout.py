@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
+from pydantic import TypeAdapter
 
 from softjaw.study.quantities import (
     ALONG,
@@ -22,6 +23,7 @@ from softjaw.study.quantities import (
     MODELS,
     MONOMIALS,
     NEEDS,
+    Axis,
     Quantity,
     definitions,
     quantities,
@@ -34,8 +36,8 @@ from softjaw.study.result.datasets import ROOT as ROOT
 
 ATTEMPTS = f"{ROOT}/status/attempts"
 
-PROGRAM, VERSION = "softjaw", 8
-LABEL_BYTES, MOST_SESSIONS, REPORT_BYTES = 80, 256, 8192
+PROGRAM, VERSION = "softjaw", 9
+MOST_SESSIONS, REPORT_BYTES = 256, 8192
 # Fixed lengths: a run writes to space that is there already, and text of any length would need more.
 SESSION = np.dtype(
     [("start", "S32"), ("stop", "S32"), ("reason", "S120"), ("ranks", "<i4"), ("hosts", "<i4"), ("done", "<i8"),
@@ -48,9 +50,8 @@ SESSION = np.dtype(
 class Header:
     """What a file says about the scene it was made from; ``labels`` name the candidates in row order.
 
-    ``about`` holds attributes of the scene, by the names of `study.result.checksums.ABOUT_OBJECT`: rotation and origin
-    of the frame of stations and angles in that of the poses, the object's own file, in which centroid and bounds are;
-    grasps that a sampler offered and rejected: point [mm], approach, long side, state.
+    ``about`` holds rotation and origin of the frame of stations and angles in that of the poses, the object's own file,
+    in which centroid and bounds are; what a sampler offered and rejected: point [mm], approach, long side, state.
     """
 
     digest: str
@@ -62,10 +63,14 @@ class Header:
     labels: tuple[str, ...] = ()
     about: Mapping[str, Any] = field(default_factory=dict)
 
+    def text(self) -> str:
+        """All but the scene, as JSON."""
+        return as_json({name: part for name, part in vars(self).items() if name != "scene"})
+
 
 @dataclass(frozen=True)
 class Layout:
-    """The file of one study: its axes (``name, values, units, long_name``), the faces of a patch and the options.
+    """The file of one study: its axes, the faces of a patch and what of the quantities it holds.
 
     No ``faces``: patches are not stored. ``has`` names what of `NEEDS` the scene asks for besides two meshes and
     patches. ``rounds`` is what each round of a run added: stations [mm], poses as `study.run.refine.Place`, or cases
@@ -74,12 +79,12 @@ class Layout:
     ``derived`` are quantities over some of the axes that are filled once, after all rows.
     """
 
-    axes: tuple[Any, ...]
+    axes: tuple[Axis, ...]
     faces: int
     meshes: int = 1
     derived: tuple[Quantity, ...] = ()
     has: tuple[str, ...] = ()
-    rounds: tuple[tuple[Any, ...], ...] = ()
+    rounds: tuple[tuple[float | tuple[int, int, int] | tuple[float, ...], ...], ...] = ()
     stored: tuple[str, ...] = ()
 
     @property
@@ -88,9 +93,9 @@ class Layout:
         return tuple(some for some in self.rounds if not is_case(some[0]))
 
     @property
-    def finer(self) -> Counter[tuple[int, int, int]]:
+    def finer(self) -> Counter[Any]:
         """How often rounds named each case for a finer mesh."""
-        return Counter(case for some in self.rounds if is_case(some[0]) for case in some)
+        return Counter(case for some in self.rounds for case in some if is_case(case))
 
     @cached_property
     def summed(self) -> tuple[str, ...]:
@@ -172,15 +177,9 @@ class Layout:
         """The definitions of all quantities of this layout, derived ones included."""
         return definitions((*self.quantities, *self.derived))
 
-    def options(self) -> str:
-        """The part of the layout that the axes do not tell, as JSON."""
-        derived = [
-            {"name": q.name, "units": q.unit, "long_name": q.label, "definition": q.definition, "axes": q.dims}
-            for q in self.derived
-        ]
-        names = ("faces", "meshes", "has", *["rounds"] * bool(self.rounds))
-        own = {name: getattr(self, name) for name in names}
-        return json.dumps(own | {"derived": derived, "columns": self.summed[:-1]})
+    def text(self) -> str:
+        """The layout as JSON."""
+        return as_json(asdict(replace(self, stored=self.summed[:-1])))
 
 
 def is_case(added: Any) -> bool:
@@ -188,29 +187,20 @@ def is_case(added: Any) -> bool:
     return isinstance(added, tuple) and len(added) == 3
 
 
-def layout_from_options(axes: Sequence[Any], text: str) -> Layout:
-    """The layout of an existing file from its axes and its options text; ``ValueError`` if they make no sense."""
-    try:
-        options = json.loads(text)
-        derived = tuple(
-            Quantity(d["name"], tuple(d["axes"]), d["units"], d["long_name"], d["definition"], "derived")
-            for d in options["derived"]
-        )
-        if options.get("sampled"):
-            raise ValueError("it holds wrenches of sampled motions, which this version does not: run the scene again")
-        rounds = tuple(tuple(map(_place, some)) for some in options.get("rounds", ()) if some)
-        has, stored = tuple(options["has"]), tuple(map(str, options["columns"]))
-        return Layout(tuple(axes), int(options["faces"]), int(options["meshes"]), derived, has, rounds, stored)
-    except (KeyError, TypeError, AttributeError, OverflowError) as error:
-        raise ValueError(f"its layout attribute is damaged ({error})") from error
+def as_json(value: Any) -> str:
+    """Records with arrays as JSON."""
+    return json.dumps(value, default=np.ndarray.tolist)
 
 
-def _place(given: Any) -> Any:
-    """A station, a pose with its step, or a case."""
-    if not isinstance(given, list):
-        return float(given)
-    if len(given) == 3:
-        return tuple(map(int, given))
-    if len(given) != 10:
-        raise ValueError(f"an added pose of {len(given)} numbers")
-    return tuple(map(float, given))
+def layout_of(text: str) -> Layout:
+    """The layout of an existing file; ``ValueError`` if it makes no sense."""
+    layout = TypeAdapter(Layout).validate_json(text)
+    axes = tuple(replace(axis, values=np.asarray(axis.values, float)) for axis in layout.axes)
+    if len(axes) < 3 or not all(axis.values.ndim == 1 and np.isfinite(axis.values).all() for axis in axes):
+        raise ValueError("its axes are not those of a study")
+    return replace(layout, axes=axes)
+
+
+def header_of(text: str, scene: str) -> Header:
+    """The header of an existing file; ``ValueError`` if it makes no sense."""
+    return TypeAdapter(Header).validate_python({**json.loads(text), "scene": scene})

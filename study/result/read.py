@@ -17,9 +17,8 @@ from numpy.typing import NDArray
 
 from softjaw.study.flags import OF_FILE, Flag
 from softjaw.study.quantities import BOTH_ENDS, BY_KEY, FINGERS, MISSING, MODELS, REALISATION, TABLE, Axis, Quantity
-from softjaw.study.result.checksums import ABOUT_OBJECT
 from softjaw.study.result.index import index_path, open_index
-from softjaw.study.result.layout import DONE, ROOT, VERSION
+from softjaw.study.result.layout import DONE, VERSION
 from softjaw.study.result.store import Result, open_result
 from softjaw.study.scene import Scene, parse_scene
 from softjaw.study.scene.sections import UPPER
@@ -227,17 +226,16 @@ def _coordinates(result: Result, variables: dict[str, Any]) -> dict[str, Any]:
 
 
 def _attributes(result: Result) -> dict[str, Any]:
-    layout, scene = result.layout, result.file.attributes(f"{ROOT}/scene")
+    layout, header = result.layout, result.header
     return {
         "title": result.title, "file": str(result.path), "layout_version": VERSION, "digest": result.digest,
-        "scene": result.scene, "scene_file": scene.get("file", ""),
-        "overrides": tuple(filter(None, str(scene.get("overrides", "")).split("\n"))),
-        "petsc_options": scene.get("petsc_options", ""), "definitions": result.definitions, "report": result.report,
+        "scene": result.scene, "scene_file": header.scene_file, "overrides": header.overrides,
+        "petsc_options": header.petsc_options, "definitions": result.definitions, "report": result.report,
         "provenance": result.sessions, "has": layout.has, "meshes": layout.meshes,
         "patches": "patch/pressure" in {c.key for c in layout.columns}, "poses": not result.axes[-3].units,
         "derived": tuple(q.name for q in layout.derived),
         "object_rotation": np.eye(3), "object_origin": np.zeros(3), "rejected": np.zeros((0, 10)),
-        **{name: np.asarray(scene[name]) for name in ABOUT_OBJECT if name in scene},
+        **{name: np.asarray(values) for name, values in header.about.items()},
     }  # fmt: skip
 
 

@@ -24,7 +24,6 @@ from softjaw.study.result import checksums
 from softjaw.study.result.datasets import CLOSING_SUMS, described
 from softjaw.study.result.hdf5 import StoredFile, reason
 from softjaw.study.result.layout import (
-    LABEL_BYTES,
     MOST_SESSIONS,
     PROGRAM,
     REPORT_BYTES,
@@ -48,6 +47,8 @@ NOT_COPIED = (f"{ROOT}/derived/", CLOSING_SUMS)
 TEXTS = {
     "title": "name of the object or of the scene",
     "scene": "the scene with all settings, as TOML",
+    "layout": "axes, and what is stored over them, as JSON",
+    "header": "where the scene comes from, the names of its candidates, and the place of its object's frame, as JSON",
     "definitions": "what every quantity means",
     "report": "best grasps, failures with their reasons, how to read the file",
 }
@@ -151,9 +152,8 @@ def _reserve(path: Path, need: int) -> None:
 def _write_skeleton(file: h5py.File, layout: Layout, header: Header, packed: bool) -> None:
     file.attrs.update(NX_class="NXroot", default=ROOT[1:], program=PROGRAM, layout_version=VERSION)
     study = file.create_group(ROOT)
-    study.attrs.update(NX_class="NXentry", default="map", options=layout.options(), title=header.title)
+    study.attrs.update(NX_class="NXentry", default="map", title=header.title)
     study.attrs.create("checksum", 0, dtype="<u4")  # has its place here, at the front, before its value is known
-    _write_attribute(study, "axes", list(layout.names))
     for name, attributes in groups(layout).items():
         group = study.create_group(name)
         for key, value in attributes.items():
@@ -162,8 +162,8 @@ def _write_skeleton(file: h5py.File, layout: Layout, header: Header, packed: boo
         scale = study["axes"].create_dataset(name, data=np.asarray(axis.values, "<f8"))
         long_name = f"{axis.long_name} [{axis.units}]" if axis.units else axis.long_name
         scale.attrs.update(units=axis.units, long_name=long_name, scene_key=axis.name)
-        if options := getattr(axis, "options", ()):
-            _write_attribute(scale, "options", list(options))
+        if axis.options:
+            _write_attribute(scale, "options", list(axis.options))
         scale.make_scale(name)
     for name, length in layout.counters.items():
         count = study["axes"].create_dataset(name, data=np.arange(length, dtype="<i4"))
@@ -184,6 +184,7 @@ def _write_checksums(file: h5py.File, stored: StoredFile, layout: Layout) -> Non
 
 def _write_texts(study: h5py.Group, layout: Layout, header: Header, packed: bool) -> None:
     texts = {"title": header.title, "scene": header.scene, "definitions": layout.definitions()}
+    texts |= {"layout": layout.text(), "header": header.text()}
     for name, text in texts.items():
         # HDF5 has no fixed-length strings of length 0.
         data = text.encode() or b" "
@@ -192,18 +193,10 @@ def _write_texts(study: h5py.Group, layout: Layout, header: Header, packed: bool
     for name, label in TEXTS.items():
         study[name].attrs["long_name"] = label
     study["provenance"].attrs["sampling"] = SAMPLING
-    study["scene"].attrs.update(digest=header.digest, file=header.scene_file, petsc_options=header.petsc_options)
-    study["scene"].attrs.update(header.about)
-    study["scene"].attrs["overrides"] = "\n".join(header.overrides)
     how = {"compression": DEFLATE_LEVEL} if packed else {}
     sessions = study["provenance"].create_dataset("sessions", data=np.zeros(MOST_SESSIONS, SESSION), **how)
     sessions.attrs["long_name"] = "one row for each time the study was started: program, machine, start, end"
     _attach_scales(sessions, ["session"])
-    labels = np.zeros(int(np.prod(layout.shape[-3:-1])), h5py.string_dtype("utf-8", LABEL_BYTES))
-    labels[: len(header.labels)] = [text_bytes(label, LABEL_BYTES) for label in header.labels]
-    named = study["candidates"].create_dataset("label", data=labels.reshape(layout.shape[-3:-1]))
-    named.attrs["long_name"] = "name of the candidate in the scene"
-    _attach_scales(named, layout.names[-3:-1])
 
 
 def text_bytes(text: str, length: int) -> bytes:
@@ -325,7 +318,7 @@ def groups(layout: Layout) -> dict[str, dict[str, Any]]:
         signal = several if q.by_model else {"signal": q.name}
         attributes[q.name] = {**plot, **signal, "title": q.label}
     attributes["status"] = {**plot, "signal": "code", "title": "state of the cases"}
-    collections = ["axes", "candidates", "checksums", "provenance", *{q.group for q in layout.quantities} - {"status"}]
+    collections = ["axes", "checksums", "provenance", *{q.group for q in layout.quantities} - {"status"}]
     collections += ["derived"] * bool(layout.derived)
     attributes.update({name: {"NX_class": "NXcollection"} for name in sorted(collections) if name != "maps"})
     return attributes

@@ -8,6 +8,7 @@ solved again.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
 from functools import cached_property
@@ -16,12 +17,11 @@ from typing import Any
 
 import numpy as np
 
-from softjaw.study.messages import OTHER_FILE, StudyError
-from softjaw.study.quantities import STATES, Axis
+from softjaw.study.messages import OTHER_FILE, StudyError, printable
+from softjaw.study.quantities import STATES
 from softjaw.study.result import checksums
 from softjaw.study.result.hdf5 import opened, text_of
 from softjaw.study.result.layout import (
-    LABEL_BYTES,
     MISSING,
     MOST_SESSIONS,
     PROGRAM,
@@ -29,12 +29,11 @@ from softjaw.study.result.layout import (
     SESSION,
     VERSION,
     Layout,
-    layout_from_options,
+    header_of,
+    layout_of,
 )
 from softjaw.study.result.lock import holder
 from softjaw.study.units import shown_text
-
-LARGEST_VALUE = 1e100  # no value of a study in SI units comes near it, and its square can be computed
 
 
 class Result:
@@ -47,7 +46,7 @@ class Result:
 
     def __init__(self, path: Path, file: Any, unchecked: bool = False) -> None:
         self.path, self.file = path, file
-        root, study = file.attributes(), file.attributes(ROOT)
+        root = file.attributes()
         # Asked first: a file of another program is told so, and not called damaged.
         if root.get("program") != PROGRAM:
             raise ValueError("it does not name its program")
@@ -55,17 +54,14 @@ class Result:
         self.version = root.get("layout_version", "")
         if self.version != str(VERSION):
             raise StudyError(OTHER_FILE, _other_version(path, self.version))
-        self.axes = tuple(self._axis(text_of(name)) for name in study["axes"])
-        self.layout = layout_from_options(self.axes, study["options"])
-        if len(self.axes) < 3 or min(self.layout.shape) < 1:
-            raise ValueError("its axes are not those of a study")
-        self.title = str(study.get("title", ""))
-        self.digest = file.attributes(f"{ROOT}/scene").get("digest", "")
+        self.layout = layout_of(self._string("layout"))
+        self.header = header_of(self._string("header"), self.scene)
+        self.axes, self.title, self.digest = self.layout.axes, printable(self.header.title), self.header.digest
         self._known = {d.path: d for d in self.layout.datasets}
         self._unchecked = unchecked
         # With a wrong header, the sums of the rows would be looked for in the wrong places.
-        if not unchecked and str(checksums.of_header(file, self.layout)) != study.get("checksum"):
-            raise self._damaged("axes, scene or definitions do not match their checksum")
+        if not unchecked and str(checksums.of_header(file, self.layout)) != file.attributes(ROOT).get("checksum"):
+            raise self._damaged("axes, layout, scene or definitions do not match their checksum")
 
     def __enter__(self) -> Result:
         """The file is open; whatever numbers it holds, no warning of numpy is worth printing."""
@@ -134,9 +130,7 @@ class Result:
     @property
     def scene(self) -> str:
         """The effective scene as TOML text."""
-        # A key of files of earlier versions, which scenes have no more.
-        gone = "wrench_samples = "
-        return "".join(line for line in self._string("scene").splitlines(keepends=True) if not line.startswith(gone))
+        return self._string("scene")
 
     @property
     def definitions(self) -> str:
@@ -150,9 +144,9 @@ class Result:
 
     @property
     def labels(self) -> np.ndarray:
-        """Names of the candidates, ``(stations, angles)``."""
-        dataset = self.file.checked(f"{ROOT}/candidates/label", self.layout.shape[-3:-1], np.dtype(f"S{LABEL_BYTES}"))
-        return _texts(self.file.values(dataset))
+        """Names of the candidates, ``(stations, angles)``; empty for those beyond the last one that has a name."""
+        labels, shape = [printable(label) for label in self.header.labels], self.layout.shape[-3:-1]
+        return np.array([*labels, *[""] * (math.prod(shape) - len(labels))]).reshape(shape)
 
     @property
     def sessions(self) -> list[dict[str, Any]]:
@@ -208,22 +202,6 @@ class Result:
         if expected is None:
             raise KeyError(f"{path} is not a dataset of this file; it has {', '.join(sorted(self._known))}")
         return self.file.checked(expected.path, expected.shape, expected.dtype)
-
-    def _axis(self, name: str) -> Axis:
-        path = f"{ROOT}/axes/{name}"
-        dataset, attributes = self.file.plain(path), self.file.attributes(path)
-        if dataset.ndim != 1 or dataset.dtype != np.dtype("<f8"):
-            raise ValueError(f"axis '{name}' is not a list of numbers")
-        units = str(attributes.get("units", ""))
-        values = self.file.values(dataset)
-        # Put this way round so that NaN is refused as well.
-        if not (np.abs(values) < LARGEST_VALUE).all():
-            raise ValueError(f"axis '{name}' has values that are not numbers")
-        label = str(attributes.get("long_name", name)).removesuffix(f" [{units}]")
-        options = tuple(text_of(text) for text in np.ravel(attributes.get("options", ())))
-        if options and len(options) != len(values):
-            raise ValueError(f"axis '{name}' has {len(values)} values and {len(options)} options")
-        return Axis(name, values, units, label, options)
 
     def _text(self, name: str) -> Any:
         dataset = self.file.plain(f"{ROOT}/{name}")

@@ -273,7 +273,7 @@ def verify(path: Path, layout: Layout, header: Header) -> bool:
                 f" {differences(result.scene, header.scene)}); choose another file with -o, or move this one away"
             )
             raise StudyError(OTHER_FILE, text)
-        if result.layout.shape != layout.shape or result.layout.options() != layout.options():
+        if result.layout.shape != layout.shape or result.layout.text() != layout.text():
             text = f"{path}: made by a version that stored other values; it can be read, but not resumed"
             raise StudyError(OTHER_FILE, f"{text}: choose another file with -o")
         datasets = [result.file.checked(d.path, d.shape, d.dtype) for d in result.layout.datasets]

@@ -19,8 +19,7 @@ def put(file, path, data):
 
 def options(**changed):
     def spoil(file):
-        told = json.loads(file["study"].attrs["options"])
-        file["study"].attrs["options"] = json.dumps(told | changed)
+        text("layout", json.dumps(json.loads(file["study/layout"][()]) | changed))(file)
 
     return spoil
 
@@ -64,7 +63,8 @@ def text(name, content):
 
 def words(file):
     file["study"].attrs["title"] = EVIL
-    file["study/candidates/label"][...] = EVIL.encode()[:80]
+    header = json.loads(file["study/header"][()])
+    text("header", json.dumps(header | {"title": EVIL, "labels": [EVIL] * len(header["labels"])}))(file)
     file["study/status/message"][...] = EVIL.encode()[:200]
     file["study/status/code"][0, 0, 0] = 2
     sessions = file["study/provenance/sessions"]
@@ -78,7 +78,7 @@ def words(file):
 
 
 SCENE = '[object]\nshape = "sphere"\nradius_mm = 30\n[candidates]\nstations_mm = [0]\n[load]\nnormal_force_n = [2]\n'
-DERIVED = {"name": "x", "units": "", "long_name": "", "definition": "", "axes": []}
+DERIVED = {"name": "x", "dims": [], "unit": "", "label": "", "definition": "", "group": "derived"}
 DEEP = "[" * 100_000
 LIES = {
     "soft link to nothing": linked("study/e_n/ccm", h5py.SoftLink("/nowhere")),
@@ -92,13 +92,13 @@ LIES = {
     "NaN axis": values("study/axes/station", np.nan),
     "zero axis": values("study/axes/normal_force", 0.0),
     "axis of two dimensions": data("study/axes/station", np.zeros((5, 1))),
-    "axes that do not exist": attribute("study", "axes", np.array(["a", "b", "c"], object)),
-    "axes elsewhere": attribute("study", "axes", np.array(["../../x", "..", "/"], object)),
+    "axes that do not exist": options(axes=[{"name": n, "values": [0], "units": "", "long_name": n} for n in "abc"]),
+    "axes elsewhere": options(axes=[{"name": n, "values": [0], "units": "", "long_name": n} for n in ("..", ".", "/")]),
+    "axes of texts": options(axes=[{"name": n, "values": ["x"], "units": "", "long_name": n} for n in "abc"]),
     "units that are words": attribute("study/axes/station", "units", "furlong"),
-    "options that are deep": attribute("study", "options", "[" * 60_000),
+    "a layout that is deep": text("layout", DEEP),
     "patches that are not there": options(faces=10**6),
-    "sampled wrenches": options(sampled=[0, 1]),
-    "derived elsewhere": options(derived=[{**DERIVED, "name": "../../x", "units": 3, "long_name": []}]),
+    "derived elsewhere": options(derived=[{**DERIVED, "name": "../../x"}]),
     "two meshes": options(meshes=2),
     "states that do not exist": values("study/status/code", 7),
     "NaN everywhere": no_numbers,

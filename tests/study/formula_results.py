@@ -39,7 +39,7 @@ def quartic(x, y, t):
 def fresh(path: Path, layout: Layout, header: Header) -> None:
     """A file without values, as ``create`` makes it."""
     axes = [(axis.name, axis.units, axis.long_name, axis.values.tolist(), axis.options) for axis in layout.axes]
-    kind = f"{axes}{layout.options()}{header}"
+    kind = f"{axes}{layout.text()}{header}"
     if kind not in SKELETONS:
         create(path, layout, header)
         SKELETONS[kind] = path.read_bytes()

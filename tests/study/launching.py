@@ -79,7 +79,7 @@ def contents(path):
 
     def keep(name, node):
         if name == "study/checksums/rows":
-            columns = json.loads(node.file["study"].attrs["options"])["columns"]
+            columns = json.loads(node.file["study/layout"][()])["stored"]
             sums = {f"{name}{path}": node[..., j] for j, path in enumerate(columns)}
             found.update({path: v.tobytes() for path, v in sums.items() if "/study/work/" not in path})
         elif isinstance(node, h5py.Dataset) and not name.startswith(NOT_COMPARED):

@@ -11,7 +11,6 @@ from scipy.spatial.transform import Rotation
 
 from softjaw.study.case.result import CaseResult
 from softjaw.study.quantities import DONE, MISSING, WIDE
-from softjaw.study.result.layout import layout_from_options
 from softjaw.study.result.skeleton import rewrite
 from softjaw.study.result.store import open_result, torn_rows
 from softjaw.study.run.estimate import measured_seconds
@@ -234,9 +233,6 @@ def test_a_grown_file_of_poses_keeps_rows_labels_and_places_and_samplers_can_be_
         assert (after.codes.reshape(8, 2)[2:] == MISSING).all()
         assert after.labels.ravel()[:2].tolist() == ["wide", "p01"]
         assert after.labels.ravel()[2:].tolist() == [f"p{i:02d}" for i in range(2, 8)]
-        text = big.layout.options().replace(str(list(rounds[0][0])), "[1.0, 2.0]")
-        with pytest.raises(ValueError, match="2 numbers"):
-            layout_from_options(after.axes, text)
     assert load_scene("jobs/box-poses.toml", ["candidates.refine=true"]).candidates.refine == 120
     assert load_scene("jobs/smoke.toml", ["candidates.refine=true"]).candidates.refine == 120
     assert load_scene("jobs/smoke.toml", ["candidates.refine=false"]).candidates.refine is None

@@ -161,6 +161,7 @@ READ = [  # datasets, and who must notice
     ("study/axes/station", [*COMMANDS, "compare", "lookup"]),
     ("study/axes/normal_force", [*COMMANDS, "compare", "lookup"]),
     ("study/scene", [*COMMANDS, "compare", "lookup"]),
+    ("study/header", [*COMMANDS, "compare", "lookup"]),
     ("study/provenance/sessions", ["status", "status --json"]),
     ("study/checksums/rows", ["show", "lookup"]),
 ]

@@ -14,7 +14,7 @@ from softjaw.study import quantities
 from softjaw.study.case.result import CaseResult
 from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, StudyError
 from softjaw.study.quantities import BY_KEY, MODELS, NEEDS, TABLE, Axis, Quantity
-from softjaw.study.result.layout import VERSION, Header, Layout, layout_from_options
+from softjaw.study.result.layout import VERSION, Header, Layout, layout_of
 from softjaw.study.result.lock import Lock, holder
 from softjaw.study.result.skeleton import axes_of, create, groups, text_bytes, view_slice
 from softjaw.study.result.store import open_result, torn_rows
@@ -199,7 +199,7 @@ def test_an_axis_of_two_values_has_a_name_only_beside_an_uneven_one_and_a_sweep_
         assert read.derived("slope").shape == (3,)
     assert view_slice(layout) == ["0", ".", ".", "2"]
     assert "patch" not in groups(layout)
-    assert layout_from_options(axes, layout.options()).options() == layout.options()
+    assert layout_of(layout.text()).text() == layout.text()
     verify(tmp_path / "s.hdf", layout, HEADER)
 
 
@@ -216,16 +216,6 @@ def test_damage_in_a_done_row_is_found(path):
         file["study/status/code"][0, 1, 0] = 2
         file["study/patch/area"][4, 1, 2, 1, 3] = 0.0
     assert torn_rows(path, layout) == [0, 3, 7, 29]
-
-
-def test_a_file_of_an_earlier_version_is_read_or_says_why_not(tmp_path):
-    """Their scenes had one key more, which named candidates whose wrenches of sampled motions were stored."""
-    layout, path = small(), tmp_path / "w.hdf"
-    create(path, layout, replace(HEADER, scene="[limit_surface]\nsamples = 500\nwrench_samples = 'none'\n"))
-    with open_result(path) as read:
-        assert read.scene.split() == ["[limit_surface]", "samples", "=", "500"]
-    with pytest.raises(ValueError, match="run the scene again"):
-        layout_from_options(layout.axes, layout.options().replace("{", '{"sampled": [3, 8], ', 1))
 
 
 def test_a_result_that_does_not_fit_is_a_bug_a_full_disk_told_and_only_an_own_file_resumed(tmp_path, monkeypatch, path):
@@ -258,10 +248,9 @@ def test_a_result_that_does_not_fit_is_a_bug_a_full_disk_told_and_only_an_own_fi
     lambda file: file.attrs.__delitem__("program"),
     lambda file: file.attrs.modify("layout_version", 99),
     lambda file: file.attrs.modify("layout_version", VERSION - 1),
-    lambda file: file["study"].attrs.create("options", "{}"),
-    lambda file: file["study"].attrs.create("axes", np.array(["station", "angle", "nothing"], object),
-                                            dtype=h5py.string_dtype()),
-], ids=["program", "newer", "older", "options", "axis"])  # fmt: skip
+    lambda file: file["study/layout"].write_direct(np.array(b"{}", file["study/layout"].dtype)),
+    lambda file: file["study"].pop("layout"),
+], ids=["program", "newer", "older", "empty", "none"])  # fmt: skip
 def test_a_file_of_another_kind_is_refused_when_it_is_opened(path, spoil):
     with h5py.File(path, "r+") as file:
         spoil(file)
