@@ -253,9 +253,19 @@ def quartic_shadow(coefficients: FloatArray, reach: FloatArray) -> float:
 
 
 def _floors(c: FloatArray, M: FloatArray) -> FloatArray:
-    out = np.empty(len(M))
-    fill_floors(c, exponents(3, 4), M, out)
-    return out
+    """``min over tau of P(x, y, tau)`` of a convex quartic for its monomials ``M (n, 15)`` at tau 1, ``(n,)``.
+
+    The derivative along tau is a cubic, ``s^3 + p s + q = 0`` for ``tau = s - a_3 / (4 a_4)``; as the quartic is convex
+    ``p`` is not negative but for rounding, and there is one root.
+    """
+    a = (M * c) @ (exponents(3, 4)[:, 2:] == np.arange(5)).astype(float)
+    shift = a[:, 3] / (4 * a[:, 4])
+    p = np.maximum(a[:, 2] / (2 * a[:, 4]) - 3 * shift**2, 0)
+    q = 2 * shift**3 - a[:, 2] * shift / (2 * a[:, 4]) + a[:, 1] / (4 * a[:, 4])
+    # with |q| both terms add and no digits cancel; the sign of the root comes below
+    u = np.cbrt(np.abs(q) / 2 + np.sqrt(q**2 / 4 + p**3 / 27))
+    tau = -shift - np.sign(q) * (u - p / np.maximum(3 * u, 1e-300))
+    return np.asarray(np.polynomial.polynomial.polyval(tau, a.T, tensor=False))
 
 
 @lru_cache
@@ -263,34 +273,3 @@ def _plane_monomials(n: int) -> FloatArray:
     """Quartic monomials of ``(cos phi, sin phi, 1)`` at ``n`` steps of half a turn, ``(n, 15)``."""
     phi = np.pi * np.arange(n) / n
     return monomials(np.column_stack([np.cos(phi), np.sin(phi), np.ones(n)]), exponents(3, 4)).copy()
-
-
-@njit(cache=True)
-def fill_floors(c, E, M, out):  # pragma: no cover - compiled
-    """Write ``min over tau of P(x, y, tau)`` for monomials ``M (n, 15)`` at tau 1, ``-> out (n,)``.
-
-    The derivative along tau is a cubic, ``s^3 + p s + q = 0`` for ``tau = s - a_3 / (4 a_4)``. The least value is at
-    its root farthest on the side of ``-q``. For a convex polynomial ``p`` is not negative but for rounding.
-    """
-    a = np.empty(5)
-    for n in range(len(M)):
-        a[:] = 0.0
-        for j in range(len(c)):
-            a[E[j, 2]] += c[j] * M[n, j]
-        shift = a[3] / (4.0 * a[4])
-        p = a[2] / (2.0 * a[4]) - 3.0 * shift**2
-        q = 2.0 * shift**3 - a[2] * shift / (2.0 * a[4]) + a[1] / (4.0 * a[4])
-        inner = q**2 / 4.0 + p**3 / 27.0
-        s = 0.0
-        if inner >= 0.0:
-            # with |q| both terms add and no digits cancel; the sign of the root comes below
-            u = (abs(q) / 2.0 + math.sqrt(inner)) ** (1.0 / 3.0)
-            # p = q = 0 is a triple root at 0
-            if u > 0.0:
-                s = u - p / (3.0 * u)
-        else:
-            reach = math.sqrt(-p / 3.0)
-            # rounding carries the cosine beyond 1 at a double root
-            s = 2.0 * reach * math.cos(math.acos(min(abs(q) / (2.0 * reach**3), 1.0)) / 3.0)
-        tau = -shift - (s if q > 0.0 else -s)
-        out[n] = (((a[4] * tau + a[3]) * tau + a[2]) * tau + a[1]) * tau + a[0]

@@ -21,21 +21,9 @@ from softjaw.lsfit.surface import ZERO_SHARE, FloatArray
 def lies_above(v: FloatArray, dimension: int, level: float) -> bool:
     """Whether a quartic form with coefficients ``v (k,)`` exceeds ``level >= 0`` all over the unit sphere.
 
-    Samples settle it if what they can have missed does not matter, as they are or where the form is 1 along every axis;
-    otherwise the smallest value is searched.
+    Samples settle it if what they can have missed does not matter; otherwise the smallest value is searched.
     """
-    if _bound(v, dimension) > level:
-        return True
-    E = exponents(dimension, 4)
-    # a long thin body has a small value along one axis by its shape alone: made as long as wide it is judged fairly
-    along = v[E.max(axis=1) == 4]
-    # the values on the axes are values on the sphere: one that is too small settles it
-    if not along.min() > level:
-        return False
-    size = along**-0.25
-    even = _bound(v * np.prod(size**E, axis=1), dimension)
-    # a unit vector is at least 1 / max(size) long in even variables, and P grows with the fourth power
-    return bool(even > level * size.max() ** 4) or smallest_value(v, dimension)[0] > level
+    return _bound(v, dimension) > level or smallest_value(v, dimension)[0] > level
 
 
 def _bound(v: FloatArray, dimension: int) -> float:

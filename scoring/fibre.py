@@ -19,7 +19,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,38 +61,12 @@ class Span:
         return self.det * np.linalg.inv(np.hstack([self.T, self.U]).T @ self.C)[:, :2].T
 
 
-class Fibre(Protocol):
-    """One contact's part in the volume of a grasp."""
-
-    exact: bool
-    finest: int
-    error_share: float  # part of what extrapolation adds to the finest level that is taken for its error at least
-
-    def measures(self, level: int) -> tuple[float, float]:
-        """Volume of the cone K and area of its shadow along T."""
-
-    def sides(self, level: int, split: FloatArray) -> FloatArray:
-        """Sides of S that come from the cone's flank, ``(m, 2)``; no side mixes both sides of the line ``split``."""
-
-    def base(self, level: int) -> FloatArray:
-        """The side of S that comes from the cone's base, ``(2,)``."""
-
-    def ridge(self, level: int, away: FloatArray) -> float:
-        """Area in U of the points below the edge of the flank that is farthest in the direction ``away``."""
-
-
-def fibre_of(body: Body, span: Span) -> Fibre:
-    """Closed form for ellipsoids, hulls for other bodies."""
-    A = ellipsoid_matrix(body)
-    return HullFibre(body, span) if A is None else EllipsoidFibre(A, span)
-
-
 class EllipsoidFibre:
     """Parts of an ellipsoid in closed form; only the sides are divided into ``128 * 2**level`` pieces."""
 
     exact = False
     finest = 7
-    error_share = 0.0
+    error_share = 0.0  # part of what extrapolation adds to the finest level that is taken for its error at least
 
     def __init__(self, A: FloatArray, span: Span) -> None:
         axes, vectors = np.linalg.eigh(A)
@@ -109,7 +82,7 @@ class EllipsoidFibre:
         return _disc(np.maximum(self.axes, MIN_THICKNESS * self.axes[2]), self.vectors, self.facet_map)
 
     def measures(self, level: int) -> tuple[float, float]:
-        """Volume of the cone and area of the hull of an ellipse and 0."""
+        """Volume of the cone K and area of its shadow along T, the hull of an ellipse and 0."""
         W, s, _ = np.linalg.svd(self.shadow_map)
         d = s[0] * s[1]
         b = math.hypot(*(W.T @ self.centre * s[::-1]))
@@ -118,11 +91,11 @@ class EllipsoidFibre:
         return self.volume, area
 
     def base(self, level: int) -> FloatArray:
-        """The base has the volume ``4/3 pi det A``."""
+        """The side of S that comes from the cone's base, whose volume is ``4/3 pi det A``, ``(2,)``."""
         return 4 / 3 * math.pi * self.c
 
     def sides(self, level: int, split: FloatArray) -> FloatArray:
-        """Pieces of the curve or of the density."""
+        """Sides of S from the cone's flank ``(m, 2)``; no piece mixes both sides of the line ``split``."""
         return self._inside(level, split) if self.rho < 1 else self._outside(level, split)
 
     def _inside(self, level: int, split: FloatArray) -> FloatArray:
@@ -158,7 +131,10 @@ class EllipsoidFibre:
         return -math.pi / 3 * np.diff(np.outer(along, self.c) + np.outer(s * rest, across), axis=0)
 
     def ridge(self, level: int, away: FloatArray) -> float:
-        """Area swept by the circle of the sphere on which ``P v - c`` has the direction ``away``."""
+        """Area in U of the points below the edge of the flank that is farthest in the direction ``away``.
+
+        It is swept by the circle of the sphere on which ``P v - c`` has that direction.
+        """
         W, _, v0, sphere = self.rim
         w = np.linalg.solve(W, away)
         w = w / math.hypot(*w)
@@ -244,6 +220,15 @@ class HullFibre:
         a, b = np.moveaxis(v[edges[order[0::2]][between]], 1, 0)
         # with signs, so that what slivers without a normal add on one side they take away on the other
         return 0.5 * abs(float(np.where(y[i][between] < 0, 1, -1) @ (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])))
+
+
+Fibre = EllipsoidFibre | HullFibre
+
+
+def fibre_of(body: Body, span: Span) -> Fibre:
+    """Closed form for ellipsoids, hulls for other bodies."""
+    A = ellipsoid_matrix(body)
+    return HullFibre(body, span) if A is None else EllipsoidFibre(A, span)
 
 
 def _cross(a: FloatArray, b: FloatArray) -> float:
