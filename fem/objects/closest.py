@@ -7,8 +7,6 @@ import math
 import numpy as np
 from numba import njit
 
-from softjaw.friction.patch import FloatArray
-
 SMALLEST_STRETCH = 1e-3  # 1 + curvature * g never drops below: beyond it the point has passed the centre of curvature
 
 
@@ -84,29 +82,16 @@ def ellipse_gap(x, a, b):
 
 
 @njit(cache=True)
-def _nearest_segment(z, r, line, blocks, size):
-    """Segment of the polyline ``line (m + 1, 2)`` closest to a point, and the place on it in [0, 1].
-
-    ``blocks`` bounds runs of ``size`` segments by circles (centre z, centre r, radius), so that most are skipped.
-    """
-    m, best, segment, place = len(line) - 1, np.inf, 0, 0.0
-    # the block that is certainly near comes first, so that most others are skipped
-    first, reach = 0, np.inf
-    for k in range(len(blocks)):
-        d = math.hypot(z - blocks[k, 0], r - blocks[k, 1]) + blocks[k, 2]
-        if d < reach:
-            first, reach = k, d
-    for step in range(len(blocks)):
-        k = (first + step) % len(blocks)
-        if math.hypot(z - blocks[k, 0], r - blocks[k, 1]) - blocks[k, 2] > math.sqrt(best):
-            continue
-        for i in range(k * size, min((k + 1) * size, m)):
-            d_z, d_r = line[i + 1, 0] - line[i, 0], line[i + 1, 1] - line[i, 1]
-            t = ((z - line[i, 0]) * d_z + (r - line[i, 1]) * d_r) / (d_z * d_z + d_r * d_r)
-            t = min(max(t, 0.0), 1.0)
-            d = (line[i, 0] + t * d_z - z) ** 2 + (line[i, 1] + t * d_r - r) ** 2
-            if d < best:
-                best, segment, place = d, i, t
+def _nearest_segment(z, r, line):
+    """Segment of the polyline ``line (m + 1, 2)`` closest to a point, and the place on it in [0, 1]."""
+    best, segment, place = np.inf, 0, 0.0
+    for i in range(len(line) - 1):
+        d_z, d_r = line[i + 1, 0] - line[i, 0], line[i + 1, 1] - line[i, 1]
+        t = ((z - line[i, 0]) * d_z + (r - line[i, 1]) * d_r) / (d_z * d_z + d_r * d_r)
+        t = min(max(t, 0.0), 1.0)
+        d = (line[i, 0] + t * d_z - z) ** 2 + (line[i, 1] + t * d_r - r) ** 2
+        if d < best:
+            best, segment, place = d, i, t
     return segment, place
 
 
@@ -149,7 +134,7 @@ def _foot(z, r, low, high, s, breaks, coefficients):
 
 
 @njit(cache=True)
-def profile_gap(x, breaks, coefficients, line, places, blocks, size):
+def profile_gap(x, breaks, coefficients, line, places):
     """Signed distance ``(n,)`` to the turned profile, normal ``(n, 3)`` and Hessian ``(n, 3, 3)`` at ``x (n, 3)``.
 
     The closest point lies in the half plane of the point, so this is a distance to the curve (z, r)(s). The Hessian has
@@ -160,7 +145,7 @@ def profile_gap(x, breaks, coefficients, line, places, blocks, size):
     for i in range(n):
         z, r = x[i, 2], math.hypot(x[i, 0], x[i, 1])
         c, d = (x[i, 0] / r, x[i, 1] / r) if r > 0.0 else (1.0, 0.0)
-        k, t = _nearest_segment(z, r, line, blocks, size)
+        k, t = _nearest_segment(z, r, line)
         # a segment more on either side: the foot on the curve may lie beyond that on the polyline
         low, high = places[max(k - 1, 0)], places[min(k + 2, len(places) - 1)]
         s = _foot(z, r, low, high, places[k] + t * (places[k + 1] - places[k]), breaks, coefficients)
@@ -179,13 +164,3 @@ def profile_gap(x, breaks, coefficients, line, places, blocks, size):
             for q in range(3):
                 hessian[i, p, q] = along * e[p] * e[q] + around * f[p] * f[q]
     return g, normal, hessian
-
-
-def bounding_circles(line: FloatArray, size: int) -> FloatArray:
-    """Circles ``(k, 3)`` (centre, radius) round each run of ``size`` segments of the polyline ``(m + 1, 2)``."""
-    circles = []
-    for i in range(0, len(line) - 1, size):
-        run = line[i : i + size + 1]
-        centre = 0.5 * (run.min(axis=0) + run.max(axis=0))
-        circles.append([*centre, np.linalg.norm(run - centre, axis=1).max()])
-    return np.array(circles)

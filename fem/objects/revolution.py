@@ -12,7 +12,6 @@ from softjaw.fem.objects.gap import Analytic, Gap, Surface, grid_triangles
 from softjaw.fem.objects.profile import Curve, through, with_lids
 from softjaw.friction.patch import NEGLIGIBLE, FloatArray
 
-BLOCK = 8  # segments of the polyline that share one bounding circle
 TURN = np.radians(3.0)  # largest turn of the curve within one segment of the polyline
 
 
@@ -72,11 +71,7 @@ class Revolution(Analytic):
         """Signed distance ``(n,)`` [m], normal ``(n, 3)`` and Hessian ``(n, 3, 3)`` [1/m]."""
         x = np.ascontiguousarray(x, dtype=float)
         curve = self.curve
-        return closest().profile_gap(x, curve.breaks, curve.coefficients, self._line, self._places, self._blocks, BLOCK)
-
-    @cached_property
-    def _blocks(self) -> FloatArray:
-        return closest().bounding_circles(self._line, BLOCK)
+        return closest().profile_gap(x, curve.breaks, curve.coefficients, self._line, self._places)
 
     @property
     def bounds(self) -> FloatArray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from types import SimpleNamespace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,7 +40,7 @@ class Stacked(Analytic):
 
     def near(self, pose: Pose, lower: FloatArray, upper: FloatArray, element: float | None = None) -> GapFunction:
         """Gap function for use close to the wall, which need not ask the triangles first."""
-        return _NearWall(self)
+        return SimpleNamespace(gap=lambda x: self._gap(x, np.ones(len(x), dtype=bool)))
 
     def _gap(self, x: FloatArray, close: NDArray[np.bool_]) -> Gap:
         """Exact where points are ``close`` to the wall and face it, else from the triangles."""
@@ -83,17 +84,6 @@ class Stacked(Analytic):
         top = np.stack([np.full(around, last), ring + (rows - 1) * around, after + (rows - 1) * around], 1)
         triangles = np.concatenate([grid_triangles(rows, around, closed=True), bottom, top])
         return np.concatenate([X.reshape(-1, 3), ends]), triangles.astype(np.int64)
-
-
-@dataclass(frozen=True, eq=False)
-class _NearWall:
-    """A stacked body as a pad that touches it sees it."""
-
-    body: Stacked
-
-    def gap(self, x: FloatArray) -> Gap:
-        """See `Stacked.gap`."""
-        return self.body._gap(x, np.ones(len(x), dtype=bool))
 
 
 def wall_surface(outer: OuterSurface, lower: float | None = None, upper: float | None = None) -> SplineSurface:

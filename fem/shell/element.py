@@ -207,11 +207,11 @@ class Shell(Generic[MeshT]):
     mesh : ShellMesh
     young_modulus, poisson_ratio : float
         [Pa], [-].
-    springs : (6 k,) array, optional
-        Stiffness to ground of every number [N/m]; the weak springs of a freely held object, for example.
 
     Attributes
     ----------
+    springs : (6 k,) array
+        Stiffness to ground of every number [N/m], 0 until it is set; the weak springs of a freely held object.
     size : int
         ``6 k``.
     start, column : (6 k + 1,), (nnz,) arrays
@@ -220,13 +220,11 @@ class Shell(Generic[MeshT]):
         Reference area that belongs to each node [m^2].
     """
 
-    def __init__(
-        self, mesh: MeshT, young_modulus: float, poisson_ratio: float, springs: FloatArray | None = None
-    ) -> None:
+    def __init__(self, mesh: MeshT, young_modulus: float, poisson_ratio: float) -> None:
         self.mesh, self.young_modulus, self.poisson_ratio = mesh, float(young_modulus), float(poisson_ratio)
         self.elements = elements(mesh.X, mesh.D, mesh.elements, self.young_modulus, self.poisson_ratio)
         self.size = 6 * len(mesh.X)
-        self.springs = np.zeros(self.size) if springs is None else springs
+        self.springs = np.zeros(self.size)
         self._reference = np.hstack([mesh.X, mesh.D])
         self.node_area = np.bincount(
             mesh.elements.ravel(), (self.elements.area @ kernel.N_G).ravel(), minlength=len(mesh.X)
