@@ -26,6 +26,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike
+from scipy.spatial import ConvexHull
 
 from softjaw.scoring.contact import FloatArray, SoftContact
 
@@ -172,11 +173,25 @@ class _Search:
 
     def refine(self) -> float:
         """Distance of the hull's nearest facet, after looking along all that are nearer than the least support."""
-        g, n = self.grasp, len(self.points)
-        points, bases = np.zeros((MOST_POINTS, 3)), np.zeros((MOST_POINTS, *self.bases[0].shape))
-        points[:n], bases[:n] = self.points, self.bases
-        lower, self.upper, self.u = _refined(g.C, g.V1, g.V2, g.kind, self.rows, points, bases, n, self.upper, self.u)
-        return lower
+        hull, before = ConvexHull(self.forces, incremental=True), np.empty(0)
+        while True:
+            nearest = int(hull.equations[:, 3].argmax())
+            plane = hull.equations[nearest]
+            # a point that the hull has already ends the search: along its nearest facet both bounds are the same
+            if (
+                len(self.points) == MOST_POINTS
+                or self.upper < ROUNDING_FORCE
+                or -plane[3] >= self.upper * (1.0 - BOUND_GAP)
+                or np.array_equal(plane, before)
+            ):
+                hull.close()
+                return -float(plane[3])
+            before, known = plane, (self.upper, self.u)
+            self.look(plane[:3], self.bases[hull.simplices[nearest, 0]])
+            # a programme that did not fill its rows says nothing of the support
+            if self.upper == -np.inf:
+                self.upper, self.u = known
+            hull.add_points(self.points[-1][None])
 
 
 def _unit(v: ArrayLike) -> FloatArray:
@@ -256,85 +271,3 @@ def _programme(C, V1, V2, kind, along, rows, basis):
         point += x[k] * basis[k, :6]
         missing += abs(x[k]) * (basis[k, 7] > 0)
     return upper, point, missing
-
-
-@njit(cache=True)
-def _refined(C, V1, V2, kind, rows, points, bases, n, upper, u):
-    """Distance of the nearest facet of the hull of ``n`` points ``(MOST_POINTS, 3)``, least support, its direction.
-
-    The nearest facet's normal is looked along until the bounds are as close as `BOUND_GAP`.
-    """
-    # A closed hull has fewer than two facets a point; one more point can leave three times as many where it is not.
-    facets, planes = np.zeros((6 * MOST_POINTS, 3), np.int64), np.zeros((6 * MOST_POINTS, 4))
-    count = _tetrahedron(points[:n], facets, planes)
-    for i in range(n):
-        count = _added(points, i, facets, planes, count)
-    while True:
-        nearest = np.argmin(planes[:count, 3])
-        lower = planes[nearest, 3]
-        if n == MOST_POINTS or count > 2 * n or upper < ROUNDING_FORCE or lower >= upper * (1.0 - BOUND_GAP):
-            return lower, upper, u
-        normal, along = planes[nearest, :3].copy(), np.zeros(6)
-        along[:3] = normal
-        bases[n] = bases[facets[nearest, 0]]
-        support, point, missing = _programme(C, V1, V2, kind, along, rows, bases[n])
-        points[n] = point[:3]
-        if missing < ROUNDING_FORCE and support < upper:
-            upper, u = support, normal
-        before = count
-        count = _added(points, n, facets, planes, count)
-        # a point that the hull has already ends the search: along its nearest facet both bounds are the same
-        if count == before and planes[nearest, 3] == lower:
-            return lower, upper, u
-        n += 1
-
-
-@njit(cache=True)
-def _plane(points, a, b, c, plane):
-    """Outward unit normal of a triangle and its distance from 0 along it, into ``plane (4,)``."""
-    normal = np.cross(points[b] - points[a], points[c] - points[a])
-    plane[:3] = normal / np.sqrt((normal**2).sum())
-    plane[3] = (plane[:3] * points[a]).sum()
-
-
-@njit(cache=True)
-def _tetrahedron(points, facets, planes):
-    """Four points far apart as the first hull: fills its facets, anticlockwise from outside, and their planes."""
-    first = np.argmax(points[:, 0])
-    arms = points - points[first]
-    second = np.argmax((arms**2).sum(axis=1))
-    axis = arms[second] / np.sqrt((arms[second] ** 2).sum())
-    off = arms - np.outer(arms @ axis, axis)
-    third = np.argmax((off**2).sum(axis=1))
-    normal = np.cross(arms[second], arms[third])
-    height = arms @ normal
-    fourth = np.argmax(np.abs(height))
-    a, b, c = (first, third, second) if height[fourth] > 0.0 else (first, second, third)
-    for k, corners in enumerate(((a, b, c), (a, fourth, b), (b, fourth, c), (c, fourth, a))):
-        facets[k] = corners
-        _plane(points, corners[0], corners[1], corners[2], planes[k])
-    return 4
-
-
-@njit(cache=True)
-def _added(points, i, facets, planes, count):
-    """Number of facets of the hull with the ``i``-th point: those that see it give way to a cone from their rim.
-
-    A point nearer than `ROUNDING_FORCE` to all facets adds nothing.
-    """
-    sees = (planes[:count, :3] * points[i]).sum(axis=1) > planes[:count, 3] + ROUNDING_FORCE
-    seen, kept = facets[:count][sees], np.flatnonzero(~sees)
-    facets[: len(kept)], planes[: len(kept)] = facets[kept], planes[kept]
-    count = len(kept)
-    for f in range(len(seen)):
-        for k in range(3):
-            a, b = seen[f, k], seen[f, (k + 1) % 3]
-            rim = True
-            for g in range(len(seen)):
-                for j in range(3):
-                    rim &= not (seen[g, j] == b and seen[g, (j + 1) % 3] == a)
-            if rim:
-                facets[count] = a, b, i
-                _plane(points, a, b, i, planes[count])
-                count += 1
-    return count
