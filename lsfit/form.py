@@ -8,7 +8,6 @@ from functools import lru_cache
 from itertools import combinations_with_replacement
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import roots_gegenbauer
 
@@ -42,11 +41,15 @@ def places(dimension: int, degree: int) -> dict[tuple[int, ...], int]:
 
 def monomials(w: ArrayLike, E: IntArray) -> FloatArray:
     """Monomials ``w^E``, ``(m, d), (k, d) -> (m, k)``."""
-    # numba compiles a version of its own for every memory layout
-    W = np.ascontiguousarray(np.atleast_2d(np.asarray(w, float)))
+    W = np.atleast_2d(np.asarray(w, float)).T
+    power = [np.ones_like(W)]
+    for _ in range(int(E.max(initial=0))):
+        power.append(power[-1] * W)
+    table = np.array(power)
     # one row per monomial, so that the products run along contiguous memory
-    out = np.empty((len(E), len(W)))
-    fill_monomials(W, E, out)
+    out = table[E[:, 0], 0]
+    for i in range(1, len(W)):
+        out *= table[E[:, i], i]
     return out.T
 
 
@@ -111,29 +114,6 @@ def _interpolation(dimension: int, degree: int) -> tuple[FloatArray, FloatArray]
     # a form grows with a power of the length, which would weigh the points unevenly
     points /= np.linalg.norm(points, axis=1, keepdims=True)
     return points, np.linalg.pinv(monomials(points, E))
-
-
-@njit(cache=True)
-def fill_monomials(w, E, out):  # pragma: no cover - compiled
-    """Write the monomials ``w^E``, ``(m, d), (k, d) -> out (k, m)``."""
-    power = powers(w, E)
-    for j in range(len(E)):
-        out[j] = power[0, E[j, 0]]
-        for i in range(1, w.shape[1]):
-            out[j] *= power[i, E[j, i]]
-
-
-@njit(cache=True)
-def powers(w, E):  # pragma: no cover - compiled
-    """Powers of the components ``(d, degree + 1, m)``."""
-    m, d = w.shape
-    power = np.empty((d, 1 + (E.max() if E.size else 0), m))
-    for i in range(d):
-        power[i, 0] = 1.0
-        for e in range(1, power.shape[1]):
-            for n in range(m):
-                power[i, e, n] = power[i, e - 1, n] * w[n, i]
-    return power
 
 
 @lru_cache

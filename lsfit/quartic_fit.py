@@ -6,15 +6,13 @@ margins mean the same for every contact.
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike
 
 from softjaw.lsfit.ellipsoid import MAX_REACH_RATIO, full_ellipsoid, nearest_solution
-from softjaw.lsfit.form import exponents, powers
+from softjaw.lsfit.form import exponents, monomial_gradients, monomials
 from softjaw.lsfit.lowest import lies_above
 from softjaw.lsfit.quartic import Quartic
 from softjaw.lsfit.samples import pressed, principal_frame
@@ -119,56 +117,9 @@ def normal_equations(samples: RoundSamples, gamma: float) -> tuple[FloatArray, F
     Gradients are in the wrench's components, coefficients in the coordinates of the samples.
     """
     Y, T, _, inverse, _ = samples
-    E, m = exponents(Y.shape[1], 4), len(Y)
-    # residuals per coefficient: of the wrenches, then of the directions across the motions
-    out = np.empty((len(E), T.shape[1], m))
-    fill_residuals(*(np.ascontiguousarray(x) for x in (Y, T, inverse)), E, float(gamma), out)
-    R = out.reshape(len(E), -1)
-    # only the residual of P has a target, 1; those of the slopes are to vanish
-    return R @ R.T / m, R[:, :m] @ np.full(m, 1 / m)
-
-
-@njit(cache=True)
-def fill_residuals(Y, T, inverse, E, gamma, out):  # pragma: no cover - compiled
-    """Write what ``P`` and ``sqrt(gamma) (I - t t') grad P`` are per coefficient, for every sample.
-
-    In ``d`` dimensions the ``d - 1`` directions across a motion hold all of the latter: columns of the reflection that
-    takes the motion to the last axis. ``Y (m, r)`` are wrenches ``w = B y``, ``T (m, d)`` unit motions, or zero where
-    they do not count, ``inverse (r, d)`` is the pseudo-inverse of B, which takes gradients along ``y`` to those along
-    ``w``, and ``E (k, r)`` are exponents; ``out (k, d, m)`` receives P and then its slopes.
-    """
-    (k, r), d, m = E.shape, T.shape[1], len(Y)
-    power = powers(Y, E)
-    for j in range(k):
-        out[j, 0] = power[0, E[j, 0]]
-        for i in range(1, r):
-            out[j, 0] *= power[i, E[j, i]]
-    # slopes are added up below, and the array comes uninitialised
-    out[:, 1:] = 0.0
-    along, slope = np.empty((r, d - 1, m)), np.empty(m)
-    for c in range(d - 1):
-        for n in range(m):
-            t = T[n]
-            # the reflection with the sign that adds: the other one cancels near the last axis
-            u = t[c] / (1.0 + abs(t[d - 1]))
-            end = 1.0 if t[d - 1] >= 0.0 else -1.0
-            # a motion of zeros would be reflected like any other; it must not count
-            moving = 0.0
-            for a in range(d):
-                moving = math.sqrt(gamma) if t[a] != 0.0 else moving
-            for i in range(r):
-                x = inverse[i, c] - u * end * inverse[i, d - 1]
-                for a in range(d):
-                    x -= u * t[a] * inverse[i, a]
-                along[i, c, n] = moving * x
-    for j in range(k):
-        for i in range(r):
-            if E[j, i] == 0:
-                continue
-            # multiplied out: dividing the monomial by a component fails where that is 0
-            slope[:] = E[j, i] * power[i, E[j, i] - 1]
-            for a in range(r):
-                if a != i:
-                    slope *= power[a, E[j, a]]
-            for c in range(d - 1):
-                out[j, c + 1] += along[i, c] * slope
+    M, G = monomials(Y, exponents(Y.shape[1], 4)), monomial_gradients(Y, Y.shape[1], 4) @ inverse
+    # slopes across the motion are to vanish; a motion of zeros does not count
+    across = (G - (G @ T[:, :, None]) * T[:, None]) * T.any(axis=1)[:, None, None]
+    R = np.concatenate([M, np.sqrt(gamma) * across.transpose(0, 2, 1).reshape(-1, M.shape[1])])
+    # only the residual of P has a target, 1
+    return R.T @ R / len(Y), M.mean(axis=0)
