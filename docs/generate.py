@@ -22,7 +22,7 @@ import softjaw
 from softjaw.study.cli.options import COMMANDS, program
 from softjaw.study.flags import DERIVED, Flag
 from softjaw.study.messages import MEANING
-from softjaw.study.quantities import EFFECT_TABLE, MODEL_NAMES, REASONS, STATES, TABLE, Quantity
+from softjaw.study.quantities import EFFECTS, INDICATORS, MODEL_NAMES, REASONS, STATES, TABLE, Quantity
 from softjaw.study.scene.grasps import GraspPose
 from softjaw.study.scene.model import SECTIONS, Scene
 from softjaw.study.scene.objects import SHAPES, SectionTable, Shape, Walled
@@ -187,7 +187,7 @@ def _quantity_row(q: Quantity) -> tuple[str, ...]:
 def flags_page() -> str:
     """Flags, states of a case, exit codes, and effects with their levels."""
     flags = [(int(f), f.word, _sentence(f.sentence) + f" {_sentence(f.more)}" * bool(f.more)) for f in Flag]
-    effects = [(_code(name), ", ".join(e.levels), e.indicator or "-") for name, e in EFFECT_TABLE.items()]
+    effects = [(_code(name), ", ".join(levels), INDICATORS.get(name, "-")) for name, levels in EFFECTS.items()]
     derived = " and ".join(f"`{f.word}`" for f in Flag if f & DERIVED)
     parts = [
         "# Flags, states, effects, exit codes",

@@ -121,22 +121,24 @@ def say(text: str) -> None:
 
 
 @contextmanager
-def beside(path: Path, folders: bool = False) -> Iterator[Path]:
-    """A place to write to, renamed to ``path`` at the end; with ``folders`` those that are missing are made.
+def beside(path: Path, folders: bool = False, part: Path | None = None) -> Iterator[Path]:
+    """A place to write to, renamed to ``path`` when it is on disk; with ``folders`` those that are missing are made.
 
-    Devices and pipes are written to as they are.
+    ``part`` names it. Devices and pipes are written to as they are.
 
     Raises `StudyError` if the file cannot be written, with exit code 5.
     """
     special = path.exists() and not path.is_file() and not path.is_dir()
-    part = path if special else path.with_name(f"{path.stem}.{os.getpid()}.part{path.suffix}")
+    part = path if special else part or path.with_name(f"{path.stem}.{os.getpid()}.part{path.suffix}")
     try:
         if folders:
             make_folders(path.parent)
         yield part
         if not special:
+            _on_disk(part)
             part.replace(path)
-    except (OSError, RuntimeError) as error:
+            _on_disk(path.parent)
+    except (OSError, RuntimeError, ValueError) as error:
         if not isinstance(error, OSError) and "write" not in str(error):  # what h5py says of a full disk
             raise
         raise StudyError(CANNOT_WRITE, f"{path}: cannot be written ({why(error)}); choose another place") from error
@@ -145,14 +147,28 @@ def beside(path: Path, folders: bool = False) -> Iterator[Path]:
             remove(part)
 
 
+def _on_disk(path: Path) -> None:
+    """Wait until a file or folder is there for good."""
+    opened = os.open(path, os.O_RDONLY)
+    os.fsync(opened)
+    os.close(opened)
+
+
 def why(error: Exception) -> str:
-    """What the system said of a file, also where HDF5 reports it.
+    """What the system said of a file, also where HDF5 reports it, or the part of an error that says something.
 
     >>> why(OSError("Unable to create file (unable to open file: errno = 13, error message = 'Permission denied')"))
     'Permission denied'
     """
-    message = re.search(r"error message = '([^']*)'", str(error))
-    return message[1] if message else getattr(error, "strerror", None) or str(error)
+    text = str(error) or type(error).__name__
+    if message := re.search(r"error message = '([^']*)'", text):
+        return message[1]
+    if getattr(error, "strerror", None):
+        return str(error.strerror)  # type: ignore[attr-defined]
+    # h5py puts what HDF5 says in parentheses behind its own sentence.
+    if isinstance(error, OSError | RuntimeError):
+        text = text.partition("(")[2].rstrip(")") or text
+    return printable(" ".join(text.split()))[:200]
 
 
 def remove(path: Path) -> None:

@@ -48,48 +48,26 @@ class Axis:
     options: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
-class Effect:
-    """An effect that a scene may call for: its levels, the cheapest first, and what its indicator is, if it has one.
-
-    ``measured`` tells whether the coarse mesh decides where the indicator does not.
-    """
-
-    levels: tuple[str, ...]
-    indicator: str = ""
-    measured: bool = False
-
-
-EFFECT_TABLE = {
-    "object": Effect(
-        ("rigid", "linear shell", "nonlinear shell"),
-        "indentation that a linear wall would get at the largest force, over the wall's thickness",
-    ),
-    "sheet": Effect(
-        ("rigid", "elastic plate"),
-        "mean deflection of the backing plate under an even pressure over that of the pad",
-        measured=True,
-    ),
-    "model_size": Effect(("quarter", "half", "full")),
-    "fingers": Effect(("one", "two")),
-    "friction": Effect(
-        ("pcm", "ccm"),
-        "share of the pressure sum that the tilt of the loaded normals takes off the normal force, 1 - F_N / S",
-    ),
-    "wrench": Effect(("3-D", "6-D"), "mean share of the three dropped components in the friction wrench"),
-    "limit_surface": Effect(
-        ("ellipsoid from three motions", "fitted ellipsoid", "convex quartic"),
-        "radial fit error of the fitted limit surface, CCM, of the finger where it is larger",
-    ),
-    "friction_pressure_coupling": Effect(
-        ("none", "tangential traction"),
-        "share of the pressure sum that friction which acted back would add across it, of the finger where it is"
-        " larger; on the coarse mesh where it is chosen by it",
-        measured=True,
-    ),
+EFFECTS = {  # that a scene may call for, and their levels, the cheapest first
+    "object": ("rigid", "linear shell", "nonlinear shell"),
+    "sheet": ("rigid", "elastic plate"),
+    "model_size": ("quarter", "half", "full"),
+    "fingers": ("one", "two"),
+    "friction": ("pcm", "ccm"),
+    "wrench": ("3-D", "6-D"),
+    "limit_surface": ("ellipsoid from three motions", "fitted ellipsoid", "convex quartic"),
+    "friction_pressure_coupling": ("none", "tangential traction"),
 }
-EFFECTS = {name: effect.levels for name, effect in EFFECT_TABLE.items()}
-INDICATORS = {name: effect.indicator for name, effect in EFFECT_TABLE.items() if effect.indicator}
+INDICATORS = {
+    "object": "indentation that a linear wall would get at the largest force, over the wall's thickness",
+    "sheet": "mean deflection of the backing plate under an even pressure over that of the pad",
+    "friction": "share of the pressure sum that the tilt of the loaded normals takes off the normal force, 1 - F_N / S",
+    "wrench": "mean share of the three dropped components in the friction wrench",
+    "limit_surface": "radial fit error of the fitted limit surface, CCM, of the finger where it is larger",
+    "friction_pressure_coupling": "share of the pressure sum that friction which acted back would add across it, of the"
+    " finger where it is larger; on the coarse mesh where it is chosen by it",
+}
+MEASURED_EFFECTS = ("sheet", "friction_pressure_coupling")  # which the coarse mesh decides where the indicator does not
 REASONS = (
     "the only level of this version",
     "forced by the scene",
@@ -184,6 +162,7 @@ SINGULAR = {"fingers": "finger", "checks": "check", "effects": "effect"}
 F, M, FM = ("finger",), ("model",), ("finger", "model")
 MESHES = "Stated error, all that is numerical: mesh, steps of the load path, effects left out, edge of the contact"
 AS_MAP = "As the map, for each finger."
+MEANS = "|P - 1|, |P^(-1/degree) - 1| (the relative error of the radius), angle between gradient and motion"
 ROWS = (
     # maps of every case, with what is said beside them
     Quantity("quality", M, "", "grasp quality",
@@ -194,8 +173,8 @@ ROWS = (
     Quantity("payload", M, "kg", "mass that is held",
              "Largest mass whose weight at the centre of mass both contacts hold with the normal force of this case, in"
              " whichever direction it pulls, or in that of [task]. The squeeze itself is borne first; 0 where friction"
-             " cannot. As [task] says how the normal forces answer a load: by default the drive keeps their sum. The"
-             " limit surfaces are hulls of the sampled wrenches, on the safe side.", rank=1, error="relative"),
+             " cannot. The limit surfaces are hulls of the sampled wrenches, on the safe side.", rank=1,
+             error="relative"),
     Quantity("safety_factor", M, "", "mass that is held over mass of the object", "payload over object.mass_g.",
              symbol="safety", needs=("mass",), rank=13, error="relative"),
     Quantity("quality_fitted", M, "", "grasp quality, fitted limit surface",
@@ -207,17 +186,15 @@ ROWS = (
     Quantity("fit_error_ellipsoid", (), "", "fit error of the ellipsoid from three motions",
              "As fit error, of the ellipsoid that quality is computed from."),
     Quantity("overclaim", (), "", "largest overclaim of the fitted limit surface",
-             "Largest share by which the fitted limit surface claims more friction than the contact carries, over the "
-             "same motions; CCM, of the finger where it is larger."),
+             "Largest share by which it claims more friction than the contact carries, over the motions of fit error."),
     Quantity("overclaim_ellipsoid", (), "", "largest overclaim of the ellipsoid from three motions",
              "As overclaim, of the ellipsoid that quality is computed from."),
     Quantity("e_n", M, "m", "eccentricity parameter e_n",
              "max tau_z / (mu S), Eq. (12) with the paper's F_N read as S, the sum of pressure times area over the "
              "patch; of the weaker finger.", rank=3, error="relative"),
     Quantity("e_n_ratio", M, "m", "eccentricity parameter, torque over force",
-             "max tau_z / max f_t, Eq. (11), with the largest friction force in the contact plane over all motions, in"
-             " whichever direction. In the planar models it is e_n, or e_n_projected; in the curved one it is no "
-             "smaller than e_n. Of the finger where it is smaller."),
+             "max tau_z / max f_t, Eq. (11), with the largest friction force in the contact plane in any direction; of"
+             " the finger where it is smaller."),
     Quantity("e_n_commanded", M, "m", "eccentricity parameter, force of the gripper",
              "max tau_z / (mu F), Eq. (12) with the paper's F_N read as the force F that the gripper is commanded to "
              "exert, the normal_force of the case; of the weaker finger."),
@@ -238,17 +215,15 @@ ROWS = (
              "Total friction torque about the contact normal when the pad turns about it, Eqs. (6)-(8); of the weaker"
              " finger.", rank=4, error="relative"),
     Quantity("tau_pure", (), "N m", "largest torque without a net force",
-             "Largest torque about the contact normal that the contact carries while it transmits no force in its "
-             "plane; tau_z_max comes with such a force where the patch is not symmetric, and is larger: up to 2 "
-             "max(a, b) / (a + b) times where a pad bears on two ends with loads a and b, because its origin lies "
-             "between them. CCM, of the weaker finger."),
+             "Largest torque about the contact normal without a force in the contact's plane; tau_z_max comes with one"
+             " where the patch is not symmetric, and is larger: up to 2 max(a, b) / (a + b) times where a pad bears on"
+             " two ends with loads a and b. CCM, of the weaker finger."),
     Quantity("S", (), "N", "pressure times area", "Sum of pressure times area over the patch; mean of both fingers."),
     Quantity("F_N", (), "N", "normal force",
              "Sum of pressure times area times (n . N), the force along the contact normal; mean of both fingers."),
     Quantity("force_excess", (), "", "force along the contact normal over the gripper's, less 1",
-             "F_N / F - 1, with F the normal_force of the case, along the approach. On a slope the contact is pushed "
-             "aside too, which the pad's backing bears: F_N is F over the cosine between approach and contact normal "
-             "where the pressure's resultant lies along that normal. Of the finger where it is larger in size."),
+             "F_N / F - 1, with F the normal_force of the case, along the approach: on a slope the contact is pushed "
+             "aside too, which the pad's backing bears. Of the finger where it is larger in size."),
     Quantity("closing", (), "m", "closing displacement of the pad",
              "How far the pad's back moved towards the object after first touch; mean of both fingers.",
              error="relative"),
@@ -259,16 +234,15 @@ ROWS = (
              "Opening at first touch less the closing displacements of both pads, as the gripper shows it then.",
              symbol="loaded", rank=12, error="absolute"),
     Quantity("contact_area", (), "m^2", "contact area",
-             "Area under pressure, mean of both fingers; its edge is found inside the faces, from the moments of the "
-             "loads along their lines.", symbol="area", rank=14, error="relative"),
+             "Area under pressure, mean of both fingers; its edge is found inside the faces.", symbol="area", rank=14,
+             error="relative"),
     Quantity("p_max", (), "Pa", "largest pressure",
              "Largest contact pressure on either finger, of a quadratic fitted to the loads within two elements of the "
-             "largest one; where the pressure is singular, at a sharp end of the object under a pad, so a mean over "
-             "these elements.", rank=15, error="relative"),
+             "largest one; at a sharp end of the object, where it is singular, so a mean.", rank=15, error="relative"),
     Quantity("contact_distance", (), "m", "distance of the contacts", "Distance between the contact frames' origins."),
     Quantity("curvature_loss", (), "", "force lost to curvature",
-             "1 - F_N / S: zero for a flat contact, what the tilt of the loaded normals takes off the normal force "
-             "otherwise; both fingers together.", error="absolute"),
+             "1 - F_N / S: what the tilt of the loaded normals takes off the normal force; both fingers together.",
+             error="absolute"),
     Quantity("misalignment", (), "rad", "misalignment of the contacts",
              "Largest of the angles between one contact normal and the other reversed, and between the line that "
              "joins the contacts and each normal."),
@@ -285,8 +259,8 @@ ROWS = (
         )
     ),
     Quantity("pad_elements", (), "", "elements of a pad",
-             "Elements of each pad's mesh, of the finest one that the case was solved on. Errors are from the two"
-             " finest; pressures on faces are joined to the faces of the scene's own mesh.", needs=("finer meshes",)),
+             "Of the finest mesh that the case was solved on. Errors are from the two finest; faces are those of the "
+             "scene's own mesh.", needs=("finer meshes",)),
     Quantity("indentation", (), "m", "indentation of the wall",
              "Largest inward displacement of the wall, less the motion of the wall as a whole.",
              needs=("wall",), rank=5, error="relative"),
@@ -297,9 +271,8 @@ ROWS = (
              "Largest principal strain, by size, on its two faces, as the stress.", needs=("wall",),
              error="relative"),
     Quantity("support_force", (), "N", "force of the support",
-             "What the support has to bear in this frictionless contact: the pads push an object with sloping walls "
-             "along its axis. Friction takes it in a grasp; where it is more than mu F_N of both fingers can take, "
-             "the flag 'slides out' says so.", needs=("wall",)),
+             "What the support bears in this frictionless contact: the pads push sloping walls along their axis. Where"
+             " friction, mu F_N of both fingers, cannot take it, the flag is 'slides out'.", needs=("wall",)),
     # each finger: limits, contact frame, pose of the pad
     Quantity("f_x_max", FM, "N", "largest friction along x", AS_MAP, "fingers"),
     Quantity("f_y_max", FM, "N", "largest friction along y", AS_MAP, "fingers"),
@@ -337,13 +310,12 @@ ROWS = (
              "Largest product of pressure and gap at a node, over the largest pressure and the element size.",
              "checks"),
     Quantity("penetration_depth", F, "m", "deepest point inside the object",
-             "Of the quadrature points of the contact face: weighted gaps hold on average, so this shows how well the "
-             "mesh follows the object.", "checks"),
+             "Of the quadrature points of the contact face: shows how well the mesh follows the object.", "checks"),
     Quantity("min_det_f", F, "", "smallest det F", "Smallest ratio of deformed to undeformed volume.", "checks"),
     Quantity("max_strain", F, "", "largest strain", "Largest difference of a principal stretch from 1.", "checks"),
     Quantity("ellipticity", F, "", "smallest eigenvalue of the acoustic tensor",
-             "Over the shear modulus, in 24 directions at one point per element; not positive: the foam lost "
-             "ellipticity and strains may localise.", "checks"),
+             "Over the shear modulus, in 24 directions at one point per element; not positive: strains may localise.",
+             "checks"),
     # work
     Quantity("newton_iterations", F, "", "Newton iterations",
              "Since the force below; from first contact with friction that acts back.", "work"),
@@ -375,18 +347,14 @@ ROWS = (
              "0 the fit failed, ellipsoid from three motions used; 1 an ellipsoid; 2 the quartic came out "
              "convex; 3 a semidefinite programme kept the quartic convex.", "limit_surface"),
     Quantity("fit_flag", FM, "", "flag of the fit",
-             "Sum of: 1 the wrenches lie in a plane or on a line, so the surface is flat; 2 fewer independent "
-             "wrenches than coefficients; 4 its size was limited, because the wrenches alone give an unbounded body;"
-             " 8 rho does not suit the contact.", "limit_surface"),
+             "Sum of: 1 the wrenches lie in a plane or on a line; 2 fewer independent wrenches than coefficients; 4 its"
+             " size was limited, which the wrenches alone do not; 8 rho does not suit the contact.", "limit_surface"),
     Quantity("fit_error", (*FM, "component"), "-, -, rad", "fit error of the fitted surface",
-             "Means over 377 motions that it was not fitted to: |P - 1|, |P^(-1/degree) - 1| (the relative error of "
-             "the radius), angle between gradient and motion.", "limit_surface"),
+             f"Means over 377 motions that it was not fitted to: {MEANS}.", "limit_surface"),
     Quantity("fit_error_own", (*FM, "component"), "-, -, rad", "fit error of the fitted surface on its own samples",
-             "Means over the motions that it was fitted to: |P - 1|, |P^(-1/degree) - 1| (the relative error of the "
-             "radius), angle between gradient and motion.", "limit_surface"),
+             f"Means over the motions that it was fitted to: {MEANS}.", "limit_surface"),
     Quantity("fit_error_ellipsoid", (*FM, "component"), "-, -, rad", "fit error of the ellipsoid from three motions",
-             "Means over the 377 motions: |P - 1|, |P^(-1/degree) - 1| (the relative error of the radius), angle "
-             "between gradient and motion.", "limit_surface"),
+             f"Means over the 377 motions: {MEANS}.", "limit_surface"),
     Quantity("matrix_6d", (*F, "wrench", "wrench_2"), "", "matrix of the fitted 6-D ellipsoid",
              "A of w A w = 1 in w = (f_x, f_y, f_z, tau_x / rho, tau_y / rho, tau_z / rho) / (mu S), CCM; of"
              " the directions that the contact resists.", "limit_surface", needs=("six components",)),
@@ -396,9 +364,9 @@ ROWS = (
              "As fit error, over the motions it was fitted to.", "limit_surface", needs=("six components",)),
     # deformed wall
     Quantity("place", ("wall_place", "component"), "m", "deformed wall",
-             f"Outer face in the frame of the object's own file at {AROUND} angles about the axis, in equal steps from"
-             f" finger 1's, times {ALONG} places along the outline, in equal steps of its arc length from the bottom's"
-             " middle or rim to the top; the angle runs slowest.", "wall", needs=("wall",)),
+             f"Outer face in the frame of the object's own file at {AROUND} angles about the axis from finger 1's,"
+             f" times {ALONG} places along the outline from the bottom's middle or rim to the top, in equal steps; the "
+             "angle runs slowest.", "wall", needs=("wall",)),
     # effects: level, indicator and reason of each
     *(
         Quantity(f"{name}_{part}", (), "", f"{part} of the effect '{name}'", text, "effects", meanings=meanings)
@@ -407,7 +375,7 @@ ROWS = (
             ("level", "Position in the list of levels, the cheapest first.", levels),
             ("indicator", INDICATORS.get(name, "None: this effect is not left to an indicator."), ()),
             ("reason", "Why this level was taken.", REASONS),
-            *((part, text, ()) for part, text in MEASURED.items() if EFFECT_TABLE[name].measured),
+            *((part, text, ()) for part, text in MEASURED.items() if name in MEASURED_EFFECTS),
         )
     ),
     # contact patches

@@ -11,7 +11,7 @@ import pytest
 from docs.generate import PAGES
 from softjaw.study.cli.options import COMMANDS
 from softjaw.study.flags import Flag
-from softjaw.study.quantities import EFFECT_TABLE, TABLE
+from softjaw.study.quantities import EFFECTS, TABLE
 from softjaw.study.scene import Scene
 
 ROOT = Path(__file__).parents[1]
@@ -38,7 +38,7 @@ def test_every_key_quantity_flag_and_effect_has_a_row_and_every_command_is_shown
         assert f"## `[{section}]`" in page("scene")
     assert not {q.name for q in TABLE} - cells("quantities")
     assert not {str(int(flag)) for flag in Flag} - cells("flags")
-    assert not set(EFFECT_TABLE) - cells("flags")
+    assert not set(EFFECTS) - cells("flags")
     for name in (name for group in COMMANDS.values() for name, *_ in group):
         assert f"### softjaw {name}\n" in page("commands")
         assert f"usage: softjaw {name} " in page("commands")

@@ -11,7 +11,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from softjaw.study.messages import IN_USE, OTHER_FILE, StudyError, printable
+from softjaw.study.messages import IN_USE, OTHER_FILE, StudyError, printable, why
 
 # what h5py raises for damage: its own errors have no class of their own
 BROKEN = (RuntimeError, OSError, KeyError, ValueError, TypeError, AttributeError, OverflowError, MemoryError)
@@ -89,7 +89,7 @@ class StoredFile:
         try:
             yield
         except BROKEN as error:
-            raise self.damaged(f"{path}: {reason(error)}") from error
+            raise self.damaged(f"{path}: {why(error)}") from error
 
 
 def opened(path: Path, kind: str, make: Callable[[StoredFile], Any]) -> Any:
@@ -114,7 +114,7 @@ def opened(path: Path, kind: str, make: Callable[[StoredFile], Any]) -> Any:
         return make(file)
     except BROKEN as error:
         file.close()
-        text = f"{path}: not a {kind} of softjaw ({reason(error)}); choose another file"
+        text = f"{path}: not a {kind} of softjaw ({why(error)}); choose another file"
         raise StudyError(OTHER_FILE, text) from error
     except StudyError:
         file.close()
@@ -127,18 +127,7 @@ def _why_not(path: Path, kind: str, error: Exception) -> str:
         return "permission denied; ask its owner to let you read it"
     if path.suffix == ".toml":
         return f"is a scene, not a {kind}; 'softjaw run {path}' solves it"
-    return f"not a readable {kind} ({reason(error)}); move it away or restore it"
-
-
-def reason(error: Exception) -> str:
-    """The part of an error of HDF5 that says something, on one line."""
-    if getattr(error, "strerror", None):
-        return str(error.strerror)  # type: ignore[attr-defined]
-    text = str(error) or type(error).__name__
-    # h5py puts what HDF5 says in parentheses behind its own sentence.
-    if isinstance(error, OSError | RuntimeError):
-        text = text.partition("(")[2].rstrip(")") or text
-    return printable(" ".join(text.split()))[:200]
+    return f"not a readable {kind} ({why(error)}); move it away or restore it"
 
 
 def text_of(value: Any) -> str:

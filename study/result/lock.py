@@ -10,7 +10,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from softjaw.study.messages import CANNOT_WRITE, IN_USE, StudyError
+from softjaw.study.messages import CANNOT_WRITE, IN_USE, StudyError, why
 
 # Some network file systems have no locks: a run there is warned, not refused.
 NO_LOCKS = {errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS, errno.EINVAL}
@@ -129,7 +129,7 @@ class OpenedFile:
         except FileNotFoundError:
             identity = None
         except OSError as error:
-            raise self._lost(error.strerror or str(error)) from error
+            raise self._lost(why(error)) from error
         if identity != self._identity:
             what = "was moved or removed" if identity is None else "was replaced by another file"
             remedy = "put it back, or begin again with the same command"
@@ -141,7 +141,7 @@ class OpenedFile:
         try:
             yield
         except (OSError, RuntimeError) as error:  # h5py has both
-            raise self._lost(str(error)) from error
+            raise self._lost(why(error)) from error
 
     def _lost(self, reason: str) -> StudyError:
         safe = "stored results are kept; make the place writable, then run the same command again to resume"

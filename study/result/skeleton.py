@@ -10,19 +10,18 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
 
-from softjaw.study.messages import CANNOT_WRITE, StudyError, remove
+from softjaw.study.messages import CANNOT_WRITE, StudyError, beside, remove
 from softjaw.study.quantities import BY_KEY, FIRST, MODELS
 from softjaw.study.result import checksums
 from softjaw.study.result.datasets import CLOSING_SUMS, described
-from softjaw.study.result.hdf5 import StoredFile, reason
+from softjaw.study.result.hdf5 import StoredFile
 from softjaw.study.result.layout import (
     MOST_SESSIONS,
     PROGRAM,
@@ -61,9 +60,10 @@ def create(path: Path, layout: Layout, header: Header, *, packed: bool = False) 
 
     What is ``packed`` is for reading: ranks cannot write to it independently of each other.
     """
-    if not packed:  # space first: a study must not find out after hours that the disk is full
-        _reserve(path, layout.nbytes)
-    with _whole(path, path.with_name(path.name + ".part")) as part:
+    part = path.with_name(path.name + ".part")
+    if not packed:  # space first: HDF5 crashes where it can write no more, and a study shall not find out after hours
+        _reserve(path, part, layout.nbytes)
+    with beside(path, part=part):
         with h5py.File(part, "w", libver=HDF5_VERSIONS) as file:
             _write_skeleton(file, layout, header, packed)
         # Opened anew: the sums are of what a reader will find in the file.
@@ -81,7 +81,7 @@ def rewrite(path: Path, layout: Layout, header: Header, *, packed: bool = False)
     Rows are copied with their checksums: a torn one stays torn, and is solved again. What is filled once nothing is
     missing is copied where no station is added.
     """
-    with _whole(path, path.with_name(path.name + ".new")) as new:
+    with beside(path, part=path.with_name(path.name + ".new")) as new:
         create(new, layout, header, packed=packed)
         with open_result(path, unchecked=True) as old, h5py.File(new, "r+", libver=HDF5_VERSIONS) as file:
             stations = _places(old.layout, layout)
@@ -93,26 +93,6 @@ def rewrite(path: Path, layout: Layout, header: Header, *, packed: bool = False)
                 target[...] = _spread(values, dataset, stations).astype(target.dtype)  # texts with their encoding
             for name in (SESSION_ROWS, *([] if left_out else [REPORT])):
                 file[name][...] = old.file.values(old.file.plain(name))
-
-
-@contextmanager
-def _whole(path: Path, part: Path) -> Iterator[Path]:
-    """A part that gets the name of a file at once and for good, when it is whole and on disk."""
-    try:
-        yield part
-        with part.open("r+b") as handle:
-            os.fsync(handle.fileno())
-    except (OSError, ValueError, RuntimeError) as error:  # h5py has all three for a write that failed
-        remove(part)
-        # A wrong layout is a bug and must not look like a full disk.
-        if not isinstance(error, OSError) and "write" not in str(error):
-            raise
-        raise StudyError(CANNOT_WRITE, f"{path}: cannot be created: {reason(error)}") from error
-    part.replace(path)
-    # The new name is on disk only when the folder is.
-    folder = os.open(path.parent, os.O_RDONLY)
-    os.fsync(folder)
-    os.close(folder)
 
 
 def _places(old: Layout, new: Layout) -> np.ndarray:
@@ -133,20 +113,17 @@ def _spread(values: np.ndarray, dataset: Dataset, stations: np.ndarray) -> np.nd
     return spread
 
 
-def _reserve(path: Path, need: int) -> None:
-    # Asked before the trial, because it can tell how much is missing.
-    free = shutil.disk_usage(path.parent).free
-    if free < need:
-        sizes = f"needs {need / 1e6:.1f} MB, only {free / 1e6:.1f} MB are free there"
-        raise StudyError(CANNOT_WRITE, f"{path}: {sizes}; choose another place with -o")
-    trial = path.with_name(path.name + ".part")
+def _reserve(path: Path, part: Path, need: int) -> None:
+    """Try whether there is room; quotas and file size limits show up here, not in the free space."""
     try:
-        with trial.open("wb") as handle:  # quotas and file size limits show up here, not in the free space
+        with part.open("wb") as handle:
             os.posix_fallocate(handle.fileno(), 0, need)
     except OSError as error:
-        raise StudyError(CANNOT_WRITE, f"{path}: {need / 1e6:.1f} MB cannot be reserved: {error.strerror}") from error
+        free = shutil.disk_usage(path.parent).free
+        text = f"{path}: cannot be written ({error.strerror}): needs {need / 1e6:.1f} MB, {free / 1e6:.1f} MB are free"
+        raise StudyError(CANNOT_WRITE, f"{text}; choose another place with -o") from error
     finally:
-        remove(trial)
+        remove(part)
 
 
 def _write_skeleton(file: h5py.File, layout: Layout, header: Header, packed: bool) -> None:

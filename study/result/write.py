@@ -15,7 +15,7 @@ import numpy as np
 
 from softjaw.study.case.result import CaseResult
 from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, StudyError
-from softjaw.study.quantities import EFFECT_TABLE, EFFECTS, MEASURED, MODELS
+from softjaw.study.quantities import EFFECTS, MEASURED, MEASURED_EFFECTS, MODELS
 from softjaw.study.result import checksums
 from softjaw.study.result.datasets import CLOSING_SUMS, MESSAGE_BYTES, SUMS
 from softjaw.study.result.hdf5 import StoredFile, text_of
@@ -251,7 +251,7 @@ def _flattened(layout: Layout, result: CaseResult) -> dict[str, Any]:
     for name, (level, indicator, reason, *changes) in result.effects.items():
         index = EFFECTS.get(name, ()).index(level) if isinstance(level, str) else level
         parts = {"level": index, "indicator": indicator, "reason": reason}
-        if EFFECT_TABLE[name].measured:
+        if name in MEASURED_EFFECTS:
             parts |= dict(zip(MEASURED, changes, strict=False))
         given.update({f"effects/{name}_{part}": value for part, value in parts.items()})
     return given

@@ -1,8 +1,7 @@
 """The result file: what it holds, what viewers see, and what is refused when it comes from elsewhere."""
 
+import os
 import re
-import shutil
-from collections import namedtuple
 from dataclasses import replace
 
 import h5py
@@ -230,9 +229,11 @@ def test_a_result_that_does_not_fit_is_a_bug_a_full_disk_told_and_only_an_own_fi
     assert text_bytes("the pad leaves", 14) == b"the pad leaves"
     assert text_bytes("the pad leaves", 13) == b"the pad ..."
     assert blank(small(), "no contact")[-1] == b"no contact"
-    usage = namedtuple("usage", "total used free")
-    monkeypatch.setattr(shutil, "disk_usage", lambda _: usage(0, 0, 12345))
-    with pytest.raises(StudyError) as caught:
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "posix_fallocate", full)
+    with pytest.raises(StudyError, match=r"No space left .* MB are free") as caught:
         create(tmp_path / "x.hdf", small(), HEADER)
     assert caught.value.code == CANNOT_WRITE
     assert list(tmp_path.iterdir()) == [path]
