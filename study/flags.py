@@ -46,12 +46,11 @@ class Flag(IntFlag):
     COARSE = 1 << 12, "coarse", "the mesh is coarse for this contact, use more elements before trusting it", (
         "the contact face overlaps the object by more than a tenth of the closing, fewer than six elements carry load,"
         " only one along its length or its width does, the object's normal turns by more than 120 deg between loaded"
-        " faces that lie beside each other, trilinear elements are too stiff for foam with a Poisson's"
-        " ratio above 0.45, or two meshes put the error above accuracy.target, where the scene names it"
+        " neighbours, trilinear elements have a Poisson's ratio above 0.45, or the error is above accuracy.target"
     )  # fmt: skip
     SNAPPED = 1 << 13, "snapped", "the wall has snapped in on the way to this force", (
-        "the force fell while the fingers closed, more force would open them, it grew less than half as fast as"
-        " before on average, or the wall closed more than twice as fast as before between two forces"
+        "the force fell while the fingers closed, more force would open them, it grew less than half as fast as before"
+        " on average, or the wall closed more than twice as fast"
     )  # fmt: skip
     SLIDES_OUT = 1 << 14, "slides out", (
         "the pads push the object along its axis with more than friction can hold, so it slides out"

@@ -114,8 +114,7 @@ OPTIONS = {
     "scene": _option("scene", metavar="SCENE", help="scene file (TOML)"),
     "set": _option("--set", metavar="KEY=VALUE", action="append", default=[], dest="overrides",
                    help="replace one value of the scene, as in object.radius_mm=20; repeatable"),
-    "objects": _option("--objects", metavar="MESHES", help="meshes in place of the scene's, from here: a quoted pattern"
-                       " as 'meshes/*.stl', a folder, or a CSV file as object.mesh takes it"),
+    "objects": _option("--objects", metavar="MESHES", help="meshes in place of the scene's: 'm/*.stl', a folder, CSV"),
     "ranks": _option("-n", type=several(whole(1), "whole numbers, such as 16,64"), default=(1,), dest="ranks",
                      metavar="RANKS", help="ranks (default 1); 16,64,256: replay a finished study on each"),
     "repeat": _option("--repeat", type=whole(1), default=1, metavar="K", help="replay K times as many candidates"),
@@ -152,8 +151,7 @@ OPTIONS = {
                    help="leave out grasps with less, in the unit of 'softjaw show', as payload=200; repeatable"),
     "written": _option("-o", metavar="FILE", dest="output", help="file to write (default: standard output)"),
     "approach": _option("--approach", choices=("x", "minus-x", "y", "minus-y"), action="append", dest="approaches",
-                        help="palm to fingertips, by the long (x) or short (y) side of pad 1 (default: from above where"
-                        " the hand is clear of the object, else the clearest)"),
+                        help="palm to fingertips, by the long (x) or short (y) side of pad 1 (default: the clearest)"),
     "gripper": _option("--gripper", metavar="NAME", help="franka_hand, robotiq_2f85, schunk_egp50, wsg50, or a file of"
                        " the same form: frame, joints, stroke, forces, palm and fingers"),
     "wider": _option("--wider", type=number("a number, 0 or above", 0.0), default=20.0, metavar="MM",

@@ -142,8 +142,7 @@ def _about(ds: xr.Dataset, gripper: GripperFrame) -> str:
     return "\n".join(
         [
             f"Made by softjaw from {ds.attrs['file']}: poses of the gripper in the frame of the object's own file [m].",
-            f"Gripper: {gripper.hand.frame}; it approaches along z and closes along {gripper.along} from finger 1 to"
-            " finger 2.",
+            f"Gripper: {gripper.hand.frame}, approaches along z, closes along {gripper.along} from finger 1 to 2.",
             "Quality and confidence are relative to the best grasp of this file.",
         ]
     )

@@ -15,7 +15,6 @@ from softjaw.study.messages import OTHER_FILE, USAGE, Problem, StudyError, short
 from softjaw.study.patch.faces import ReadPatch, checked, corner_geometry, refuse
 
 ENDINGS = (".csv", ".vtu", ".vtp")
-LARGEST_FIELD = 100 * 2**20  # bytes
 MOST_PATCH_FACES = 500_000
 FACTORS = {
     "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3},
@@ -49,7 +48,7 @@ class Reading:
 
 
 def checked_file(file: str, endings: Sequence[str]) -> Path:
-    """The path of a file with one of these endings, which can be read and is not too large."""
+    """The path of a file with one of these endings, which can be read."""
     path = Path(file)
     if path.suffix.lower() not in endings:
         found = f"the ending {path.suffix}" if path.suffix else "no ending"
@@ -57,15 +56,11 @@ def checked_file(file: str, endings: Sequence[str]) -> Path:
         remedy = "export the patch as CSV, or as VTU or VTP from ParaView" if len(endings) > 1 else "export a table"
         raise StudyError(USAGE, f"{file}: found {found}, expected {expected}; {remedy}")
     try:
-        size = path.stat().st_size
-        if not path.is_file():  # a device or a pipe may have no end
+        if path.exists() and not path.is_file():  # a device or a pipe may have no end
             raise StudyError(OTHER_FILE, f"{file}: not a regular file; name the file of a patch")
         path.open("rb").close()
     except OSError as error:
         raise StudyError(OTHER_FILE, f"{file}: cannot be read ({error.strerror}); check the path") from error
-    if size > LARGEST_FIELD:
-        text = f"{file}: has {size >> 20} MiB, more than {LARGEST_FIELD >> 20} MiB"
-        raise StudyError(USAGE, f"{text}; export the contact surface alone")
     return path
 
 

@@ -38,9 +38,8 @@ def derived(scene: Scene) -> list[Quantity]:
     if scene.object.mass is not None:
         listed += [
             Quantity(LOW, over, "N", "force to use",
-                     "Smallest normal force per finger that holds the object: at which safety_factor (CCM) passes "
-                     "task.safety, between the solved forces by straight lines, and from 0 at 0 N. NaN: none of them"
-                     " holds it.", "derived"),
+                     "Smallest normal force per finger at which safety_factor (CCM) passes task.safety, between the"
+                     " solved forces and 0 by straight lines. NaN: none of them holds it.", "derived"),
             Quantity(LOW_ERROR, over, "N", "error of the force to use",
                      "What the stated error of the payload and the bend of safety_factor over the solved forces may "
                      "move it; NaN where fewer than two of them are solved up to it.", "derived"),
@@ -49,8 +48,8 @@ def derived(scene: Scene) -> list[Quantity]:
         listed.append(Quantity(
             HIGH, over, "N", "largest force that the wall bears",
             "Normal force per finger at which the indentation passes object.allowed_dent_mm or the stress the yield "
-            "strength, between the solved forces by straight lines, and from 0 at 0 N; where neither does, the largest"
-            " solved force: the wall bears at least that. NaN where the wall was taken as rigid.", "derived",
+            "strength, as force_low; where neither does, the largest solved force. NaN: the wall was taken as rigid.",
+            "derived",
         ))  # fmt: skip
     return listed
 

@@ -15,8 +15,7 @@ from typing import Any
 import numpy as np
 
 SAMPLING = (
-    "No seed to choose, and the same numbers in every run: sampled motions and directions are Fibonacci points; where a"
-    " search begins at random points, their generator has a fixed seed in the program."
+    "The same numbers in every run: sampled motions are Fibonacci points, generators of random ones have fixed seeds."
 )
 
 

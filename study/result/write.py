@@ -270,7 +270,7 @@ def verify(path: Path, layout: Layout, header: Header) -> bool:
         if result.digest != header.digest:
             text = (
                 f"{path}: made from another scene ({result.digest[:8]}, this one is {header.digest[:8]}:"
-                f" {differences(result.scene, header.scene)}); choose another file with -o, or move this one away"
+                f" {differences(result.scene, header.scene)}); choose another file with -o"
             )
             raise StudyError(OTHER_FILE, text)
         if result.layout.shape != layout.shape or result.layout.text() != layout.text():

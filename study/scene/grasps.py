@@ -77,13 +77,11 @@ class Candidates(SceneSection):
         (), strict=False, max_length=100_000, description="explicit grasps", examples=[POSE]
     )
     sampled: int | None = Field(
-        None, ge=1, le=1000, description="looks for so many distinct grasps itself: pairs of places of the surface that"
-        " face each other"
+        None, ge=1, le=1000, description="looks for so many distinct grasps itself: places that face each other"
     )
     refine: Annotated[Annotated[int, Field(ge=1, le=100_000)] | None, BeforeValidator(_budget)] = Field(
         None,
-        description="most cases that are solved beside the scene's own, at stations between the given ones or at poses"
-        f" around the best; true is {BUDGET}",
+        description=f"most cases that are solved beside the scene's own, around the best; true is {BUDGET}",
         examples=[BUDGET],
     )
     angles, roll, station_values = si("angles_deg"), si("roll_deg"), si("station_values_mm")
@@ -162,9 +160,8 @@ class Candidates(SceneSection):
         over = [s for s in places if s - half < low - slack or s + half > high + slack]
         if over and not isinstance(shape, Plate | SphereShape):
             yield (
-                f"candidates: at {len(over)} of {len(places)} stations ({_listed(over)} mm) the pad, {2 * half:g} mm"
-                f" along the object's axis, leaves the object, which reaches from {low:g} to {high:g} mm: it meets the"
-                " edge"
+                f"candidates: at {len(over)} of {len(places)} stations ({_listed(over)} mm) a pad of {2 * half:g} mm"
+                f" meets the edge of the object, which reaches from {low:g} to {high:g} mm"
             )
 
 

@@ -161,8 +161,7 @@ class Scene(SceneSection):
         if strain > 2:
             area = f"{g.pad_length_mm * g.pad_width_mm:g} mm^2"
             yield (
-                f"load.normal_force_n = {force:g} N on {area} is a mean pressure of {strain:.2g} times the pad's shear"
-                " modulus: cases may not converge"
+                f"load.normal_force_n = {force:g} N on {area}: {strain:.2g} times the shear modulus may not converge"
             )
         walled = getattr(self.object, "wall", None) is not None
         if self.accuracy.target is not None and walled and self.effects.object != "rigid":

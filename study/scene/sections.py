@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-import string
+import re
 from collections.abc import Mapping
 from contextlib import suppress
 from typing import Annotated, Any, ClassVar, Literal
@@ -36,8 +36,7 @@ FINEST = MOST_MESHES - 1
 CONVEX_FITS = ("full", "quartic")  # models that a convex program can fit, too
 SAMPLES_SEED = 20240229  # any number; the samples of a scene are always the same
 UPPER = 0.975  # where a 95 % interval ends
-OPTION_CHARACTERS = {*string.ascii_lowercase, *string.digits, "_"}
-VALUE_CHARACTERS = {*string.ascii_letters, *string.digits, *"_,.+-"}
+OPTION, VALUE = re.compile("contact_[a-z0-9_]+"), re.compile("[A-Za-z0-9_,.+-]*")  # of PETSc that a scene may have
 OTHERS = "other options go into the environment variable PETSC_OPTIONS"
 
 
@@ -60,8 +59,7 @@ class Gripper(SceneSection):
     elements: Counts = Field((20, 10, 6), description="elements of the whole pad along its length, width and thickness")
     element: Literal["hex8", "hex27"] = Field("hex8", description="trilinear or triquadratic elements")
     grading: Gradings = Field(
-        (1.0, 1.0, 1.0), description="size of the elements at the pad's ends, sides and back over that at the middle of"
-        " its contact face"
+        (1.0, 1.0, 1.0), description="size of elements at the pad's ends, sides and back over that at its middle"
     )
     max_opening_mm: float | None = Field(
         None, gt=0, le=1000, description="largest distance of the pads' faces; wider grasps are not solved"
@@ -210,8 +208,7 @@ class ScoreKeys(SceneSection):
 
     object_length_mm: Annotated[float, Field(gt=0, le=2000)] | Literal["per_axis", "longest"] = Field(
         "per_axis",
-        description="what scales torque arms: the object's own extents along x, y and z, as in the paper, the longest"
-        " of them, or a length",
+        description="what scales torque arms: the object's extents, as in the paper, the longest of them, or a length",
     )
     contact_length_mm: Annotated[float, Field(gt=0, le=500)] | Literal["pad", "object"] = Field(
         "pad", description="what scales soft torques: the pad's length, as in the paper, the object's, or a length"
@@ -288,16 +285,14 @@ class Accuracy(SceneSection):
         2, ge=1, le=2, description="2 solves every case on a coarser mesh too, which tells the error of every number"
     )
     target: float | None = Field(
-        None, gt=1e-4, le=0.5, description="largest relative error; a case on a rigid object that may have a larger one"
-        " is solved on up to two finer meshes"
+        None, gt=1e-4, le=0.5, description="largest relative error; a rigid object gets up to two finer meshes for it"
     )
     target_of: Literal["payload", "quality", "e_n"] = Field("payload", description="what the target is for")
     contact: Literal["auto", "weighted", "nodal", "blended"] = Field(
         "auto", description="how gaps are collocated; auto is blended for hex8, else weighted"
     )
     wall_element_mm: WallSize = Field(
-        1.5, description="size of a thin wall's elements round the object, under the pads; along it 5/3, elsewhere 4"
-        " times as large"
+        1.5, description="size of a wall's elements round the object, under the pads; elsewhere up to 4 times as large"
     )
 
     def rules(self) -> Errors:
@@ -387,10 +382,10 @@ def petsc_rules(options: Mapping[str, Any]) -> Errors:
     """Options of the contact solver only, and none that writes files or runs code."""
     for key, value in options.items():
         bare = key.lstrip("-").removeprefix("contact_")
-        if not key.startswith("contact_") or set(bare) - OPTION_CHARACTERS or not bare:
+        if not OPTION.fullmatch(key):
             expected = f"an option of the contact solver, as contact_{bare}; {OTHERS}"
             yield wrong(value, expected, key)
         elif bare.endswith("python_type"):
             yield wrong(value, "no option that runs Python code", key)
-        elif isinstance(value, str) and set(value) - VALUE_CHARACTERS:
+        elif isinstance(value, str) and not VALUE.fullmatch(value):
             yield wrong(value, f"a word, a number or a list of them; {OTHERS}", key)

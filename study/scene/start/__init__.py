@@ -18,7 +18,7 @@ from softjaw.study.messages import CANNOT_WRITE, USAGE, StudyError, write_file
 from softjaw.study.scene.section import numbers_text
 
 HERE = Path(__file__).parent
-PAD_LENGTH, PAD_WIDTH, OPENING = 50.0, 22.0, 85.0  # mm, as in the template of a mesh
+PAD_LENGTH, OPENING = 50.0, 85.0  # mm, as in the template of a mesh
 IN_METRES = (".glb", ".gltf")  # glTF has no other unit
 
 
@@ -132,21 +132,13 @@ def _about_mesh(options: Namespace, scene: Path, measure: Callable) -> tuple[dic
         raise StudyError(USAGE, text)
     axis, extents, stations, notes = measure(options)
     file = os.path.relpath(Path(options.mesh).absolute(), scene.absolute().parent)
-    longest_side, next_side, _ = sorted(extents, reverse=True)
     return {
         "MESH": json.dumps(file, ensure_ascii=False),
         "UNIT": options.unit,
         "AXIS": axis,
         "SIZE": " x ".join(f"{extents[i - 'xyz'.index(axis) - 1]:.4g}" for i in range(3)),
-        "LONG": _larger(PAD_LENGTH, longest_side, "longer"),
-        "WIDE": _larger(PAD_WIDTH, next_side, "wider"),
         "STATIONS": _stations(extents, stations),
     }, notes
-
-
-def _larger(pad: float, side: float, word: str) -> str:
-    """A comment where the user's pad is larger than the object; the pad stays as it is."""
-    return f"# {word} than the object, {side:.3g} mm: the rest of it stays free" if pad > side else ""
 
 
 def _stations(extents: Sequence[float], stations: Sequence[float]) -> str:
@@ -161,6 +153,5 @@ def _stations(extents: Sequence[float], stations: Sequence[float]) -> str:
     return (
         "# Or, for an object with an axis, stations: heights above its lowest point, at which the pad stays on it.\n"
         f"# stations_mm = {json.dumps(stations)}\n"
-        f"# angles_deg = {json.dumps(angles)}        # about the centre line of the object's sections; those where it"
-        f" is at most {OPENING:g} mm wide"
+        f"# angles_deg = {json.dumps(angles)}        # about its centre line, where it is at most {OPENING:g} mm wide"
     )
