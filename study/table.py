@@ -20,6 +20,7 @@ from rich.cells import cell_len
 from rich.console import Console
 from rich.table import Table as Grid
 
+from softjaw.study.units import number as number
 from softjaw.study.units import shown, shown_unit
 
 GAP = 2  # characters between columns
@@ -100,19 +101,6 @@ class Table:
 
 
 # --- numbers and lines -----------------------------------------------------------------------------------------------
-
-
-def number(value: float, digits: int = 3) -> str:
-    """A number with so many significant digits; a dash where there is none.
-
-    >>> number(0.0123456), number(1.6e-9), number(math.nan), number(120000.0)
-    ('0.0123', '1.6e-09', '-', '120000')
-    """
-    value = float(value)
-    if not math.isfinite(value):
-        return "-"
-    text = f"{value:.{digits}g}"
-    return f"{float(text):.0f}" if "e" in text and 1 <= abs(value) < 1e6 else text
 
 
 def with_error(value: float, error: float) -> str:

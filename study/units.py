@@ -111,10 +111,23 @@ def shown(value: Any, si_unit: str) -> Any:
     return value if unit is None else value * (unit.over / unit.times)
 
 
+def number(value: float, digits: int = 3) -> str:
+    """A number with so many significant digits; a dash where there is none.
+
+    >>> number(0.0123456), number(1.6e-9), number(math.nan), number(120000.0)
+    ('0.0123', '1.6e-09', '-', '120000')
+    """
+    value = float(value)
+    if not math.isfinite(value):
+        return "-"
+    text = f"{value:.{digits}g}"
+    return f"{float(text):.0f}" if "e" in text and 1 <= abs(value) < 1e6 else text
+
+
 def shown_text(value: float, si_unit: str, digits: int = 4) -> str:
     """A value with its unit, as it is shown.
 
     >>> shown_text(0.0125, "m"), shown_text(5.0, "N"), shown_text(0.5, "")
     ('12.5 mm', '5 N', '0.5')
     """
-    return f"{shown(value, si_unit):.{digits}g} {shown_unit(si_unit)}".rstrip()
+    return f"{number(shown(value, si_unit), digits)} {shown_unit(si_unit)}".rstrip()

@@ -24,6 +24,7 @@ from softjaw.study.table import Column, Row, Table, as_text, noted, number, term
 from softjaw.study.units import GRAVITY, in_si, shown, shown_text, shown_unit
 
 NOTES_WIDTH, OTHERS_WIDTH, LABEL_WIDTH = 13, 16, 20  # characters
+MOST_NAMED = 4  # grasps that a note names
 MU_ERROR = 0.1  # of mu, by which it is off where nothing is known of it
 LEVER, LEVER_SHARE = 1e-3, 0.1  # [m] and loss of payload, below which the lever of the weight is not worth a word
 BRIEF = ("payload", "opening", "quality", "e_n")  # maps of a table in a terminal
@@ -194,7 +195,9 @@ def _notes(ds: xr.Dataset, accuracy: Sequence[str], marks: np.ndarray) -> list[s
              "left out": no_grasps(ds.status.values[..., ds.attrs["level"]])}  # fmt: skip
     if gone:
         hand = Path(task_keys(ds, "gripper")["preset"]).stem
-        parts["left out"] = [f"out of the reach of {hand}, so last: {', '.join(gone)}", *parts["left out"]]
+        more = f" and {len(gone) - MOST_NAMED} more" * (len(gone) > MOST_NAMED)
+        last = f"out of the reach of {hand}, so last: {', '.join(gone[:MOST_NAMED])}{more}"
+        parts["left out"] = [last, *parts["left out"]]
     return [noted(head, clauses) for head, clauses in parts.items() if clauses]
 
 
@@ -297,7 +300,7 @@ def _limit(ds: xr.Dataset, index: Index, lever: float) -> str:
     lost = without_lever(ds, index) - at(ds, "payload", index)
     if lever > LEVER and lost > LEVER_SHARE * at(ds, "payload", index):
         parts.append(f"the weight acts {shown_text(lever, 'm', 2)} beside the pads, which costs some"
-                     f" {number(shown(lost, 'kg'), 2)} {shown_unit('kg')}")  # fmt: skip
+                     f" {shown_text(lost, 'kg', 2)}")  # fmt: skip
     done = np.flatnonzero(ds["status"].values[..., k].ravel() == DONE)
     name = ds.attrs["score"] if ds.attrs["score"] != LEAST_FORCE else score_of(ds)
     values = rank_values(ds, name, k)[done]

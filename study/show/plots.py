@@ -99,5 +99,6 @@ def points(places: np.ndarray, colour: str, size: float, text: Any = None) -> go
 def scene(unit: str = "mm", names: Sequence[str] = ("x", "y", "z"), **more: Any) -> dict[str, Any]:
     """Settings of a panel in three dimensions, seen without perspective so that lengths can be compared."""
     titles = {a: {"text": f"{name} [{unit}]" if unit else name} for a, name in zip("xyz", names, strict=True)}
-    axes = {f"{a}axis": {"title": t, "gridcolor": GRID, "backgroundcolor": "white"} for a, t in titles.items()}
+    look = {"gridcolor": GRID, "backgroundcolor": "white", "nticks": 5}
+    axes = {f"{a}axis": {"title": title, **look} for a, title in titles.items()}
     return {"aspectmode": "data", "camera": {"projection": {"type": "orthographic"}}, **axes, **more}

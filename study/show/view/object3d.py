@@ -154,5 +154,5 @@ def _traces(whole: bool) -> list[Any]:
 
 def _camera(view: View, index: Index) -> dict[str, Any]:
     eye, up = view.eye(index)
-    at = {"eye": dict(zip("xyz", (1.6 * eye).tolist(), strict=True)), "up": dict(zip("xyz", up.tolist(), strict=True))}
+    at = {"eye": dict(zip("xyz", (1.75 * eye).tolist(), strict=True)), "up": dict(zip("xyz", up.tolist(), strict=True))}
     return {**at, "projection": {"type": "orthographic"}}
