@@ -6,13 +6,11 @@ Maps grow evenly in lightness, so that they can be read without colour. Nothing 
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
 from typing import Any
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
@@ -88,17 +86,3 @@ def span(values: Any) -> tuple[float, float]:
         return low, high
     room = 0.05 * abs(high) or 0.5
     return low - room, high + room
-
-
-def thumbnail(corners: Sequence[np.ndarray], colours: np.ndarray, pixels: int = 208) -> bytes:
-    """A small square PNG of polygons ``(k, 2)`` in the order in which they cover each other, each of one colour."""
-    drawn = Figure(figsize=(1, 1), dpi=pixels)
-    FigureCanvasAgg(drawn)
-    axes = drawn.add_axes((0, 0, 1, 1))
-    axes.add_collection(PolyCollection(list(corners), facecolors=colours, edgecolors=colours, linewidths=0.3))
-    points = np.concatenate(list(corners))
-    low, high = points.min(axis=0), points.max(axis=0)
-    middle, half = 0.5 * (low + high), 0.53 * (high - low).max()
-    axes.set(xlim=middle[0] + half * np.array([-1, 1]), ylim=middle[1] + half * np.array([-1, 1]))
-    axes.set_axis_off()
-    return _saved(drawn, format="png", facecolor="white", metadata={"Software": None})

@@ -16,7 +16,7 @@ import xarray as xr
 from softjaw.study.flags import LOST, OF_FILE, Flag, flag_words, flags_in
 from softjaw.study.grippers import APPROACHES, Hand, gripper_file
 from softjaw.study.messages import StudyError
-from softjaw.study.quantities import LISTED, MODELS, NO_GRASP, STATES
+from softjaw.study.quantities import LISTED, MAIN, MODELS, NO_GRASP, STATES
 from softjaw.study.ranking import at_level, distinct, judged, rank_values, ranked, score_of, task_keys
 from softjaw.study.result.layout import DONE, FAILED
 from softjaw.study.result.read import axes_of
@@ -26,6 +26,9 @@ from softjaw.study.table import number, with_unit
 from softjaw.study.units import shown, shown_unit
 
 Index = tuple[int, ...]
+# Maps to choose from besides the main ones.
+MORE = ("epsilon", "safety_factor", "F_N", "S", "contact_area", "p_max", "closing", "curvature_loss", "overclaim",
+        "overclaim_ellipsoid", "indentation", "wall_stress", "support_force")  # fmt: skip
 # What a check may be at most (or, for those of `ABOVE`, must exceed).
 LIMITS = {"force_balance": 1e-6, "adhesion": 1e-6, "penetration": 1e-6, "complementarity": 1e-6, "min_det_f": 0.0,
           "ellipticity": 0.0}  # fmt: skip
@@ -92,21 +95,19 @@ def approach_of(ds: xr.Dataset, index: Index, hand: Hand) -> tuple[float, ...] |
 
 
 def field(ds: xr.Dataset, name: str, model: str = "ccm") -> Any:
-    """Array of a variable over all cases, a map of several friction models in one; None where it has no value.
-
-    Cases that are not done have NaN.
-    """
+    """Array of a variable over all cases, a map of several friction models in one; None where it has no value."""
     if name not in ds.variables:
         return None
     found = ds.variables[name]
-    values = found.values
-    if found.dims[-1:] == ("model",) and "finger" not in found.dims:
-        values = values[..., MODELS.index(model)]
-    if values.dtype.kind != "f":  # codes have integers also where nothing is done
-        done = ds.variables["status"].values == DONE
-        values = np.where(done.reshape(done.shape + (1,) * (values.ndim - done.ndim)), values.astype(float), np.nan)
+    several = "model" in found.dims and "finger" not in found.dims
+    values = np.asarray(found.isel(model=MODELS.index(model)).values if several else found.values, float)
     # A map without any value is left out instead of being drawn empty.
     return values if np.isfinite(values).any() else None
+
+
+def choices(ds: xr.Dataset, first: str) -> list[str]:
+    """Maps with a value that a menu or a table offers, one of them first."""
+    return [name for name in dict.fromkeys((first, *MAIN, *MORE)) if field(ds, name) is not None]
 
 
 def at(ds: xr.Dataset, name: str, index: Index, model: str = "ccm") -> float:

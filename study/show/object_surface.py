@@ -26,11 +26,15 @@ Feet = Iterable[tuple[int, Pose, float]]  # pads: their candidate, where they fi
 
 
 class Surface(NamedTuple):
-    """Triangles of the object: ``points (n, 3)`` [m], ``triangles (m, 3)``, ``candidate (m,)``, -1 for none."""
+    """Triangles of the object: ``points (n, 3)`` [m], ``triangles (m, 3)``, ``candidate (m,)``, -1 for none.
+
+    A point on the border of two candidates' cells is there twice: ``owner (n,)`` is the candidate of every point.
+    """
 
     points: np.ndarray
     triangles: np.ndarray
     candidate: np.ndarray
+    owner: np.ndarray
 
 
 def surface_of(scene: Any, axes: Any, feet: Feet = ()) -> Surface:
@@ -55,8 +59,9 @@ def surface_of(scene: Any, axes: Any, feet: Feet = ()) -> Surface:
             kept = ~_lid(scene.object, corners)
             corners, cell = corners[kept], cell[kept]
     # After the cuts, corners of neighbours differ by rounding: 1 nm makes them one point again.
-    points, inverse = np.unique(np.round(corners.reshape(-1, 3), 9), axis=0, return_inverse=True)
-    return Surface(points, inverse.reshape(-1, 3), cell)
+    rows = np.column_stack([np.round(corners.reshape(-1, 3), 9), np.repeat(cell, 3)])
+    points, inverse = np.unique(rows, axis=0, return_inverse=True)
+    return Surface(points[:, :3], inverse.reshape(-1, 3), cell, points[:, 3].astype(int))
 
 
 def pressed(corners: np.ndarray, feet: Feet, size: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:

@@ -166,11 +166,15 @@ def largest_error(
 def counts(result: Any) -> str:
     """How many cases are in which state, and how many grasps a refinement added."""
     title = f" ({result.title})" if result.title else ""
-    states = [*(f"{int(np.sum(result.status == state))} {STATES[state]}" for state in (FAILED, MISSING)),
-              *no_grasps(result.status)]  # fmt: skip
-    done = f"{int(np.sum(result.status == DONE))} of {result.status.size} cases {STATES[DONE]}"
     stations = f"\n{wrapped(text, PAPER, '  ', '    ')}" if (text := about(result)) else ""
-    return f"{result.path}{title}:\n  {', '.join([done, *states])}{stations}"
+    return f"{result.path}{title}:\n  {state_counts(result.status)}{stations}"
+
+
+def state_counts(codes: NDArray[np.integer]) -> str:
+    """How many cases are in which state."""
+    done, *others = (f"{int(np.sum(codes == state))}" for state in (DONE, FAILED, MISSING))
+    states = [f"{n} {STATES[state]}" for n, state in zip(others, (FAILED, MISSING), strict=True)]
+    return ", ".join([f"{done} of {codes.size} cases {STATES[DONE]}", *states, *no_grasps(codes)])
 
 
 def no_grasps(codes: NDArray[np.integer]) -> list[str]:

@@ -23,11 +23,10 @@ from softjaw.study.result.lock import holder
 from softjaw.study.result.read import dataset
 from softjaw.study.result.store import open_result, place_text
 from softjaw.study.run.progress import Progress, duration
-from softjaw.study.show.best_grasps import case_table
-from softjaw.study.show.grasps import unravelled
+from softjaw.study.show.best_grasps import value_text
+from softjaw.study.show.grasps import index_of
 from softjaw.study.show.status import RESUME, reasons
 from softjaw.study.table import terminal_width
-from softjaw.study.units import shown_unit
 
 INTERRUPTED = 130  # what shells say of a program that Ctrl-C ended
 Look = Callable[[], tuple[list[str], int | None]]
@@ -120,8 +119,6 @@ def best_so_far(result: Any, codes: np.ndarray) -> str:
     if not solved.any():
         return "best so far: no case is complete yet"
     ds, level = dataset(result), int(np.flatnonzero(solved)[-1])
-    index = (*unravelled(int(ranked(ds, level)[0]), ds.status.shape[:-1]), level)
-    table = case_table(ds, [index], rank=True)
-    cells = [f"{c.name} {table.cell(table.rows[0], c)} {shown_unit(c.unit)}".rstrip()
-             for c in table.columns if c.name in MAIN[:2]]  # fmt: skip
-    return f"best so far: {', '.join(cells)}, at {place_text(result.axes, result.labels, index)}"
+    index = index_of(ds, int(ranked(ds, level)[0]), level)
+    values = ", ".join(f"{name} {value_text(ds, name, index, unit=True)}" for name in MAIN[:2] if name in ds)
+    return f"best so far: {values}, at {place_text(result.axes, result.labels, index)}"

@@ -16,6 +16,7 @@ from softjaw.study.show.grasps import (
     axis_label,
     axis_text,
     axis_values,
+    choices,
     field,
     forces,
     label_of,
@@ -27,9 +28,6 @@ from softjaw.study.show.grasps import (
 from softjaw.study.units import shown_unit
 
 MOST_PANELS, MOST_LABELS, MOST_NOTES = 6, 16, 8000
-MORE = ("quality_fitted", "epsilon", "f_x_max", "f_y_max", "tau_z_max", "safety_factor", "contact_area", "p_max",
-        "closing", "curvature_loss", "fit_error", "overclaim", "overclaim_ellipsoid",
-        "indentation", "wall_stress", "support_force", *(q.of_error.name for q in TABLE if q.error and q.rank))
 MARKS = (((FAILED,), "x-thin-open", 8), (NO_GRASP, "line-ew-open", 8), ((MISSING,), "circle", 3))  # of states; size
 
 
@@ -141,9 +139,9 @@ def _on_cells(made: Any, ds: xr.Dataset, cuts: Any, x: int, y: int) -> None:
 
 def _names(ds: xr.Dataset) -> list[str]:
     """Maps with values, and the error estimates of the first ones; quality where nothing is known."""
-    walled = ["effect_object_level"] * ("wall" in ds.attrs["has"])
-    names = dict.fromkeys((ds.attrs["score"], *FIRST, *MORE, *walled))
-    return [name for name in names if field(ds, name) is not None] or ["quality"]
+    more = [q.of_error.name for q in TABLE if q.error and q.rank]
+    more += ["effect_object_level"] * ("wall" in ds.attrs["has"])
+    return [*choices(ds, ds.attrs["score"]), *(name for name in more if field(ds, name) is not None)] or ["quality"]
 
 
 def _button(ds: xr.Dataset, name: str, cuts: Any, x: int, y: int) -> dict[str, Any]:

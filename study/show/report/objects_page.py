@@ -6,9 +6,7 @@ import math
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from softjaw.study import page, pictures
+from softjaw.study import page
 from softjaw.study.messages import StudyError, write_file
 from softjaw.study.result.index import SOLVED, read_index
 from softjaw.study.result.read import open
@@ -17,11 +15,9 @@ from softjaw.study.show.objects import counts_text, index_table
 from softjaw.study.show.report.tables import best_grasps
 from softjaw.study.show.report.writing import the_answer
 from softjaw.study.show.view.model import View
+from softjaw.study.show.view.solids import thumbnail
 from softjaw.study.table import Row, with_unit
 from softjaw.study.units import shown_unit
-
-BODY, PAD = np.array([0.72, 0.78, 0.83]), np.array([0.93, 0.55, 0.25])
-AMBIENT = 0.45  # share of the light that comes from everywhere
 
 
 def write_objects_page(index: Path, out: Path) -> Path:
@@ -63,27 +59,4 @@ def _object(folder: Path, row: Row) -> tuple[bytes, list[page.Block]]:
         blocks.append(page.link(f"report on {row['object']}", report.as_posix()))
     else:
         blocks.append(page.text(f"softjaw report {folder / row['file']}: all maps, contacts and definitions", "note"))
-    return picture(View(ds, ds.attrs["best"][:-3]), ds.attrs["best"]) if ds.attrs["best"] else b"", blocks
-
-
-def picture(view: View, best: tuple[int, ...]) -> bytes:
-    """Small picture of an object between the pads of a case; empty where the object cannot be drawn."""
-    surface, pads = view.surface, view.pads(best)
-    if not len(surface.triangles) or not pads:
-        return b""
-    towards, up = view.eye(best)
-    towards = towards / np.linalg.norm(towards)
-    up = up - (up @ towards) * towards
-    up /= np.linalg.norm(up)
-    screen = np.column_stack([np.cross(up, towards), up])
-    body = surface.points[surface.triangles]
-    parts = [(body, BODY), *((np.concatenate([pad.quads(), pad.sides()]), PAD) for pad in pads)]
-    flat, colours, depth = [], [], []
-    for corners, colour in parts:
-        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        light = np.abs(normal @ towards) / np.maximum(np.linalg.norm(normal, axis=1), 1e-30)
-        colours.append((AMBIENT + (1 - AMBIENT) * light)[:, None] * colour)
-        depth.append((corners @ towards).mean(axis=1))
-        flat += list(corners @ screen)
-    order = np.argsort(np.concatenate(depth), kind="stable")
-    return pictures.thumbnail([flat[i] for i in order], np.concatenate(colours)[order])
+    return thumbnail(View(ds, best[:-3]), best) if (best := ds.attrs["best"]) else b"", blocks

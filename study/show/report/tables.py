@@ -15,6 +15,7 @@ from softjaw.study.show.best_grasps import best, case_table
 from softjaw.study.show.grasps import (
     ABOVE,
     LIMITS,
+    choices,
     field,
     forces,
     number,
@@ -31,7 +32,6 @@ from softjaw.study.show.status import split_of
 BEST = 6
 # Columns of a page that has room for them.
 SHOWN = ("payload", "quality", "quality_fitted", "e_n", "f_x_max", "f_y_max", "tau_z_max")
-MORE = ("epsilon", "contact_area", "p_max", "closing", "indentation", "wall_stress", "safety_factor")
 WALL = ("indentation", "wall_stress", "wall_strain", "support_force", "safety_factor")
 SAFE = "Safe forces per finger hold the object's weight and are borne by its wall; +: also the largest solved force is."
 STRESS = "Wall stress: largest von Mises stress on both faces. Support force: what table or clamp bears along the axis."
@@ -64,8 +64,7 @@ def every_case(ds: xr.Dataset) -> list[Block]:
     if count > 8000:  # a page with more rows would be heavy
         summary = f"The {count} cases are too many to be listed here; softjaw export writes all of them."
         return [text(summary, "note")]
-    names = [name for name in (*SHOWN, *MORE) if field(ds, name) is not None]
-    cases = case_table(ds, np.ndindex(ds.status.shape), maps=names)
+    cases = case_table(ds, np.ndindex(ds.status.shape), maps=choices(ds, SHOWN[0]))
     title = f"All {count} cases (CCM, weaker finger)"
     return [details(f"All {count} cases as a table", [block_of(replace(cases, title=title))])]
 

@@ -9,12 +9,12 @@ import numpy as np
 import xarray as xr
 
 from softjaw.study.flags import BORNE
-from softjaw.study.quantities import DONE, FAILED, MISSING, MODEL_NAMES, MODELS
+from softjaw.study.quantities import MISSING, MODEL_NAMES, MODELS
 from softjaw.study.result.read import axes_of
 from softjaw.study.result.store import value_text
 from softjaw.study.show.best_grasps import best_text
 from softjaw.study.show.grasps import Index, at, flagged, flags_of, judge, reason_lines, spoken
-from softjaw.study.show.status import no_grasps
+from softjaw.study.show.status import state_counts
 from softjaw.study.table import number
 
 CAVEAT = (
@@ -49,9 +49,7 @@ def subtitle(ds: xr.Dataset) -> str:
 
 def verdict(ds: xr.Dataset) -> list[str]:
     """What the planar model claims, and how many cases the answer rests on; tables have the numbers."""
-    done, failed, missing = (int(np.sum(ds.status.values == state)) for state in (DONE, FAILED, MISSING))
-    none = "".join(f", {text}" for text in no_grasps(ds.status.values))
-    cases = f"{done} of {ds.status.size} cases are solved, {failed} failed, {missing} are not computed{none}."
+    cases = f"{state_counts(ds.status.values)}."
     index = ds.attrs["best"]
     return [f"No grasp is solved. {cases}"] if index is None else [*_planar(ds, index), cases]
 

@@ -23,7 +23,7 @@ from softjaw.study.result.read import axes_of, read_field, read_patch, scene_of
 from softjaw.study.scene import SceneError
 from softjaw.study.show.best_grasps import value_text
 from softjaw.study.show.grasps import Index, candidate_of, field, forces, order, place, quantity, stated, unravelled
-from softjaw.study.show.object_surface import NOBODY, Surface, moved, on_wall, surface_of, undeformed
+from softjaw.study.show.object_surface import Surface, moved, on_wall, surface_of, undeformed
 from softjaw.study.show.stored_surface import body, stored_surface, weaker
 from softjaw.study.show.view.pads import Faces, Pad, pads_of
 
@@ -94,26 +94,17 @@ class View:
 
     @cached_property
     def surface(self) -> Surface:
-        """The object's surface; a point on the border of two candidates' cells is there twice. Empty with a `note`."""
-        nothing = Surface(np.empty((0, 3)), np.empty((0, 3), int), np.empty(0, int))
+        """The object's surface; empty with a `note`."""
+        nothing = Surface(np.empty((0, 3)), np.empty((0, 3), int), np.empty(0, int), np.empty(0, int))
         if self.scene is None:
             self.note = "the object is not drawn: this version cannot read the scene in the file"
             return nothing
         try:
-            points, corners, candidate = surface_of(self.scene, axes_of(self.ds), self._feet())
+            surface = surface_of(self.scene, axes_of(self.ds), self._feet())
         except (ValueError, OSError) as error:
             self.note = f"the object is not drawn: {error}"
             return nothing
-        pairs = np.column_stack([corners.ravel(), np.repeat(candidate, 3)])
-        found, inverse = np.unique(pairs, axis=0, return_inverse=True)
-        return Surface(self.placed.to_object(points[found[:, 0]]), inverse.reshape(-1, 3), candidate)
-
-    @cached_property
-    def owner(self) -> np.ndarray:
-        """Candidate of every point of `surface` ``(n,)``, -1 for none."""
-        owners = np.full(len(self.surface.points), NOBODY)
-        owners[self.surface.triangles] = self.surface.candidate[:, None]
-        return owners
+        return surface._replace(points=self.placed.to_object(surface.points))
 
     def _feet(self) -> Iterator[tuple[int, Pose, float]]:
         """Pads of explicit poses at the force that is nearest to the one shown, the best grasp first."""

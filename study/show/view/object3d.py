@@ -18,13 +18,11 @@ from softjaw.study.page import Block, Section, label, page, plot, text
 from softjaw.study.quantities import ALONG, AROUND
 from softjaw.study.result.layout import DONE
 from softjaw.study.show import plots
-from softjaw.study.show.grasps import Index, field, forces, label_of, order, place, stated
+from softjaw.study.show.grasps import Index, choices, forces, label_of, order, place, stated
 from softjaw.study.show.stored_surface import NAMES
 from softjaw.study.show.view.model import ARROW_MM, CROSSED, FORCE, NEUTRAL, OPEN, PAD, View
 
 MOST = 24_000_000  # bytes of pads, walls and limit surfaces; beyond it, those of the worst grasps are left out
-CHOICES = ("quality", "quality_fitted", "e_n", "epsilon", "f_x_max", "f_y_max", "tau_z_max", "safety_factor", "F_N",
-           "S", "contact_area", "p_max", "closing", "curvature_loss", "indentation", "wall_stress")  # fmt: skip
 
 
 def object_block(
@@ -80,10 +78,10 @@ def payload(
         "states": [view.state(k).tolist() for k in levels],
         "words": {key: view.summary(i, quantity) for key, i in every.items()},
         "notes": {key: label(said) for key, i in every.items() if (said := stated(ds, i))},
-        "quantities": [_choice(view, n) for n in dict.fromkeys((*CHOICES, quantity)) if field(ds, n) is not None],
+        "quantities": [_choice(view, name) for name in choices(ds, quantity)],
         "points": _packed(1e3 * surface.points, "<f4"),
         "triangles": _packed(surface.triangles, "<i4"),
-        "owner": _packed(view.owner, "<i4"),
+        "owner": _packed(surface.owner, "<i4"),
         "grid": [AROUND, ALONG],
         "around": "" if wall is None else _packed(np.nan_to_num(wall[:, 0], nan=-1e9), "<f4"),
         "along": "" if wall is None else _packed(np.nan_to_num(wall[:, 1]), "<f4"),

@@ -5,6 +5,7 @@ Lengths are drawn in mm and pressures in kPa; files are in SI units.
 
 from __future__ import annotations
 
+from io import BytesIO
 from pathlib import Path
 from textwrap import fill
 from typing import Any
@@ -23,7 +24,8 @@ from softjaw.study.show.view.model import ARROW_MM, CROSSED, FORCE, NEUTRAL, OPE
 from softjaw.study.show.view.pads import Pad
 
 ENDINGS = (".vtm", ".vtp")
-SIZE = (1400, 900)
+SIZE, SMALL = (1400, 900), 208
+BODY, FINGER = "#b8c7d4", "#ed8c40"
 LIGHT = {"ambient": 0.62, "diffuse": 0.42, "specular": 0.0}  # colours have to be those of the bar
 BAR = {"vertical": True, "height": 0.36, "width": 0.045, "title_font_size": 15, "label_font_size": 13, "n_labels": 5,
        "color": INK, "fmt": "%.4g", "position_x": 0.07}  # fmt: skip
@@ -50,6 +52,25 @@ def save_picture(view: View, index: Index, path: Path, quantity: str, motion: st
             plotter.screenshot(path)
         finally:
             plotter.close()
+
+
+def thumbnail(view: View, index: Index) -> bytes:
+    """A small square PNG of an object between the pads of a case; empty where the object cannot be drawn."""
+    body, pads, image = view.surface, view.pads(index), BytesIO()
+    if not len(body.triangles) or not pads:
+        return b""
+    with pv.vtk_verbosity("off"):
+        plotter = pv.Plotter(off_screen=True, window_size=(SMALL, SMALL))
+        plotter.set_background("white")
+        surface(plotter, 1e3 * body.points, body.triangles, color=BODY)
+        for pad in pads:
+            faces(plotter, 1e3 * np.concatenate([pad.quads(), pad.sides()]), color=FINGER, lighting=True)
+        look(plotter, *view.eye(index))
+        try:
+            plotter.screenshot(image)
+        finally:
+            plotter.close()
+    return image.getvalue()
 
 
 def _object(plotter: Any, view: View, index: Index, quantity: str) -> None:
@@ -204,7 +225,7 @@ def write_vtk(ds: xr.Dataset, path: Path, force: float | None = None) -> Path:
 
 def _object_file(view: View, index: Index) -> pv.PolyData:
     """The object's surface with its maps."""
-    x, corners, cell = view.surface
+    x, corners, cell, _ = view.surface
     body = pv.PolyData.from_regular_faces(x, corners)
     body.cell_data["candidate"] = cell
     maps = {name: field(view.ds, name) for name in maps_of(view.ds)}

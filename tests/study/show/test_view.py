@@ -192,7 +192,7 @@ def test_the_page_holds_every_solved_case_with_pads_friction_and_limit_surface_w
     assert told["quantities"][0]["values"][1][5] is None
     points, owner = unpacked(told["points"]).reshape(-1, 3), unpacked(told["owner"], "<i4")
     assert points == pytest.approx(1e3 * view.surface.points, rel=1e-6)
-    assert (owner == view.owner).all()
+    assert (owner == view.surface.owner).all()
     assert (unpacked(told["triangles"], "<i4").reshape(-1, 3) == view.surface.triangles).all()
     view, index = shown
     one = payload(view, index, "quality", [index], "x", whole=True)[0]["cases"]["1 2"]
