@@ -16,7 +16,7 @@ import xarray as xr
 from softjaw.study.flags import LOST, OF_FILE, Flag, flag_words, flags_in
 from softjaw.study.grippers import APPROACHES, Hand, gripper_file
 from softjaw.study.messages import StudyError
-from softjaw.study.quantities import LISTED, MAIN, MODELS, NO_GRASP, STATES
+from softjaw.study.quantities import FORCE_RANGE, LISTED, MAIN, MODELS, NO_GRASP, STATES
 from softjaw.study.ranking import at_level, distinct, judged, rank_values, ranked, score_of, task_keys
 from softjaw.study.result.layout import DONE, FAILED
 from softjaw.study.result.read import axes_of
@@ -95,19 +95,24 @@ def approach_of(ds: xr.Dataset, index: Index, hand: Hand) -> tuple[float, ...] |
 
 
 def field(ds: xr.Dataset, name: str, model: str = "ccm") -> Any:
-    """Array of a variable over all cases, a map of several friction models in one; None where it has no value."""
+    """Array of a variable over all cases, a map of several friction models in one; None where it has no value.
+
+    What is known of a candidate only has the same value at every force.
+    """
     if name not in ds.variables:
         return None
     found = ds.variables[name]
     several = "model" in found.dims and "finger" not in found.dims
     values = np.asarray(found.isel(model=MODELS.index(model)).values if several else found.values, float)
+    if found.dims == ds.status.dims[:-1]:
+        values = np.repeat(values[..., None], ds.status.shape[-1], axis=-1)
     # A map without any value is left out instead of being drawn empty.
     return values if np.isfinite(values).any() else None
 
 
-def choices(ds: xr.Dataset, first: str) -> list[str]:
-    """Maps with a value that a menu or a table offers, one of them first."""
-    return [name for name in dict.fromkeys((first, *MAIN, *MORE)) if field(ds, name) is not None]
+def choices(ds: xr.Dataset, first: str, *more: str) -> list[str]:
+    """Maps with a value that a menu offers, one of them first, with the bounds of the safe forces."""
+    return [name for name in dict.fromkeys((first, *MAIN, *MORE, *FORCE_RANGE, *more)) if field(ds, name) is not None]
 
 
 def at(ds: xr.Dataset, name: str, index: Index, model: str = "ccm") -> float:

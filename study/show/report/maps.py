@@ -1,4 +1,4 @@
-"""Maps of a report: every quantity over station, angle and force, CCM beside PCM; and safe forces."""
+"""Maps of a report: every quantity over station, angle and force, CCM beside PCM."""
 
 from __future__ import annotations
 
@@ -141,7 +141,7 @@ def _names(ds: xr.Dataset) -> list[str]:
     """Maps with values, and the error estimates of the first ones; quality where nothing is known."""
     more = [q.of_error.name for q in TABLE if q.error and q.rank]
     more += ["effect_object_level"] * ("wall" in ds.attrs["has"])
-    return [*choices(ds, ds.attrs["score"]), *(name for name in more if field(ds, name) is not None)] or ["quality"]
+    return choices(ds, ds.attrs["score"], *more) or ["quality"]
 
 
 def _button(ds: xr.Dataset, name: str, cuts: Any, x: int, y: int) -> dict[str, Any]:
@@ -175,33 +175,3 @@ def elsewhere(ds: xr.Dataset, index: Index, *drawn: int) -> str:
     axes = [str(axis) for axis in ds.status.dims]
     others = [(axis, i) for k, (axis, i) in enumerate(zip(axes, index, strict=True)) if k not in drawn]
     return ", ".join(f"{spoken(axis)} {axis_text(ds, axis, i)}" for axis, i in others if ds.sizes[axis] > 1)
-
-
-def safe_forces(ds: xr.Dataset, index: Index) -> Block | None:
-    """Safe force range of every candidate: from the minimum holding force to the maximum force before damage."""
-    high = field(ds, "force_high")
-    if high is None or high.size == 1:
-        return None
-    low = ds.force_low.values if "force_low" in ds else np.zeros(high.shape)
-    x, angle = main_axis(ds), len(index) - 2
-    panels = some(different_angles(ds), index[-2])
-    titles = [f"angle {axis_text(ds, 'angle', p)}" for p in panels] if ds.sizes["angle"] > 1 else ()
-    made = plots.figure(1, len(panels), titles, shared_yaxes=True)
-    values, settings = ticks(ds, x)
-    for column, p in enumerate(panels, start=1):
-        cut = tuple(slice(None) if i == x else (p if i == angle else k) for i, k in enumerate(index[:-1]))
-        top, bottom = high[cut], low[cut]
-        good = bottom <= top
-        made.add_bar(x=values, y=np.where(good, top - bottom, np.nan), base=bottom, marker_color="#2a8c82", row=1,
-                     col=column, hovertemplate="%{x}: %{base:.3g} to %{customdata:.3g} N<extra></extra>",
-                     customdata=top)  # fmt: skip
-        for bound, symbol in ((bottom, "triangle-up"), (top, "triangle-down")):
-            bad = np.isfinite(top) & np.isfinite(bound) & ~good
-            look = {"symbol": f"{symbol}-open", "color": plots.INK, "size": 8}
-            made.add_scatter(x=[values[k] for k in np.flatnonzero(bad)], y=bound[bad], mode="markers", marker=look,
-                             row=1, col=column)  # fmt: skip
-    made.update_layout(showlegend=False).update_xaxes(**settings)
-    made.update_yaxes(range=[0, 1.12 * forces(ds)[-1]]).update_yaxes(title_text="normal force [N]", col=1)
-    bars = "Bars: from the force that holds (CCM; 0 without a mass) to the one that the wall bears."
-    caption = f"{bars} No bar: no force is safe; triangles mark the force that holds (up) and that is borne (down)."
-    return plot(made, caption, f"Safe force ranges: {int(np.sum(low <= high))} of {high.size} grasps have one.", 300)

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from softjaw.study.page import Block, block_of, bullets, details, table, text, verbatim
-from softjaw.study.quantities import EFFECTS, PARTS, REASONS
+from softjaw.study.quantities import EFFECTS, FORCE_RANGE, PARTS, REASONS
 from softjaw.study.ranking import largest
 from softjaw.study.show.best_grasps import best, case_table
 from softjaw.study.show.grasps import (
@@ -64,7 +64,7 @@ def every_case(ds: xr.Dataset) -> list[Block]:
     if count > 8000:  # a page with more rows would be heavy
         summary = f"The {count} cases are too many to be listed here; softjaw export writes all of them."
         return [text(summary, "note")]
-    cases = case_table(ds, np.ndindex(ds.status.shape), maps=choices(ds, SHOWN[0]))
+    cases = case_table(ds, np.ndindex(ds.status.shape), maps=[n for n in choices(ds, SHOWN[0]) if n not in FORCE_RANGE])
     title = f"All {count} cases (CCM, weaker finger)"
     return [details(f"All {count} cases as a table", [block_of(replace(cases, title=title))])]
 

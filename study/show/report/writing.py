@@ -87,13 +87,12 @@ def the_object(view: View, best: Index) -> Block | None:
 
 
 def wall(view: View, best: Index) -> list[Block | None]:
-    """Limits, safe forces, shape and force curves of a thin wall; empty without one."""
+    """Limits, shape and force curves of a thin wall; empty without one."""
     ds, shape = view.ds, getattr(view.scene, "object", None)
     if field(ds, "indentation") is None:
         return []
     allowed = getattr(shape, "allowed_dent", None)
-    sections = curves.wall_section(view, best)
-    return [*tables.wall(ds, shape), maps.safe_forces(ds, best), sections, curves.wall_curves(ds, best, allowed)]
+    return [*tables.wall(ds, shape), curves.wall_section(view, best), curves.wall_curves(ds, best, allowed)]
 
 
 def cases(view: View) -> list[Section]:

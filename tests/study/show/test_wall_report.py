@@ -21,7 +21,7 @@ from softjaw.study.result.write import ResultWriter, record
 from softjaw.study.run.plan import make_plan, memory, wall_unknowns
 from softjaw.study.scene import parse_scene
 from softjaw.study.show.best_grasps import best, safe_range
-from softjaw.study.show.grasps import at, judge
+from softjaw.study.show.grasps import at, field, judge
 from softjaw.study.show.object_surface import undeformed
 from softjaw.study.show.report import curves, maps, tables, writing
 from softjaw.study.show.view.model import View, view_of
@@ -134,14 +134,13 @@ def test_the_report_answers_at_a_force_that_the_wall_bears_and_shows_the_wall_as
         assert data.normal_force.values[data.attrs["best"][-1]] == 1.0
         assert safe_range(data, (0, 0, 0)).endswith(f"{high:.3g}")
         words, limits, *figures = writing.wall(View(data), data.attrs["best"])
-        (bars,) = [t for t in maps.safe_forces(data, data.attrs["best"])["figure"].data if t.type == "bar"]
         (over_force,) = maps.maps(data, data.attrs["best"])
     assert "0.3 mm PP" in words["text"]
     assert len(limits["rows"]) == 2
-    assert len(figures) == 3  # safe forces, sections of the wall, force over indentation
-    assert bars.customdata[0] == pytest.approx(high)
-    assert np.add(bars.base, bars.y) == pytest.approx(bars.customdata)
-    level = over_force["figure"].layout.updatemenus[0].buttons[-1]
+    assert len(figures) == 2  # sections of the wall, force over indentation
+    *buttons, level = over_force["figure"].layout.updatemenus[0].buttons
+    borne = buttons[maps._names(data).index("force_high")]
+    assert borne.args[0]["z"][0][0][0] == borne.args[0]["z"][0][1][0] == pytest.approx(high)
     assert level.args[0]["z"][0] == [[2.0, 2.0]] * 2  # nonlinear shell at both forces
     # The can's radius is 30 mm; its wall comes nearer to the axis by the indentation, less the motion as a whole.
     with open_result(can) as result:
@@ -166,8 +165,7 @@ def test_failed_candidates_are_shown_as_failed(tmp_path, solved):
     path = write(tmp_path / "half.hdf", scene, {row: results[row] for row in (0, 1)})
     with open_result(path) as result:
         data = judge(dataset(result))
-        (bars,) = [t for t in maps.safe_forces(data, data.attrs["best"])["figure"].data if t.type == "bar"]
-        assert np.isfinite(np.array(bars.y, float)).tolist() == [True, False]
+        assert np.isfinite(field(data, "force_high")[:, 0, 0]).tolist() == [True, False]
         assert safe_range(data, (1, 0, 0)) == "-"
         (block,) = tables.reasons(data, FAILED)
         assert block["texts"][0].startswith("2 x failed: the wall gave way")
