@@ -70,30 +70,19 @@ def lines(
         )  # fmt: skip
 
 
-def triangles(quads: np.ndarray) -> np.ndarray:
-    """Two triangles ``(2 k, 3)`` for each of the quadrilaterals ``(k, 4)``."""
-    return quads[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)
+def heatmap(x: np.ndarray, y: np.ndarray, values: np.ndarray) -> go.Heatmap:
+    """Values ``(len(y), len(x))`` in the colours of the figure's one bar; nothing where they are NaN."""
+    return go.Heatmap(x=x, y=y, z=values.astype(np.float32), coloraxis="coloraxis", hoverinfo="z")
 
 
-def mesh(points: np.ndarray, corners: np.ndarray, **look: Any) -> go.Mesh3d:
-    """Triangles ``corners (m, 3)`` among ``points (n, 3)``."""
-    x, y, z = np.asarray(points, np.float32).T
-    i, j, k = np.asarray(corners, np.int32).T
-    return go.Mesh3d(x=x, y=y, z=z, i=i, j=j, k=k, **look)
-
-
-def segments(ends: np.ndarray, **look: Any) -> go.Scatter3d:
-    """Lines between pairs of points ``(k, 2, 3)``."""
-    gaps = np.concatenate([ends, np.full((len(ends), 1, 3), np.nan)], axis=1).reshape(-1, 3)
-    x, y, z = gaps.astype(np.float32).T
-    return go.Scatter3d(x=x, y=y, z=z, mode="lines", hoverinfo="skip", showlegend=False, **look)
-
-
-def points(places: np.ndarray, colour: str, size: float, text: Any = None) -> go.Scatter3d:
-    """Dots at places ``(n, 3)``, with names beside them if there are any."""
-    x, y, z = places.astype(np.float32).T
-    return go.Scatter3d(x=x, y=y, z=z, mode="markers+text" if text else "markers", text=text, hoverinfo="skip",
-                        marker={"color": colour, "size": size}, showlegend=False)  # fmt: skip
+def segments(ends: np.ndarray, colour: str, names: str = "") -> go.Scatter:
+    """Lines between pairs of points ``(k, 2, ...)`` of a plane with a dot, or a name, at the second one."""
+    gaps = np.concatenate([ends[..., :2], np.full((len(ends), 1, 2), np.nan)], axis=1).reshape(-1, 2)
+    texts = [text for name in names for text in ("", name, "")]
+    look = {"line": {"color": colour, "width": 1.5}, "textfont": {"color": colour}, "textposition": "top right"}
+    sizes = [0, 0 if names else 4, 0] * len(ends)
+    return go.Scatter(x=gaps[:, 0], y=gaps[:, 1], mode="lines+markers+text", text=texts, marker={"size": sizes},
+                      hoverinfo="skip", showlegend=False, **look)  # fmt: skip
 
 
 def scene(unit: str = "mm", names: Sequence[str] = ("x", "y", "z"), **more: Any) -> dict[str, Any]:

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from softjaw.friction.motion import fibonacci_twists
 from softjaw.friction.patch import ContactPatch
 from softjaw.friction.wrench import friction_wrench
 from softjaw.lsfit.ellipsoid import Ellipsoid
@@ -49,11 +48,6 @@ class StoredSurface:
         S = float((self.patch.pressure * self.patch.area).sum())
         wrench = friction_wrench(self.patch, twist / [1, 1, self.rho], 1.0, self.model)[:, AXES]
         return wrench / (S * np.array([1.0, 1.0, self.rho]))
-
-    def samples(self, count: int) -> Any:
-        """Exact wrenches of evenly spread motions and of their opposites ``(2 count, 3)`` [-]."""
-        wrenches = self.wrenches(fibonacci_twists(count, 1.0))
-        return None if wrenches is None else np.vstack([wrenches, -wrenches])
 
     def outline(self, i: int, j: int, count: int = 90) -> Any:
         """Exact outline of the body's shadow on the plane of two components ``(count, 2)`` [-]."""

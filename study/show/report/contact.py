@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,6 @@ from softjaw.study.show.stored_surface import (
     NAMES,
     PLANES,
     StoredSurface,
-    body,
     shadow_outline,
     stored_surface,
     weaker,
@@ -26,7 +26,7 @@ SLIPS = {"x": "slip along x", "turn": "turn about z"}
 
 
 def patch(view: View, index: Index) -> Block | None:
-    """Pressure and friction on the pads of one case, seen from the object; None if they are not stored."""
+    """Pressure and friction on the pads of one case, each in its own frame; None if they are not stored."""
     both = view.pads(index)
     if not any(pad.loaded.any() for pad in both):
         return None
@@ -36,72 +36,58 @@ def patch(view: View, index: Index) -> Block | None:
     alike = bool(np.abs(one - two).max() <= 1e-3 * top)
     fingers = {"both fingers alike": both[0]} if alike else {f"finger {k}": pad for k, pad in enumerate(both, start=1)}
     titles = [f"{name}: friction against a {slip}" for name in fingers for slip in SLIPS.values()]
-    made = plots.figure(len(fingers), 2, titles, specs=[[{"type": "scene"}] * 2] * len(fingers),
-                        horizontal_spacing=0.02, vertical_spacing=0.06)  # fmt: skip
-    for row, pad in enumerate(fingers.values(), start=1):
-        for column, motion in enumerate(SLIPS, start=1):
-            for trace in pad_face(pad, motion, top, bar=row == column == 1):
-                made.add_trace(trace, row=row, col=column)
-    eye = {"eye": {"x": 0, "y": 0, "z": 2.1}, "up": {"x": 0, "y": 1, "z": 0}, "projection": {"type": "orthographic"}}
-    made.update_scenes(plots.scene(camera=eye)).update_layout(margin={"l": 0, "r": 80, "t": 58, "b": 0})
+    made = plots.figure(len(fingers), 2, titles)
+    for (row, pad), (column, motion) in product(enumerate(fingers.values(), start=1), enumerate(SLIPS, start=1)):
+        for trace in pad_face(pad, motion):
+            made.add_trace(trace, row=row, col=column)
+    scale = {"colorscale": plots.colours("pressure"), "cmin": 0, "cmax": 1e-3 * top}
+    made.update_layout(coloraxis={**scale, "colorbar": plots.bars("pressure [kPa]")}, plot_bgcolor=plots.EMPTY)
+    made.update_xaxes(title_text="x [mm]", showgrid=False, row=len(fingers))
+    made.update_yaxes(showgrid=False).update_yaxes(title_text="y [mm]", col=1)
+    made.for_each_yaxis(lambda axis: axis.update(scaleanchor=axis.anchor))  # true to scale
     words = {name: value_text(view.ds, name, index, unit=True) for name in ("p_max", "contact_area")}
     summary = f"largest pressure {words['p_max']}, contact area {words['contact_area']}"
-    frame = "The pad's deformed face in its own frame, x along the pad; faces without contact are pale."
-    blue = "Blue: friction of the faces against a slip along x or a turn about z of the contact frame (black axes)."
-    caption = f"{place(view.ds, index, force=True)}: {summary}. {frame} {blue} Drag to turn it."
+    frame = "The pad's face in its own frame, x along the pad; faces without contact are pale."
+    blue = "Blue: friction of the faces against a slip along x or a turn about z of the contact frame (white axes)."
+    caption = f"{place(view.ds, index, force=True)}: {summary}. {frame} {blue}"
     return plot(made, caption, f"Contact pressure and friction on the pad, {summary}", 300 * len(fingers) + 40)
 
 
-def pad_face(pad: Pad, motion: str, top: float, bar: bool) -> list[Any]:
-    """Traces of one pad in its own frame [mm, kPa]: faces with their pressure, friction, contact frame."""
-    corners = 1e3 * pad.own(pad.quads().reshape(-1, 3))
-    corners -= [0, 0, corners[:, 2].min()]
-    quads, loaded = np.arange(len(corners)).reshape(-1, 4), pad.loaded.ravel()
-    traces = [plots.mesh(corners, plots.triangles(quads[~loaded]), color="#eef0f1", hoverinfo="skip", **plots.FLAT)]
-    pressure = np.repeat(1e-3 * pad.pressure.ravel()[loaded], 2)
-    traces.append(plots.mesh(
-        corners, plots.triangles(quads[loaded]), intensity=pressure, intensitymode="cell", cmin=0, cmax=1e-3 * top,
-        colorscale=plots.colours("pressure"), showscale=bar, hoverinfo="skip", colorbar=plots.bars("pressure [kPa]"),
-        **plots.FLAT,
-    ))  # fmt: skip
-    high = np.array([0, 0, 0.3 + np.ptp(corners[:, 2])])
-    arrows = 1e3 * pad.own(1e-3 * pad.arrows(motion, np.ptp(corners[:, 0]) / 16)) * [1, 1, 0] + high
-    traces.append(plots.segments(arrows, line={"color": FORCE, "width": 4}))
-    traces.append(plots.points(arrows[:, 1], FORCE, 2.5))
-    axes = 0.3 * np.ptp(corners[:, 1]) * (pad.frame @ pad.rotation)[:2]
-    ends = 1e3 * pad.own(pad.origin) * [1, 1, 0] + high + np.stack([np.zeros((2, 3)), axes], 1)
-    traces.append(plots.segments(ends, line={"color": plots.INK, "width": 5}))
-    return [*traces, plots.points(ends[:, 1], plots.INK, 1, text=["x", "y"])]
+def pad_face(pad: Pad, motion: str) -> list[Any]:
+    """Traces of one pad in its own frame [mm, kPa]: pressure of the loaded faces, friction, contact frame."""
+    own = 1e3 * pad.own(pad.centroid)
+    pressure = np.where(pad.loaded, 1e-3 * pad.pressure, np.nan).T
+    size = 0.5 * np.ptp(own[..., 1])
+    arrows = 1e3 * pad.own(1e-3 * pad.arrows(motion, size / 4))
+    axes = 1e3 * pad.own(pad.origin) + np.stack([np.zeros((2, 3)), 0.6 * size * (pad.frame @ pad.rotation)[:2]], axis=1)
+    return [plots.heatmap(own[..., 0].mean(axis=1), own[..., 1].mean(axis=0), pressure),
+            plots.segments(arrows, FORCE), plots.segments(axes, "white", "xy")]  # fmt: skip
 
 
 def limit_surfaces(view: View, index: Index) -> Block | None:
-    """Shadows of the weaker finger's limit surfaces, CCM beside PCM, and both in space; None where none is stored."""
+    """Shadows of the weaker finger's limit surfaces, CCM beside PCM; None where none is stored."""
     ds, finger, faces = view.ds, weaker(view.ds, index), view.faces(index)
     stored = {model: stored_surface(ds, index, finger, model, faces) for model in ("ccm", "pcm")}
     known = {model: s for model, s in stored.items() if s is not None and s.ellipsoid.rank == 3}
     if not known:
         return None
-    made = plots.figure(2, 3, specs=[[{}, {}, {}], [{"type": "scene", "colspan": 3}, None, None]],
-                        row_heights=[0.42, 0.58], vertical_spacing=0.1)  # fmt: skip
+    made = plots.figure(1, 3)
     for column, (i, j) in enumerate(PLANES, start=1):
         for model, surface in reversed(known.items()):  # the CCM on top
             _shadow(made, surface, model, i, j, column)
         made.update_xaxes(title_text=NAMES[i], row=1, col=column).update_yaxes(title_text=NAMES[j], row=1, col=column)
     made.update_yaxes(scaleanchor="x", row=1, col=1)
-    for model, surface in known.items():
-        _in_space(made, surface, model)
-    made.update_scenes(plots.scene("", NAMES, aspectmode="cube"))
-    made.update_layout(legend={"y": 0.56, "yanchor": "middle"}, margin={"t": 20, "b": 10})
+    made.update_layout(legend={"y": -0.25}, margin={"t": 20})
     exact = "Dots: exact wrenches of slip motions. " if any(s.patch for s in known.values()) else ""
     worst = [at(ds, name, index) for name in ("overclaim", "overclaim_ellipsoid")]
     mean = [at(ds, name, index) for name in ("fit_error", "fit_error_ellipsoid")]
     parts = zip(worst, mean, strict=True)
     fitted, ellipsoid = (f"{number(100 * w, 2)} % (mean error {number(100 * m, 2)} %)" for w, m in parts)
     off = f"They claim too much by up to (CCM): {fitted} the fitted surface, {ellipsoid} the ellipsoid."
-    caption = f"{place(ds, index, force=True)}: the loads that one contact carries without slipping, and their shadows."
+    caption = f"{place(ds, index, force=True)}: shadows of the loads that one contact carries without slipping."
     caption += f" Full: the fitted surface; dashed: the ellipsoid from three motions. {exact}"
     caption += off * bool(np.isfinite([*worst, *mean]).all())
-    return plot(made, caption, f"Limit surfaces of {' and '.join(known)} over f_x, f_y and tau_z.", 820)
+    return plot(made, caption, f"Limit surfaces of {' and '.join(known)} over f_x, f_y and tau_z.", 420)
 
 
 def _shadow(made: Any, surface: StoredSurface, model: str, i: int, j: int, column: int) -> None:
@@ -119,14 +105,3 @@ def _shadow(made: Any, surface: StoredSurface, model: str, i: int, j: int, colum
         x, y = (exact * scale).T
         made.add_scatter(x=x, y=y, mode="markers", name=f"{name}, exact", legendgroup=f"{model} exact", **common,
                          marker={"color": colour, "symbol": f"{symbol}-open", "size": 5})  # fmt: skip
-
-
-def _in_space(made: Any, surface: StoredSurface, model: str) -> None:
-    colour, points = plots.MODELS[model][1], body(surface)
-    if points is not None:
-        x, y, z = np.moveaxis(points.astype(np.float32), -1, 0)
-        made.add_surface(x=x, y=y, z=z, colorscale=[[0, colour], [1, colour]], showscale=False, row=2, col=1,
-                         opacity=0.75 if model == "ccm" else 0.25, name=plots.MODELS[model][0])  # fmt: skip
-    exact = surface.samples(300)  # exact wrenches that are drawn
-    if exact is not None and model == "ccm":
-        made.add_trace(plots.points(exact * surface.unit, plots.INK, 1.5), row=2, col=1)

@@ -6,13 +6,12 @@ object and its maps; what failed and why; the best case in detail; then how it w
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import xarray as xr
 
 from softjaw.study.messages import CANNOT_WRITE, StudyError, write_file
-from softjaw.study.page import Block, Section, answer, box, heading, page, text
+from softjaw.study.page import Block, Section, answer, box, page, text
 from softjaw.study.quantities import DONE, FAILED, NO_GRASP
 from softjaw.study.result.read import open
 from softjaw.study.show.best_grasps import answer as answer_lines
@@ -103,15 +102,9 @@ def cases(view: View) -> list[Section]:
         roles["Chosen candidate"] = chosen
     # The other case may belong to another point of the sweep, and so to another object.
     views = {index: view if index[:-3] == view.point else View(ds, index[:-3]) for index in roles.values()}
-    which = "of the best case" if len(roles) == 1 else "of both cases"
-
-    def headed(draw: Callable[[View, Index], Block | None]) -> list[Block]:
-        drawn = {role: block for role, index in roles.items() if (block := draw(views[index], index))}
-        return [part for role, block in drawn.items() for part in ([heading(role)] * (len(roles) > 1) + [block])]
-
     mu = view.scene.friction.mu if view.scene else None
     return [
         ("models", "Friction models compared", curves.models(ds, roles, mu)),
-        ("patch", f"Contact patch {which}", headed(contact.patch)),
-        ("surface", f"Limit surface {which}", headed(contact.limit_surfaces)),
+        ("patch", "Contact patch", [contact.patch(views[index], index) for index in roles.values()]),
+        ("surface", "Limit surface", [contact.limit_surfaces(views[index], index) for index in roles.values()]),
     ]
