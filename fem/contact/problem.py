@@ -168,8 +168,8 @@ class Evaluated:
         Nodal pressures [Pa].
     weighted, active : (nodes,) arrays
         Weighted gaps [m^3], active set.
-    force : (facets, 3, k) array
-        Forces on the pad's nodes in its own frame [N].
+    load : (n, 3) array
+        Forces of the points on what they touch, friction included [N].
     surface : Any
         Derivatives: the Hessian of a rigid object's gap, or what the points face on a wall.
     traction : (n, 3) array, optional
@@ -182,7 +182,7 @@ class Evaluated:
     lam: FloatArray
     weighted: FloatArray
     active: NDArray[np.bool_]
-    force: FloatArray
+    load: FloatArray
     surface: Any
     traction: FloatArray | None = None
 
@@ -215,17 +215,28 @@ class ContactProblem(ABC):
     # -- evaluation ---------------------------------------------------------------------------------------------------
 
     @abstractmethod
-    def _faces(self, x: FloatArray, tangent: bool) -> list[Evaluated]:
-        """Contact faces of all fingers without friction; ``tangent``: with what the tangent needs."""
+    def _met(self, k: int, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, Any]:
+        """Of a finger at the state ``x`` what `Evaluated` calls points, gap, normal and surface."""
 
-    def evaluate(self, x: FloatArray, tangent: bool = False) -> list[Evaluated]:
+    def evaluate(self, x: FloatArray) -> list[Evaluated]:
         """Contact faces of all fingers at the state ``x``."""
-        faces = self._faces(x, tangent)
+        return [self._face(k, f, x) for k, f in enumerate(self.fingers)]
+
+    def _face(self, k: int, f: Finger, x: FloatArray) -> Evaluated:
+        points, gap, normal, surface = self._met(k, x)
+        N, whole, lam = f.pad.face_N, f.pad.face_area, f.pressure(x)[f.nodes]
+        # points that face nothing are left out, so that a pad over a rim is carried up to the rim
+        area = np.where(gap.reshape(whole.shape) == FAR, 0.0, whole)
+        load = (area * (lam @ N.T)).reshape(-1, 1) * normal
+        weighted = f.nodal((area * gap.reshape(whole.shape)) @ N)
+        # a node that hangs over the rim with most of its area would put all of its pressure on the rest
+        # part of a node's area that must face something for the node to carry load
+        gaps = np.where(f.nodal(area @ N) > 0.3 * f.area, weighted, FAR * f.area)
+        c = Evaluated(points, gap, normal, lam, gaps, f.active(x, gaps), load, surface)
         if self.friction is not None:
-            for k, (f, c) in enumerate(zip(self.fingers, faces, strict=True)):
-                area, c.traction = f.pad.face_area, self.traction(k, x, c)[0]
-                c.force -= np.einsum("fq,qa,fqi->fia", area, f.pad.face_N, (c.traction @ f.R).reshape(*area.shape, 3))
-        return faces
+            c.traction = self.traction(k, x, c)[0]
+            c.load = load + whole.reshape(-1, 1) * c.traction
+        return c
 
     def residual(self, x: FloatArray) -> FloatArray:
         """Residual of all rows ``(size,)`` [N]; NaN where an element is inverted, so that the step is refused."""
@@ -242,7 +253,8 @@ class ContactProblem(ABC):
             return refused
         R = np.zeros(self.size)
         for f, c, (inner, _) in zip(self.fingers, contacts, foam, strict=True):
-            R[f.unknowns] = inner + gather(f.local_dofs, c.force, f.pad.size)
+            force = -np.einsum("qa,fqi->fia", f.pad.face_N, (c.load @ f.R).reshape(*f.pad.face_area.shape, 3))
+            R[f.unknowns] = inner + gather(f.local_dofs, force, f.pad.size)
             # vinewtonrsls keeps the pressures at their bounds itself; it needs the gap alone
             R[f.pressures] = f.kappa * c.weighted if self.complementarity else f.contact_rows(x, c.weighted)
         self._active_set = np.concatenate([c.active for c in contacts])

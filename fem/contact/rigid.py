@@ -8,7 +8,6 @@ import numpy as np
 
 from softjaw.fem.assembly import Pattern, add_up, gather, pairs
 from softjaw.fem.contact.problem import ContactProblem, Control, Evaluated, Finger, Gap
-from softjaw.fem.pad import foam as kernel
 from softjaw.fem.pad.mesh import Pad
 from softjaw.friction.patch import FloatArray
 
@@ -34,9 +33,6 @@ class RigidProblem(ContactProblem):
 
     def _build_pattern(self) -> None:
         """Work arrays, so that nothing large is allocated in an iteration, and the place of every entry."""
-        m, k = self.finger.nodes.shape
-        self._K_ul = np.empty((m, k, 3, k))
-        self._none = np.empty((0, 0, 0, 0, 0)), np.empty((0, 0, 0, 0))
         face, pressure = self.finger.local_dofs, self.finger.pressure_dofs
         # the diagonal of closing and pressures: an idle node has nothing else in its row
         diagonal = np.arange(self.closing_dof, self.size, dtype=np.int32)
@@ -53,24 +49,14 @@ class RigidProblem(ContactProblem):
         self._ends = np.cumsum([len(part[0]) for part in parts])
         self._closing_entries = np.flatnonzero(self.foam.columns == self.closing_dof)
         self._values = np.zeros(rows.size)
-        self._K_uu = self._parts()[1].reshape(m, 3, k, 3, k)
 
     def _parts(self) -> list[FloatArray]:
         """Views of the values: elements, face stiffness, force by pressure, gap by displacement, diagonal."""
         return np.split(self._values, self._ends[:-1])
 
-    def _faces(self, x: FloatArray, tangent: bool) -> list[Evaluated]:
-        f, area = self.finger, self.pad.face_area
-        points = f.points(x).reshape(-1, 3)
-        gap, normal, hessian = f.gap(points)
-        lam, weighted = f.pressure(x)[f.nodes], np.empty(f.nodes.shape)
-        force = np.empty((len(f.nodes), 3, f.nodes.shape[1]))
-        kernel.contact(
-            self.pad.face_N, area, lam, gap.reshape(area.shape), normal.reshape(*area.shape, 3),
-            hessian.reshape(*area.shape, 3, 3), weighted, force, *((self._K_uu, self._K_ul) if tangent else self._none),
-        )  # fmt: skip
-        gaps = f.nodal(weighted)
-        return [Evaluated(points, gap, normal, lam, gaps, f.active(x, gaps), force, hessian)]
+    def _met(self, k: int, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        points = self.finger.points(x).reshape(-1, 3)
+        return points, *self.finger.gap(points)
 
     def _unit_normal(self, c: Evaluated) -> FloatArray:
         # the gradient of a sampled distance is not quite a unit vector, and only one makes I - n n^T a projection
@@ -93,10 +79,18 @@ class RigidProblem(ContactProblem):
 
     def _evaluate_entries(self, x: FloatArray) -> None:
         """Entries of the tangent, not added up yet."""
-        elements, _, by_pressure, by_displacement, diagonal = self._parts()
+        elements, face, by_pressure, by_displacement, diagonal = self._parts()
         self.foam.stiffness(x, elements)
-        [c], f = self.evaluate(x, tangent=True), self.finger
-        by_pressure[:] = -f.kappa * self._K_ul.ravel()
+        [c], f = self.evaluate(x), self.finger
+        pressure = (c.lam @ self.pad.face_N.T).ravel()[:, None, None]
+        # where nothing presses a Hessian may not exist
+        by_place, by_lam = -pressure * np.where(pressure == 0.0, 0.0, c.surface), c.normal
+        if self.friction is not None:
+            slip_by_place, slip_by_lam = self._slip(x, c)
+            by_place, by_lam = by_place - slip_by_place, by_lam + slip_by_lam
+        face[:] = self._products(by_place).transpose(0, 3, 1, 4, 2).ravel()
+        by_pressure[:] = -f.kappa * self._products(by_lam).transpose(0, 1, 3, 2).ravel()
+        self._K_ul = self._products(c.normal).transpose(0, 1, 3, 2)
         diagonal[:] = 0.0
         self._tangent_set = c.active
         if self.complementarity:
@@ -109,27 +103,26 @@ class RigidProblem(ContactProblem):
             # this row holds the control instead of the foam's force on the backing plate
             elements[self.foam.closing_entries] = 0.0
             diagonal[0] = self.closing_stiffness
-        if self.friction is not None:
-            self._add_friction(x, c)
 
-    def _add_friction(self, x: FloatArray, c: Evaluated) -> None:
-        """Add to the entries what friction changes."""
+    def _products(self, values: FloatArray) -> FloatArray:
+        """Integrals ``(m, k, k, ...)`` of values ``(n, ...)`` at the points times two shape functions of the facet."""
         N, weight = self.pad.face_N, self.pad.face_area
         (m, points), k = weight.shape, N.shape[1]
+        # two matrices, of which one is the same for all facets
+        NN = np.einsum("qa,qb->abq", N, N).reshape(k * k, points)
+        weighted = weight[..., None] * values.reshape(m, points, -1)
+        return (NN @ weighted).reshape(m, k, k, *values.shape[1:])
+
+    def _slip(self, x: FloatArray, c: Evaluated) -> tuple[FloatArray, FloatArray]:
+        """Derivatives of friction's traction by the point's place and by its pressure.
+
+        It grows with the pressure, and no pressure with it, so the tangent is not symmetric.
+        """
         _, by_motion, by_normal, by_pressure = self.traction(0, x, c, derivatives=True)
         length = np.linalg.norm(c.normal, axis=-1)[..., None]
         n = c.normal / length
         turns = (np.eye(3) - n[..., :, None] * n[..., None, :]) @ c.surface / length[..., None]
-        by_place = by_motion + by_normal @ turns
-        # products of shape functions times what each point adds: two matrices, of which one is the same for all facets
-        NN = np.einsum("qa,qb->abq", N, N).reshape(k * k, points)
-        weight = weight.ravel()
-        K = (NN @ (weight[:, None, None] * by_place).reshape(m, points, 9)).reshape(m, k, k, 3, 3)
-        self._K_uu -= K.transpose(0, 3, 1, 4, 2)
-        # slip grows with the pressure, which makes the tangent unsymmetric
-        entries = self._parts()[2]
-        by_node = (NN @ (weight[:, None] * by_pressure).reshape(m, points, 3)).reshape(m, k, k, 3)
-        entries -= self.finger.kappa * by_node.transpose(0, 2, 3, 1).ravel()
+        return by_motion + by_normal @ turns, by_pressure
 
     def _condense(self) -> FloatArray:
         """Make the entries symmetric; returns what was the column of the closing displacement, 0 under force control.

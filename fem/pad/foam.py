@@ -157,50 +157,6 @@ def _bound_to(laws):
 elements, strain_measures = _bound_to(hashlib.sha256(Path(materials.__file__).read_bytes()).hexdigest())
 
 
-@njit(cache=True)
-def contact(N, w, lam, gap, normal, hessian, weighted_gap, force, K_uu, K_ul):
-    """Weighted gaps, nodal forces and tangent blocks of the contact face.
-
-    ``G_i = int N_i g dA`` and its derivative ``N_i N_a n``; the pressure ``p = sum N_i lam_i`` acts on node ``a`` with
-    ``-int N_a p n dA``, whose derivative is ``-int N_a N_b p Hess(g) dA``. Nodal collocation is the same with the
-    quadrature points on the nodes.
-
-    ``N (points, nodes)``, ``w (n, points)`` [m^2], ``lam (n, nodes)`` [Pa], ``gap (n, points)`` [m], ``normal``,
-    ``hessian`` [1/m] of the object at the deformed points; out: ``weighted_gap (n, nodes)`` [m^3], ``force (n, 3,
-    nodes)`` [N], ``K_uu (n, 3, nodes, 3, nodes)`` [N/m], ``K_ul (n, nodes, 3, nodes)`` [m^2]; with size 0 the latter
-    are not computed.
-    """
-    nodes = N.shape[1]
-    tangent = K_uu.size > 0
-    for f in range(w.shape[0]):
-        weighted_gap[f] = 0.0
-        force[f] = 0.0
-        if tangent:
-            K_uu[f] = 0.0
-            K_ul[f] = 0.0
-        for q in range(w.shape[1]):
-            p = 0.0
-            for a in range(nodes):
-                p += N[q, a] * lam[f, a]
-            dA = w[f, q]
-            for a in range(nodes):
-                weighted_gap[f, a] += dA * N[q, a] * gap[f, q]
-                for i in range(3):
-                    force[f, i, a] -= dA * N[q, a] * p * normal[f, q, i]
-            # skipped where nothing presses: most facets of a pad are open, and their Hessian may not exist
-            if not tangent:
-                continue
-            for a in range(nodes):
-                for i in range(3):
-                    for b in range(nodes):
-                        K_ul[f, a, i, b] += dA * N[q, a] * N[q, b] * normal[f, q, i]
-                    if p != 0.0:
-                        for k in range(3):
-                            h = dA * N[q, a] * p * hessian[f, q, i, k]
-                            for b in range(nodes):
-                                K_uu[f, i, a, k, b] -= h * N[q, b]
-
-
 class Foam:
     """Foam of a pad; vectors of unknowns are numbered as ``fem.pad.mesh.Pad`` says.
 

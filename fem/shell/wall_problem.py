@@ -113,36 +113,19 @@ class WallProblem(ContactProblem):
             columns += [back, np.array([f.closing_dof], np.int32)]
         return np.concatenate(rows), np.concatenate(columns)
 
-    def _faces(self, x: FloatArray, tangent: bool) -> list[Evaluated]:
+    def _met(self, k: int, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, Facing]:
+        f = self.fingers[k]
+        points = self._object_points(f, x)
+        facing = face(f.wall, points, self.places[k], *self.model.outer(x[: self.model.size]))
+        return points, facing.gap, facing.normal, facing
+
+    def evaluate(self, x: FloatArray) -> list[Evaluated]:
+        """See `ContactProblem`; the forces on the wall's nodes are noted [N]."""
+        contacts = super().evaluate(x)
         self._wall_force = np.zeros((len(self.model.first), 3))
-        v, w = self.model.outer(x[: self.model.size])
-        contacts = []
-        for f, places in zip(self.fingers, self.places, strict=True):
-            points, pad, lam = self._object_points(f, x), f.pad, f.pressure(x)[f.nodes]
-            facing = face(f.wall, points, places, v, w)
-            # points that face no wall are left out, so that a pad over a rim is carried up to the rim
-            area = np.where(facing.gap == FAR, 0.0, pad.face_area.ravel()).reshape(pad.face_area.shape)
-            load = (area * (lam @ pad.face_N.T))[..., None] * facing.normal.reshape(*area.shape, 3)
-            force = -np.einsum("qa,fqi->fia", pad.face_N, load @ f.R)
-            self._bear(facing, load.reshape(-1, 3))
-            weighted = f.nodal((area * facing.gap.reshape(area.shape)) @ pad.face_N)
-            # a node that hangs over the rim with most of its area would put all of its pressure on the rest
-            # part of a node's area that must face the wall for the node to carry load
-            gaps = np.where(f.nodal(area @ pad.face_N) > 0.3 * f.area, weighted, FAR * f.area)
-            contacts.append(Evaluated(points, facing.gap, facing.normal, lam, gaps, f.active(x, gaps), force, facing))
+        for c in contacts:
+            np.add.at(self._wall_force, c.surface.nodes, c.surface.N[..., None] * c.load[:, None, :])
         return contacts
-
-    def evaluate(self, x: FloatArray, tangent: bool = False) -> list[Evaluated]:
-        """See `ContactProblem`; the forces on the wall's nodes are noted."""
-        contacts = super().evaluate(x, tangent)
-        for f, c in zip(self.fingers, contacts, strict=True):
-            if c.traction is not None:
-                self._bear(c.surface, f.pad.face_area.reshape(-1, 1) * c.traction)
-        return contacts
-
-    def _bear(self, facing: Facing, load: FloatArray) -> None:
-        """Add the forces of points ``(n, 3)`` to those on the wall's nodes [N]."""
-        np.add.at(self._wall_force, facing.nodes, facing.N[..., None] * load[:, None, :])
 
     def residual(self, x: FloatArray) -> FloatArray:
         """See `ContactProblem`."""

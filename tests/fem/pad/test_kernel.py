@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from softjaw.fem.contact.rigid import RigidProblem
 from softjaw.fem.materials import material
 from softjaw.fem.pad import foam as kernel
 from softjaw.fem.pad.mesh import Pad
@@ -124,15 +125,11 @@ def test_blatz_ko_loses_ellipticity_at_a_stretch_ratio_of_two_plus_root_three(pa
 def test_contact_face_under_constant_pressure_and_gap(element, contact):
     """Every node gets ``A_i g`` and ``-A_i p n``."""
     pad = Pad(PadShape(SIZE, (2, 2, 1), (2.0, 1.0, 1.0), element), LAWS["blatz_ko"], contact=contact)
-    m, k = pad.face_nodes.shape
     n = np.array([0.0, 0.6, -0.8])
-    G_i, force, none = np.empty((m, k)), np.empty((m, 3, k)), np.empty((0, 0, 0, 0))
-    kernel.contact(
-        pad.face_N, pad.face_area, np.full((m, k), 5e3), np.full((m, k), 2e-3), np.tile(n, (m, k, 1)),
-        np.zeros((m, k, 3, 3)), G_i, force, np.empty((0, 0, 0, 0, 0)), none,
-    )  # fmt: skip
-    index = pad.pressure_index[pad.face_nodes].ravel()
-    assert np.bincount(index, G_i.ravel()) == pytest.approx(2e-3 * pad.node_area, rel=1e-13)
-    for i in range(3):
-        expected = -5e3 * n[i] * pad.node_area
-        assert np.bincount(index, force[:, i].ravel()) == pytest.approx(expected, rel=1e-13, abs=1e-20)
+    problem = RigidProblem(pad, lambda x: (np.full(len(x), 2e-3), np.tile(n, (len(x), 1)), np.zeros((len(x), 3, 3))))
+    x = np.zeros(problem.size)
+    x[problem.finger.pressures] = 5e3 / problem.finger.kappa
+    (c,) = problem.evaluate(x)
+    assert c.weighted == pytest.approx(2e-3 * pad.node_area, rel=1e-13)
+    force = problem.residual(x)[pad.dofs[pad.contact_nodes]]
+    np.testing.assert_allclose(force, -5e3 * np.outer(pad.node_area, n), rtol=1e-12, atol=1e-20)
