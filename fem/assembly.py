@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from softjaw.friction.patch import FloatArray
@@ -26,7 +25,7 @@ class Pattern:
 
     def slots(self, rows: IntArray, columns: IntArray) -> IntArray:
         """Index into ``values`` of every entry, -1 for negative rows or columns; all must be in the pattern."""
-        # fixed unknowns keep -1, so that element matrices are added whole and `add_up` skips those entries
+        # fixed unknowns keep -1, so that element matrices are added whole and `gather` skips those entries
         slots = np.full(len(rows), -1, dtype=np.int32)
         slots[(rows >= 0) & (columns >= 0)] = np.searchsorted(self.keys, self._keys(rows, columns))
         return slots
@@ -53,15 +52,6 @@ class Pattern:
         self.column = (keys % self.size).astype(np.int32)
         self.start = np.searchsorted(keys, np.arange(self.size + 1) * np.int64(self.size)).astype(np.int32)
         self.values = np.zeros(len(keys))
-
-
-@njit(cache=True)
-def add_up(slots, values, out):
-    """Add every value to its slot of the compressed rows."""
-    # entries that share a slot add up, which indexing with `slots` would not do
-    for k in range(slots.size):
-        if slots[k] >= 0:
-            out[slots[k]] += values[k]
 
 
 def pairs(rows: IntArray, columns: IntArray) -> tuple[IntArray, IntArray]:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from softjaw.fem.assembly import Pattern, add_up, gather, pairs
+from softjaw.fem.assembly import Pattern, gather, pairs
 from softjaw.fem.contact.problem import ContactProblem, Control, Evaluated, Finger, Gap
 from softjaw.fem.pad.mesh import Pad
 from softjaw.friction.patch import FloatArray
@@ -71,11 +71,10 @@ class RigidProblem(ContactProblem):
         self._evaluate_entries(x)
         if self.condensed:
             self._closing_column = self._condense()
-        self._add_up(self.pattern.values)
+        self.pattern.values[:] = self._added_up()
 
-    def _add_up(self, values: FloatArray) -> None:
-        values[:] = 0.0
-        add_up(self._slots, self._values, values)
+    def _added_up(self) -> FloatArray:
+        return gather(self._slots, self._values, self.pattern.values.size)
 
     def _evaluate_entries(self, x: FloatArray) -> None:
         """Entries of the tangent, not added up yet."""
@@ -192,9 +191,7 @@ class RigidProblem(ContactProblem):
         active = self._tangent_set
         self.control, self._tangent_set, self._by_force = before
         # not into the pattern's own values, which stay those of the last tangent
-        values = np.empty_like(self.pattern.values)
-        self._add_up(values)
-        return values, int(np.count_nonzero(active))
+        return self._added_up(), int(np.count_nonzero(active))
 
     def largest_strain(self, x: FloatArray) -> float:
         """Largest principal strain of the foam."""

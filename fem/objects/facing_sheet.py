@@ -18,11 +18,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from scipy.ndimage import distance_transform_edt, gaussian_filter
+from scipy.ndimage import distance_transform_edt, gaussian_filter, map_coordinates
 
 from softjaw.fem.objects.gap import Pose
 from softjaw.fem.objects.smooth_triangles import SmoothTriangles
-from softjaw.fem.objects.splines import evaluate_grid, grid_coefficients
+from softjaw.fem.objects.splines import PADDING, grid_coefficients
 from softjaw.fem.objects.triangle_tree import DEPTH, TriangleTree, first_hit
 from softjaw.friction.patch import FloatArray
 
@@ -90,20 +90,6 @@ def _seen(which, normals, sides, directions, spacing, rotation, origin, lower, u
 
 
 @njit(cache=True)
-def _behind(which, normals, lift, nodes):
-    """Triangle that the line from each triangle's middle against its normal meets first, and how far away."""
-    corners, order, low, high, start, count = nodes
-    stack = np.empty(DEPTH, np.int64)
-    hit, distance = np.full(len(which), -1), np.full(len(which), np.inf)
-    for m in range(len(which)):
-        p = corners[which[m]]
-        middle = (p[0] + p[1] + p[2]) / 3.0
-        distance[m], hit[m] = first_hit(middle, -normals[m], lift, which[m], False, corners, order, low, high,
-                                        start, count, stack)  # fmt: skip
-    return hit, distance
-
-
-@njit(cache=True)
 def _reached(x, directions, nodes):
     """Whether a line of sight reaches the points, ``(n,)``."""
     corners, order, low, high, start, count = nodes
@@ -147,8 +133,8 @@ class FacingSheet:
         part = (slice(None, None, COARSE),) * 3
         known = self.signed(x[part].reshape(-1, 3))[0].reshape(x[part].shape[:3])
         known = _with_shadows(known, COARSE * step, STAIRS / COARSE)
-        places = np.stack(np.meshgrid(*(np.arange(n) / COARSE for n in x.shape[:3]), indexing="ij"), axis=-1)
-        g = evaluate_grid(grid_coefficients(known), np.zeros(3), 1.0, places.reshape(-1, 3))[0].reshape(x.shape[:3])
+        places = np.stack(np.meshgrid(*(PADDING + np.arange(n) / COARSE for n in x.shape[:3]), indexing="ij"))
+        g = map_coordinates(grid_coefficients(known), places, prefilter=False)
         # contact is decided near the sheet, so no sample is interpolated there
         near = np.abs(g) < 3 * step  # steps from the sheet within which every sample is taken
         g[near] = self.signed(x[near])[0]
@@ -199,7 +185,7 @@ def facing_sheet(
     straight = np.zeros(len(normals), dtype=bool)
     straight[near[np.abs(how) == 2]] = True
     slanted = near[np.abs(how) == 1]
-    hit, far = _behind(slanted, side[slanted, None] * normals[slanted], lift, whole.nodes)
+    far, hit = whole.behind(slanted, side[slanted, None] * normals[slanted], lift)
     # without a hit the index is -1, which does no harm: the distance is infinite then
     # share of the box's depth: a wall thinner than this has one side only
     slanted = slanted[~(straight[hit] & (far < (1 / 3) * depth))]

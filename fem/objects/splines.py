@@ -17,6 +17,7 @@ from numba import njit
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import spline_filter
 
+from softjaw.fem.objects.gap import Gap
 from softjaw.friction.patch import FloatArray
 
 
@@ -97,63 +98,33 @@ def grid_coefficients(samples: FloatArray) -> FloatArray:
     return np.ascontiguousarray(spline_filter(extended, order=3, output=np.float64, mode="mirror"))
 
 
-@njit(cache=True)
-def _weights(t, w):
-    """Cubic B-spline weights ``w (3, 4)`` at ``t`` in [0, 1]: values, first and second derivatives."""
+def _weights(t: FloatArray) -> FloatArray:
+    """Cubic B-spline weights ``(n, 3, 3, 4)`` at ``t (n, 3)`` in [0, 1]: values, first and second derivatives."""
     u = 1.0 - t
-    w[0, 0], w[0, 1] = u * u * u / 6.0, (4.0 - 6.0 * t * t + 3.0 * t * t * t) / 6.0
-    w[0, 2], w[0, 3] = (4.0 - 6.0 * u * u + 3.0 * u * u * u) / 6.0, t * t * t / 6.0
-    w[1, 0], w[1, 1] = -u * u / 2.0, t * (3.0 * t - 4.0) / 2.0
-    w[1, 2], w[1, 3] = -u * (3.0 * u - 4.0) / 2.0, t * t / 2.0
-    w[2, 0], w[2, 1], w[2, 2], w[2, 3] = u, 3.0 * t - 2.0, 3.0 * u - 2.0, t
+    rows = [
+        [u**3 / 6, (4 - 6 * t**2 + 3 * t**3) / 6, (4 - 6 * u**2 + 3 * u**3) / 6, t**3 / 6],
+        [-(u**2) / 2, t * (3 * t - 4) / 2, -u * (3 * u - 4) / 2, t**2 / 2],
+        [u, 3 * t - 2, 3 * u - 2, t],
+    ]
+    return np.moveaxis(np.array(rows), (2, 3), (0, 1))
 
 
-@njit(cache=True)
-def evaluate_grid(c, lower, step, x):
+ORDERS = np.eye(3, dtype=int)[:, None] + np.eye(3, dtype=int)  # of the derivatives along each axis in a Hessian
+
+
+def evaluate_grid(c: FloatArray, lower: FloatArray, step: float, x: FloatArray) -> Gap:
     """Value ``(n,)``, gradient ``(n, 3)`` and Hessian ``(n, 3, 3)`` of the spline at ``x (n, 3)``.
 
     ``c`` are padded coefficients, ``lower (3,)`` is the place of the first sample. The points must lie on the grid.
     """
-    n = len(x)
-    g, gradient, hessian = np.empty(n), np.empty((n, 3)), np.empty((n, 3, 3))
-    w = np.empty((3, 3, 4))
-    base = np.empty(3, np.int64)
-    for i in range(n):
-        for d in range(3):
-            s = (x[i, d] - lower[d]) / step
-            # a point on the last sample, or off the grid by rounding, belongs to the nearest cell
-            k = min(max(int(np.floor(s)), 0), c.shape[d] - 2 * PADDING - 2)
-            base[d] = k + PADDING - 1
-            _weights(s - k, w[d])
-        # one axis at a time takes far fewer products than 64 weights for each of the ten values
-        v = v_x = v_y = v_z = v_xx = v_yy = v_zz = v_xy = v_xz = v_yz = 0.0
-        for a in range(4):
-            p = p_y = p_z = p_yy = p_zz = p_yz = 0.0
-            for b in range(4):
-                q = q_z = q_zz = 0.0
-                for e in range(4):
-                    f = c[base[0] + a, base[1] + b, base[2] + e]
-                    q += w[2, 0, e] * f
-                    q_z += w[2, 1, e] * f
-                    q_zz += w[2, 2, e] * f
-                p += w[1, 0, b] * q
-                p_y += w[1, 1, b] * q
-                p_yy += w[1, 2, b] * q
-                p_z += w[1, 0, b] * q_z
-                p_yz += w[1, 1, b] * q_z
-                p_zz += w[1, 0, b] * q_zz
-            v += w[0, 0, a] * p
-            v_x += w[0, 1, a] * p
-            v_xx += w[0, 2, a] * p
-            v_y += w[0, 0, a] * p_y
-            v_xy += w[0, 1, a] * p_y
-            v_z += w[0, 0, a] * p_z
-            v_xz += w[0, 1, a] * p_z
-            v_yy += w[0, 0, a] * p_yy
-            v_yz += w[0, 0, a] * p_yz
-            v_zz += w[0, 0, a] * p_zz
-        g[i] = v
-        gradient[i] = v_x / step, v_y / step, v_z / step
-        hessian[i, 0], hessian[i, 1], hessian[i, 2] = (v_xx, v_xy, v_xz), (v_xy, v_yy, v_yz), (v_xz, v_yz, v_zz)
-        hessian[i] /= step * step
-    return g, gradient, hessian
+    n, s = len(x), (x - lower) / step
+    # a point on the last sample, or off the grid by rounding, belongs to the nearest cell
+    k = np.clip(np.floor(s).astype(int), 0, np.array(c.shape) - 2 * PADDING - 2)
+    near = k[:, :, None] + PADDING - 1 + np.arange(4)
+    cells = c[near[:, 0, :, None, None], near[:, 1, None, :, None], near[:, 2, None, None, :]]
+    w = _weights(s - k)
+    # one axis at a time takes far fewer products than 64 weights for each of the ten values
+    z = (cells.reshape(n, 16, 4) @ w[:, 2].swapaxes(1, 2)).reshape(n, 4, 4, 3)
+    D = (w[:, 0] @ (w[:, None, 1] @ z).reshape(n, 4, 9)).reshape(n, 3, 3, 3)
+    gradient, hessian = (D[:, *np.moveaxis(order, -1, 0)] for order in (np.eye(3, dtype=int), ORDERS))
+    return D[:, 0, 0, 0], gradient / step, hessian / step**2

@@ -203,13 +203,14 @@ def first_hit(o, d, least, skipped, anyone, corners, order, low, high, start, co
 
 
 @njit(cache=True)
-def _along(x, d, nodes):
-    """Distances ``(n,)`` from points to the first triangle in one direction; infinite where there is none."""
+def _along(x, d, least, skipped, nodes):
+    """`first_hit` from points ``(n, 3)`` in directions ``(n, 3)``, each without a triangle ``skipped (n,)``."""
     corners, order, low, high, start, count = nodes
-    stack, distance = np.empty(DEPTH, np.int64), np.empty(len(x))
+    stack, distance, hit = np.empty(DEPTH, np.int64), np.empty(len(x)), np.empty(len(x), np.int64)
     for i in range(len(x)):
-        distance[i] = first_hit(x[i], d, 0.0, -1, False, corners, order, low, high, start, count, stack)[0]
-    return distance
+        distance[i], hit[i] = first_hit(x[i], d[i], least, skipped[i], False, corners, order, low, high, start, count,
+                                        stack)  # fmt: skip
+    return distance, hit
 
 
 def corner_angles(corners: FloatArray) -> FloatArray:
@@ -276,7 +277,17 @@ class TriangleTree:
 
     def along(self, x: FloatArray, direction: FloatArray) -> FloatArray:
         """Distances ``(n,)`` [m] from points ``(n, 3)`` to the first triangle in a direction; infinite without one."""
-        return np.asarray(_along(np.ascontiguousarray(x), np.ascontiguousarray(direction), self.nodes))
+        each = np.ascontiguousarray(np.broadcast_to(direction, x.shape))
+        return np.asarray(_along(np.ascontiguousarray(x), each, 0.0, np.full(len(x), -1), self.nodes)[0])
+
+    def behind(self, which: IntArray, normals: FloatArray, lift: float) -> tuple[FloatArray, IntArray]:
+        """How far behind the middles of triangles ``which (k,)``, against normals, the next one lies, and which it is.
+
+        Infinite and -1 where there is none; nearer than ``lift`` [m] does not count.
+        """
+        middle = self.points[self.triangles[which]].sum(axis=1) / 3.0
+        distance, hit = _along(middle, -normals, lift, which, self.nodes)
+        return distance, hit
 
     def signed(self, x: FloatArray) -> tuple[FloatArray, FloatArray, np.ndarray]:
         """Signed distance ``(n,)`` [m], its unit gradient ``(n, 3)``, and whether the border is closest ``(n,)``."""

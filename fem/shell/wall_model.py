@@ -17,7 +17,7 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 from scipy.sparse import csr_matrix
 
-from softjaw.fem.assembly import IntArray, Pattern, add_up
+from softjaw.fem.assembly import IntArray, Pattern, gather
 from softjaw.fem.petsc import Factors
 from softjaw.fem.shell import element_kernel as kernel
 from softjaw.fem.shell.element import Shell
@@ -133,7 +133,7 @@ class LinearWall(NonlinearWall):
 def _matrix(size: int, entries: tuple[IntArray, IntArray], values: FloatArray) -> Pattern:
     """Compressed rows with the values of these entries."""
     pattern = Pattern(size, *entries)
-    add_up(pattern.slots(*entries), values, pattern.values)
+    pattern.values = gather(pattern.slots(*entries), values, pattern.values.size)
     return pattern
 
 

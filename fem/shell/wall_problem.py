@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softjaw.fem.assembly import IntArray, Pattern, add_up, pairs
+from softjaw.fem.assembly import IntArray, Pattern, gather, pairs
 from softjaw.fem.contact.friction import Anchor
 from softjaw.fem.contact.problem import ContactProblem, Control, Evaluated, Finger, Gap
 from softjaw.fem.objects.gap import Pose
@@ -164,13 +164,12 @@ class WallProblem(ContactProblem):
     def _fill(self, wall: FloatArray, contacts: list[Evaluated]) -> None:
         """Entries of wall, foam, idle pressures and control."""
         values = self.pattern.values
-        values[:] = 0.0
-        add_up(self._wall_slots, wall, values)
+        values[:] = gather(self._wall_slots, wall, values.size)
         if self.damping is not None:
             tied = np.flatnonzero(self.damping[0])
             values[self.pattern.slots(tied, tied)] += self.damping[0][tied]
         for f, slots, foam, c in zip(self.fingers, self._foam_slots, self._values, contacts, strict=True):
-            add_up(slots, foam, values)
+            values += gather(slots, foam, values.size)
             idle = np.flatnonzero(~c.active)
             index = f.closing_dof + 1 + idle
             values[self.pattern.slots(index, index)] += f.kappa * f.area[idle]
@@ -183,7 +182,8 @@ class WallProblem(ContactProblem):
         back = self._foam_slots[0][first.foam.closing_entries]
         if last is not first:
             values[self.pattern.start[last.closing_dof] : self.pattern.start[last.closing_dof + 1]] /= last.pad.share
-            add_up(self._balance_slots, -self._values[0][first.foam.closing_entries] / first.pad.share, values)
+            balance = -self._values[0][first.foam.closing_entries] / first.pad.share
+            values += gather(self._balance_slots, balance, values.size)
         values[back[back >= 0]] = 0.0
         closings = np.array([f.closing_dof for f in self.fingers])
         mean = self.pattern.slots(np.full_like(closings, first.closing_dof), closings)
