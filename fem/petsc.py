@@ -29,6 +29,7 @@ from typing import Any, Protocol, TypeVar, cast
 
 import numpy as np
 import scipy.linalg
+from scipy.sparse import csr_matrix
 
 from softjaw.fem.assembly import Pattern
 from softjaw.fem.errors import ConvergenceError, SpentError
@@ -334,20 +335,10 @@ class NonlinearSolver:
 
         An eigenvalue within rounding of zero may count as either; all of them count where MUMPS gives up.
         """
-        matrix = PETSc.Mat().createAIJ(
-            self._matrix.size, csr=(self._pattern.start, self._pattern.column, values), comm=PETSc.COMM_SELF
-        )
-        # MUMPS counts negative pivots only in a symmetric factorisation; by Sylvester's law they are the eigenvalues'
-        matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-        factors = PETSc.PC().create(PETSc.COMM_SELF)
-        factors.setType("cholesky")
-        factors.setFactorSolverType("mumps")
-        factors.setOperators(matrix)
-        factors.setUp()
-        factor = factors.getFactorMatrix()
-        negative = factor.getMumpsInfog(12) if factor.getMumpsInfog(1) == 0 else self.problem.size
+        factors = Factors(csr_matrix((values, self._pattern.column, self._pattern.start)), symmetric=True)
+        infog = factors.factor.getMumpsInfog
+        negative = infog(12) if infog(1) == 0 else self.problem.size
         factors.destroy()
-        matrix.destroy()
         return negative
 
     def answer(self, right: FloatArray) -> FloatArray:
@@ -445,52 +436,44 @@ def _set_values(matrix: PETSc.Mat, values: FloatArray) -> None:
 
 
 class Factors:
-    """LU factors of one matrix, for many right-hand sides.
+    """Factors of one matrix by MUMPS, LU or of a ``symmetric`` one L D L^T, for many right-hand sides."""
 
-    Parameters
-    ----------
-    pattern : Pattern
-        With the matrix's values in ``pattern.values``.
-
-    Raises
-    ------
-    ConvergenceError
-        When the matrix is singular.
-    """
-
-    COLUMNS = 256  # solved at once; bounds the memory
-
-    def __init__(self, pattern: Pattern) -> None:
-        n = len(pattern.start) - 1
+    def __init__(self, matrix: csr_matrix, symmetric: bool = False) -> None:
         self._matrix = PETSc.Mat().createAIJ(
-            (n, n), csr=(pattern.start, pattern.column, pattern.values), comm=PETSc.COMM_SELF
+            matrix.shape, csr=(matrix.indptr, matrix.indices, matrix.data), comm=PETSc.COMM_SELF
         )
+        # MUMPS counts negative pivots only in a symmetric factorisation; by Sylvester's law they are the eigenvalues'
+        self._matrix.setOption(PETSc.Mat.Option.SYMMETRIC, symmetric)
         self._pc = PETSc.PC().create(PETSc.COMM_SELF)
-        self._pc.setType("lu")
+        self._pc.setType("cholesky" if symmetric else "lu")
         self._pc.setFactorSolverType("mumps")
         self._pc.setOperators(self._matrix)
         self._pc.setUp()
-        self._factor = self._pc.getFactorMatrix()
-        try:
-            self.solve(np.zeros(n))
-        except PETSc.Error as error:  # the factorisation itself fails silently
-            raise ConvergenceError(f"a linear system of {n} unknowns is singular; is everything supported?") from error
+        self.factor = self._pc.getFactorMatrix()
 
     def solve(self, B: FloatArray) -> FloatArray:
-        """Solutions ``X`` of ``A X = B`` for a vector ``(n,)`` or the columns of ``(n, m)``."""
-        columns = B.reshape(len(B), -1)
-        X = np.empty(columns.shape, order="F")
-        for k in range(0, columns.shape[1], self.COLUMNS):
-            part = np.asfortranarray(columns[:, k : k + self.COLUMNS])
-            # dense PETSc matrices take over the memory they are given, so each gets an array of its own
-            right, left = (
-                PETSc.Mat().createDense(part.shape, array=a, comm=PETSc.COMM_SELF)
-                for a in (part.copy(order="F"), np.zeros_like(part, order="F"))
-            )
-            self._factor.matSolve(right, left)
-            X[:, k : k + self.COLUMNS] = left.getDenseArray()
-            right.destroy()
-            left.destroy()
+        """Solutions ``X`` of ``A X = B`` for a vector ``(n,)`` or the columns of ``(n, m)``, few enough for the memory.
+
+        Raises
+        ------
+        ConvergenceError
+            When the matrix is singular.
+        """
+        columns = np.asfortranarray(B.reshape(len(B), -1))
+        # dense PETSc matrices take over the memory they are given, so each gets an array of its own
+        right, left = (
+            PETSc.Mat().createDense(columns.shape, array=a, comm=PETSc.COMM_SELF)
+            for a in (columns.copy(order="F"), np.zeros_like(columns, order="F"))
+        )
+        try:
+            self.factor.matSolve(right, left)
+        except PETSc.Error as error:  # the factorisation itself fails silently
+            raise ConvergenceError(
+                f"a linear system of {len(B)} unknowns is singular; is everything supported?"
+            ) from error
+        X = left.getDenseArray().copy()
+        right.destroy()
+        left.destroy()
         return X.reshape(B.shape)
 
     def destroy(self) -> None:

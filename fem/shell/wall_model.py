@@ -17,7 +17,7 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 from scipy.sparse import csr_matrix
 
-from softjaw.fem.assembly import IntArray, Pattern, gather
+from softjaw.fem.assembly import IntArray
 from softjaw.fem.petsc import Factors
 from softjaw.fem.shell import element_kernel as kernel
 from softjaw.fem.shell.element import Shell
@@ -41,8 +41,8 @@ class LinearShell:
     def __init__(self, shell: Shell, fixed: FloatArray) -> None:
         self.shell = shell
         unknown, self.free = free_numbers(fixed)
-        pattern = _matrix(len(self.free), shell.entries(unknown), shell.tangent(np.zeros(shell.size)))
-        self._factors = Factors(pattern)
+        matrix = _matrix(len(self.free), shell.entries(unknown), shell.tangent(np.zeros(shell.size)))
+        self._factors = Factors(matrix)
 
     def solve(self, load: FloatArray) -> FloatArray:
         """State ``q`` [m] under the load [N], both ``(6 k,)`` or several as the columns of ``(6 k, m)``."""
@@ -118,8 +118,7 @@ class LinearWall(NonlinearWall):
     def __init__(self, shell: Shell[BodyMesh], fixed: FloatArray) -> None:
         super().__init__(shell, fixed)
         self._values = shell.tangent(np.zeros(shell.size))
-        pattern = _matrix(self.size, self.entries, self._values)
-        self.stiffness = csr_matrix((pattern.values, pattern.column, pattern.start), shape=(self.size, self.size))
+        self.stiffness = _matrix(self.size, self.entries, self._values)
 
     def residual(self, y: FloatArray, force: FloatArray) -> FloatArray:
         """See `NonlinearWall`."""
@@ -130,11 +129,11 @@ class LinearWall(NonlinearWall):
         return self._values
 
 
-def _matrix(size: int, entries: tuple[IntArray, IntArray], values: FloatArray) -> Pattern:
-    """Compressed rows with the values of these entries."""
-    pattern = Pattern(size, *entries)
-    pattern.values = gather(pattern.slots(*entries), values, pattern.values.size)
-    return pattern
+def _matrix(size: int, entries: tuple[IntArray, IntArray], values: FloatArray) -> csr_matrix:
+    """Compressed rows with the values of these entries; those in negative rows or columns are left out."""
+    rows, columns = entries
+    free = (rows >= 0) & (columns >= 0)
+    return csr_matrix((values[free], (rows[free], columns[free])), shape=(size, size))
 
 
 @dataclass(frozen=True)
