@@ -104,7 +104,7 @@ def test_the_error_is_stated_and_kept(seed):
     np.testing.assert_allclose(usual[:2], fine[:2], rtol=1e-5)
 
 
-def test_laws_of_scale_and_motion():
+def test_laws_of_scale_and_motion_and_bodies_known_by_their_support_are_within_the_stated_error():
     rng = np.random.default_rng(7)
     one, two = anywhere(rng, *map(Ellipsoid.of_axes, rng.uniform(0.1, 1, (2, 3))))
     exact = pose_volume(one, two, 1.0, 1.0, relative_error=1e-8)
@@ -116,9 +116,6 @@ def test_laws_of_scale_and_motion():
     for found in same:
         np.testing.assert_allclose(found[:2], exact[:2], rtol=1e-7)
     np.testing.assert_allclose(pose_volume(one, two, 2.0, 2.0)[:2], np.array(exact[:2]) / 8, rtol=1e-5)
-
-
-def test_bodies_known_by_their_support_have_the_volume_within_the_stated_error():
     hidden = [Smooth(Ellipsoid.of_axes(a)) for a in (A, B)]
     for pose in POSES[1:4]:
         exact = pose_volume(*tilted(*pose), 1.0, 0.7, relative_error=1e-9)
@@ -172,7 +169,7 @@ def test_contacts_that_do_not_carry_every_load(axes1, flat):
         np.testing.assert_allclose(by_support[:2], limit[:2], rtol=by_support.relative_error + 1e-5)
 
 
-def test_no_volume_in_fewer_than_six_dimensions():
+def test_no_volume_in_fewer_than_six_dimensions_and_mixed_areas_of_polygons():
     points = [Ellipsoid.of_axes([1, 1, 0])] * 2
     cases = [
         tilted(0, 0, bodies=points), tilted(20, -30, (0, 0.1, 0.2), bodies=points),  # no torque about their line
@@ -182,10 +179,7 @@ def test_no_volume_in_fewer_than_six_dimensions():
     ]  # fmt: skip
     for contacts in cases:
         assert pose_volume(*contacts, 1.0, 1.0) == (0, 0, 0)
-
-
-def test_mixed_areas_of_polygons_and_areas_of_hulls_with_the_origin():
-    """V(P, P) is the area, and |P + Q| = |P| + 2 V + |Q|."""
+    # V(P, P) is the area, and |P + Q| = |P| + 2 V + |Q|.
     P, Q = np.random.default_rng(2).normal(size=(2, 9, 2))
     sums = (P[:, None] + Q).reshape(-1, 2)
 

@@ -90,7 +90,7 @@ def test_the_variables_of_a_surrounding_mpirun_are_left_out_and_threads_are_pinn
     assert os.environ["OPENBLAS_NUM_THREADS"] == "4"
 
 
-def test_the_doctor_loads_no_mpi_itself_and_the_folder_goes_with_the_process_without_numba():
+def test_the_doctor_loads_no_mpi_itself_and_every_package_with_compiled_loops_is_looked_at():
     foreign = {"mpi4py", "petsc4py", "h5py", "pyvista", "numpy"}
     assert ask(f"import sys, softjaw.study.doctor; print({foreign} & set(sys.modules))").stdout.strip() == "set()"
     code = (
@@ -102,9 +102,6 @@ def test_the_doctor_loads_no_mpi_itself_and_the_folder_goes_with_the_process_wit
     assert Path(folder).name.startswith(doctor.PASSING)
     assert not Path(folder).exists()
     assert loaded == "False"
-
-
-def test_every_package_with_compiled_loops_is_looked_at():
     home = doctor.ROOT / "softjaw"
     users = {p.parent.relative_to(home).as_posix() for name in ("fem", "friction", "lsfit", "scoring", "study")
              for p in (home / name).rglob("*.py") if "njit(cache" in p.read_text()}  # fmt: skip

@@ -71,7 +71,7 @@ def colours(picture):
     return len(np.unique(rgb[np.ptp(rgb, axis=1) > 2], axis=0))
 
 
-def test_nexus_checks_find_no_error(result, python, tmp_path):
+def test_nexus_checks_find_no_error_silx_opens_at_a_drawn_map_and_xarray_has_coordinates(result, python, tmp_path):
     """nexusformat takes every virtual dataset for a stack of whole ones, so views become plain datasets for it."""
     plain = shutil.copy(result, tmp_path)
     with h5py.File(plain, "r+") as file:
@@ -83,9 +83,6 @@ def test_nexus_checks_find_no_error(result, python, tmp_path):
     told = re.sub(r"\x1b\[[0-9;]*m", "", answer([python.with_name("nxcheck"), plain]))
     assert "Total number of errors: 0" in told
     assert "NXentry: /study" in told
-
-
-def test_silx_opens_at_a_drawn_map_every_group_is_a_plot_and_xarray_has_coordinates(result, python, tmp_path):
     told = json.loads(answer([python, BROWSE / "silx_picture.py", result, tmp_path / "silx.png"]).splitlines()[-1])
     assert told["issues"] == {}
     assert told["plots"] > 20

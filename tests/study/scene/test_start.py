@@ -54,7 +54,7 @@ def test_what_is_written_runs(kind, tmp_path):
     assert (tmp_path / "results" / "mine.hdf").exists()
 
 
-def test_lines_behind_a_number_sign_make_the_bottle_thin_walled_and_a_mesh_gets_a_sampler(tmp_path):
+def test_lines_behind_a_number_sign_count_a_mesh_gets_a_sampler_and_a_banana_is_held_along_its_axis(tmp_path, capsys):
     assert started("bottle") == 0
     path = tmp_path / "bottle.toml"
     lines = [line[2:] if line.startswith("# ") and " = " in line else line for line in path.read_text().splitlines()]
@@ -73,9 +73,6 @@ def test_lines_behind_a_number_sign_make_the_bottle_thin_walled_and_a_mesh_gets_
     lying = load_scene(tmp_path / "lying.toml")
     assert (lying.object.axis, lying.gripper.pad_length_mm) == ("y", 50)
     assert "stations_mm" not in (tmp_path / "lying.toml").read_text()
-
-
-def test_a_banana_is_grasped_along_its_longest_axis_where_its_line_bends_less_than_the_pad(tmp_path, capsys):
     assert main(["init", "mesh", "--mesh", str(SCANS / "ycb_011_banana.stl"), "--unit", "m", "-o", "b"]) == 0
     text = (tmp_path / "b.toml").read_text().replace("\nsampled", "\n# sampled")  # with its stations instead
     (tmp_path / "b.toml").write_text(text.replace("\n# stations_mm", "\nstations_mm").replace("\n# angles", "\nangles"))
