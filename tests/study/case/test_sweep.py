@@ -55,15 +55,15 @@ def test_roll_turns_the_gripper_about_an_approach_and_an_explicit_pose_is_the_st
     assert (place.station, place.angle, place.label) == (0.0, 0.0, "p00")
 
 
-def mesh_scene(mesh, tmp_path, stations):
-    mesh.export(tmp_path / "body.stl")
+def mesh_scene(mesh, file, stations):
+    mesh.export(file)
     pad = ("gripper.pad_length_mm=40", "gripper.pad_width_mm=20")
-    return scene_of(mesh_of(tmp_path / "body.stl", "m"), *pad, stations=stations, angles="[0, 90]", forces="[5]")
+    return scene_of(mesh_of(file, "m"), *pad, stations=stations, angles="[0, 90]", forces="[5]")
 
 
 def test_stations_of_a_bent_mesh_follow_its_centre_line_and_those_of_a_straight_one_stay_on_the_axis(tmp_path):
     """A tube along an arc of 150 mm: pads are aimed at the arc, across it, with their long side along it."""
-    scene = mesh_scene(trimesh.Trimesh(*bent(), process=False), tmp_path, [50, 90])
+    scene = mesh_scene(trimesh.Trimesh(*bent(), process=False), tmp_path / "bent.stl", [50, 90])
     high = build_object(scene.object).bounds[1]
     for place in candidates.candidates(scene):
         t = np.arcsin((place.station - 0.5 * high[2]) / 0.15)
@@ -79,7 +79,7 @@ def test_stations_of_a_bent_mesh_follow_its_centre_line_and_those_of_a_straight_
         assert not place.note
     body = trimesh.creation.cylinder(0.03, 0.2, sections=48)
     body.vertices += 1e-5 * np.random.default_rng(0).normal(size=body.vertices.shape)
-    for place in candidates.candidates(mesh_scene(body, tmp_path, [60, 100])):
+    for place in candidates.candidates(mesh_scene(body, tmp_path / "straight.stl", [60, 100])):
         for pose, same in zip(place.poses, poses.axis_poses(place.station, place.angle, 0.0), strict=True):
             assert pose.rotation == pytest.approx(same.rotation, abs=1e-14)
             assert pose.origin == pytest.approx(same.origin, abs=1e-15)
