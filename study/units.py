@@ -130,4 +130,5 @@ def shown_text(value: float, si_unit: str, digits: int = 4) -> str:
     >>> shown_text(0.0125, "m"), shown_text(5.0, "N"), shown_text(0.5, "")
     ('12.5 mm', '5 N', '0.5')
     """
-    return f"{number(shown(value, si_unit), digits)} {shown_unit(si_unit)}".rstrip()
+    text = number(shown(value, si_unit), digits) if math.isfinite(value) else str(float(value))
+    return f"{text} {shown_unit(si_unit)}".rstrip()

@@ -19,12 +19,21 @@ from softjaw.study.result.layout import DONE
 from softjaw.study.result.read import axes_of, dataset, values_of
 from softjaw.study.show.grasps import Index, at, candidate_of, forces, index_of, judge, note, order, place
 from softjaw.study.show.places import folded_text, named, short_name, side_text, spot
-from softjaw.study.show.status import RESUME, aim, counts, largest_error, no_grasps, reasons, time_split, unfinished
+from softjaw.study.show.status import (
+    MOST_PLACES,
+    RESUME,
+    aim,
+    counts,
+    largest_error,
+    no_grasps,
+    reasons,
+    time_split,
+    unfinished,
+)
 from softjaw.study.table import Column, Row, Table, as_text, noted, number, terminal_width, with_error, wrapped
 from softjaw.study.units import GRAVITY, in_si, shown, shown_text, shown_unit
 
 NOTES_WIDTH, OTHERS_WIDTH, LABEL_WIDTH = 13, 16, 20  # characters
-MOST_NAMED = 4  # grasps that a note names
 MU_ERROR = 0.1  # of mu, by which it is off where nothing is known of it
 LEVER, LEVER_SHARE = 1e-3, 0.1  # [m] and loss of payload, below which the lever of the weight is not worth a word
 BRIEF = ("payload", "opening", "quality", "e_n")  # maps of a table in a terminal
@@ -66,8 +75,8 @@ def best(
     what = "places" if lines else "candidates"
     title = f"best {len(listed)} {what} of {len(found)} solved candidates by {score} at {forces(ds)[k]:g} N"
     notes = _notes(ds, [certainty(ds, [place.best for place in places], score, k), *error], marks)
-    facts = {"answer": {key: spoken_line(*value) for key, value in answer(ds, found[0]).items()},
-             "pads": pads(ds, found[0]), "force": float(forces(ds)[k]), "ranked_by": score,
+    told = {key: ", ".join(filter(None, texts)) for key, texts in answer(ds, found[0]).items()}
+    facts = {"answer": told, "pads": pads(ds, found[0]), "force": float(forces(ds)[k]), "ranked_by": score,
              "largest_error": "; ".join(error)}  # fmt: skip
     return Table(title, columns if lines else table.columns, rows if lines else table.rows, notes, facts, "grasps")
 
@@ -195,8 +204,8 @@ def _notes(ds: xr.Dataset, accuracy: Sequence[str], marks: np.ndarray) -> list[s
              "left out": no_grasps(ds.status.values[..., ds.attrs["level"]])}  # fmt: skip
     if gone:
         hand = Path(task_keys(ds, "gripper")["preset"]).stem
-        more = f" and {len(gone) - MOST_NAMED} more" * (len(gone) > MOST_NAMED)
-        last = f"out of the reach of {hand}, so last: {', '.join(gone[:MOST_NAMED])}{more}"
+        more = f" and {len(gone) - MOST_PLACES} more" * (len(gone) > MOST_PLACES)
+        last = f"out of the reach of {hand}, so last: {', '.join(gone[:MOST_PLACES])}{more}"
         parts["left out"] = [last, *parts["left out"]]
     return [noted(head, clauses) for head, clauses in parts.items() if clauses]
 
@@ -227,11 +236,6 @@ def answer(ds: xr.Dataset, index: Index) -> dict[str, tuple[str, str]]:
         lines["opening"] = (shown_text(opening, "m", 3), f"at first touch{hand}")
     lines |= {"force": _force(ds, index), "holds": _held(ds, index), "limit": ("", _limit(ds, index, there.lever))}
     return {key: value for key, value in lines.items() if any(value)}
-
-
-def spoken_line(main: str, more: str) -> str:
-    """A line of an answer."""
-    return ", ".join(text for text in (main, more) if text)
 
 
 def value_text(ds: xr.Dataset, name: str, index: Index, digits: int = 4, unit: bool = False) -> str:
