@@ -16,7 +16,7 @@ from numba import njit
 
 from softjaw.fem import materials
 from softjaw.fem.assembly import gather, pairs
-from softjaw.fem.materials import inverted, principal, stress
+from softjaw.fem.materials import inverted, stress
 from softjaw.fem.pad.mesh import Pad
 from softjaw.friction.patch import FloatArray
 
@@ -118,43 +118,17 @@ def _bound_to(laws):
         return _elements(law, par, u, dN, w, 27, r, K)
 
     @njit(cache=True)
-    def strain_measures(law, par, shear_modulus, u, dN, directions):
-        """Largest ``|principal stretch - 1|`` of all points, and smallest eigenvalue of the acoustic tensor.
+    def tangents(law, par, F):
+        """Tangents of the law ``(n, 3, 3, 3, 3)`` [Pa] at the deformation gradients ``F (n, 3, 3)``."""
+        B, P, A = np.empty((3, 3)), np.empty((3, 3)), np.empty((len(F) if len(laws) > 0 else 0, 3, 3, 3, 3))
+        for n in range(len(A)):
+            stress(law, F[n], B, inverted(F[n], B), par, P, A[n])
+        return A
 
-        The acoustic tensor ``Q[i, k] = A[i, J, k, L] m_J m_L`` is formed at the first point of every element for the
-        given unit ``directions (k, 3)`` and divided by the shear modulus: positive means strongly elliptic (no
-        localisation).
-        """
-        F, B, P, A = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3, 3, 3))
-        C, Q = np.empty((3, 3)), np.empty((3, 3))
-        strain, ellipticity = 0.0, np.inf if len(laws) > 0 else np.nan
-        for e in range(dN.shape[0]):
-            for q in range(dN.shape[1]):
-                J = _gradient(u[e], dN[e, q], dN.shape[3], F, B)
-                for i in range(3):
-                    for k in range(3):
-                        C[i, k] = F[0, i] * F[0, k] + F[1, i] * F[1, k] + F[2, i] * F[2, k]
-                for square in principal(C)[0]:
-                    # rounding can leave the smallest eigenvalue of a crushed element below zero
-                    strain = max(strain, abs(np.sqrt(max(square, 0.0)) - 1.0))
-                # one point per element: loss of ellipticity is a warning, and the tensor in 24 directions is dear
-                if q > 0:
-                    continue
-                stress(law, F, B, J, par, P, A)
-                for m in directions:
-                    for i in range(3):
-                        for k in range(3):
-                            value = 0.0
-                            for j in range(3):
-                                value += m[j] * (A[i, j, k, 0] * m[0] + A[i, j, k, 1] * m[1] + A[i, j, k, 2] * m[2])
-                            Q[i, k] = value
-                    ellipticity = min(ellipticity, principal(Q)[0].min())
-        return strain, ellipticity / shear_modulus
-
-    return elements, strain_measures
+    return elements, tangents
 
 
-elements, strain_measures = _bound_to(hashlib.sha256(Path(materials.__file__).read_bytes()).hexdigest())
+elements, tangents = _bound_to(hashlib.sha256(Path(materials.__file__).read_bytes()).hexdigest())
 
 
 class Foam:
@@ -210,10 +184,21 @@ class Foam:
         return factor
 
     def strains(self, x: FloatArray, directions: FloatArray) -> tuple[float, float, float]:
-        """Smallest ``det F``, largest principal strain and smallest scaled eigenvalue of the acoustic tensor."""
+        """Smallest ``det F``, largest ``|principal stretch - 1|`` and smallest eigenvalue of the acoustic tensor.
+
+        The acoustic tensor ``Q[i, k] = A[i, J, k, L] m_J m_L`` is formed at the first point of every element for the
+        given unit ``directions (k, 3)`` and divided by the shear modulus: positive means strongly elliptic (no
+        localisation).
+        """
         u, dN, law = self._displacements(x), self.pad.dN, self.pad.material
-        strain, ellipticity = strain_measures(law.number, law.parameters, law.shear_modulus, u, dN, directions)
-        return smallest_det(u, dN), strain, ellipticity
+        F = np.eye(3) + np.einsum("eia,eqja->eqij", u, dN)
+        # rounding can leave the smallest eigenvalue of a crushed element below zero
+        stretch = np.sqrt(np.maximum(np.linalg.eigvalsh(F.swapaxes(-1, -2) @ F), 0.0))
+        # one point per element: loss of ellipticity is a warning, and the tensor in 24 directions is dear
+        A = tangents(law.number, law.parameters, np.ascontiguousarray(F[:, 0]))
+        Q = np.einsum("mj,eijkm->emik", directions, np.einsum("eijkl,ml->eijkm", A, directions))
+        ellipticity = np.linalg.eigvalsh(Q).min(initial=np.inf) / law.shear_modulus
+        return smallest_det(u, dN), float(np.abs(stretch - 1.0).max()), float(ellipticity)
 
     def _evaluate(self, x: FloatArray, K: FloatArray) -> float:
         law, pad = self.pad.material, self.pad
