@@ -6,7 +6,7 @@ import math
 import re
 from argparse import Namespace
 from collections.abc import Callable, Sequence
-from datetime import datetime
+from datetime import UTC, datetime
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -251,13 +251,17 @@ def sessions(result: Any, running: bool, width: int = PAPER) -> list[str]:
         now = running and i == len(result.sessions)
         reason = s["reason"] if s["stop"] else "running" if now else "no end was recorded (killed?)"
         ranks = f"{s['ranks']} rank{'s' * (s['ranks'] != 1)} on {s['host']}"
-        wall = _between(s["start"], s["stop"])
-        lines.append(wrapped(f"session {i}: {s['start']}, {ranks}{wall}, {reason}", width, "  ", "  "))
+        took = lasted(s["start"], s["stop"]) if s["stop"] else ""
+        parts = (f"session {i}: {s['start']}", ranks, took, reason)
+        lines.append(wrapped(", ".join(filter(None, parts)), width, "  ", "  "))
     return lines
 
 
-def _between(start: str, stop: str) -> str:
+def lasted(start: str, stop: str = "") -> str:
+    """How long it is from one time to another, or to now; empty where one is no time, as while it is written."""
     try:
-        return f", {duration((datetime.fromisoformat(stop) - datetime.fromisoformat(start)).total_seconds())}"
+        end = datetime.fromisoformat(stop) if stop else datetime.now(UTC)
+        # Never negative: clocks of two machines may disagree.
+        return duration(max((end - datetime.fromisoformat(start)).total_seconds(), 0.0))
     except ValueError:
         return ""

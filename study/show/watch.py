@@ -6,7 +6,6 @@ import sys
 import time
 from collections.abc import Callable
 from contextlib import nullcontext
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -22,10 +21,10 @@ from softjaw.study.ranking import ranked
 from softjaw.study.result.lock import holder
 from softjaw.study.result.read import dataset
 from softjaw.study.result.store import open_result, place_text
-from softjaw.study.run.progress import Progress, duration
+from softjaw.study.run.progress import Progress
 from softjaw.study.show.best_grasps import value_text
 from softjaw.study.show.grasps import index_of
-from softjaw.study.show.status import RESUME, reasons
+from softjaw.study.show.status import RESUME, lasted, reasons
 from softjaw.study.table import terminal_width
 
 INTERRUPTED = 130  # what shells say of a program that Ctrl-C ended
@@ -81,7 +80,9 @@ def file_look(path: Path) -> Look:
             counts = f"{progress.line(codes)}{f', round {rounds} of further grasps' * bool(rounds)}"
             if not runner:
                 return [counts, *_end(result, codes)], _code(codes)
-            about = f"{result.path}{f' ({result.title})' * bool(result.title)}: {runner}{_since(result)}"
+            title = f" ({result.title})" * bool(result.title)
+            since = lasted(result.sessions[-1]["start"]) if result.sessions else ""
+            about = f"{result.path}{title}: {runner}{f', for {since}' * bool(since)}"
             failures = reasons(result, terminal_width())[: bool((codes == FAILED).any())]
             return [counts, about, best_so_far(result, codes), *failures], None
 
@@ -99,17 +100,6 @@ def _end(result: Any, codes: np.ndarray) -> list[str]:
     if missing := int(np.sum(codes == MISSING)):
         return [f"{missing} cases are not computed; {RESUME}"]
     return ["complete", *reasons(result, terminal_width()), f"'softjaw show {result.path}' lists the best grasps"]
-
-
-def _since(result: Any) -> str:
-    """How long the last session has been running."""
-    try:
-        began = datetime.fromisoformat(result.sessions[-1]["start"])
-    # A session may be in the middle of being written; the view can do without it.
-    except (IndexError, ValueError):
-        return ""
-    # Never negative: clocks of two machines may disagree.
-    return f", for {duration(max((datetime.now(UTC) - began).total_seconds(), 0.0))}"
 
 
 def best_so_far(result: Any, codes: np.ndarray) -> str:

@@ -19,23 +19,18 @@ from softjaw.study.show.grasps import (
     axis_values,
     field,
     forces,
+    label_of,
     number,
     place,
+    quantity,
     spoken,
 )
 from softjaw.study.show.object_surface import undeformed
 from softjaw.study.show.report.maps import ticks
 from softjaw.study.show.view.model import View
 
-# map, title, factor from SI; "F" divides by the normal force
-PANELS = (
-    ("e_n", "eccentricity parameter e_n [mm]", 1e3),
-    ("quality", "grasp quality [-]", 1.0),
-    ("tau_z_max", "max tau_z [N mm]", 1e3),
-    ("f_x_max", "max f_x / F, along the pad [-]", "F"),
-    ("f_y_max", "max f_y / F, across the pad [-]", "F"),
-    ("closing", "closing displacement of the pads [mm]", 1e3),
-)
+PANELS = ("e_n", "quality", "tau_z_max", "f_x_max", "f_y_max", "closing")
+OVER_F = ("f_x_max", "f_y_max")  # drawn over the normal force
 COMPONENTS = {
     "f_x": ("along, f_x", "#12436d", "circle"),
     "f_y": ("across, f_y", "#c05a00", "square"),
@@ -71,17 +66,19 @@ def worth_a_curve(ds: xr.Dataset) -> list[int]:
 
 def _models(ds: xr.Dataset, position: int, index: Index, mu: float | None) -> Block:
     """Six quantities in all friction models along one axis."""
-    made = plots.figure(2, 3, [title for _, title, _ in PANELS], vertical_spacing=0.16, horizontal_spacing=0.07)
+    titles = [f"{quantity(ds, name)[0]} / F" if name in OVER_F else label_of(ds, name) for name in PANELS]
+    made = plots.figure(2, 3, titles, vertical_spacing=0.16, horizontal_spacing=0.07)
     x, settings = ticks(ds, position, by_name=False)
     cut, over_force = along(position, index), position == len(index) - 1
-    for k, (name, _, factor) in enumerate(PANELS):
+    for k, name in enumerate(PANELS):
         row, column = k // 3 + 1, k % 3 + 1
-        scale = factor if factor != "F" else 1 / (forces(ds) if over_force else forces(ds)[index[-1]])
+        F = forces(ds) if over_force else forces(ds)[index[-1]]
+        scale = 1 / F if name in OVER_F else quantity(ds, name)[2]
         by_model = {m: values[cut] * scale for m in (MODELS if name != "closing" else ("ccm",))
                     if (values := field(ds, name, m)) is not None}  # fmt: skip
         error = field(ds, f"{name}_error")
         plots.lines(made, x, by_model, row, column, None if error is None else by_model["ccm"] * error[cut])
-        if factor == "F" and mu is not None:
+        if name in OVER_F and mu is not None:
             made.add_hline(mu, line={"color": plots.SOFT, "width": 1, "dash": "dash"}, row=row, col=column)
     made.update_xaxes(**settings, row=2)
     bars = HALF_AS_FINE if field(ds, "e_n_error") is not None else ""
