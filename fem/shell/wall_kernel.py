@@ -1,4 +1,4 @@
-"""Compiled loop over the points of a pad that press on a deformable wall.
+"""Entries of the tangent by the points of a pad that press on a deformable wall.
 
 At a point with the pressure ``p = sum N_i lam_i`` and the traction ``t`` of friction, the pad's node ``b`` gets
 ``-N_b (p n + t) dA`` and the wall's node ``a`` gets ``N_a (p n + t) dA``; the weighted gap of a contact node is
@@ -15,140 +15,58 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from softjaw.fem.shell.facing import FAR
+from softjaw.fem.shell.facing import Facing
+from softjaw.friction.patch import FloatArray
 
 
-@njit(cache=True)
-def contact_tangent(N, area, lam, active, kappa, gap, normal, e, nodes, wall_N, H, G, S, held, traction, by_motion,
-                    by_normal, by_pressure, old_nodes, old_N, R, pad_dofs, pressures, first, second, start, column,
-                    values):  # fmt: skip
-    """Add one pad's entries of the tangent to the compressed rows; whether all of them had a place.
+def changes(N: FloatArray, R: FloatArray, facing: Facing) -> tuple[FloatArray, FloatArray]:
+    """Changes of points relative to the wall ``D (n, 3, 3 k + 24)`` and of the normals, with every local unknown.
 
-    ``active (faces, k)``: whether a node's complementarity row is its gap; ``kappa``: scale of pressures, ``lam /
-    kappa`` are the unknowns and ``kappa int N_i g dA`` the rows [Pa/m]; ``e, H, G, S``: as in `Facing`; ``held (n,)``:
-    points whose traction counts, with its derivatives, ``old_nodes, old_N`` where they stuck to the wall; ``pad_dofs
-    (faces, 3, k)``, ``pressures (faces, k)``, ``first, second (wall nodes, 3)``: unknowns of the whole problem, -1
-    where fixed.
+    These are the pad's (component, node), then those of the wall (node, component), first and second; ``N (n, k)`` are
+    the pad's shape functions.
     """
-    points, k = N.shape
-    t = 3 * k  # local order: pad (component, node), wall first (node, component), wall second, pressures, old places
-    u, old = t + 24, t + 24 + k
-    M, dof = np.empty((t + 12, old + 24)), np.empty(old + 24, np.int64)
-    D = np.empty((3, u))  # change of the point relative to the wall, as far as it turns and slides what it faces
-    dn, change, force, row = np.empty((3, u)), np.empty((3, old + 24)), np.empty(3), np.empty(u)
+    n, t = len(N), 3 * N.shape[1]
+    turned = np.einsum("na,ndc->ndac", facing.N, facing.G).reshape(n, 3, 12)
+    pad = np.einsum("dc,nb->ndcb", R, N).reshape(n, 3, t)
+    first = -np.einsum("na,dc->ndac", facing.N, np.eye(3)).reshape(n, 3, 12)
+    D = np.concatenate([pad, first, first - facing.gap[:, None, None] * turned], axis=2)
+    dn = facing.H @ D
+    dn[:, :, t + 12 :] += turned
+    return D, dn
+
+
+def force_blocks(
+    N: FloatArray, R: FloatArray, facing: Facing, D: FloatArray, force: FloatArray, change: FloatArray
+) -> FloatArray:
+    """Derivatives ``(n, 3 k + 24, m)`` of the forces on pad and wall by ``m`` unknowns, from those of a point.
+
+    ``force (n, 3)`` and its derivatives ``change (n, 3, m)``; what moves the outer face carries the same force.
+    """
+    n, k, m = len(N), N.shape[1], change.shape[2]
+    pad = -N[:, None, :, None] * (R.T @ change)[:, :, None]
+    slide = np.zeros((n, 4, m))
+    slide[:, :, : D.shape[2]] = facing.S @ D
+    wall = facing.N[:, :, None, None] * change[:, None] + slide[:, :, None] * force[:, None, :, None]
+    wall = wall.reshape(n, 12, m)
+    return np.concatenate([pad.reshape(n, 3 * k, m), wall, wall], axis=1)
+
+
+@njit(cache=True)
+def add_blocks(blocks, rows, columns, start, column, values):
+    """Add blocks ``(n, r, m)`` in rows and columns, -1 where fixed, to compressed rows; whether all had a place."""
     complete = True
-    for f in range(area.shape[0]):
-        engaged = False
-        for i in range(k):
-            # facets that neither press nor are about to have no couplings, and most have none
-            engaged = engaged or active[f, i] or lam[f, i] != 0.0
-        if not engaged:
-            continue
-        for q in range(points):
-            m = f * points + q
-            if gap[m] == FAR:
+    for n in range(len(blocks)):
+        for r in range(rows.shape[1]):
+            if rows[n, r] < 0:
                 continue
-            p = 0.0
-            for i in range(k):
-                p += N[q, i] * lam[f, i]
-            changes(N[q], gap[m], wall_N[m], H[m], G[m], R, D, dn)
-            number(pad_dofs[f], pressures[f], first, second, nodes[m], dof)
-            for d in range(3):
-                force[d] = p * normal[m, d]
-                for j in range(u):
-                    change[d, j] = p * dn[d, j]
-                for i in range(k):
-                    change[d, u + i] = kappa * N[q, i] * normal[m, d]
-            if held[m]:
-                for d in range(3):
-                    force[d] += traction[m, d]
-                    for c in range(3):
-                        for j in range(u):
-                            change[d, j] += by_normal[m, d, c] * dn[c, j]
-                        for j in range(t):
-                            change[d, j] += by_motion[m, d, c] * D[c, j]
-                        for a in range(4):
-                            dragged = -old_N[m, a] * by_motion[m, d, c]
-                            change[d, old + 3 * a + c] = change[d, old + 12 + 3 * a + c] = dragged
-                    for i in range(k):
-                        change[d, u + i] += kappa * N[q, i] * by_pressure[m, d]
-                for a in range(4):
-                    for c in range(3):
-                        dof[old + 3 * a + c] = first[old_nodes[m, a], c]
-                        dof[old + 12 + 3 * a + c] = second[old_nodes[m, a], c]
-            w, columns = area[f, q], old + 24 if held[m] else old
-            for j in range(columns):
-                for c in range(3):
-                    pull = R[0, c] * change[0, j] + R[1, c] * change[1, j] + R[2, c] * change[2, j]
-                    for b in range(k):
-                        M[c * k + b, j] = -w * N[q, b] * pull
-                for a in range(4):
-                    slide = S[m, a, 0] * D[0, j] + S[m, a, 1] * D[1, j] + S[m, a, 2] * D[2, j] if j < u else 0.0
-                    for c in range(3):
-                        M[t + 3 * a + c, j] = w * (wall_N[m, a] * change[c, j] + slide * force[c])
-            for r in range(u):
-                if dof[r] >= 0:
-                    # what moves the outer face carries the same force
-                    local = r if r < t + 12 else r - 12
-                    complete &= add_row(dof[r], M[local, :columns], dof, start, column, values)
-            for i in range(k):
-                if active[f, i]:
-                    for j in range(u):
-                        row[j] = kappa * w * N[q, i] * (e[m, 0] * D[0, j] + e[m, 1] * D[1, j] + e[m, 2] * D[2, j])
-                    complete &= add_row(pressures[f, i], row, dof, start, column, values)
+            low, high = start[rows[n, r]], start[rows[n, r] + 1]
+            for j in range(columns.shape[1]):
+                if columns[n, j] < 0:
+                    continue
+                # columns ascend within a row, so bisection finds the slot; if none, the caller grows the pattern
+                place = low + np.searchsorted(column[low:high], columns[n, j])
+                if place == high or column[place] != columns[n, j]:
+                    complete = False
+                else:
+                    values[place] += blocks[n, r, j]
     return complete
-
-
-@njit(cache=True)
-def number(pad_dofs, pressures, first, second, nodes, dof):
-    """Write to ``dof`` the unknowns of a pad's face, of the wall's nodes that a point faces, and of the pressures."""
-    k = pressures.size
-    t = 3 * k
-    for i in range(k):
-        dof[t + 24 + i] = pressures[i]
-        for c in range(3):
-            dof[c * k + i] = pad_dofs[c, i]
-    for a in range(4):
-        for c in range(3):
-            dof[t + 3 * a + c] = first[nodes[a], c]
-            dof[t + 12 + 3 * a + c] = second[nodes[a], c]
-
-
-@njit(cache=True)
-def add_row(row, entries, dof, start, column, values):
-    """Add entries in the columns ``dof``, -1 where fixed, to a compressed row; whether all of them had a place."""
-    complete = True
-    low, high = start[row], start[row + 1]
-    for j in range(entries.size):
-        if dof[j] < 0:
-            continue
-        # columns ascend within a row, so bisection finds the slot; if none, the caller grows the pattern
-        place = low + np.searchsorted(column[low:high], dof[j])
-        if place == high or column[place] != dof[j]:
-            complete = False
-        else:
-            values[place] += entries[j]
-    return complete
-
-
-@njit(cache=True)
-def changes(N, gap, wall_N, H, G, R, D, dn):
-    """Changes with every local unknown: position relative to the wall ``D (3, t + 24)`` and normal ``dn``."""
-    k = N.size
-    t = 3 * k
-    for c in range(3):
-        for b in range(k):
-            for d in range(3):
-                D[d, c * k + b] = R[d, c] * N[b]
-    for a in range(4):
-        for c in range(3):
-            for d in range(3):
-                D[d, t + 3 * a + c] = -wall_N[a] if c == d else 0.0
-                D[d, t + 12 + 3 * a + c] = D[d, t + 3 * a + c] - gap * wall_N[a] * G[d, c]
-    for j in range(t + 24):
-        for d in range(3):
-            dn[d, j] = H[d, 0] * D[0, j] + H[d, 1] * D[1, j] + H[d, 2] * D[2, j]
-    for b in range(4):
-        for c in range(3):
-            for d in range(3):
-                dn[d, t + 12 + 3 * b + c] += wall_N[b] * G[d, c]

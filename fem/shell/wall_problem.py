@@ -17,7 +17,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,14 +27,10 @@ from softjaw.fem.contact.problem import ContactProblem, Control, Evaluated, Fing
 from softjaw.fem.objects.gap import Pose
 from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.shell.facing import FAR, Facing, Wall, face
-from softjaw.fem.shell.wall_kernel import contact_tangent
+from softjaw.fem.shell.wall_kernel import add_blocks, changes, force_blocks
 from softjaw.fem.shell.wall_model import NonlinearWall
 from softjaw.friction.patch import FloatArray
 
-# traction of no point, its derivatives by motion, normal and pressure, and where no point stuck
-NO_FRICTION: tuple[Any, ...] = (
-    *(np.empty((0, *shape)) for shape in ((3,), (3, 3), (3, 3), (3,))), np.empty((0, 4), np.int32), np.empty((0, 4)),
-)  # fmt: skip
 ROUNDING = 1.5e-18  # norm of the residual over the wall's modulus [m^2]: its forces are differences of large numbers
 
 
@@ -191,16 +186,41 @@ class WallProblem(ContactProblem):
 
     def _add_contact(self, k: int, x: FloatArray, c: Evaluated) -> bool:
         """Add the contact of the ``k``-th finger to the tangent; whether the pattern has a place for all entries."""
-        f, facing = self.fingers[k], c.surface
-        held, friction = np.zeros(len(facing.gap), dtype=bool), NO_FRICTION
+        f, pick = self.fingers[k], self._engaged(self.fingers[k], c)
+        facet, point = np.divmod(pick, f.pad.face_N.shape[0])
+        facing = Facing(*(values[pick] for values in vars(c.surface).values()))
+        N, area = f.pad.face_N[point], f.pad.face_area[facet, point]
+        D, dn = changes(N, f.R, facing)
+        pressure = (c.lam[facet] * N).sum(axis=1)
+        force, by_lam = pressure[:, None] * facing.normal, facing.normal
+        change = pressure[:, None, None] * dn
+        nodes, old = self.wall_dofs(facing.nodes), np.empty((len(pick), 3, 0))
+        before = np.empty((len(pick), 0), np.int32)
         if self.friction is not None:
-            anchor, held = self.friction.anchors[k], self._dragged(k, f, c)
-            friction = *self.traction(k, x, c, derivatives=True), anchor.nodes, anchor.N
-        return contact_tangent(
-            f.pad.face_N, f.pad.face_area, c.lam, c.active[f.nodes], f.kappa, facing.gap, facing.normal, facing.e,
-            facing.nodes, facing.N, facing.H, facing.G, facing.S, held, *friction, f.R, f.dofs, f.pressure_dofs,
-            self.model.first, self.model.second, self.pattern.start, self.pattern.column, self.pattern.values,
-        )  # fmt: skip
+            anchor, held = self.friction.anchors[k], self._dragged(k, f, c)[pick]
+            assert anchor.nodes is not None
+            assert anchor.N is not None
+            slip = self.traction(k, x, c, derivatives=True)
+            t, by_motion, by_normal, by_pressure = (v[pick] * held.reshape(-1, *[1] * (v.ndim - 1)) for v in slip)
+            force, by_lam, pad = force + t, by_lam + by_pressure, slice(3 * N.shape[1])
+            change += by_normal @ dn
+            change[:, :, pad] += by_motion @ D[:, :, pad]
+            dragged = -np.einsum("na,ndc->ndac", anchor.N[pick], by_motion).reshape(len(pick), 3, 12)
+            old = np.concatenate([dragged, dragged], axis=2)
+            before = np.where(held[:, None], self.wall_dofs(anchor.nodes[pick]), -1)
+        moved = np.concatenate([f.dofs[facet].reshape(len(pick), -1), nodes], axis=1)
+        unknowns = np.concatenate([moved, f.pressure_dofs[facet], before], axis=1)
+        change = np.concatenate([change, f.kappa * by_lam[:, :, None] * N[:, None], old], axis=2)
+        forces = area[:, None, None] * force_blocks(N, f.R, facing, D, force, change)
+        gaps = (f.kappa * area[:, None] * N)[:, :, None] * (facing.e[:, None] @ D)
+        rows = np.where(c.active[f.nodes[facet]], f.pressure_dofs[facet], -1)
+        stored = self.pattern.start, self.pattern.column, self.pattern.values
+        return add_blocks(forces, moved, unknowns, *stored) & add_blocks(gaps, rows, moved, *stored)
+
+    def _engaged(self, f: Finger, c: Evaluated) -> IntArray:
+        """Points that face the wall, of facets that already press or that the next iteration may close: few."""
+        presses = (c.active[f.nodes] | (c.lam != 0.0)).any(axis=1)
+        return np.flatnonzero(np.repeat(presses, f.pad.face_N.shape[0]) & (c.gap < FAR))
 
     def _grow(self, contacts: list[Evaluated]) -> None:
         """Couple the faces that press with the wall's nodes that they face."""
@@ -217,9 +237,7 @@ class WallProblem(ContactProblem):
 
     def _couplings(self, k: int, f: Finger, c: Evaluated) -> list[tuple[IntArray, IntArray]]:
         """Rows and columns of the entries that the contact of the ``k``-th finger may have."""
-        facets = np.repeat(np.arange(len(f.nodes)), f.pad.face_N.shape[0])
-        # facets that already press, or that the next iteration may close
-        pick = (c.active[f.nodes] | (c.lam != 0.0)).any(axis=1)[facets] & (c.gap < FAR)
+        facets, pick = np.repeat(np.arange(len(f.nodes)), f.pad.face_N.shape[0]), self._engaged(f, c)
         on_pad = np.concatenate([f.dofs.reshape(len(f.nodes), -1), f.pressure_dofs], axis=1)[facets[pick]]
         on_wall = self.wall_dofs(c.surface.nodes[pick])
         pair = pairs(on_pad[:, :, None], on_wall[:, None, :])
@@ -235,8 +253,8 @@ class WallProblem(ContactProblem):
 
     def wall_dofs(self, nodes: IntArray) -> IntArray:
         """Unknowns ``(n, 24)`` that move the outer face at nodes ``(n, 4)`` of the wall, -1 where fixed."""
-        both = np.concatenate([self.model.first[nodes], self.model.second[nodes]], axis=2)
-        return both.reshape(len(nodes), 24)
+        first, second = (part[nodes].reshape(len(nodes), 12) for part in (self.model.first, self.model.second))
+        return np.concatenate([first, second], axis=1)
 
     # -- friction that acts back --------------------------------------------------------------------------------------
 
