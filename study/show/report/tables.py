@@ -31,8 +31,8 @@ from softjaw.study.show.status import split_of
 
 BEST = 6
 # Columns of a page that has room for them.
-SHOWN = ("payload", "quality", "quality_fitted", "e_n", "f_x_max", "f_y_max", "tau_z_max")
-WALL = ("indentation", "wall_stress", "wall_strain", "support_force", "safety_factor")
+SHOWN = ("payload", "quality", "quality_fitted", "e_n", "f_x_max", "f_y_max", "tau_z_max", "indentation", "wall_stress",
+         "wall_strain", "support_force", "safety_factor")  # fmt: skip
 SAFE = "Safe forces per finger hold the object's weight and are borne by its wall; +: also the largest solved force is."
 STRESS = "Wall stress: largest von Mises stress on both faces. Support force: what table or clamp bears along the axis."
 
@@ -87,13 +87,9 @@ def checks(ds: xr.Dataset) -> Block:
     return table("Checks of the contact solutions, worst of all solved cases and fingers", heads, rows, texts=(0, 3, 4))
 
 
-def wall(ds: xr.Dataset, shape: Any) -> list[Block]:
-    """Limits of a thin wall, and what it bears in the best grasps at the force shown."""
-    limits = [f"The wall: {wall_text(shape)}."] if shape is not None else []
-    known = [name for name in WALL if field(ds, name) is not None]
-    grasps = case_table(ds, order(ds, ds.attrs["level"])[:BEST], maps=known)
-    title = f"The wall in the best grasps at {number(forces(ds)[ds.attrs['level']])} N per finger"
-    return [text(" ".join([*limits, STRESS])), block_of(replace(grasps, title=title), first=True)]
+def wall(shape: Any) -> Block:
+    """Limits of a thin wall, and what the maps of the best grasps say of it."""
+    return text(f"The wall: {wall_text(shape)}. {STRESS}" if shape is not None else STRESS)
 
 
 def effects(ds: xr.Dataset) -> list[Block]:

@@ -91,7 +91,7 @@ def wall(view: View, best: Index) -> list[Block | None]:
     if field(ds, "indentation") is None:
         return []
     allowed = getattr(shape, "allowed_dent", None)
-    return [*tables.wall(ds, shape), curves.wall_section(view, best), curves.wall_curves(ds, best, allowed)]
+    return [tables.wall(shape), curves.wall_section(view, best), curves.wall_curves(ds, best, allowed)]
 
 
 def cases(view: View) -> list[Section]:

@@ -133,10 +133,9 @@ def test_the_report_answers_at_a_force_that_the_wall_bears_and_shows_the_wall_as
         high = result.derived("force_high")[0, 0]
         assert data.normal_force.values[data.attrs["best"][-1]] == 1.0
         assert safe_range(data, (0, 0, 0)).endswith(f"{high:.3g}")
-        words, limits, *figures = writing.wall(View(data), data.attrs["best"])
+        words, *figures = writing.wall(View(data), data.attrs["best"])
         (over_force,) = maps.maps(data, data.attrs["best"])
     assert "0.3 mm PP" in words["text"]
-    assert len(limits["rows"]) == 2
     assert len(figures) == 2  # sections of the wall, force over indentation
     *buttons, level = over_force["figure"].layout.updatemenus[0].buttons
     borne = buttons[maps._names(data).index("force_high")]
