@@ -160,7 +160,8 @@ def friction_rows() -> Iterator[Row]:
     for label, scene in rigid_scenes():
         free, coupled = contacts_at(scene), contacts_at(scene, **{COUPLED: "tangential"})
         for n, choice in enumerate(choices(at_levels(scene, sheet="rigid"))):
-            for force, level in zip(choice.solver.forces, choice.chosen[COUPLED], strict=True):
+            for k, force in enumerate(choice.solver.forces):
+                level = choice.level(COUPLED, k)
                 if (n, force) in free and (n, force) in coupled:
                     error = off(e_n(free[n, force]), e_n(coupled[n, force]))
                     taken = int(level.level != "none")
@@ -172,7 +173,8 @@ def plate_rows() -> Iterator[Row]:
     for label, scene in rigid_scenes():
         free, plate = contacts_at(scene), contacts_at(scene, sheet="elastic")
         for n, choice in enumerate(choices(at_levels(scene, **{COUPLED: "none"}))):
-            for force, level in zip(choice.solver.forces, choice.chosen["sheet"], strict=True):
+            for k, force in enumerate(choice.solver.forces):
+                level = choice.level("sheet", k)
                 if (n, force) in free and (n, force) in plate:
                     error, taken = off(e_n(free[n, force]), e_n(plate[n, force])), int(level.level != "rigid")
                     yield "sheet", named(label, n, force), level.indicator, level.change, taken, error
@@ -202,7 +204,7 @@ def wall_rows() -> Iterator[Row]:
         for force in scene.load.normal_force:
             alone = at_levels(scene.with_values({"load.normal_force_n": [force]}), **(PLAIN | {"object": "auto"}))
             for n, choice in enumerate(choices(alone)):
-                key, name, level = (n, force), named(label, n, force), choice.chosen["object"][0]
+                key, name, level = (n, force), named(label, n, force), choice.level("object", 0)
                 number = EFFECTS["object"].index(level.level)
                 if key in shell and key in rigid:
                     change = level.change if number < 2 else np.nan

@@ -63,7 +63,7 @@ def test_claims_of_the_lookup_hold(tmp_path):
     print(f"{point.ok.size} cases, {1 - point.ok.mean():.0%} of them across a change of the contact")
     assert point.ok.mean() > 0.8
     levels = whole["effect_friction_pressure_coupling_level"].values
-    assert 0.2 < levels.mean() < 0.8  # both are in the map
+    assert 0.2 < levels.mean() < 0.98  # both are in the map
     for name in (name for name in MAIN if name in held):
         true = (held[name].sel(model="ccm") if "model" in held[name].dims else held[name]).values[point.ok]
         error, claim = np.abs(point.value(name)[point.ok] / true - 1), (point.error(name)[point.ok] / np.abs(true))
