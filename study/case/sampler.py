@@ -25,7 +25,7 @@ from softjaw.study.case.fit import Jaws, fit_of, jaws_of
 from softjaw.study.case.poses import across, in_file, pad_axes, pose_of
 from softjaw.study.case.task import Task, task_of
 from softjaw.study.messages import USAGE, NoGraspError
-from softjaw.study.quantities import MISSING, SLIPS, STATES
+from softjaw.study.quantities import COLLIDES, MISSING, SLIPS, STATES, WIDE
 from softjaw.study.scene import Scene
 from softjaw.study.scene.grasps import OF_EVERY_KIND, Candidates
 
@@ -227,7 +227,11 @@ def principal_axes(corners: FloatArray, area: FloatArray) -> FloatArray:
 
 def state_of(grip: JawsOnSurface) -> int:
     """Why a grasp is not worth a solve, or `MISSING`."""
-    state, _ = fit_of(grip.local, grip.triangles, grip.jaws)
+    # foam gives way by its thickness at most to what only the rim of a pad meets, between the cells of its face
+    felt, most = grip.opening + grip.jaws.pad[2], grip.jaws.max_opening
+    state, _ = fit_of(grip.local, grip.triangles, replace(grip.jaws, max_opening=min(felt, most)))
+    if state == WIDE and felt < most:
+        return COLLIDES
     return int(state or (SLIPS if slips(grip.misalignment[1], grip.jaws.mu) else MISSING))
 
 

@@ -6,7 +6,7 @@ import trimesh
 
 from softjaw.study.case.bed import CRUSHED, GRID, JawsOnSurface, height_fields, held
 from softjaw.study.case.fit import Jaws, fit_of
-from softjaw.study.case.sampler import antipodal_grasps, axes_of, same_grasp, with_sampled_grasps
+from softjaw.study.case.sampler import antipodal_grasps, axes_of, same_grasp, state_of, with_sampled_grasps
 from softjaw.study.case.task import Task
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.quantities import COLLIDES, MISSING, WIDE
@@ -77,6 +77,10 @@ def test_inner_walls_do_not_count_large_fingers_meet_a_step_and_the_same_seed_gi
     points = body[0] @ axes_of(np.array([0.0, 0.0, -1.0]), np.array([1.0, 0.0, 0.0]))
     assert fit_of(points, body[1], JAWS)[0] == MISSING
     assert fit_of(points, body[1], Jaws(**vars(JAWS) | {"finger": (0.08, 0.03)}))[0] == COLLIDES
+    # A pad whose rim meets the higher one between two cells of its face.
+    axes, half = axes_of(np.array([0.0, 0.0, -1.0]), np.array([1.0, 0.0, 0.0])), JAWS.pad[0] / 2
+    for overlap, state in ((-2e-4, MISSING), (2e-4, COLLIDES)):
+        assert state_of(JawsOnSurface(body, np.array([0.03 - half + overlap, 0.0, 0.0]), axes, JAWS)) == state
     body = surface(trimesh.creation.annulus(0.02, 0.03, 0.1))
     one, two = (antipodal_grasps(body, JAWS, TASK, 8, seed=3, samples=40) for _ in range(2))
     assert len(one) == len(two)
