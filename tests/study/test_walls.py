@@ -1,6 +1,7 @@
 """Thin walls through the whole study on coarse meshes: levels, symmetry, images, order, refusals."""
 
 from functools import lru_cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -47,6 +48,14 @@ def test_the_level_follows_the_indentation_and_says_so():
     assert indicators == tuple(sorted(indicators))
     assert indicators[1] <= SMALL_INDENTATION < indicators[2]
     assert reasons == (BELOW, BELOW, ABOVE)
+
+
+def test_compression_is_a_strain_too(monkeypatch):
+    face = SimpleNamespace(von_mises=np.ones(1), principal_strain=np.array([[-3e-3, 1e-3]]))
+    for name, value in (("faces", [face, face]), ("_indentations", np.zeros(1)), ("_places", None)):
+        monkeypatch.setattr(wall, name, lambda *_, value=value: value)
+    state = SimpleNamespace(wall=SimpleNamespace(q=np.zeros(6), reaction=np.zeros(3)))
+    assert wall.wall_values(None, state, None)["maps/wall_strain"] == pytest.approx(3e-3)
 
 
 LONG = pytest.mark.long
