@@ -476,9 +476,5 @@ class SpringBed:
     @cached_property
     def _column(self) -> NDArray[np.int64]:
         """For every node the index, in ``contact_nodes``, of the node above it (columns are straight)."""
-        face = self.pad.nodes[self.pad.contact_nodes].reshape(*self.pad.contact_grid, 3)
-        x, y = face[:, 0, 0], face[0, :, 1]
-        # the nearest line, not an equal one: nodes inside elements are off their line by rounding
-        i = np.abs(self.pad.nodes[:, 0, None] - x).argmin(axis=1)
-        j = np.abs(self.pad.nodes[:, 1, None] - y).argmin(axis=1)
-        return i * len(y) + j
+        i, j = self.pad.places(self.pad.nodes[:, :2])
+        return i * self.pad.contact_grid[1] + j

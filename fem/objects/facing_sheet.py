@@ -89,20 +89,6 @@ def _seen(which, normals, sides, directions, spacing, rotation, origin, lower, u
     return seen
 
 
-@njit(cache=True)
-def _reached(x, directions, nodes):
-    """Whether a line of sight reaches the points, ``(n,)``."""
-    corners, order, low, high, start, count = nodes
-    stack = np.empty(DEPTH, np.int64)
-    out = np.zeros(len(x), np.bool_)
-    for i in range(len(x)):
-        for k in range(len(directions)):
-            if first_hit(x[i], -directions[k], 0.0, -1, True, corners, order, low, high, start, count, stack)[1] < 0:
-                out[i] = True
-                break
-    return out
-
-
 @dataclass(frozen=True, eq=False)
 class FacingSheet:
     """What a finger sees of a mesh: small triangles of the surface that is seen, and the ``whole`` mesh.
@@ -119,7 +105,10 @@ class FacingSheet:
         g, normal, border = self.sheet.signed(x)
         if border.any():
             # pseudo-normals fail at the border of an open sheet, so lines of sight decide the sign
-            out = _reached(np.ascontiguousarray(x[border]), self.directions, self.whole.nodes)
+            out = np.zeros(np.count_nonzero(border), dtype=bool)
+            for direction in self.directions:
+                hidden = np.flatnonzero(~out)
+                out[hidden] = np.isinf(self.whole.along(x[border][hidden], -direction))
             turn = np.where(out == (g[border] >= 0), 1.0, -1.0)
             g[border] *= turn
             normal[border] *= turn[:, None]
