@@ -17,6 +17,7 @@ from softjaw.study.export.sdf import as_sdf, as_stl
 from softjaw.study.export.selection import GripperFrame, chosen, grasps, usable
 from softjaw.study.grippers import Hand, gripper_file
 from softjaw.study.messages import USAGE, StudyError, write_file
+from softjaw.study.ranking import task_keys
 from softjaw.study.result.index import index_path
 from softjaw.study.result.read import open
 from softjaw.study.units import in_si
@@ -50,7 +51,7 @@ def export(options: Namespace) -> str:
     if options.form in TABLES:
         asked = options.force or options.by or options.least or options.top is not None
         return _written(options, [TABLES[options.form](ds, options.model, chosen(ds, **choice)[0] if asked else None)])
-    gripper = gripper_of(options)
+    gripper = gripper_of(options, task_keys(ds, "gripper").get("preset"))
     ranked = grasps(ds, gripper, **choice)
     if options.form != "graspgen":  # which has a field for those that do not hold
         ranked, left = usable(ranked)
@@ -70,9 +71,10 @@ def export(options: Namespace) -> str:
     return "\n".join([_written(options, texts), *beside])
 
 
-def gripper_of(options: Namespace) -> GripperFrame:
-    """The gripper that comes to the grasps."""
-    hand = gripper_file(options.gripper)[1] if options.gripper else Hand()
+def gripper_of(options: Namespace, preset: str | None = None) -> GripperFrame:
+    """The gripper that comes to the grasps: the one that is asked for, or the scene's own."""
+    name = options.gripper or preset
+    hand = gripper_file(name)[1] if name else Hand()
     approaches = tuple(options.approaches or (("x",) if options.form in SIMULATORS else ()))
     closing = CLOSING.get(options.form, "")
     return GripperFrame(hand, approaches, closing, in_si("wider_mm", options.wider), options.frame)

@@ -1,9 +1,12 @@
 """From where the hand comes: on an elliptic cylinder of 50 x 40 x 100 mm, whose clearances are known."""
 
+from argparse import Namespace
+
 import numpy as np
 import pytest
 
 from softjaw.study.case.poses import axis_poses
+from softjaw.study.cli.exporting import gripper_of
 from softjaw.study.export.reach import WAY, boxes, clearance, surface_points
 from softjaw.study.export.rigid_body import scene_of
 from softjaw.study.export.selection import GripperFrame, grasps, usable
@@ -79,3 +82,11 @@ def test_boxes_clear_a_sphere_points_lie_on_its_surface_and_boxes_stand_beside_t
     assert palm[:, 2] == pytest.approx([-0.0259 - WAY, 0.066])
     turned = boxes(FRANKA, "x", np.array([0.02, 0.018, 0.005]), 0.06, 0.10365)
     assert turned == pytest.approx(parts[:, :, [1, 0, 2]])
+
+
+def test_the_gripper_of_the_scene_comes_unless_another_one_is_named():
+    options = Namespace(gripper=None, approaches=None, form="isaac_grasp", wider=20.0, frame="object")
+    assert gripper_of(options, "franka_hand").hand == FRANKA
+    assert gripper_of(options).hand == Hand()
+    options.gripper = "wsg50"
+    assert gripper_of(options, "franka_hand").hand == gripper_file("wsg50")[1]
