@@ -8,7 +8,7 @@ wider than the opening, runs into the fingers or slips comes with that state.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
@@ -23,7 +23,9 @@ from softjaw.study.case.build import build_object, listed_accuracy, own_frame, s
 from softjaw.study.case.contact import slips
 from softjaw.study.case.fit import Jaws, fit_of, jaws_of
 from softjaw.study.case.poses import across, in_file, pad_axes, pose_of
+from softjaw.study.case.reach import FREE, opened, rooms, surface_points
 from softjaw.study.case.task import Task, task_of
+from softjaw.study.grippers import gripper_file
 from softjaw.study.messages import USAGE, NoGraspError
 from softjaw.study.quantities import COLLIDES, MISSING, SLIPS, STATES, WIDE
 from softjaw.study.scene import Scene
@@ -38,6 +40,7 @@ APART, NEAR = 0.5, 0.25  # of the pad's length: grasps that are nearer are at on
 ALIKE, ROLLED = math.radians(20.0), math.radians(30.0)  # the same for approach and roll
 CLIMBS = (0.25, 0.25, 0.12, 0.06)  # steps of a climb, of the pad's sides; rolls of `ROLLED` go with the first
 WORTHWHILE = 0.01  # gain of payload that is worth a step
+BETWEEN = 4e-3  # distance of the points of an object that a hand must not meet [m]
 EDGE_COST = 0.05  # of a payload, for which a place off the edges of the object is preferred
 
 
@@ -129,13 +132,15 @@ def antipodal_grasps(
     seed: int = 0,
     samples: int = SAMPLES,
     lids: FloatArray | None = None,
+    reached: Callable[[SampledGrasp], bool] = lambda _: True,
 ) -> list[SampledGrasp]:
     """At most ``count`` distinct grasps of a surface, the best first; then those that are not worth a solve.
 
     ``surface`` (k, 3) array, (m, 3) int array: points [m] and triangles. ``task``: what they have to hold. ``count``:
     grasps that can be solved. ``seed``: of the points where grasps are looked for; the same seed gives the same grasps
     on every machine. ``samples``: number of those points. ``lids`` (n, 3, 3) array, optional: corners of the triangles
-    that close holes [m]: no pad is put there if there are other places.
+    that close holes [m]: no pad is put there if there are other places. ``reached``: whether the hand gets to a grasp;
+    others are given where it gets to none.
     """
     surface = np.ascontiguousarray(surface[0]), np.ascontiguousarray(surface[1])
     offered: list[SampledGrasp] = []
@@ -145,10 +150,10 @@ def antipodal_grasps(
         (offered if over is None else over_holes if over else seen).append(grasp)
     # an open box may be held nowhere else
     seen = seen if any(not grasp.state for grasp in seen) else [*seen, *over_holes]
-    best = [grasp for grasp in thinned(seen, count, jaws.pad[0]) if not grasp.state]
+    best = [grasp for grasp in thinned(seen, count, jaws.pad[0], reached) if not grasp.state]
     seen += [climbed(surface, grasp, jaws, task, lids) for grasp in best]
     seen += offered
-    return thinned(seen, count, jaws.pad[0])
+    return thinned(seen, count, jaws.pad[0], reached)
 
 
 def offers(
@@ -243,10 +248,13 @@ def judged(grip: JawsOnSurface, task: Task) -> SampledGrasp:
     return SampledGrasp(grip.point, grip.axes[:, 2], grip.axes[:, 0], grip.opening, worth, state)
 
 
-def thinned(seen: Sequence[SampledGrasp], count: int, length: float) -> list[SampledGrasp]:
+def thinned(
+    seen: Sequence[SampledGrasp], count: int, length: float, reached: Callable[[SampledGrasp], bool]
+) -> list[SampledGrasp]:
     """At most ``count`` distinct grasps that are worth a solve, then as many that are not; by payload each.
 
-    The best one of every place comes before any place gets a second one; places are half a pad's ``length`` apart.
+    Of the first those that the hand has ``reached``, if there are any. The best one of every place comes before any
+    place gets a second one; places are half a pad's ``length`` apart.
     """
     kept: list[SampledGrasp] = []
     for good in (True, False):
@@ -256,13 +264,16 @@ def thinned(seen: Sequence[SampledGrasp], count: int, length: float) -> list[Sam
         # digits of a payload over the best one, by which grasps are ranked
         ranked = sorted(some, key=lambda g: -round(g.payload / best, 3) if best > 0 else 0.0)
         chosen: list[SampledGrasp] = []
-        for alike in (same_point, same_grasp):
-            for grasp in ranked:
-                # share of the best payload, below which a grasp is not proposed
-                if len(chosen) == count or grasp.payload < 0.02 * best:
-                    break
-                if not any(alike(grasp, other, length) for other in chosen):
-                    chosen.append(grasp)
+        for asked in (reached, lambda _: True) if good else (lambda _: True,):
+            for alike in (same_point, same_grasp):
+                for grasp in ranked:
+                    # share of the best payload, below which a grasp is not proposed
+                    if len(chosen) == count or grasp.payload < 0.02 * best:
+                        break
+                    if not any(alike(grasp, other, length) for other in chosen) and asked(grasp):
+                        chosen.append(grasp)
+            if chosen:
+                break
         kept += sorted(chosen, key=lambda g: -g.payload)
     return kept
 
@@ -294,7 +305,9 @@ def with_sampled_grasps(scene: Scene) -> Scene:
     """
     given, obj = scene.candidates, build_object(scene.object)
     task, surface = task_of(scene, obj), surface_triangles(scene.object)
-    found = antipodal_grasps(surface, jaws_of(scene), task, given.sampled or 1, lids=lids_of(obj))
+    found = antipodal_grasps(
+        surface, jaws_of(scene), task, given.sampled or 1, lids=lids_of(obj), reached=reached_by_hand(scene)
+    )
     placed = own_frame(scene.object)
     given_as = [(in_file(grasp.point, grasp.approach, grasp.long_side, placed), grasp.state) for grasp in found]
     poses = tuple(pose_of(numbers) for numbers, state in given_as if not state)
@@ -305,6 +318,25 @@ def with_sampled_grasps(scene: Scene) -> Scene:
     where = Candidates(poses=poses, **kept).model_copy(update={"sampled": given.sampled})
     where._rejected = tuple((*numbers, state) for numbers, state in given_as if state)
     return scene.model_copy(update={"candidates": where, "accuracy": listed_accuracy(scene)})
+
+
+def reached_by_hand(scene: Scene) -> Callable[[SampledGrasp], bool]:
+    """Whether the hand of the scene's gripper gets to a grasp; of a gripper without a name nothing is known."""
+    if scene.gripper.preset is None:
+        return lambda _: True
+    hand, placed, size = gripper_file(scene.gripper.preset)[1], own_frame(scene.object), scene.gripper.pad_size
+    points = surface_points(scene.object, BETWEEN)
+    known: dict[int, bool] = {}
+
+    def reached(grasp: SampledGrasp) -> bool:
+        if id(grasp) not in known:
+            axes = placed.rotation @ axes_of(grasp.approach, grasp.long_side)
+            wide, most, depth = opened(hand, scene.gripper, grasp.opening)
+            room = rooms(points, hand, hand.closing, axes, placed.to_object(grasp.point), size, wide, depth)
+            known[id(grasp)] = grasp.opening <= most and max(room.values()) > FREE
+        return known[id(grasp)]
+
+    return reached
 
 
 def check_sampler(scene: Scene) -> None:

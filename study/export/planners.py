@@ -29,8 +29,8 @@ from typing import Any
 
 import xarray as xr
 
+from softjaw.study.case.reach import WAY
 from softjaw.study.export.cases import MEANING
-from softjaw.study.export.reach import WAY
 from softjaw.study.export.selection import GripperFrame, RankedGrasp
 from softjaw.study.ranking import task_keys
 from softjaw.study.table import plain

@@ -7,7 +7,7 @@ The gripper's frame has its origin its hand's depth behind the middle between th
 faces at first touch. Its z axis is the direction of approach, from the palm to the fingertips; its closing axis, x or
 y, runs from finger 1 to finger 2; the third axis makes it right-handed. A parallel gripper may come from any side
 across its closing axis, so ``approach`` says which: along the long side (x) or the short side (y) of finger 1's pad, or
-against one of them (`study.export.reach` finds the clearest).
+against one of them (`study.case.reach` finds the clearest).
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from softjaw.study.case.reach import FREE, OPENED_MORE, chosen_approach, hand_axes, opened, rooms, surface_points
 from softjaw.study.case.result import TIE
 from softjaw.study.export.cases import cases
-from softjaw.study.export.reach import FREE, boxes, chosen_approach, clearance, surface_points
 from softjaw.study.export.rigid_body import scene_of
 from softjaw.study.flags import LOST, flag_words, flags_in
-from softjaw.study.grippers import APPROACHES, Hand
+from softjaw.study.grippers import Hand
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.quantities import FORCE_RANGE, LEAST_FORCE, MAIN
 from softjaw.study.ranking import at_level, judged, ranked, score_of
@@ -53,7 +53,7 @@ class GripperFrame:
     hand: Hand = field(default_factory=Hand)
     approach: tuple[str, ...] = ("minus-x",)
     closing: str = ""
-    wider: float = 0.02
+    wider: float = OPENED_MORE
     object_frame: str = "object"
 
     @property
@@ -144,12 +144,13 @@ def quaternion(rotation: FloatArray) -> FloatArray:
 
 def gripper_frame(case: dict[str, Any], approach: str, closing: str, depth: float) -> tuple[FloatArray, FloatArray]:
     """Axes as columns ``(3, 3)`` and origin ``(3,)`` [m] of the gripper in a grasp; see the module."""
-    pads = case["fingers"]
-    axis, sign = APPROACHES[approach]
-    z, across = sign * pads[0]["pose_rotation"][:, axis], pads[0]["pose_rotation"][:, 2]
-    columns = [across, np.cross(z, across), z] if closing == "x" else [np.cross(across, z), across, z]
-    middle = (pads[0]["pose_origin"] + pads[1]["pose_origin"]) / 2
-    return np.column_stack(columns), middle - depth * z
+    R = hand_axes(case["fingers"][0]["pose_rotation"], approach, closing)
+    return R, _middle(case) - depth * R[:, 2]
+
+
+def _middle(case: dict[str, Any]) -> FloatArray:
+    """Middle between the pads' faces at first touch ``(3,)`` [m]."""
+    return np.asarray(sum(pad["pose_origin"] for pad in case["fingers"]) / 2)
 
 
 def chosen(
@@ -204,9 +205,8 @@ def holds(ds: xr.Dataset, case: dict[str, Any], gripper: GripperFrame) -> dict[s
     hand, maps, force = gripper.hand, case["maps"], case["place"]["normal_force"]
     scene = scene_of(ds, case)
     foam, opening = 2 * scene.gripper.pad_thickness, float(maps["opening"])
-    most = min(hand.stroke_mm / 1e3 - foam, scene.gripper.max_opening or np.inf)
-    wide, closed = min(opening + gripper.wider, max(most, opening)), float(maps["opening_loaded"]) + foam
-    depth, low, high = hand.depth(opening + foam), *hand.force_n
+    wide, most, depth = opened(hand, scene.gripper, opening, gripper.wider)
+    closed, (low, high) = float(maps["opening_loaded"]) + foam, hand.force_n
     beyond = [f"wider than the {shown_text(most, 'm')} that it opens"] * (opening > most * (1 + TIE))
     beyond += [f"a force beyond its {low:g} to {high:g} N"] * (not low <= force <= high)
     joints = hand.values(wide + foam), hand.values(closed), depth
@@ -224,15 +224,9 @@ def _clearest(scene: Any, case: dict[str, Any], gripper: GripperFrame, wide: flo
     except (ValueError, OSError) as error:
         text = f"the object cannot be built, so that no approach can be chosen: {error}; name one with --approach"
         raise StudyError(USAGE, text) from error
-    length, width = scene.gripper.pad_size[:2]
-    weight = np.array(scene.task.direction or (0.0, 0.0, -1.0))
-    room, down = {}, {}
-    for approach in gripper.hand.approaches:
-        R, o = gripper_frame(case, approach, gripper.along, depth)
-        sides = (length, width) if approach.endswith("x") else (width, length)
-        parts = boxes(gripper.hand, gripper.along, np.array([*sides, scene.gripper.pad_thickness]), wide, depth)
-        room[approach] = clearance((points - o) @ R, parts)
-        down[approach] = float(R[:, 2] @ weight / np.linalg.norm(weight))
+    weight, pad = np.array(scene.task.direction or (0.0, 0.0, -1.0)), case["fingers"][0]["pose_rotation"]
+    room = rooms(points, gripper.hand, gripper.along, pad, _middle(case), scene.gripper.pad_size, wide, depth)
+    down = {name: float(hand_axes(pad, name, "x")[:, 2] @ weight / np.linalg.norm(weight)) for name in room}
     approach = chosen_approach(room, down)
     return approach, room[approach]
 

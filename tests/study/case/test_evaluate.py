@@ -84,7 +84,8 @@ def test_arms_are_scaled_along_the_axes_of_the_object(angle):
 
 def test_extents_scale_arms_contacts_that_lean_are_flagged_and_errors_are_differences_of_meshes():
     for overrides, arms, torques in (
-        ([], [0.05, 0.04, 0.12], 0.05), (['score.object_length_mm="longest"'], [0.12] * 3, 0.05),
+        ([], [0.05, 0.04, 0.12], 0.05),
+        (['score.object_length_mm="longest"'], [0.12] * 3, 0.05),
         (["score.object_length_mm=80"], [0.08] * 3, 0.05),
         (['score.contact_length_mm="object"'], [0.05, 0.04, 0.12], 0.12),
     ):

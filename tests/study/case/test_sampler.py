@@ -6,7 +6,15 @@ import trimesh
 
 from softjaw.study.case.bed import CRUSHED, GRID, JawsOnSurface, height_fields, held
 from softjaw.study.case.fit import Jaws, fit_of
-from softjaw.study.case.sampler import antipodal_grasps, axes_of, same_grasp, state_of, with_sampled_grasps
+from softjaw.study.case.sampler import (
+    SampledGrasp,
+    antipodal_grasps,
+    axes_of,
+    reached_by_hand,
+    same_grasp,
+    state_of,
+    with_sampled_grasps,
+)
 from softjaw.study.case.task import Task
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.quantities import COLLIDES, MISSING, WIDE
@@ -172,3 +180,23 @@ def test_a_sampler_excludes_stations(more):
     with pytest.raises(SceneError) as refused:
         sampled_scene(more=more)
     assert any("candidates" in problem for problem in map(str, refused.value.problems))
+
+
+def test_grasps_that_the_hand_does_not_reach_are_left_out_if_there_are_others():
+    body = surface(trimesh.creation.annulus(0.02, 0.03, 0.2))
+
+    def grasps(reached):
+        return [g for g in antipodal_grasps(body, JAWS, TASK, 8, samples=40, reached=reached) if not g.state]
+
+    everywhere = grasps(lambda _: True)
+    assert min(grasp.point[2] for grasp in everywhere) < 0.0
+    assert all(grasp.point[2] > 0.0 for grasp in grasps(lambda grasp: grasp.point[2] > 0.0))
+    assert [g.payload for g in grasps(lambda _: False)] == [g.payload for g in everywhere]
+
+
+def test_a_hand_reaches_a_slab_as_far_as_its_fingers_do():
+    slab = text_of('shape = "box"\nsize_mm = [40, 200, 200]\nedge_radius_mm = 2', forces="[5]")
+    at = [SampledGrasp(np.array([0.0, 0.0, z]), np.eye(3)[0], np.eye(3)[2], 0.04, 1.0) for z in (0.0, 0.09)]
+    assert list(map(reached_by_hand(parse_scene(slab, "slab")), at)) == [True, True]
+    hand = reached_by_hand(parse_scene(slab, "slab", ['gripper.preset="franka_hand"']))
+    assert list(map(hand, at)) == [False, True]

@@ -87,7 +87,8 @@ def test_stations_of_a_bent_mesh_follow_its_centre_line_and_those_of_a_straight_
 
 def test_axes_end_with_station_angle_and_force_in_si_units_and_poses_are_numbered():
     over = [
-        "sweep.object.semi_axis_b_mm=[40, 10, 20]", "sweep.gripper.material=['linear', 'blatz_ko']",
+        "sweep.object.semi_axis_b_mm=[40, 10, 20]",
+        "sweep.gripper.material=['linear', 'blatz_ko']",
         "sweep.friction.mu=[0.5]",
     ]
     axes = candidates.axes(parse_scene(CYLINDER, overrides=over))

@@ -13,9 +13,9 @@ from softjaw.study.cli import main
 from softjaw.study.cli.exporting import DATA_SETS, PLANNERS, SIMULATORS, TABLES
 from softjaw.study.cli.options import FORMATS
 from softjaw.study.export.planners import CLOSING, as_graspgen, yaml_text
-from softjaw.study.export.selection import APPROACHES, GripperFrame, grasps
+from softjaw.study.export.selection import GripperFrame, grasps
 from softjaw.study.flags import Flag
-from softjaw.study.grippers import Hand
+from softjaw.study.grippers import APPROACHES, Hand
 from softjaw.study.messages import CANNOT_WRITE, USAGE
 from tests.study.export.grasp_results import RADIUS, STATIONS, geometry, opened, write
 

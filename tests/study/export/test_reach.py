@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from softjaw.study.case.poses import axis_poses
+from softjaw.study.case.reach import WAY, boxes, clearance, surface_points
 from softjaw.study.cli.exporting import gripper_of
-from softjaw.study.export.reach import WAY, boxes, clearance, surface_points
 from softjaw.study.export.rigid_body import scene_of
 from softjaw.study.export.selection import GripperFrame, grasps, usable
 from softjaw.study.grippers import Hand, gripper_file

@@ -7,17 +7,18 @@ the hand comes. The distance of a point from a box is exact: the clearance is kn
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from trimesh.remesh import subdivide_to_size
 
 from softjaw.study.case.build import own_frame, surface_triangles
-from softjaw.study.grippers import Hand
+from softjaw.study.grippers import APPROACHES, Hand
 
 FloatArray = NDArray[np.float64]
+OPENED_MORE = 0.02  # the fingers open beyond first touch before a grasp [m]
 WAY = 0.1  # of approach and retreat [m]
 FREE = 1e-3  # clearance [m] from which a hand and an object are apart, of points that are 2 mm apart
 SPACING = 2e-3  # of points on a surface [m]
@@ -27,11 +28,13 @@ FROM_ABOVE = np.cos(np.radians(45.0))  # between the approach and the weight
 
 
 @lru_cache(maxsize=8)
-def surface_points(shape: Any) -> FloatArray:
-    """Points ``(n, 3)`` [m] on an object's surface, no further apart than `SPACING`, in the frame of its own file."""
+def surface_points(shape: Any, spacing: float = SPACING) -> FloatArray:
+    """Points ``(n, 3)`` [m] on an object's surface, no further apart than ``spacing``, in the frame of its own file."""
+    from trimesh.remesh import subdivide_to_size  # slow to load
+
     points, triangles = surface_triangles(shape)
     points = own_frame(shape).to_object(np.asarray(points, float))
-    size = max(SPACING, float(np.linalg.norm(np.ptp(points, axis=0))) / MOST_SPACINGS)
+    size = max(spacing, float(np.linalg.norm(np.ptp(points, axis=0))) / MOST_SPACINGS)
     finer = subdivide_to_size(points, np.asarray(triangles), size, max_iter=20)[0]
     return np.unique(np.round(finer, 7), axis=0)
 
@@ -63,6 +66,38 @@ def boxes(hand: Hand, along: str, pad: FloatArray, opening: float, depth: float)
         palm[:, :2] = palm[:, :2] if along == hand.closing else palm[:, 1::-1]
         made.append(palm - [[0.0, 0.0, WAY], [0.0, 0.0, 0.0]])
     return np.stack(made)
+
+
+def hand_axes(pad: FloatArray, approach: str, closing: str) -> FloatArray:
+    """Axes of the hand as columns ``(3, 3)``, from those of finger 1's pad and the hand's ``closing`` axis."""
+    axis, sign = APPROACHES[approach]
+    z, across = sign * pad[:, axis], pad[:, 2]
+    columns = [across, np.cross(z, across), z] if closing == "x" else [np.cross(across, z), across, z]
+    return np.column_stack(columns)
+
+
+def rooms(
+    points: FloatArray, hand: Hand, along: str, pad: FloatArray, middle: FloatArray, size: Sequence[float], wide: float,
+    depth: float,
+) -> dict[str, float]:  # fmt: skip
+    """By approach the clearance [m] of a hand that comes to pads ``wide`` apart round ``middle (3,)`` [m].
+
+    ``pad``: axes of finger 1's as columns ``(3, 3)``. ``size``: of a pad, along its axes. Others as for `boxes`.
+    """
+    found = {}
+    for approach in hand.approaches:
+        R = hand_axes(pad, approach, along)
+        sides = size[:2] if approach.endswith("x") else size[1::-1]
+        parts = boxes(hand, along, np.array([*sides, size[2]]), wide, depth)
+        found[approach] = clearance((points - middle) @ R + [0.0, 0.0, depth], parts)
+    return found
+
+
+def opened(hand: Hand, gripper: Any, opening: float, wider: float = OPENED_MORE) -> tuple[float, float, float]:
+    """Opening before a grasp, the largest there is, and the depth of the pads in it [m]; ``gripper`` is a scene's."""
+    foam = 2 * gripper.pad_thickness
+    most = min(hand.stroke_mm / 1e3 - foam, gripper.max_opening or np.inf)
+    return min(opening + wider, max(most, opening)), most, hand.depth(opening + foam)
 
 
 def clearance(points: FloatArray, corners: FloatArray) -> float:
