@@ -65,7 +65,7 @@ def test_what_is_missing_outweighs_what_cannot_be_written(monkeypatch, capsys, c
     assert capsys.readouterr().out.count("cure: do this") == len(codes)
 
 
-def test_a_check_that_fails_itself_does_not_hide_the_others_and_a_crash_and_a_hang_are_answers(monkeypatch, capsys):
+def test_a_check_that_fails_hides_no_other_and_variables_of_a_surrounding_mpirun_are_left_out(monkeypatch, capsys):
     monkeypatch.setattr(doctor, "CHECKS", {"broken": lambda: 1 / 0, "good": lambda: ("good", "", 0)})
     assert doctor.doctor() == 2
     broken, good = capsys.readouterr().out.splitlines()
@@ -73,9 +73,6 @@ def test_a_check_that_fails_itself_does_not_hide_the_others_and_a_crash_and_a_ha
     assert good.startswith("fine")
     assert trouble(ask("import os; os.abort()")) == "ended with exit code -6"
     assert trouble(ask("import time; time.sleep(60)", limit=0.5)) == "no answer in time"
-
-
-def test_the_variables_of_a_surrounding_mpirun_are_left_out_and_threads_are_pinned_unless_the_user_chose(monkeypatch):
     monkeypatch.setenv("OMPI_COMM_WORLD_RANK", "1")
     monkeypatch.setenv("PMIX_RANK", "1")
     monkeypatch.setenv("PATH_TO_KEEP", "yes")

@@ -38,11 +38,10 @@ def test_keys_of_the_scene_come_first_and_a_preset_may_stand_on_the_command_line
     assert scene.gripper.max_opening_mm == 100
 
 
-@pytest.mark.parametrize(
-    ("name", "force", "key"),
-    [("four_fingers", 5, "gripper.preset"), ("robotiq_2f85", 5, "load.normal_force_n"),
-     ("wsg50", 41, "load.normal_force_n")],
-)  # fmt: skip
+@pytest.mark.parametrize(("name", "force", "key"), [
+    ("four_fingers", 5, "gripper.preset"), ("wsg50", 41, "load.normal_force_n"),
+    ("robotiq_2f85", 5, "load.normal_force_n"),
+])  # fmt: skip
 def test_what_a_gripper_cannot_do_is_refused_with_its_key_and_line(tmp_path, name, force, key):
     with pytest.raises(SceneError) as error:
         loaded(tmp_path, name, force)

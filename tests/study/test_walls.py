@@ -36,7 +36,7 @@ def solved(*arguments, **choices):
     return [result for _, result in pipeline.solve_unit(walled(*arguments, **choices)[0])]
 
 
-def test_the_level_follows_the_indentation_and_says_so():
+def test_the_level_follows_the_indentation_and_compression_is_a_strain_too(monkeypatch):
     levels = []
     for thickness, modulus, forces in ((1.0, 200.0, "[0.2]"), (0.7, 5.0, "[0.5]"), (0.2, 200.0, "[4]")):
         wall_ = f"object.wall_mm={thickness}", f"object.young_modulus_gpa={modulus}"
@@ -48,9 +48,6 @@ def test_the_level_follows_the_indentation_and_says_so():
     assert indicators == tuple(sorted(indicators))
     assert indicators[1] <= SMALL_INDENTATION < indicators[2]
     assert reasons == (BELOW, BELOW, ABOVE)
-
-
-def test_compression_is_a_strain_too(monkeypatch):
     face = SimpleNamespace(von_mises=np.ones(1), principal_strain=np.array([[-3e-3, 1e-3]]))
     for name, value in (("faces", [face, face]), ("_indentations", np.zeros(1)), ("_places", None)):
         monkeypatch.setattr(wall, name, lambda *_, value=value: value)

@@ -1,8 +1,7 @@
 """Numbers of CalculiX for a hard case: a quarter of a pad of Blatz-Ko foam that is pressed to a plane, ``plane.inp``.
 
-Run once, from the repository's root, where ``ccx`` (Debian: calculix-ccx) is installed: ``python -m
-tests.hard_cases.calculix.decks``. It writes the numbers beside this file. Nothing of softjaw is used. In the deck the
-foam is ``*HYPERFOAM`` with alpha = -2, which is Blatz-Ko's law (as two equal terms, because ccx 2.20 finds a singular
+``python -m tests.hard_cases.calculix.decks`` writes them beside this file, once, with ``ccx`` (Debian: calculix-ccx).
+In the deck the foam is ``*HYPERFOAM`` with alpha = -2, Blatz-Ko's law (as two equal terms: ccx 2.20 finds a singular
 matrix for one), and the whole contact face slides freely on the plane: a displacement alone. Units are mm, N, MPa.
 """
 

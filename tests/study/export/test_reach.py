@@ -61,7 +61,7 @@ def test_what_the_gripper_cannot_take_is_left_out_with_the_reason(path, hand, wh
     assert said.startswith("5 of 5 ")
 
 
-def test_boxes_clear_a_sphere_points_lie_on_its_surface_and_boxes_stand_beside_the_pads(path):
+def test_boxes_clear_a_sphere_and_stand_beside_the_pads_and_the_gripper_of_the_scene_comes_unless_named(path):
     ball = np.random.default_rng(1).normal(size=(20_000, 3))
     ball *= 0.03 / np.linalg.norm(ball, axis=1)[:, None]
     beside, corner = np.array([[0.05, -1, -1], [1, 1, 1]]), np.array([[0.03, 0.03, 0.03], [1, 1, 1]])
@@ -82,9 +82,6 @@ def test_boxes_clear_a_sphere_points_lie_on_its_surface_and_boxes_stand_beside_t
     assert palm[:, 2] == pytest.approx([-0.0259 - WAY, 0.066])
     turned = boxes(FRANKA, "x", np.array([0.02, 0.018, 0.005]), 0.06, 0.10365)
     assert turned == pytest.approx(parts[:, :, [1, 0, 2]])
-
-
-def test_the_gripper_of_the_scene_comes_unless_another_one_is_named():
     options = Namespace(gripper=None, approaches=None, form="isaac_grasp", wider=20.0, frame="object")
     assert gripper_of(options, "franka_hand").hand == FRANKA
     assert gripper_of(options).hand == Hand()

@@ -181,7 +181,7 @@ def test_viewers_open_at_stations_and_angles_at_the_highest_force(sizes, expecte
     assert view_slice(small(sizes=sizes)) == expected
 
 
-def test_an_axis_of_two_values_has_a_name_only_beside_an_uneven_one_and_a_sweep_comes_first(tmp_path):
+def test_an_axis_of_two_values_has_a_name_beside_an_uneven_one_and_damage_in_a_done_row_is_found(tmp_path, path):
     even = small()
     uneven = Layout((*even.axes[:-1], replace(even.axes[-1], values=np.array([1.0, 2.0, 5.0]))), 4)
     assert axes_of(even, range(3)) == ["station", ".", "normal_force"]
@@ -200,9 +200,6 @@ def test_an_axis_of_two_values_has_a_name_only_beside_an_uneven_one_and_a_sweep_
     assert "patch" not in groups(layout)
     assert layout_of(layout.text()).text() == layout.text()
     verify(tmp_path / "s.hdf", layout, HEADER)
-
-
-def test_damage_in_a_done_row_is_found(path):
     layout = small()
     result = CaseResult({"maps/e_n": [1.0, 2.0, 3.0], "work/seconds_total": 2.0})
     for row in (0, 3, 7, 11, 29):

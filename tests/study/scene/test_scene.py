@@ -242,10 +242,7 @@ def test_combinations_of_a_sweep_that_make_no_scene_are_named_and_too_many_refus
     # Each value fits the scene alone; together they make elements of 0.2 x 5 mm.
     p = problem(BALL, "sweep.gripper.pad_width_mm=[22, 2]", "sweep.gripper.pad_thickness_mm=[15, 30]")
     assert (p.key, p.found) == ("sweep", '"gripper.pad_width_mm = 2, gripper.pad_thickness_mm = 30"')
-    many = (
-        "candidates.stations=10000", "candidates.stations_mm=[-30, 30]",
-        "load.normal_force_n=" + str(list(range(1, 60))),
-    )
+    many = "candidates.stations=10000", "candidates.stations_mm=[-30, 30]", f"load.normal_force_n={[*range(1, 60)]}"
     assert problem(BALL, *many).found == "1180000"
     swept = [f"sweep.friction.mu={[i / 100 for i in range(101)]}", f"sweep.gripper.pad_width_mm={list(range(15, 115))}"]
     assert problem(BALL, *swept).found == "10100"

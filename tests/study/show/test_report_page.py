@@ -11,9 +11,7 @@ from tests.study import view_files
 from tests.study.chromium import PROGRAM, Browser
 from tests.study.sealing import sealed
 
-pytestmark = [
-    pytest.mark.long, pytest.mark.skipif(PROGRAM is None, reason="no Chromium on this machine"),
-]
+pytestmark = [pytest.mark.long, pytest.mark.skipif(PROGRAM is None, reason="no Chromium on this machine")]
 REASON = "</script> convergence <b>lost</b>"
 
 
