@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import repeat
+from itertools import islice, repeat
 from typing import Any, NamedTuple, TypeVar
 
 from softjaw.fem.contact.path import Pressed
@@ -250,11 +250,11 @@ class CandidateSolver:
                 self._states[i, mesh, levels, part] = solve(i, mesh, levels, part)
         return self._states[k, mesh, levels, part]
 
-    def _next(self, _: int, mesh: int, levels: Levels, part: int) -> Any:
-        """The next state on a load path."""
+    def _next(self, i: int, mesh: int, levels: Levels, part: int) -> Any:
+        """The ``i``-th state on a load path, whose states before are known; one that was put away is followed again."""
         if (mesh, levels, part) not in self._paths:
             load_path = self.pressing(mesh, levels).parts[part].load_path
-            self._paths[mesh, levels, part] = followed(load_path, self.forces)
+            self._paths[mesh, levels, part] = islice(followed(load_path, self.forces), i, None)
         return next(self._paths[mesh, levels, part])
 
     def _alone(self, k: int, mesh: int, levels: Levels, part: int) -> Any:

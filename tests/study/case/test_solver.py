@@ -2,6 +2,7 @@
 
 from collections import Counter
 
+import numpy as np
 import pytest
 
 from softjaw.fem.contact.press import Press
@@ -71,3 +72,13 @@ def test_a_fine_state_starts_from_the_three_nearest_coarse_ones(monkeypatch):
     assert given == [[3.0, 2.0, 1.5]] * 2 + [[1.0]] * 4
     assert finer.contacts[0].state.pad.shape.elements == (12, 6, 3)
     solver.put_away()
+
+
+def test_a_solver_that_was_put_away_goes_on_with_the_next_force_of_its_path():
+    unit = unit_of("load.normal_force_n=[1, 3]")
+    kept, new = (CandidateSolver(unit.scene, unit.candidate.poses) for _ in range(2))
+    kept.solve(0, COARSE, PLAIN)
+    kept.put_away()
+    later, alone = (solver.solve(1, COARSE, PLAIN).states[0] for solver in (kept, new))
+    assert later.force == 3.0
+    np.testing.assert_array_equal(later.points.load, alone.points.load)
