@@ -9,7 +9,7 @@ RESULT  = results/$(basename $(notdir $(SCENE))).hdf
 PAGE    = $(RESULT:.hdf=.html)
 FIGURES = results/figures
 BIN     = .venv/bin
-# Of the benchmark: any of kernels element contact map; all if empty.
+# Of the benchmark: any of kernels element contact getfem map users; all if empty.
 PARTS   =
 # Of the random scenes and spoiled meshes of `make objects`: the page of 0 is kept in docs, those of others beside their results.
 SEED    = 0

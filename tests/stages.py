@@ -1,7 +1,7 @@
 """The tests in stages: ``python -m tests.stages test`` or ``test-long``, with names of stages to run only those.
 
-The last lines report which passed, their times, what was left out, and the command for it. Exit code: 0 when all
-stages passed, 1 when one failed, 2 when a tool was missing for one.
+The last lines report what passed, the time of each stage, what was left out, and the command for it. Exit code: 0 when
+all stages passed, 1 when one failed, 2 when a tool was missing for one.
 """
 
 import importlib.util
@@ -10,7 +10,9 @@ import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import time
+import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -80,21 +82,34 @@ def thorough() -> list[Stage]:
     ]  # fmt: skip
 
 
+def counted(report: Path) -> str:
+    if not report.exists():
+        return ""
+    suite = next(ElementTree.parse(report).iter("testsuite"))
+    total, skipped, failed, errors = (int(suite.get(key, 0)) for key in ("tests", "skipped", "failures", "errors"))
+    parts = {"passed": total - skipped - failed - errors, "skipped": skipped, "failed": failed + errors}
+    return ", ".join(f"{count} {word}" for word, count in parts.items() if count)
+
+
 def run(stage: Stage) -> Outcome:
     if missing := [name for name in stage.needs if shutil.which(name) is None]:
         return Outcome(stage, None, f"not installed: {', '.join(missing)}")
     settings = [f"{name}={value}" for name, value in stage.variables.items()]
     print(f"\n== {stage.name}: {' '.join([*settings, *stage.words])}", flush=True)
-    begun, environment = time.monotonic(), {**launch_environment(), **stage.variables}
-    with subprocess.Popen(stage.words, cwd=ROOT, env=environment, start_new_session=True) as process:
-        try:
-            code = process.wait(stage.minutes * MINUTE)
-            text = f"exit code {code}"
-        except BaseException as error:  # at Ctrl-C too nothing goes on in the background
-            os.killpg(process.pid, signal.SIGTERM)
-            if not isinstance(error, subprocess.TimeoutExpired):
-                raise
-            code, text = 124, f"stopped after {stage.minutes:g} minutes"
+    begun = time.monotonic()
+    with tempfile.TemporaryDirectory() as folder:
+        report = Path(folder) / "report.xml"
+        words = [*stage.words, f"--junitxml={report}"] if "pytest" in stage.words else list(stage.words)
+        environment = {**launch_environment(), **stage.variables}
+        with subprocess.Popen(words, cwd=ROOT, env=environment, start_new_session=True) as process:
+            try:
+                code = process.wait(stage.minutes * MINUTE)
+                text = counted(report) or f"exit code {code}"
+            except BaseException as error:  # at Ctrl-C too nothing goes on in the background
+                os.killpg(process.pid, signal.SIGTERM)
+                if not isinstance(error, subprocess.TimeoutExpired):
+                    raise
+                code, text = 124, f"stopped after {stage.minutes:g} minutes"
     passed = None if code == CANNOT_RUN else code == 0
     return Outcome(stage, passed, text, time.monotonic() - begun)
 

@@ -1,10 +1,12 @@
 """The tools of the tests: stages that never count as passed what fails, hangs or lacks a tool; mutations; kernels."""
 
 import os
+import re
 import sys
 
 import pytest
 
+from tests.benchmark import kernels
 from tests.blas import STANDS_IN, loaded
 from tests.stages import CANNOT_RUN, Stage, fast, report, run, thorough
 from tests.tools.mutate import FOLDERS, KINDS, ROOT, Mutation, mutated, mutations, sample
@@ -68,3 +70,11 @@ def test_the_kernel_that_was_asked_for_is_in_use():
     kernels = set(loaded().values())
     assert kernels
     assert kernels <= {ASKED, STANDS_IN.get(ASKED)}
+
+
+@pytest.mark.long
+def test_every_kernel_has_a_time(capsys):
+    kernels.every_kernel(0.01)
+    rows = [line.split("|") for line in capsys.readouterr().out.splitlines() if re.search(r"\| +\d", line)]
+    assert len(rows) == 12
+    assert all(re.fullmatch(r" +\d[\d.e+]* (s|ms|us|ns) *", figure) for _, figure, *_ in rows)

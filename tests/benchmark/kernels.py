@@ -1,7 +1,6 @@
 """Time of friction, limit surfaces and scores on patches of known size; tests hold their accuracy."""
 
 import math
-import time
 from collections.abc import Callable
 
 import numpy as np
@@ -17,36 +16,9 @@ from softjaw.scoring.contact import SoftContact
 from softjaw.scoring.epsilon import epsilon
 from softjaw.scoring.pose import pose_volume
 from softjaw.scoring.quality import score
+from tests.benchmark.table import fastest, line, span, title
 from tests.generators import cor_grid, cyl_mesh, cylinder_grid, disc_polar, lcg_noise, lcg_patch, lcg_sphere, mesh_patch
 from tests.scoring.grasps import contact_axes
-
-
-def fastest(work: Callable[[], object], seconds: float = 1.0) -> float:
-    """Shortest of the times that ``work`` takes when it is repeated for so long [s]."""
-    work()
-    times, end = [], time.perf_counter() + seconds
-    while time.perf_counter() < end or len(times) < 3:
-        start = time.perf_counter()
-        work()
-        times.append(time.perf_counter() - start)
-    return min(times)
-
-
-def line(what: str, figure: str, goal: str = "") -> None:
-    print(f"{what:<62} | {figure:>16} | {goal}".rstrip(" |"), flush=True)
-
-
-def title(text: str) -> None:
-    print(f"\n{text}", flush=True)
-    line("what", "figure", "goal")
-
-
-def span(seconds: float) -> str:
-    for size, unit in ((1.0, "s"), (1e-3, "ms"), (1e-6, "us")):
-        if seconds >= size:
-            return f"{seconds / size:.3g} {unit}"
-    return f"{seconds * 1e9:.3g} ns"
-
 
 FACES, MOTIONS = 2400, 441
 

@@ -23,8 +23,8 @@ from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.pad.shape import PadShape
 from softjaw.study.case.model import Finger, touching
 from softjaw.study.doctor import launch_environment
-from tests.benchmark import kernels
-from tests.benchmark.kernels import fastest, line, title
+from tests.benchmark import kernels, other_code, users
+from tests.benchmark.table import fastest, line, title
 
 ROOT = Path(__file__).parents[2]
 SIZE = (0.060, 0.030, 0.015)  # pad [m]
@@ -93,7 +93,9 @@ def main() -> None:
         "kernels": kernels.every_kernel,
         "element": element_routine,
         "contact": contact_solve,
+        "getfem": other_code.compare,
         "map": lambda: whole_map(options.scene),
+        "users": users.every_mesh,
     }
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("part", nargs="*", choices=[*parts, []], help="default: all")

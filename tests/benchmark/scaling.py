@@ -16,6 +16,7 @@ CASES = (10**3, 10**4, 10**5, 10**6)
 def main(result: Path, figure: Path) -> None:
     mpl.use("Agg")
     from matplotlib import pyplot as plt
+
     with open_result(result) as file:
         seconds, (write, service, _) = file.read("work/seconds_total").ravel(), row_writes(file.layout)
     seconds = np.sort(seconds[np.isfinite(seconds)])[::-1]
