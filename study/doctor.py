@@ -98,10 +98,10 @@ def ask(code: str, *, prefix: tuple[str, ...] = (), limit: float = 60.0) -> Comp
 
 
 SADDLE = """
-from types import SimpleNamespace; import numpy as np; from softjaw.fem.petsc import PETSc, Factors
+import numpy as np; from scipy.sparse import csr_matrix; from softjaw.fem.petsc import PETSc, Factors
 assert PETSc.ScalarType is np.float64, "PETSc was built with complex scalars"
-start, column = np.array([0, 3, 6, 9], "i4"), np.tile(np.arange(3, dtype="i4"), 3)
-K = SimpleNamespace(start=start, column=column, values=np.array([2.0, 0, 1, 0, 2, 1, 1, 1, 0]))
+rows, columns = np.indices((3, 3), "i4").reshape(2, -1)
+K = csr_matrix((np.array([2.0, 0, 1, 0, 2, 1, 1, 1, 0]), (rows, columns)))
 x = Factors(K).solve(np.array([5.0, 7.0, 3.0]))
 assert np.allclose(x, [1.0, 2.0, 3.0]), f"MUMPS gave {x} for (1, 2, 3)"
 print(".".join(map(str, PETSc.Sys.getVersion())), "with real scalars; MUMPS solves a saddle-point system")

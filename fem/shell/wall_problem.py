@@ -187,6 +187,8 @@ class WallProblem(ContactProblem):
     def _add_contact(self, k: int, x: FloatArray, c: Evaluated) -> bool:
         """Add the contact of the ``k``-th finger to the tangent; whether the pattern has a place for all entries."""
         f, pick = self.fingers[k], self._engaged(self.fingers[k], c)
+        if not len(pick):
+            return True
         facet, point = np.divmod(pick, f.pad.face_N.shape[0])
         facing = Facing(*(values[pick] for values in vars(c.surface).values()))
         N, area = f.pad.face_N[point], f.pad.face_area[facet, point]

@@ -57,13 +57,12 @@ def choice(options: Namespace) -> tuple[int | None, tuple[float | None, float | 
 def report(options: Namespace) -> str:
     """Write one page with everything, of a file or of all objects of a folder."""
     # loads plotly, which tables do not need
-    from softjaw.study.show.report.objects_page import write_objects_page
-    from softjaw.study.show.report.writing import write_report
+    from softjaw.study.show.report import objects_page, writing
 
     if index := index_path(options.file):
-        return f"written: {write_objects_page(index, Path(options.output or index.with_suffix('.html')))}"
+        return f"written: {objects_page.write_objects_page(index, Path(options.output or index.with_suffix('.html')))}"
     page = Path(options.output or Path(options.file).with_suffix(".html"))
-    return f"written: {write_report(Path(options.file), page, *choice(options))}"
+    return f"written: {writing.write_report(Path(options.file), page, *choice(options))}"
 
 
 def view(options: Namespace) -> str:

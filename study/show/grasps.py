@@ -13,8 +13,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from softjaw.study.export.cases import cases
-from softjaw.study.export.selection import GripperFrame, holds
 from softjaw.study.flags import LOST, OF_FILE, Flag, flag_words, flags_in
 from softjaw.study.grippers import APPROACHES, Hand, gripper_file
 from softjaw.study.messages import StudyError
@@ -84,8 +82,11 @@ def hand_of(ds: xr.Dataset) -> Hand | None:
 
 def approach_of(ds: xr.Dataset, index: Index, hand: Hand) -> tuple[float, ...] | None:
     """Direction from which a hand comes to a case; empty where it does not reach it, None where that is not known."""
+    from softjaw.study.export import cases, selection  # with PETSc, which is slow to load
+
+    frame = selection.GripperFrame(hand, ())
     try:
-        ((approach, hold),) = holds(ds, next(cases(ds, MODELS[0], [index])), GripperFrame(hand, ())).items()
+        ((approach, hold),) = selection.holds(ds, next(cases.cases(ds, MODELS[0], [index])), frame).items()
     except StudyError:  # the object is not there now
         return None
     axis, sign = APPROACHES[approach]
