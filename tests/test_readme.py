@@ -3,6 +3,7 @@
 import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -17,7 +18,7 @@ PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 TEXT = "\n".join(page.read_text() for page in PAGES)
 FENCED = re.findall(r"^```(\w*)\n(.*?)^```$", TEXT, re.M | re.S)
 BLOCKS = [block.strip().splitlines() for language, block in FENCED if language != "python"]
-TYPED = re.compile(r"^(mkdir|cat) |softjaw ")
+TYPED = re.compile(r"^(mkdir|cat|python) |softjaw ")
 TYPED_IN = [[line for line in block if TYPED.search(line)] for block in BLOCKS if not block[0].startswith("conda")]
 SOFTJAW = [list(block) for block in dict.fromkeys(map(tuple, TYPED_IN))]
 FIRST = "mpirun -n 2 softjaw run jobs/smoke.toml"
@@ -36,7 +37,9 @@ def shell(line: str, folder: Path) -> None:
     programs = folder / "bin"
     programs.mkdir(exist_ok=True)
     (programs / "softjaw").write_text(f'#!/bin/sh\nexec {shlex.quote(sys.executable)} -m softjaw "$@"\n')
-    (programs / "softjaw").chmod(0o755)
+    (programs / "python").write_text(f'#!/bin/sh\nexec {shlex.quote(sys.executable)} "$@"\n')
+    for program in programs.iterdir():
+        program.chmod(0o755)
     path = f"{programs}:{os.environ['PATH']}"
     env = {**launch_environment(), "PYTHONPATH": str(ROOT), "PATH": path, "HOME": str(folder)}
     done = subprocess.run(
@@ -62,6 +65,8 @@ def run_in(folder: Path, block: list[str]) -> None:
             assert main(shlex.split(line, comments=True)[1:]) == 0, line
         else:
             shell(line, folder)
+        for objects in folder.glob("results/meshes/*.csv"):  # a few stand for all
+            objects.write_text("".join(objects.read_text().splitlines(keepends=True)[:4]))
         for file in made:
             assert (folder / file).stat().st_size > 300
         if PLAIN.fullmatch(line):
@@ -93,6 +98,8 @@ def test_commands_of_a_block(block, folder):
 @pytest.mark.long
 @pytest.mark.parametrize("block", blocks(True))
 def test_commands_that_take_longer(block, folder):
+    if shutil.which(program := block[0].split()[0]) is None and program not in ("python", "softjaw"):
+        pytest.skip(f"{program} is not installed")
     run_in(folder, block)
 
 
