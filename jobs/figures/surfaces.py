@@ -150,7 +150,8 @@ def _body(plotter: Any, found: StoredSurface, shape: Any, error: np.ndarray, top
     corners = np.stack([grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]], axis=2).reshape(-1, 4, 3)
     middle = 0.25 * (e[:-1, :-1] + e[1:, :-1] + e[1:, 1:] + e[:-1, 1:])
     solids.faces(plotter, corners, middle.ravel(), cmap=ERRORS, clim=(0, top))
-    drawing.dots(plotter, found.samples(MOTIONS) / most, 0.012, "white")
+    wrenches = found.wrenches(fibonacci_twists(MOTIONS, 1.0)) / most
+    drawing.dots(plotter, np.vstack([wrenches, -wrenches]), 0.012, "white")
     solids.lines(plotter, np.stack([np.eye(3), 1.25 * np.eye(3)], axis=1), pictures.INK, 3)
     solids.labels(plotter, 1.33 * np.eye(3), [name for name, _ in COMPONENTS])
 
