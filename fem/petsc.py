@@ -121,11 +121,16 @@ class Problem(Protocol):
         """Factor in (0, 1] by which the step ``x - factor * step`` must be shortened."""
 
 
-class SymmetricProblem(Problem, Protocol):
-    """A problem that says whether its tangent has a symmetric form; the solver sets ``condensed`` to get that one."""
+class SteppedProblem(Problem, Protocol):
+    """A problem that makes Newton's steps with another system than residual and tangent where the solver lets it.
+
+    It says whether its tangent has a symmetric form; the solver sets ``condensed`` to get that one, and ``stepped``
+    where it asks for the right side.
+    """
 
     symmetric: bool
     condensed: bool
+    stepped: bool
 
     def right_side(self, R: FloatArray) -> FloatArray:
         """Right-hand side ``(size,)`` with which the tangent gives the step that belongs to ``R``."""
@@ -183,7 +188,8 @@ class NonlinearSolver:
         self.seconds, self.thrifty, self.left = Seconds(), True, math.inf
         self._pattern = self.problem.pattern
         self._stored = self._pattern.start
-        self._condensed: SymmetricProblem | None = None
+        self._stepped: SteppedProblem | None = None
+        self._condensed = False
         self._norms: list[float] = []  # of the residual, at every step of this solve
         self._end: FloatArray | None = None  # solution of the solve before
         self._matrix = PETSc.Mat().createAIJ(
@@ -209,9 +215,11 @@ class NonlinearSolver:
         """Let the problem change the system of a step if it does so and the solver is one that gets on with it."""
         kind = (PETSc.Options().getAll() | self.options).get(f"{self.prefix}snes_type", "newtonls")
         # others use residual and tangent for more than a step, so these have to belong together
-        if kind == "newtonls" and getattr(self.problem, "symmetric", False):
-            self._condensed = cast(SymmetricProblem, self.problem)
-            self._condensed.condensed = True
+        if kind == "newtonls" and hasattr(self.problem, "right_side"):
+            self._stepped = cast(SteppedProblem, self.problem)
+            self._stepped.stepped = True
+            self._condensed = self._stepped.condensed = self._stepped.symmetric
+        if self._condensed:
             self._matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
 
     @contextmanager
@@ -344,7 +352,7 @@ class NonlinearSolver:
     def answer(self, right: FloatArray) -> FloatArray:
         """Solution of a linear system with the last solve's last tangent; its factors are at hand."""
         b, y = self._f.duplicate(), self._f.duplicate()
-        b.array[:] = self._condensed.right_side(right) if self._condensed else right
+        b.array[:] = self._stepped.right_side(right) if self._stepped else right
         self._snes.getKSP().solve(b, y)
         solution = y.array.copy()
         b.destroy()
@@ -383,9 +391,9 @@ class NonlinearSolver:
         # a matrix that nobody touches is not factorised again
         if not self._keeps(x.array_r):
             self._timed(lambda: self._fill(x.array_r, matrix))
-        if self._condensed:
+        if self._stepped:
             # between the norm of the residual and the linear system with it: nobody asks for it again
-            self._f.array[:] = self._condensed.right_side(self._f.array_r)
+            self._f.array[:] = self._stepped.right_side(self._f.array_r)
 
     def _fill(self, x: FloatArray, matrix: PETSc.Mat) -> None:
         self.problem.tangent(x)

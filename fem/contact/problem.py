@@ -329,11 +329,14 @@ class ContactProblem(ABC):
         """Nominal pressures of the points ``(n,)`` [Pa], negative ones of quadratic faces cut off."""
         return np.maximum(c.lam @ f.pad.face_N.T, 0.0).ravel()
 
-    def traction(self, k: int, x: FloatArray, c: Evaluated, derivatives: bool = False) -> tuple[FloatArray, ...]:
+    def traction(
+        self, k: int, x: FloatArray, c: Evaluated, derivatives: bool = False, before: FloatArray | None = None,
+        share: float = 1.0,
+    ) -> tuple[FloatArray, ...]:  # fmt: skip
         """Traction on the points of one pad ``(n, 3)`` [Pa], and its derivatives.
 
         They are those by what the point has moved along the object ``(n, 3, 3)`` [Pa/m], by the normal ``(n, 3, 3)``
-        [Pa] and by the pressure ``(n, 3)`` [-].
+        [Pa] and by the pressure ``(n, 3)`` [-]. ``before`` and ``share`` as in `stick_or_slip`.
         """
         assert self.friction is not None
         f, anchor, mu = self.fingers[k], self.friction.anchors[k], self.friction.mu
@@ -342,7 +345,7 @@ class ContactProblem(ABC):
         sticks = (anchor.closed & (c.gap < FAR))[:, None]
         d = np.where(sticks, anchor.traction - stick * self._moved(x, c, anchor), 0.0)
         pressure = self.point_pressure(f, c)
-        t, *changes = stick_or_slip(self._unit_normal(c), d, mu, pressure, derivatives)
+        t, *changes = stick_or_slip(self._unit_normal(c), d, mu, pressure, derivatives, before, share)
         if not derivatives:
             return (t,)
         by_d, by_normal, by_pressure = changes

@@ -17,7 +17,7 @@ NO_DIRECTIONS = np.empty((0, 3))
 class RigidProblem(ContactProblem):
     """One pad pressed on one rigid object; ``gap`` takes points of the pad's frame."""
 
-    condensed = False
+    condensed, stepped = False, False
 
     def __init__(self, pad: Pad, gap: Gap, mu: float | None = None) -> None:
         self.pad, self.closing_dof = pad, pad.closing_dof
@@ -25,6 +25,7 @@ class RigidProblem(ContactProblem):
         super().__init__([Finger(pad, gap)], mu)
         [self.finger] = self.fingers
         self.foam, self.non_negative = self.finger.foam, self.finger.pressures
+        self._slip_force: FloatArray | float = 0.0
         self.symmetric = mu is None  # slip grows with the pressure, but no pressure with slip
         self._build_pattern()
 
@@ -117,7 +118,16 @@ class RigidProblem(ContactProblem):
 
         It grows with the pressure, and no pressure with it, so the tangent is not symmetric.
         """
-        _, by_motion, by_normal, by_pressure = self.traction(0, x, c, derivatives=True)
+        assert self.friction is not None
+        assert c.traction is not None
+        before, share = self.friction.judging(x) if self.stepped else (None, 1.0)
+        t, by_motion, by_normal, by_pressure = self.traction(0, x, c, True, before, share)
+        if self.stepped:
+            self.friction.before = t
+            # the step is that of these tractions, the residual has its own
+            weight = self.pad.face_area
+            off = weight[..., None] * (c.traction - t).reshape(*weight.shape, 3)
+            self._slip_force = gather(self.finger.dofs, np.einsum("qa,fqi->fia", self.pad.face_N, off), self.size)
         length = np.linalg.norm(c.normal, axis=-1)[..., None]
         n = c.normal / length
         turns = (np.eye(3) - n[..., :, None] * n[..., None, :]) @ c.surface / length[..., None]
@@ -142,7 +152,9 @@ class RigidProblem(ContactProblem):
     def right_side(self, R: FloatArray) -> FloatArray:
         """Right-hand side ``(size,)`` with which the tangent has the step that belongs to the residual."""
         if not self.condensed:
-            return R
+            # once: the next step may be made with the same factors
+            right, self._slip_force = R + self._slip_force, 0.0
+            return right
         right, active, f = R.copy(), self._tangent_set, self.finger
         idle = np.where(active, 0.0, R[f.pressures] / (f.kappa * f.area))
         if idle.any():
@@ -182,14 +194,14 @@ class RigidProblem(ContactProblem):
         the others are left out. So it has one negative eigenvalue per node in contact, and more if ``x`` is unstable.
         """
         # the second and third belong to the factors at hand
-        before = self.control, self._tangent_set, self._by_force
+        before = self.control, self._tangent_set, self._by_force, self.stepped
         # any force will do: the kind of control enters the tangent, its value does not
-        self.control = Control(force=1.0)
+        self.control, self.stepped = Control(force=1.0), False
         self._evaluate_entries(x)
         # pressures are multipliers with the sign that makes the matrix symmetric
         self._condense()
         active = self._tangent_set
-        self.control, self._tangent_set, self._by_force = before
+        self.control, self._tangent_set, self._by_force, self.stepped = before
         # not into the pattern's own values, which stay those of the last tangent
         return self._added_up(), int(np.count_nonzero(active))
 

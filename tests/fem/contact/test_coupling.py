@@ -61,6 +61,17 @@ def test_coulombs_law_and_balance_hold(mu):
     assert state.checks.force_balance < 1e-8
 
 
+def test_judging_slip_by_what_was_before_changes_iterations_and_no_state(monkeypatch):
+    """The first steps of a solve are those of another system, the residual that ends it is not."""
+    (judged,) = press(OVAL, 0.4, pad_of((8, 6, 3), (False, False))).load_path([3.0])
+    monkeypatch.setattr(coupling, "SHARES", ())
+    (plain,) = press(OVAL, 0.4, pad_of((8, 6, 3), (False, False))).load_path([3.0])
+    assert judged.iterations != plain.iterations
+    assert judged.iterations < 1.2 * plain.iterations
+    assert judged.closing == pytest.approx(plain.closing, rel=1e-8)
+    assert np.abs(judged.pressure - plain.pressure).max() < 1e-5 * plain.pressure.max()
+
+
 def steeper(x):
     """Of the ball, with a gradient that is up to a fifth longer than a unit vector, as that of a sampled distance."""
     g, n, H = BALL(x)
