@@ -84,13 +84,14 @@ class RigidProblem(ContactProblem):
         [c], f = self.evaluate(x), self.finger
         pressure = (c.lam @ self.pad.face_N.T).ravel()[:, None, None]
         # where nothing presses a Hessian may not exist
-        by_place, by_lam = -pressure * np.where(pressure == 0.0, 0.0, c.surface), c.normal
+        by_place = -pressure * np.where(pressure == 0.0, 0.0, c.surface)
+        self._K_ul = by_lam = self._products(c.normal).transpose(0, 1, 3, 2)
         if self.friction is not None:
             slip_by_place, slip_by_lam = self._slip(x, c)
-            by_place, by_lam = by_place - slip_by_place, by_lam + slip_by_lam
+            by_place -= slip_by_place
+            by_lam = by_lam + self._products(slip_by_lam).transpose(0, 1, 3, 2)
         face[:] = self._products(by_place).transpose(0, 3, 1, 4, 2).ravel()
-        by_pressure[:] = -f.kappa * self._products(by_lam).transpose(0, 1, 3, 2).ravel()
-        self._K_ul = self._products(c.normal).transpose(0, 1, 3, 2)
+        by_pressure[:] = -f.kappa * by_lam.ravel()
         diagonal[:] = 0.0
         self._tangent_set = c.active
         if self.complementarity:
