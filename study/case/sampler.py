@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
@@ -44,7 +44,7 @@ BETWEEN = 4e-3  # distance of the points of an object that a hand must not meet 
 EDGE_COST = 0.05  # of a payload, for which a place off the edges of the object is preferred
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SampledGrasp:
     """A grasp as the spring foundation sees it.
 
@@ -263,19 +263,25 @@ def thinned(
         # rounded, so that those that are equal but for rounding come in the order in which they were found
         # digits of a payload over the best one, by which grasps are ranked
         ranked = sorted(some, key=lambda g: -round(g.payload / best, 3) if best > 0 else 0.0)
-        chosen: list[SampledGrasp] = []
-        for asked in (reached, lambda _: True) if good else (lambda _: True,):
-            for alike in (same_point, same_grasp):
-                for grasp in ranked:
-                    # share of the best payload, below which a grasp is not proposed
-                    if len(chosen) == count or grasp.payload < 0.02 * best:
-                        break
-                    if not any(alike(grasp, other, length) for other in chosen) and asked(grasp):
-                        chosen.append(grasp)
-            if chosen:
-                break
+        # share of the best payload, below which a grasp is not proposed
+        worth = ranked[: next((n for n, grasp in enumerate(ranked) if grasp.payload < 0.02 * best), len(ranked))]
+        chosen = (good and _spread(worth, count, length, reached)) or _spread(worth, count, length)
         kept += sorted(chosen, key=lambda g: -g.payload)
     return kept
+
+
+def _spread(
+    ranked: Sequence[SampledGrasp], count: int, length: float, asked: Callable[[SampledGrasp], bool] = lambda _: True
+) -> list[SampledGrasp]:
+    """At most ``count`` distinct grasps of which ``asked`` is true: of every place the first, then further ones."""
+    chosen: list[SampledGrasp] = []
+    for alike in (same_point, same_grasp):
+        for grasp in ranked:
+            if len(chosen) == count:
+                return chosen
+            if not any(alike(grasp, other, length) for other in chosen) and asked(grasp):
+                chosen.append(grasp)
+    return chosen
 
 
 def same_point(grasp: SampledGrasp, other: SampledGrasp, length: float) -> bool:
@@ -326,15 +332,13 @@ def reached_by_hand(scene: Scene) -> Callable[[SampledGrasp], bool]:
         return lambda _: True
     hand, placed, size = gripper_file(scene.gripper.preset)[1], own_frame(scene.object), scene.gripper.pad_size
     points = surface_points(scene.object, BETWEEN)
-    known: dict[int, bool] = {}
 
+    @cache
     def reached(grasp: SampledGrasp) -> bool:
-        if id(grasp) not in known:
-            axes = placed.rotation @ axes_of(grasp.approach, grasp.long_side)
-            wide, most, depth = opened(hand, scene.gripper, grasp.opening)
-            room = rooms(points, hand, hand.closing, axes, placed.to_object(grasp.point), size, wide, depth)
-            known[id(grasp)] = grasp.opening <= most and max(room.values()) > FREE
-        return known[id(grasp)]
+        axes = placed.rotation @ axes_of(grasp.approach, grasp.long_side)
+        wide, most, depth = opened(hand, scene.gripper, grasp.opening)
+        room = rooms(points, hand, hand.closing, axes, placed.to_object(grasp.point), size, wide, depth)
+        return grasp.opening <= most and max(room.values()) > FREE
 
     return reached
 
