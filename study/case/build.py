@@ -70,7 +70,7 @@ def centre_of_volume(obj: Any) -> NDArray[np.float64]:
     return solid_centroid(*obj.surface())
 
 
-def body_of(shape: Any) -> dict[str, NDArray[np.float64]]:
+def centroid_and_bounds(shape: Any) -> dict[str, NDArray[np.float64]]:
     """Centroid ``(3,)`` and bounds ``(2, 3)`` [m] of an object in the frame of its own file."""
     placed = own_frame(shape)
     points = placed.to_object(np.asarray(surface_triangles(shape)[0], float))

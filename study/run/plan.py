@@ -14,7 +14,7 @@ import numpy as np
 
 from softjaw.study.case import candidates as grasps
 from softjaw.study.case.build import (
-    body_of,
+    centroid_and_bounds,
     check_object,
     forces_apart,
     geometry,
@@ -123,7 +123,7 @@ def _about(scene: Any) -> dict[str, Any]:
     if scene.candidates.rejected:
         about["rejected"] = np.array(scene.candidates.rejected, np.float32)
     if scene.object.shape == "mesh" and not any(key.startswith("object.") for key in scene.sweep):
-        about |= body_of(scene.object)
+        about |= centroid_and_bounds(scene.object)
     return about
 
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from softjaw.study.case.build import body_of
+from softjaw.study.case.build import centroid_and_bounds
 from softjaw.study.ranking import Place
 from softjaw.study.result.read import scene_of
 from softjaw.study.scene import SceneError
@@ -56,7 +56,7 @@ def spot(ds: xr.Dataset, index: Index) -> Spot:
     origin, turn = (field(ds, f"finger_pose_{name}") for name in ("origin", "rotation"))
     try:
         scene = scene_of(ds, index)
-        body = ds.attrs if "object_bounds" in ds.attrs else body_of(scene.object)
+        body = ds.attrs if "object_bounds" in ds.attrs else centroid_and_bounds(scene.object)
     except (SceneError, ValueError, OSError, AttributeError):
         return Spot("", "", math.nan)
     if origin is None or turn is None or not np.isfinite(turn[index]).all():
