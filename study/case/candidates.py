@@ -80,9 +80,7 @@ def check_candidates(scene: Scene) -> None:
     Raises `StudyError` with the numbers and labels of the poses.
     """
     if scene.candidates.sampled and not scene.candidates.poses:
-        from softjaw.study.case import sampler  # compiled loops, which most scenes are checked without
-
-        sampler.check_sampler(scene)
+        _sampler().check_sampler(scene)
     if not scene.candidates.poses or scene.object.shape == "plane":  # which has no end
         return
     labels: dict[int, str] = {}
@@ -145,9 +143,13 @@ def with_sampled_grasps(scene: Scene) -> Scene:
     if scene.candidates.sampled is None:
         return scene
     check_object(scene)
-    from softjaw.study.case import sampler
+    return _sampler().with_sampled_grasps(scene)
 
-    return sampler.with_sampled_grasps(scene)
+
+def _sampler() -> Any:
+    from softjaw.study.case import sampler  # compiled loops, which most scenes are checked without
+
+    return sampler
 
 
 # --- axes of the maps, and units of work ------------------------------------------------------------------------------
