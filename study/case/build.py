@@ -39,7 +39,7 @@ def build_object(shape: Any) -> GapObject:
         case "mesh":
             return geometry().mesh_object(shape)
         case "revolution":
-            return _revolution(shape)
+            return objects.Revolution(np.array(shape.profile))
         case "sections":
             return geometry().Stacked(outer_surface(shape))
         case "elliptic_cylinder":
@@ -124,21 +124,17 @@ def centre_of_mass(scene: Scene, obj: Any) -> NDArray[np.float64]:
 
 
 @lru_cache(maxsize=8)
-def _revolution(shape: Any) -> objects.Revolution:
-    return objects.Revolution(np.array(shape.profile))
-
-
-@lru_cache(maxsize=8)
 def outer_surface(shape: Any) -> OuterSurface:
     """Outer surface of an object that can have a wall.
 
     Raises `ValueError` for geometry that cannot be.
     """
     if shape.shape == "revolution":
-        return of_revolution(_revolution(shape))
+        body = build_object(shape)
+        assert isinstance(body, objects.Revolution)
+        return of_revolution(body)
     if shape.shape == "mesh":
-        surface, _ = geometry().traced_surface(shape)
-        return surface
+        return geometry().traced_surface(shape)[0]
     return of_sections([Section(s.z, s.a, s.b, s.exponent, s.shift) for s in shape.sections])
 
 
@@ -222,7 +218,7 @@ def warnings(scene: Scene) -> tuple[str, ...]:
     edges = (scene.candidates.warnings(shape, axis_span(shape), scene.gripper) for shape in shapes)
     walls = [geometry().trace_warning(shape) for shape in shapes if shape.shape == "mesh" and shape.wall is not None]
     placed = next((warned for warned in map(tuple, edges) if warned), ())
-    return (*scene.warnings, *placed, *_remarks(scene), *walls)
+    return (*scene.warnings(), *placed, *_remarks(scene), *walls)
 
 
 def told(scene: Scene) -> list[str]:

@@ -49,12 +49,7 @@ from softjaw.study.scene.text import flat, parse_toml, read_text, toml_text
 Option = str | int | float | bool
 Numbers = Annotated[tuple[int | float, ...], Field(strict=False)]  # one value of a key that takes a list
 WATCHING = ("monitor", "view", "converged_reason")  # PETSc options that only print
-ALTERNATIVES = {  # what an override of a way of giving candidates replaces
-    "stations": ("poses", "sampled"),
-    "stations_mm": ("stations", "poses", "sampled"),
-    "poses": ("stations", "stations_mm", "sampled"),
-    "sampled": ("stations", "stations_mm", "poses"),
-}
+WAYS = ("stations", "stations_mm", "poses", "sampled")  # of giving candidates: an override of one replaces the others
 NOT_SWEPT = (  # they change which datasets a file has and how large they are, or no number of a case
     "object.shape", "object.mesh", "object.name", "object.mass_g", "object.density", "gripper.preset",
     "candidates.stations", "accuracy.meshes", "accuracy.target", "effects.wrench", "limit_surface.samples",
@@ -148,12 +143,8 @@ class Scene(SceneSection):
         """
         return load_scene(file, overrides)
 
-    @property
-    def warnings(self) -> tuple[str, ...]:
+    def warnings(self) -> Iterator[str]:
         """Sentences about values that are allowed but seldom meant."""
-        return tuple(self._warnings())
-
-    def _warnings(self) -> Iterator[str]:
         mu, g, force = self.friction.mu, self.gripper, self.load.normal_force[-1]
         if mu > 2:
             yield f"friction.mu = {mu:g} is large: foam on plastic has about 0.8, and the paper's highest is 2"
@@ -427,8 +418,10 @@ def put_overrides(data: dict[str, Any], overrides: Sequence[str], given: dict[Ke
                 data[section][key] = {**old, **value} if both else value
                 given[(section, key)] = place, None
                 given.setdefault((section,), (place, None)) if len(data[section]) == 1 else None
-                if section == "candidates":
-                    _drop_alternatives(data[section], key, given)
+                for way in WAYS if section == "candidates" and key in WAYS else ():
+                    # a number of stations stands beside the first and the last of them
+                    if (section, way) not in given and (key, way) != ("stations", "stations_mm"):
+                        data[section].pop(way, None)
     return problems
 
 
@@ -442,13 +435,6 @@ def _override(text: str) -> dict[str, Any] | None:
             if equals and text.isprintable():
                 return tomllib.loads(f"{key} = {written}")
     return None
-
-
-def _drop_alternatives(table: dict[str, Any], key: str, given: Mapping[KeyPath, Place]) -> None:
-    """Let an override of one way of giving candidates replace the others, unless they are overrides too."""
-    for way in ALTERNATIVES.get(key, ()):
-        if ("candidates", way) not in given:
-            table.pop(way, None)
 
 
 def axis_rules(sweep: Mapping[str, Sequence[Any]], sections: Mapping[str, Any]) -> Errors:

@@ -48,12 +48,6 @@ class Shape(SceneSection):
         """Extent along each axis, where it is known without a mesh file [mm]."""
         return self._geometry()[1]
 
-    @property
-    def extent(self) -> float | None:
-        """Largest extent [m]; None where it is not known without a mesh file."""
-        spans = self.spans_mm.values()
-        return in_si("extent_mm", max(high - low for low, high in spans)) if len(spans) == 3 else None
-
     def _geometry(self) -> tuple[int, dict[str, Span]]:
         """`axis_symmetry` and `spans_mm`."""
         return 1, {}

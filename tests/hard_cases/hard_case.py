@@ -16,12 +16,12 @@ from softjaw.study.case.result import CaseFailure, CaseResult
 from softjaw.study.messages import StudyError
 from softjaw.study.quantities import NEEDS, quantities
 from softjaw.study.scene import Scene, SceneError, parse_scene
-from softjaw.study.scene.model import ALTERNATIVES
+from softjaw.study.scene.model import WAYS
 from softjaw.study.scene.text import toml_text
 
 FOLDER = Path(__file__).parent
 MAPS = {q.name: q for q in quantities(NEEDS) if q.group == "maps"}
-WHOLE = {"object": ("shape",), "candidates": tuple(ALTERNATIVES)}  # keys that make a section replace its base's
+WHOLE = {"object": ("shape",), "candidates": tuple(WAYS)}  # keys that make a section replace its base's
 CHECKS = {"force_balance": max, "adhesion": max, "penetration": max, "min_det_f": min, "ellipticity": min}
 
 
