@@ -321,8 +321,8 @@ class EffectChoice:
         try:
             # a wall whose coarse load path with friction has ended: the fine one takes long to end, too
             walled = self.solver.walled and self.levels.object.endswith("shell")
-            if walled and forces_apart(self.solver.scene) and (lost := self.solver.failure(k, COARSE, coupled)):
-                raise ConvergenceError(f"on the coarse mesh {lost}")
+            if walled and forces_apart(self.solver.scene):
+                self.solver.solve(k, COARSE, coupled)
             return self.solver.case(k, coupled, self._share_left_out(k))
         except (ConvergenceError, CheckError) as error:
             self._chosen[COUPLING, k] = level._replace(level=level_named(COUPLING, "none"), reason=FAILED)

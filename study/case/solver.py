@@ -172,13 +172,6 @@ class CandidateSolver:
             self._solutions[k, mesh, levels] = Solution(fingers, states, fingers.contacts(states))
         return self._solutions[k, mesh, levels]
 
-    def failure(self, k: int, mesh: int, levels: Levels) -> Failure | None:
-        """Why there is no solution at the ``k``-th force; None where there is one."""
-        if (k, mesh, levels) in self._solutions:
-            return None
-        parts = range(len(self.pressing(mesh, levels).parts))
-        return next((s for part in parts if isinstance(s := self._state(k, mesh, levels, part), Failure)), None)
-
     def case(self, k: int, levels: Levels, left_out: float = 0.0) -> Solved:
         """Solutions of a case on the scene's meshes, and on finer ones where ``accuracy.target`` asks for them.
 
@@ -189,20 +182,17 @@ class CandidateSolver:
         fine = self.solve(k, FINE, levels)
         if not forces_apart(self.scene):
             return Solved([fine])
-        if failure := self.failure(k, COARSE, levels):
-            solved = Solved([fine], NO_ERROR.format(reason=failure))
-        else:
-            solved = Solved([fine, self.solve(k, COARSE, levels)])
+        solved, unknown = Solved([fine]), NO_ERROR
+        try:
+            coarse = self.solve(k, COARSE, levels)
+            solved, unknown = Solved([fine, coarse]), NO_PATH_ERROR
             if levels.friction_pressure_coupling != "none":
-                solved = self._with_long_steps(solved, k, levels)
+                # what the steps of its load path leave: the difference to steps of twice the length
+                pair = coarse.contacts, self.solve(k, LONG_STEPS, levels).contacts
+                solved = replace(solved, pairs=[pair])
+        except (ConvergenceError, CheckError) as failure:
+            solved = replace(solved, note=unknown.format(reason=failure))
         return self._refined(solved, k, levels, left_out) if isinstance(fine.fingers, OnRigid) else solved
-
-    def _with_long_steps(self, solved: Solved, k: int, levels: Levels) -> Solved:
-        """The case with what the steps of its load path leave: the difference to steps of twice the length."""
-        if failure := self.failure(k, LONG_STEPS, levels):
-            return replace(solved, note=NO_PATH_ERROR.format(reason=failure))
-        assert solved.coarse is not None
-        return replace(solved, pairs=[(solved.coarse.contacts, self.solve(k, LONG_STEPS, levels).contacts)])
 
     @property
     def seconds(self) -> Seconds:
