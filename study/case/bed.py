@@ -89,8 +89,10 @@ class Side:
     @property
     def normal(self) -> FloatArray:
         """Mean direction into the object in the pad's frame, weighted by pressure; z is the approach ``(3,)``."""
-        mean = (self.pressure[..., None] * self.slope).sum(axis=(0, 1)) / self.pressure.sum()
-        return _direction(mean)
+        x, y = (self.pressure[..., None] * self.slope).sum(axis=(0, 1)) / self.pressure.sum()
+        # the height grows where the surface recedes: its outward normal leans towards that side
+        direction = np.array([-x, -y, 1.0])
+        return direction / np.linalg.norm(direction)
 
     @property
     def peak(self) -> float:
@@ -107,18 +109,6 @@ class Side:
         return Contact(patch, self.jaws.mu, pose)
 
 
-def _direction(slope: FloatArray) -> FloatArray:
-    """Unit normal into the object where its height field has a slope ``(2,)``."""
-    # the height grows where the surface recedes: its outward normal leans towards that side
-    direction = np.array([-slope[0], -slope[1], 1.0])
-    return direction / np.linalg.norm(direction)
-
-
-def _one_more(x: FloatArray) -> FloatArray:
-    """Even steps ``(n,)`` with one more at both ends."""
-    return np.concatenate([[2.0 * x[0] - x[1]], x, [2.0 * x[-1] - x[-2]]])
-
-
 class JawsOnSurface:
     """Both pads on a surface, in one pose of the gripper."""
 
@@ -128,7 +118,9 @@ class JawsOnSurface:
         x, y = (side * ((np.arange(n) + 0.5) / n - 0.5) for side, n in zip((length, width), GRID, strict=True))
         local = (surface[0] - point) @ axes
         self.local, self.triangles = np.ascontiguousarray(local), surface[1]
-        low, high = height_fields(self.local, self.triangles, *(_one_more(part) for part in (x, y)))
+        # with one more even step at both ends
+        wider = (np.pad(part, 1, "reflect", reflect_type="odd") for part in (x, y))
+        low, high = height_fields(self.local, self.triangles, *wider)
         if not np.isfinite(low[INNER]).any():
             raise NoContactError("the pad misses the object")
         # finger 2 looks against the approach, with its short side reversed
@@ -192,14 +184,11 @@ class JawsOnSurface:
         shares = []
         for side, height in zip(self.sides, self._fields, strict=True):
             z = np.where(np.isfinite(height), height, side.touch + side.jaws.pad[2])
-            steps = abs(side.x[1, 0] - side.x[0, 0]), abs(side.y[0, 1] - side.y[0, 0])
-            edge = np.zeros(z.shape, dtype=bool)
-            for axis, step in enumerate(steps):
-                jump = np.abs(np.diff(z, axis=axis)) > 3.0 * step
-                first, second = ([slice(None)] * 2 for _ in range(2))
-                first[axis], second[axis] = slice(None, -1), slice(1, None)
-                edge[tuple(first)] |= jump
-                edge[tuple(second)] |= jump
+            edge, dx, dy = np.zeros(z.shape, dtype=bool), side.x[1, 0] - side.x[0, 0], side.y[0, 1] - side.y[0, 0]
+            for field, mask, step in ((z, edge, dx), (z.T, edge.T, dy)):
+                jump = np.abs(np.diff(field, axis=0)) > 3.0 * abs(step)
+                mask[:-1] |= jump
+                mask[1:] |= jump
             shares.append(float(side.pressure[edge[INNER]].sum() / side.pressure.sum()))
         return max(shares)
 

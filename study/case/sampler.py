@@ -29,7 +29,6 @@ from softjaw.study.grippers import gripper_file
 from softjaw.study.messages import USAGE, NoGraspError
 from softjaw.study.quantities import COLLIDES, MISSING, SLIPS, STATES, WIDE
 from softjaw.study.scene import Scene
-from softjaw.study.scene.grasps import OF_EVERY_KIND, Candidates
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -319,9 +318,8 @@ def with_sampled_grasps(scene: Scene) -> Scene:
     poses = tuple(pose_of(numbers) for numbers, state in given_as if not state)
     if not poses:
         raise _no_grasp(found)
-    kept = {key: getattr(given, key) for key in OF_EVERY_KIND}
     # how many were asked for stays, which tells that they are screened
-    where = Candidates(poses=poses, **kept).model_copy(update={"sampled": given.sampled})
+    where = given.model_copy(update={"poses": poses})
     where._rejected = tuple((*numbers, state) for numbers, state in given_as if state)
     return scene.model_copy(update={"candidates": where, "accuracy": listed_accuracy(scene)})
 
