@@ -1,13 +1,13 @@
 """Friction, fit and score in one function: two contact patches in, all values of a case out.
 
-The study, the cost study and the uncertainty call `evaluate`, or `quality` and `volume_in_pose` where one number is
-enough; ``softjaw patch`` takes the limits and fits of the same `Contact`, and `exact_score`.
+The study, the cost study and the uncertainty call `evaluate`, or `quality` where one number is enough; ``softjaw
+patch`` takes the limits and fits of the same `Contact`, and `exact_score`.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -98,7 +98,11 @@ def evaluate(
     each contact its limit surface in every friction model.
     """
     # friction limits come with the contacts, so fitting is the first step that takes time
-    fits = _per_patch(contacts, lambda c: {m: fit_surface(c, m, settings.surface) for m in MODELS})
+    first, second = contacts
+    fits = [{m: fit_surface(first, m, settings.surface) for m in MODELS}]
+    # the patch object itself tells an image: equal numbers would tell it too, but cost a comparison of all faces
+    alike = second.patch is first.patch
+    fits.append(fits[0] if alike else {m: fit_surface(second, m, settings.surface) for m in MODELS})
     scores, best = _scores(contacts, fits, settings)
     values = _friction_values(contacts) | scores | surface_values(contacts, fits, settings.six)
     values["maps/flags"] = pose_flags(contacts) | raised(best.flag) | fit_flag(fits)
@@ -107,13 +111,6 @@ def evaluate(
         values |= payloads
         values["maps/flags"] |= flag
     return values, fits
-
-
-def _per_patch(contacts: Sequence[Contact], work: Callable[[Contact], Any]) -> list[Any]:
-    """A result for each contact, computed once where the second one is an image with the patch of the first."""
-    # the patch object itself tells an image: equal numbers would tell it too, but cost a comparison of all faces
-    first = work(contacts[0])
-    return [first, first if contacts[1].patch is contacts[0].patch else work(contacts[1])]
 
 
 def _friction_values(contacts: Sequence[Contact]) -> dict[str, Any]:
@@ -201,12 +198,12 @@ def _scores(
     return {f"maps/{name}": values for name, values in scores.items()}, closed[MODELS[0]]
 
 
-def quality(contacts: Sequence[Contact], settings: EvaluationSettings, model: str = MODELS[0]) -> float:
-    """The map ``quality`` of one friction model alone."""
-    closed = _closed(contacts, model, settings).quality
+def quality(contacts: Sequence[Contact], settings: EvaluationSettings) -> float:
+    """The map ``quality`` of the curved model alone."""
+    closed = _closed(contacts, MODELS[0], settings).quality
     if faces(contacts, settings) or closed == 0:
         return closed
-    return _volume(contacts, [c.ellipsoids[model] for c in contacts], settings)
+    return _volume(contacts, [c.ellipsoids[MODELS[0]] for c in contacts], settings)
 
 
 def faces(contacts: Sequence[Contact], settings: EvaluationSettings) -> bool:
@@ -252,18 +249,13 @@ def _volume(contacts: Sequence[Contact], bodies: Sequence[Any], settings: Evalua
     # A flat body would fail in the volume's integration, and its result is known.
     if any(body.rank < 3 for body in bodies):
         return 0.0
-    return volume_in_pose(soft(contacts, bodies), settings.arms, settings.torques)
+    first, second = soft(contacts, bodies)
+    return pose_volume(first, second, settings.arms, settings.torques, with_l1=False).linf
 
 
 def soft(contacts: Sequence[Contact], bodies: Sequence[Any]) -> list[SoftContact]:
     """Contacts as a score takes them, each with a limit surface in ``(f_x, f_y, tau_z)`` per unit of S."""
     return [c.soft(body) for c, body in zip(contacts, bodies, strict=True)]
-
-
-def volume_in_pose(pair: Sequence[SoftContact], arms: ArrayLike, torques: float) -> float:
-    """Volume of the grasp wrench space (L-infinity) of two contacts with any full bodies, in any pose."""
-    first, second = pair
-    return pose_volume(first, second, arms, torques, with_l1=False).linf
 
 
 def exact_score(pair: Sequence[SoftContact], arms: float, torques: float) -> dict[str, Any]:
