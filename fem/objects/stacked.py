@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from types import SimpleNamespace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,13 +35,13 @@ class Stacked(Analytic):
         """Signed distance ``(n,)`` [m], normal ``(n, 3)`` and Hessian ``(n, 3, 3)`` [1/m]."""
         x = np.asarray(x, dtype=float)
         # where the exact place on the wall is looked for [m]
-        return self._gap(x, np.abs(self._triangles.gap(x)[0]) < 0.004)
+        return self.gap_of(x, np.abs(self._triangles.gap(x)[0]) < 0.004)
 
     def near(self, pose: Pose, lower: FloatArray, upper: FloatArray, element: float | None = None) -> GapFunction:
         """Gap function for use close to the wall, which need not ask the triangles first."""
-        return SimpleNamespace(gap=lambda x: self._gap(x, np.ones(len(x), dtype=bool)))
+        return CloseToWall(self)
 
-    def _gap(self, x: FloatArray, close: NDArray[np.bool_]) -> Gap:
+    def gap_of(self, x: FloatArray, close: NDArray[np.bool_]) -> Gap:
         """Exact where points are ``close`` to the wall and face it, else from the triangles."""
         g, normal, hessian = np.zeros(len(x)), np.zeros((len(x), 3)), np.zeros((len(x), 3, 3))
         none = np.zeros((self._wall.nodes.max() + 1, 3))
@@ -84,6 +83,17 @@ class Stacked(Analytic):
         top = np.stack([np.full(around, last), ring + (rows - 1) * around, after + (rows - 1) * around], 1)
         triangles = np.concatenate([grid_triangles(rows, around, closed=True), bottom, top])
         return np.concatenate([X.reshape(-1, 3), ends]), triangles.astype(np.int64)
+
+
+@dataclass(frozen=True, eq=False)
+class CloseToWall:
+    """Gap function of a body for points close to its wall, as of a pad that touches it."""
+
+    body: Stacked
+
+    def gap(self, x: FloatArray) -> Gap:
+        """Signed distance, normal and Hessian, as of `Stacked`."""
+        return self.body.gap_of(x, np.ones(len(x), dtype=bool))
 
 
 def wall_surface(outer: OuterSurface, lower: float | None = None, upper: float | None = None) -> SplineSurface:

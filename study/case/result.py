@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -36,12 +37,12 @@ class TimeLimitError(BaseException):
     """The case in flight has had its time; not an ``Exception``, so that no solver takes it for a failed step."""
 
 
-class GraspNumbers:
+class GraspNumbers(ABC):
     """The main numbers of a grasp by name, for who has a `value`: of a case in memory, or of points of a map."""
 
+    @abstractmethod
     def value(self, name: str, model: str = "ccm") -> Any:
         """A quantity of the grasp in SI units, of one friction model where it has several."""
-        raise NotImplementedError
 
     @property
     def e_n(self) -> Any:
