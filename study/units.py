@@ -87,11 +87,6 @@ def in_si(key: str, value: Any) -> Any:
     return value * unit.times / unit.over if unit else value
 
 
-def si(key: str) -> Any:
-    """A property that gives the key ``key`` of a scene section in SI units (None where the key says ``"auto"``)."""
-    return property(lambda section: in_si(key, getattr(section, key)), doc=f"``{key}`` in SI units.")
-
-
 def shown_unit(si_unit: str) -> str:
     """The unit in which a quantity is shown.
 

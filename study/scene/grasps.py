@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr
 
 from softjaw.study.scene.objects import LARGEST_MM, Plate, Shape, Span, SphereShape
 from softjaw.study.scene.section import Direction, Errors, SceneSection, Text, Vector, once_and_rising, wrong
 from softjaw.study.scene.sections import Gripper
-from softjaw.study.units import converted, si
+from softjaw.study.units import converted
 
 Angle = Annotated[float, Field(ge=-360, le=360)]
 POSE = [{"point_mm": [0, 0, 20], "approach": [1, 0, 0], "long_side": [0, 0, 1]}]
@@ -33,7 +33,6 @@ class GraspPose(SceneSection):
         description="direction of the pads' long side; only its part across the approach counts", examples=[[0, 0, 1]]
     )
     label: Text = Field("", max_length=100, description="name of the grasp")
-    point: ClassVar[Any] = si("point_mm")
 
     def rules(self) -> Errors:
         """Directions that do not fix a frame, points far from any object."""
@@ -84,8 +83,6 @@ class Candidates(SceneSection):
         description=f"most cases that are solved beside the scene's own, around the best; true is {BUDGET}",
         examples=[BUDGET],
     )
-    angles, roll, station_values = si("angles_deg"), si("roll_deg"), si("station_values_mm")
-    shift: ClassVar[Any] = si("shift_mm")
 
     @property
     def station_values_mm(self) -> tuple[float, ...]:

@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, get_args
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, get_args
 
 from pydantic import Field, ValidationInfo, field_validator
 
 from softjaw.fem.objects.mesh_file import ENDINGS, lacking
 from softjaw.study.scene.section import Errors, Point, SceneSection, Text, numbers_text, refusal, wrong
-from softjaw.study.units import in_si, si
 
 SMALLEST_MM, LARGEST_MM = 1.0, 2000.0
 WALL_KEYS = ("base_wall_mm", "young_modulus_gpa", "wall_poisson_ratio", "yield_strength_mpa", "allowed_dent_mm")
@@ -36,7 +35,6 @@ class Shape(SceneSection):
     density: Annotated[float, Field(gt=0, le=30_000)] | None = Field(
         None, description="instead of the mass, of a body that is solid [kg/m^3]"
     )
-    mass: ClassVar[Any] = si("mass_g")
 
     @property
     def axis_symmetry(self) -> int:
@@ -84,13 +82,6 @@ class Walled(Shape):
     support: Literal["standing", "clamped", "free"] = Field(
         "standing", description="standing on its bottom, clamped there (a tube at both ends), or held by the fingers"
     )
-    base_wall, young_modulus = si("base_wall_mm"), si("young_modulus_gpa")
-    yield_strength, allowed_dent = si("yield_strength_mpa"), si("allowed_dent_mm")
-
-    @property
-    def wall(self) -> float | tuple[Span, ...] | None:
-        """Wall thickness, or pairs of height and thickness [m]; None for a rigid object."""
-        return in_si("wall_mm", self.wall_mm)
 
     @property
     def thicknesses_mm(self) -> tuple[float, ...]:
@@ -141,7 +132,6 @@ class SphereShape(Shape):
     SIZE_KEYS = ("radius_mm",)
     shape: Literal["sphere"]
     radius_mm: Length = Field(description="radius")
-    radius: ClassVar[Any] = si("radius_mm")
 
     def _geometry(self) -> tuple[int, dict[str, Span]]:
         return 0, dict.fromkeys("xyz", (-self.radius_mm, self.radius_mm))
@@ -155,7 +145,6 @@ class EllipticCylinderShape(Shape):
     semi_axis_a_mm: Length = Field(description="semi-axis along x, the approach at angle 0")
     semi_axis_b_mm: Length = Field(description="semi-axis along y, across the approach at angle 0")
     length_mm: Length = Field(description="length along z, edges rounded by 2 mm included")
-    semi_axis_a, semi_axis_b, length = si("semi_axis_a_mm"), si("semi_axis_b_mm"), si("length_mm")
 
     def _geometry(self) -> tuple[int, dict[str, Span]]:
         a, b, half = self.semi_axis_a_mm, self.semi_axis_b_mm, self.length_mm / 2
@@ -170,7 +159,6 @@ class BoxShape(Shape):
     shape: Literal["box"]
     size_mm: Triple = Field(description="size along x, y and z", examples=[[60, 40, 120]])
     edge_radius_mm: float = Field(gt=0, description="radius of the edges and corners")
-    size, edge_radius = si("size_mm"), si("edge_radius_mm")
 
     def _geometry(self) -> tuple[int, dict[str, Span]]:
         symmetry = 4 if self.size_mm[0] == self.size_mm[1] else 2
@@ -190,7 +178,6 @@ class Plate(Shape):
     SIZE_KEYS = ("thickness_mm",)
     shape: Literal["plane"]
     thickness_mm: Length = Field(description="distance of the two planes, which the fingers press along x")
-    thickness: ClassVar[Any] = si("thickness_mm")
 
     def _geometry(self) -> tuple[int, dict[str, Span]]:
         return 2, {"x": (-self.thickness_mm / 2, self.thickness_mm / 2)}
@@ -208,7 +195,6 @@ class RevolutionShape(Walled):
         description="outline as points [z, radius] with rising z",
         examples=[[[0, 30], [50, 30], [80, 20], [100, 20]]],
     )
-    profile: ClassVar[Any] = si("profile_mm")
 
     def _geometry(self) -> tuple[int, dict[str, Span]]:
         radius = max(r for _, r in self.profile_mm)
@@ -237,7 +223,6 @@ class SectionTable(SceneSection):
     b_mm: Length | None = Field(None, description="semi-axis along y; that along x if left out")
     exponent: float = Field(2.0, ge=2, le=20, description="2 for an ellipse, more for a rounded rectangle")
     shift_mm: Point = Field((0.0, 0.0), strict=False, description="place of the section's middle, [x, y]")
-    z, a, b, shift = si("z_mm"), si("a_mm"), si("b_mm"), si("shift_mm")
 
 
 class Sections(Walled):
@@ -284,7 +269,6 @@ class Mesh(Walled):
     crease_angle_deg: Annotated[float, Field(ge=0, le=180)] = Field(
         30.0, description="edges that turn by less are facets of a smooth surface, others stay edges; 0: all stay"
     )
-    grid_step: ClassVar[Any] = si("grid_step_mm")
 
     @field_validator("mesh")
     @classmethod

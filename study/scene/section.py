@@ -9,6 +9,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import cache
 from typing import Annotated, Any, Self
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
@@ -16,7 +17,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 
 from softjaw.study.messages import USAGE, Problem, StudyError, closest, printable, shown
-from softjaw.study.units import UNITS, split_unit
+from softjaw.study.units import UNITS, in_si, split_unit
 
 KeyPath = tuple[str | int, ...]
 Errors = Iterator[InitErrorDetails]  # what a rule yields
@@ -59,10 +60,22 @@ def refuse(errors: Iterable[InitErrorDetails]) -> None:
         raise ValidationError.from_exception_data("scene", listed)
 
 
+@cache
+def _with_unit(section: type[BaseModel], name: str) -> str | None:
+    """The key or property of a section that has this name and a unit."""
+    keys = (f"{name}_{unit}" for unit in UNITS)
+    return next((key for key in keys if key in section.model_fields or hasattr(section, key)), None)
+
+
 class SceneSection(BaseModel):
     """What all sections share: nothing unknown, nothing converted from text, nothing changed later."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False, protected_namespaces=())
+
+    def __getattr__(self, name: str) -> Any:
+        """A key without its unit is its value in SI units; None where the key says ``"auto"``."""
+        key = _with_unit(type(self), name)
+        return in_si(key, getattr(self, key)) if key else super().__getattr__(name)  # type: ignore[misc]
 
     @model_validator(mode="after")
     def _rules_hold(self) -> Self:

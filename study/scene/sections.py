@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Mapping
 from contextlib import suppress
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
@@ -16,7 +16,7 @@ from softjaw.study.messages import shown
 from softjaw.study.scene.objects import Shape, Walled
 from softjaw.study.scene.section import Direction, Errors, Point, SceneSection, Vector, once_and_rising, wrong
 from softjaw.study.scene.text import flat
-from softjaw.study.units import in_si, si
+from softjaw.study.units import in_si
 
 Count = Annotated[int, Field(ge=2, le=400)]
 Counts = Annotated[tuple[Count, Count, Count], Field(strict=False)]
@@ -75,12 +75,6 @@ class Gripper(SceneSection):
     tilt_stiffness_nm_per_rad: float | None = Field(
         None, ge=1e-3, le=1e5, description="moment per angle of a mount that lets the pad tilt; left out: it does not"
     )
-    pad_length, pad_width, pad_thickness = si("pad_length_mm"), si("pad_width_mm"), si("pad_thickness_mm")
-    shear_modulus: ClassVar[Any] = si("shear_modulus_kpa")
-    max_opening: ClassVar[Any] = si("max_opening_mm")
-    finger_size: ClassVar[Any] = si("finger_size_mm")
-    sheet_thickness, sheet_modulus = si("sheet_thickness_mm"), si("sheet_modulus_gpa")
-    sheet_support: ClassVar[Any] = si("sheet_support_mm")
 
     @model_validator(mode="before")
     @classmethod
@@ -200,7 +194,6 @@ class Load(SceneSection):
     normal_force_n: Annotated[
         tuple[Force, ...], Field(strict=False, min_length=1, max_length=1000), AfterValidator(once_and_rising)
     ] = Field(description="normal forces per finger", examples=[[1, 2, 5]])
-    normal_force: ClassVar[Any] = si("normal_force_n")
 
 
 class ScoreKeys(SceneSection):
@@ -248,7 +241,6 @@ class TaskKeys(SceneSection):
     drive: Literal["shared", "up_to", "fixed"] = Field(
         "shared", description="what a load makes of the normal forces: their sum stays, each gives way, each stays"
     )
-    centre_of_mass: ClassVar[Any] = si("centre_of_mass_mm")
 
     @property
     def direction(self) -> tuple[float, float, float] | None:
