@@ -287,17 +287,17 @@ SECTIONS: dict[str, type[SceneSection]] = {
 }
 
 
-def section_model(name: str, table: Mapping[str, Any]) -> type[SceneSection] | None:
-    """The model of a section; that of ``[object]`` depends on its shape."""
-    return SHAPES.get(str(table.get("shape"))) if name == "object" else SECTIONS.get(name)
+def models_of(shape: Any) -> dict[str, type[SceneSection]]:
+    """The models of all sections by name; that of ``[object]`` depends on its shape."""
+    return SECTIONS | ({"object": SHAPES[shape]} if shape in SHAPES else {})
 
 
 def tables_of(data: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     """Keys of every section by its name, with those of the tables inside; those of the object by its shape."""
-    tables = {name: dict(SECTIONS[name].model_fields if name in SECTIONS else {}) for name in Scene.model_fields}
     shape = data.get("object")
-    model = SHAPES.get(str(shape.get("shape"))) if isinstance(shape, Mapping) else None
-    tables["object"] = {**SectionTable.model_fields, **(model.model_fields if model else {})}
+    models = models_of(str(shape.get("shape")) if isinstance(shape, Mapping) else None)
+    tables = {name: dict(models[name].model_fields if name in models else {}) for name in Scene.model_fields}
+    tables["object"] = {**SectionTable.model_fields, **tables["object"]}
     tables["candidates"] |= GraspPose.model_fields
     return tables
 
@@ -396,7 +396,7 @@ def _fill_in(data: dict[str, Any], path: Path) -> None:
         table = data.get(section)
         if not isinstance(table, dict) or not isinstance(values, list) or not values or key in NOT_SWEPT:
             continue
-        if (model := section_model(section, table)) and name in model.model_fields:
+        if (model := models_of(str(table.get("shape"))).get(section)) and name in model.model_fields:
             # A swept key needs a value at which the sections can be checked.
             table.setdefault(name, values[0])
 
@@ -439,12 +439,10 @@ def _override(text: str) -> dict[str, Any] | None:
 
 def axis_rules(sweep: Mapping[str, Sequence[Any]], sections: Mapping[str, Any]) -> Errors:
     """What is wrong with the axes of a sweep before any of their values is tried."""
-    shape = getattr(sections.get("object"), "shape", None)
+    models = models_of(getattr(sections.get("object"), "shape", None))
     for key, values in sweep.items():
         section, _, name = key.partition(".")
-        model = section_model(section, {"shape": shape})
-        if model is None or name not in model.model_fields:
-            models = {**SECTIONS, **({"object": SHAPES[shape]} if shape else {})}
+        if section not in models or name not in models[section].model_fields:
             near = closest(key, [f"{s}.{k}" for s, m in models.items() for k in m.model_fields])
             yield wrong(key, f"a key with a single value, as `{near or 'gripper.pad_width_mm'}`", key)
         elif key in NOT_SWEPT or section in NO_RESULT:
