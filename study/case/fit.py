@@ -48,13 +48,10 @@ def extremes(points: FloatArray, triangles: IntArray, sides: tuple[float, float]
         for beyond in (points[:, k] > half[k], points[:, k] < -half[k]):
             near &= ~(beyond[a] & beyond[b] & beyond[c])
     corners = points[triangles[near]]
-    z = np.concatenate([_inside(corners, half), _on_sides(corners, half), _on_corners(corners, half)])
+    inside = corners[(np.abs(corners[..., :2]) <= half).all(axis=-1)][:, 2]
+    above, over = heights_over(corners, half * [[-1, -1], [-1, 1], [1, -1], [1, 1]])
+    z = np.concatenate([inside, _on_sides(corners, half), above[over]])
     return (float(z.min()), float(z.max())) if z.size else (math.inf, -math.inf)
-
-
-def _inside(corners: FloatArray, half: FloatArray) -> FloatArray:
-    within = (np.abs(corners[..., :2]) <= half).all(axis=-1)
-    return corners[within][:, 2]
 
 
 def _on_sides(corners: FloatArray, half: FloatArray) -> FloatArray:
@@ -69,12 +66,6 @@ def _on_sides(corners: FloatArray, half: FloatArray) -> FloatArray:
             crosses = (t >= 0.0) & (t <= 1.0) & (np.abs(place[..., 1 - k]) <= half[1 - k])
             crossings.append(place[crosses][:, 2])
     return np.concatenate(crossings)
-
-
-def _on_corners(corners: FloatArray, half: FloatArray) -> FloatArray:
-    """Heights of the triangles above the rectangle's corners."""
-    z, over = heights_over(corners, half * [[-1, -1], [-1, 1], [1, -1], [1, 1]])
-    return z[over]
 
 
 def heights_over(corners: FloatArray, points: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:

@@ -125,7 +125,8 @@ def unit_seconds(plan: Any, seconds: np.ndarray) -> list[float]:
     """
     # Candidates served by symmetry have no times, so the solved one speaks for the unit. A load path that is measured
     # in part has none either: it would be taken for a cheap one.
-    times, costs = np.array([seconds[list(unit.rows[0])].sum() for unit in plan.tried]), np.array(plan.costs)
+    times = np.array([seconds[list(unit.rows[0])].sum() for unit in plan.tried])
+    costs = np.array([unit.cost for unit in plan.tried])
     known = np.isfinite(times)
     if not costs[known].sum():
         return []

@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 import time
 import traceback
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from softjaw.study.case.result import CaseFailure, CaseResult, TimeLimitError
+from softjaw.study.case.result import CaseFailure, TimeLimitError
 from softjaw.study.quantities import NO_GRASP
 from softjaw.study.result.layout import FAILED, MISSING
 from softjaw.study.result.lock import OpenedFile
@@ -96,7 +96,7 @@ class PathSolver:
         Raises `StudyError`: the file cannot be written any more.
         """
         unit, pending = share.unit, _pending(share, codes)
-        cases = self._cases(unit, pending)
+        cases = self._solve_unit(unit, tuple(pending))
         clock = time.perf_counter()
         while pending and not self._claims.stopped:
             # A file that was moved away would be filled where nobody finds it.
@@ -113,7 +113,7 @@ class PathSolver:
             except (Exception, TimeLimitError) as error:  # whatever a case dies of is its result
                 _close(cases)
                 self._fail(unit, pending, sentence(error, stopper.limit), time.perf_counter() - clock)
-                cases, clock = self._cases(unit, pending), time.perf_counter()
+                cases, clock = self._solve_unit(unit, tuple(pending)), time.perf_counter()
                 continue
             finally:
                 # Also after a failure, or this rank would be taken for one that hangs.
@@ -126,9 +126,6 @@ class PathSolver:
         self._uncount()
         _close(cases)
 
-    def _cases(self, unit: Any, wanted: Iterable[int]) -> Iterator[tuple[int, Any]]:
-        yield from self._solve_unit(unit, tuple(wanted))
-
     def _store(self, unit: Any, served: list[tuple[int, int]], result: Any, seconds: float) -> None:
         rows = {row for _, row in served}
         # No longer begun before it is stored: a stop amid the writes must not count it back.
@@ -140,7 +137,10 @@ class PathSolver:
                     writer.fail(at, result.message, seconds=math.nan if c else seconds)
                 continue
             mine = self._image(result, unit, c) if self._image else result
-            values = record(writer.layout, _with_work(mine, c, seconds))
+            # A candidate that is served by symmetry cost nothing: its timings stay empty, so that sums are right.
+            own = {k: v for k, v in mine.values.items() if not (c and k.startswith("work/"))}
+            own = own if c else {"work/seconds_total": seconds, **own}
+            values = record(writer.layout, replace(mine, values=own))
             with self._state.writing():
                 writer.write(at, values)
 
@@ -194,13 +194,6 @@ def _pending(share: Share, codes: np.ndarray) -> Pending:
     rows_at = {k: [(c, rows[k]) for c, rows in enumerate(share.unit.rows)] for k in share.forces}
     missing = {k: [(c, row) for c, row in served if codes[row] == MISSING] for k, served in rows_at.items()}
     return {k: served for k, served in missing.items() if served}
-
-
-def _with_work(result: CaseResult, c: int, seconds: float) -> CaseResult:
-    # A candidate that is served by symmetry cost nothing: its timings stay empty, so that sums are right.
-    if c:
-        return replace(result, values={k: v for k, v in result.values.items() if not k.startswith("work/")})
-    return replace(result, values={"work/seconds_total": seconds, **result.values})
 
 
 def sentence(error: BaseException, limit: float) -> str:

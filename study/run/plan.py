@@ -54,11 +54,6 @@ class Plan:
         """Units that are to be solved."""
         return [unit for unit in self.units if not unit.state]
 
-    @property
-    def costs(self) -> list[float]:
-        """Cost of every unit that is tried, in any unit of time."""
-        return [float(unit.cost) for unit in self.tried]
-
     def in_parts(self, costs: Sequence[float]) -> list[float]:
         """Costs of the units that are tried, those of one whose forces ranks may divide as that of each force."""
         forces = self.layout.shape[-1]
@@ -105,14 +100,7 @@ def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = (), r
         labels=tuple(candidate.label for candidate in grasps.candidates(scene)),
         about=_about(scene),
     )
-    layout = Layout(
-        axes,
-        faces,
-        scene.accuracy.meshes,
-        tuple(derived(scene)),
-        has(scene),
-        rounds,
-    )
+    layout = Layout(axes, faces, scene.accuracy.meshes, tuple(derived(scene)), has(scene), rounds)
     return Plan(layout, header, tuple(units))
 
 
@@ -160,7 +148,7 @@ def shells(scene: Any) -> bool:
 def plan_text(plan: Plan, scene: Any, path: Path, ranks: int) -> str:
     """Cases, units, disk, memory and time on so many ranks."""
     layout = plan.layout
-    each = memory(scene)
+    each, ranks_busy = memory(scene), sensible_ranks(plan.in_parts([unit.cost for unit in plan.tried]))
     forces = layout.shape[-1]
     shared = plan.served - len(plan.units)
     symmetric = f", {shared} candidates are images of others by symmetry" if shared else ""
@@ -175,7 +163,7 @@ def plan_text(plan: Plan, scene: Any, path: Path, ranks: int) -> str:
         "disk": f"{space}, {free / 1e9:.1f} GB free" if free >= 0 else space,
         "memory": f"roughly {each / 1e9:.1g} GB on each rank, {each * ranks / 1e9:.2g} GB on {ranks}",
         "time": _time(plan, scene, path, ranks),
-        "ranks": f"up to {sensible_ranks(plan.in_parts(plan.costs))} are busy at least 80 % of the time",
+        "ranks": f"up to {ranks_busy} are busy at least 80 % of the time",
     }
     return "\n".join(f"  {name:<10}  {text}" for name, text in rows.items() if text)
 
