@@ -18,7 +18,7 @@ import h5py
 import numpy as np
 
 from softjaw.study.messages import CANNOT_WRITE, StudyError, beside, remove
-from softjaw.study.quantities import BY_KEY, FIRST, MODELS
+from softjaw.study.quantities import BY_KEY, DEFINITIONS, FIRST, MODELS
 from softjaw.study.result import checksums
 from softjaw.study.result.datasets import CLOSING_SUMS, described
 from softjaw.study.result.hdf5 import StoredFile
@@ -38,9 +38,10 @@ from softjaw.study.result.store import open_result
 from softjaw.study.units import shown_text
 
 HDF5_VERSIONS = ("v108", "v110")  # v110 would mark a file as open for writing, and a killed run could not resume
+PACKED_VERSIONS = ("v110", "v110")  # of a file that nobody writes to: an index of chunks takes 5 kB less for a dataset
 TEXT = h5py.string_dtype("utf-8")
 SESSION_ROWS, REPORT = f"{ROOT}/provenance/sessions", f"{ROOT}/report"
-MIN_PACKED_BYTES, CHUNK_BYTES, DEFLATE_LEVEL = 4096, 2**20, 4
+CHUNK_BYTES, DEFLATE_LEVEL = 2**20, 4
 # What a grown file has of its own, or what is filled again once nothing is missing.
 NOT_COPIED = (f"{ROOT}/derived/", CLOSING_SUMS)
 TEXTS = {
@@ -48,7 +49,7 @@ TEXTS = {
     "scene": "the scene with all settings, as TOML",
     "layout": "axes, and what is stored over them, as JSON",
     "header": "where the scene comes from, the names of its candidates, and the place of its object's frame, as JSON",
-    "definitions": "what every quantity means",
+    "definitions": "friction models, and values that are not there; every dataset has its own definition",
     "report": "best grasps, failures with their reasons, how to read the file",
 }
 CUT = " ..."  # at the end of a text that was too long
@@ -64,7 +65,7 @@ def create(path: Path, layout: Layout, header: Header, *, packed: bool = False) 
     if not packed:  # space first: HDF5 crashes where it can write no more, and a study shall not find out after hours
         _reserve(path, part, layout.nbytes)
     with beside(path, part=part):
-        with h5py.File(part, "w", libver=HDF5_VERSIONS) as file:
+        with h5py.File(part, "w", libver=PACKED_VERSIONS if packed else HDF5_VERSIONS) as file:
             _write_skeleton(file, layout, header, packed)
         # Opened anew: the sums are of what a reader will find in the file.
         with h5py.File(part, "r+", libver=HDF5_VERSIONS) as file:
@@ -160,7 +161,7 @@ def _write_checksums(file: h5py.File, stored: StoredFile, layout: Layout) -> Non
 
 
 def _write_texts(study: h5py.Group, layout: Layout, header: Header, packed: bool) -> None:
-    texts = {"title": header.title, "scene": header.scene, "definitions": layout.definitions()}
+    texts = {"title": header.title, "scene": header.scene, "definitions": DEFINITIONS}
     texts |= {"layout": layout.text(), "header": header.text()}
     for name, text in texts.items():
         # HDF5 has no fixed-length strings of length 0.
@@ -197,7 +198,7 @@ def report_bytes(text: str) -> np.ndarray:
 
 def _create_dataset(file: h5py.File, dataset: Dataset, packed: bool) -> None:
     plist = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
-    if packed and dataset.nbytes >= MIN_PACKED_BYTES:
+    if packed:
         plist.set_chunk(_chunk(dataset))
         plist.set_shuffle()
         plist.set_deflate(DEFLATE_LEVEL)

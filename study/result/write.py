@@ -218,6 +218,16 @@ def blank(layout: Layout, message: str = "", seconds: float = math.nan) -> list[
     return row
 
 
+def rounded(faces: np.ndarray) -> np.ndarray:
+    """Values of faces to 3e-5 of the largest one: far below the error of their mesh, and packed to 60 % of the size.
+
+    >>> rounded(np.array([0.75, 1e-6, 1 / 3])).tolist()
+    [0.75, 0.0, 0.333343505859375]
+    """
+    step = np.exp2(np.frexp(np.fmax.reduce(np.abs(faces), axis=None, initial=0.0))[1] - 15)
+    return np.asarray(np.round(faces / step) * step, faces.dtype)
+
+
 def record(layout: Layout, result: CaseResult) -> list[np.ndarray]:
     """The row of a solved case, aligned with ``layout.columns``; what the result does not give stays empty.
 
@@ -231,7 +241,7 @@ def record(layout: Layout, result: CaseResult) -> list[np.ndarray]:
         value = np.asarray(given.pop(column.key), column.dtype)
         if value.shape != column.share:
             raise ValueError(f"'{column.key}' of a case has shape {value.shape}, its quantity says {column.share}")
-        row[i] = value
+        row[i] = value if column.dtype.kind != "f" or column.dtype.itemsize > 4 else rounded(value)
     # A key that nobody stores would be lost without a word.
     if given:
         raise ValueError(f"a case gives {', '.join(sorted(given))}, which study.quantities does not list")
