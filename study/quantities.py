@@ -6,7 +6,7 @@ rows: which maps are the main ones, in which order, what their columns are calle
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any
 
@@ -401,6 +401,13 @@ FORCE_RANGE = ("force_low", "force_high")  # derived bounds of the forces that h
 BY_KEY = {q.key: q for q in TABLE}
 
 
+DEFINITIONS = """Friction models: 'ccm', the curved contact model, lets every face resist in its own plane (Xu, Alt,
+Zhang, Steinbach: Grasping Posture Estimation for a Two-Finger Parallel Gripper with Soft Material Jaws using a Curved
+Contact Area Friction Model); 'pcm', the paper's planar contact model, lays all faces into one plane and keeps the
+pressure sum S; 'pcm_projected' is the planar model with the physical normal force F_N. NaN: no value; status/code and
+status/message say why. All values are SI."""
+
+
 def checked_model(model: str) -> str:
     """One of `MODELS`; `ValueError` for what is none."""
     if model not in MODELS:
@@ -422,19 +429,3 @@ def quantities(has: Collection[str] = ()) -> tuple[Quantity, ...]:
 def map_row(name: str) -> Quantity:
     """The row of a map; `KeyError` for a name that is none."""
     return BY_KEY[f"maps/{name}"]
-
-
-def definitions(listed: Iterable[Quantity]) -> str:
-    """One text that says what every one of these quantities is; stored in each result file."""
-    lines = [
-        "Friction models: 'ccm', the curved contact model, lets every face resist in its own plane (Xu, Alt, Zhang,",
-        "Steinbach: Grasping Posture Estimation for a Two-Finger Parallel Gripper with Soft Material Jaws using a",
-        "Curved Contact Area Friction Model); 'pcm', the paper's planar contact model, lays all faces into one plane",
-        "and keeps the pressure sum S; 'pcm_projected' is the planar model with the physical normal force F_N.",
-        "NaN: no value; status/code and status/message say why. All values are SI.",
-        "",
-    ]
-    for q in listed:
-        models = f" [{', '.join(MODELS)}]" if q.by_model else ""
-        lines.append(f"{q.key} [{q.unit or '-'}]{models}: {q.label}. {q.definition}")
-    return "\n".join(lines) + "\n"

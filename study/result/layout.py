@@ -25,7 +25,6 @@ from softjaw.study.quantities import (
     NEEDS,
     Axis,
     Quantity,
-    definitions,
     quantities,
 )
 from softjaw.study.quantities import DONE as DONE
@@ -172,10 +171,6 @@ class Layout:
         count = len(self.datasets) + len(self.axes) + 16
         texts = MOST_SESSIONS * SESSION.itemsize + REPORT_BYTES
         return sum(d.nbytes for d in self.datasets) + texts + 4096 * count + 2**16
-
-    def definitions(self) -> str:
-        """The definitions of all quantities of this layout, derived ones included."""
-        return definitions((*self.quantities, *self.derived))
 
     def text(self) -> str:
         """The layout as JSON."""

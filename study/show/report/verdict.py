@@ -24,13 +24,13 @@ CAVEAT = (
 )
 TOP, MOST_REASONS, WIDTH = 5, 10, 120  # of the plain text in the file: grasps, messages, characters
 READING = """How to read the file
-All values are SI. Every dataset has its unit, its label and its definition as attributes; /study/definitions has all
-definitions in one text, with the friction models: ccm lets every face resist in its own plane (curved contact model),
-pcm and pcm_projected are planar models with the pressure sum S and with the normal force F_N. NaN: there is no value,
-and /study/status/code (0 missing, 1 done, 2 failed) and /study/status/message say why. Candidates are counted over
-stations and angles, the angle running fastest. /study/scene is the scene with all settings, /study/provenance/sessions
-lists programs and machine. Plots: h5web, silx or NeXpy open at the map of payload; 'softjaw export
---format vtk' writes the object with its maps and the pads with their pressure for ParaView."""
+All values are SI. Every dataset has its unit, its label and its definition as attributes. Friction models: ccm lets
+every face resist in its own plane (curved contact model), pcm and pcm_projected are planar models with the pressure sum
+S and with the normal force F_N. NaN: there is no value, and /study/status/code (0 missing, 1 done, 2 failed) and
+/study/status/message say why. Candidates are counted over stations and angles, the angle running fastest. /study/scene
+is the scene with all settings, /study/provenance/sessions lists programs and machine. Plots: h5web, silx or NeXpy open
+at the map of payload; 'softjaw export --format vtk' writes the object with its maps and the pads with their pressure
+for ParaView."""
 ASCII = {"\N{MULTIPLICATION SIGN}": "x", "±": "+-"}
 
 
