@@ -23,9 +23,7 @@ class NotReachedError(ConvergenceError):
 
 
 class CheckError(RuntimeError):
-    """A solve converged to a state that breaks a law of contact or of the material; ``law`` is its key, where known."""
-
-    law = ""
+    """A solve converged to a state that breaks a law of contact or of the material."""
 
 
 class MeshError(ValueError):

@@ -25,6 +25,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, Protocol, TypeVar, cast
 
 import numpy as np
@@ -95,6 +96,7 @@ OUT_OF_MEMORY = (-5, -7, -13)  # INFOG(1) of MUMPS
 WITHIN, FAST = 1e5, 0.05  # see NonlinearSolver
 STALLED = 5  # iterations without a fall to less than a part `FAST`: good ones need fewer
 ITERATIONS_TO_RECOVER = 8  # before a growth of the residual counts: solves that converge pass 20 times the first one
+PREFIX = "contact_"  # of the options of a solve
 PRINTING = re.compile("monitor|view|converged_reason")
 
 
@@ -144,11 +146,6 @@ class Seconds:
     factorisation: float = 0.0
     total: float = 0.0
 
-    @property
-    def rest(self) -> float:
-        """What is neither assembly nor factorisation with its triangular solves."""
-        return self.total - self.assembly - self.factorisation
-
 
 def factorisation_seconds() -> float:
     """Seconds this process has spent so far in numeric and symbolic factorisation and triangular solves."""
@@ -180,24 +177,21 @@ class NonlinearSolver:
 
     problem: Problem
     options: dict[str, Any] = field(default_factory=dict)
-    prefix: str = "contact_"
 
     def __post_init__(self) -> None:
         """Create matrix, vectors and solver."""
         comm, n = PETSc.COMM_SELF, self.problem.size
         self.seconds, self.thrifty, self.left = Seconds(), True, math.inf
-        self._pattern = self.problem.pattern
-        self._stored = self._pattern.start
+        pattern = self.problem.pattern
+        self._stored = pattern.start
         self._stepped: SteppedProblem | None = None
         self._condensed = False
         self._norms: list[float] = []  # of the residual, at every step of this solve
         self._end: FloatArray | None = None  # solution of the solve before
-        self._matrix = PETSc.Mat().createAIJ(
-            (n, n), csr=(self._pattern.start, self._pattern.column, self._pattern.values), comm=comm
-        )
+        self._matrix = PETSc.Mat().createAIJ((n, n), csr=(pattern.start, pattern.column, pattern.values), comm=comm)
         self._x, self._f = self._matrix.createVecs()
         snes = self._snes = PETSc.SNES().create(comm)
-        snes.setOptionsPrefix(self.prefix)
+        snes.setOptionsPrefix(PREFIX)
         snes.setType("newtonls")
         snes.setFunction(self._on_residual, self._f)
         snes.setJacobian(self._on_tangent, self._matrix)
@@ -213,7 +207,7 @@ class NonlinearSolver:
 
     def _change_steps(self) -> None:
         """Let the problem change the system of a step if it does so and the solver is one that gets on with it."""
-        kind = (PETSc.Options().getAll() | self.options).get(f"{self.prefix}snes_type", "newtonls")
+        kind = (PETSc.Options().getAll() | self.options).get(f"{PREFIX}snes_type", "newtonls")
         # others use residual and tangent for more than a step, so these have to belong together
         if kind == "newtonls" and hasattr(self.problem, "right_side"):
             self._stepped = cast(SteppedProblem, self.problem)
@@ -240,7 +234,7 @@ class NonlinearSolver:
             defaults["mat_mumps_icntl_8"] = 0
             if self.problem.size > 2500 or not self._condensed:  # where the analysis of a better ordering pays
                 defaults["mat_mumps_icntl_7"] = 4  # PORD; METIS and SCOTCH are rarely built in
-        mine = {self.prefix + key: value for key, value in defaults.items()}
+        mine = {PREFIX + key: value for key, value in defaults.items()}
         mine = {key: value for key, value in mine.items() if key not in given} | dict(self.options)
         for key, value in mine.items():
             database.setValue(key, None if value is True else value)  # a flag such as snes_monitor takes no value
@@ -285,7 +279,7 @@ class NonlinearSolver:
             # factors that failed half way must not be taken for those of the next solve
             snes.getKSP().getPC().reset()
             raise ConvergenceError(
-                f"a linear system of the {self.prefix.rstrip('_')} solve is singular: something is not supported"
+                "a linear system of the contact solve is singular: something is not supported"
             ) from error
         finally:
             snes.setTolerances(max_it=limit)
@@ -301,8 +295,8 @@ class NonlinearSolver:
             raise MemoryError(f"for the factors of {self.problem.size} unknowns")
         if reason <= 0:
             failed = ConvergenceError(
-                f"the {self.prefix.rstrip('_')} solve stopped with {REASONS.get(reason, reason)} after {done} "
-                f"iterations at residual {snes.getFunctionNorm():.3e} N; see it with '-- -{self.prefix}snes_monitor'"
+                f"the contact solve stopped with {REASONS.get(reason, reason)} after {done} iterations at residual "
+                f"{snes.getFunctionNorm():.3e} N; see it with '-- -{PREFIX}snes_monitor'"
             )
             if self._stalls():
                 failed.end = self._x.array.copy(), snes.getFunctionNorm()
@@ -343,7 +337,8 @@ class NonlinearSolver:
 
         An eigenvalue within rounding of zero may count as either; all of them count where MUMPS gives up.
         """
-        factors = Factors(csr_matrix((values, self._pattern.column, self._pattern.start)), symmetric=True)
+        pattern = self.problem.pattern
+        factors = Factors(csr_matrix((values, pattern.column, pattern.start)), symmetric=True)
         infog = factors.factor.getMumpsInfog
         negative = infog(12) if infog(1) == 0 else self.problem.size
         factors.destroy()
@@ -361,9 +356,7 @@ class NonlinearSolver:
 
     def forget(self) -> None:
         """Let the next solve be that of a new solver."""
-        self._end, self._pattern = None, self.problem.pattern
-        if self._pattern.start is not self._stored:
-            self._grow()
+        self._end = None
         # MUMPS orders symmetric matrices, and those of walls, by the first values that it sees
         if self._condensed or not hasattr(self.problem, "symmetric"):
             self._snes.getKSP().getPC().reset()
@@ -397,9 +390,13 @@ class NonlinearSolver:
 
     def _fill(self, x: FloatArray, matrix: PETSc.Mat) -> None:
         self.problem.tangent(x)
-        if self._pattern.start is not self._stored:
-            self._grow()
-        _set_values(matrix, self._pattern.values)
+        pattern = self.problem.pattern
+        if pattern.start is not self._stored:
+            # the matrix gets the pattern's new rows; the old symbolic analysis belongs to the old ones
+            self._stored = pattern.start
+            matrix.setPreallocationCSR((pattern.start, pattern.column, pattern.values))
+            self._snes.getKSP().getPC().reset()
+        _set_values(matrix, pattern.values)
 
     def _keeps(self, x: FloatArray) -> bool:
         """Whether the step from ``x`` is made with the factors at hand."""
@@ -414,13 +411,6 @@ class NonlinearSolver:
         if not self.thrifty or len(norms) > self._limit - 5:
             return False
         return norms[-1] <= min(FAST * norms[-2], WITHIN * self._goal) and keep(x, False)
-
-    def _grow(self) -> None:
-        """Give the matrix the pattern's new rows; its factors are analysed anew."""
-        self._stored = self._pattern.start
-        # the old symbolic analysis belongs to the old pattern
-        self._matrix.setPreallocationCSR((self._pattern.start, self._pattern.column, self._pattern.values))
-        self._snes.getKSP().getPC().reset()
 
     def _on_step(self, x, y) -> bool:
         factor = self.problem.shorten(x.array_r, y.array_r)
@@ -486,31 +476,9 @@ class Factors:
 
     def destroy(self) -> None:
         """Give the factors' memory back."""
-        self._pc.destroy()
-        self._matrix.destroy()
-
-
-class _FewUnknowns:
-    """The equation ``x = 1`` of a few unknowns: enough for PETSc to read every option of a solve."""
-
-    # PORD ends the process at a matrix without zeros, that of one unknown too
-    size, complementarity, non_negative = 30, False, slice(0)
-
-    def __init__(self) -> None:
-        diagonal = np.arange(self.size, dtype=np.int32)
-        self.pattern = Pattern(self.size, diagonal, diagonal)
-
-    def residual(self, x: FloatArray) -> FloatArray:
-        """See `Problem`."""
-        return x - 1.0
-
-    def tangent(self, x: FloatArray) -> None:
-        """See `Problem`."""
-        self.pattern.values[:] = 1.0
-
-    def shorten(self, x: FloatArray, step: FloatArray) -> float:
-        """See `Problem`."""
-        return 1.0
+        # the factor matrix too: what asked for it holds it as long as the preconditioner does
+        for thing in (self.factor, self._pc, self._matrix):
+            thing.destroy()
 
 
 def unknown_options(options: dict[str, Any]) -> list[str]:
@@ -520,7 +488,15 @@ def unknown_options(options: dict[str, Any]) -> list[str]:
     """
     asked = ctypes.CDLL(PETSc.__file__).PetscOptionsUsed
     judged = {name: value for name, value in options.items() if not PRINTING.search(name)}
-    solver = NonlinearSolver(_FewUnknowns(), judged)
+    # x = 1 of a few unknowns is enough for PETSc to read every option; PORD ends the process at a matrix without zeros
+    diagonal = np.arange(30, dtype=np.int32)
+    pattern = Pattern(len(diagonal), diagonal, diagonal)
+    pattern.values[:] = 1.0
+    problem = SimpleNamespace(
+        size=pattern.size, pattern=pattern, complementarity=False, non_negative=slice(0),
+        residual=lambda x: x - 1.0, tangent=lambda x: None, shorten=lambda x, step: 1.0,
+    )  # fmt: skip
+    solver = NonlinearSolver(cast(Problem, problem), judged)
     unknown = []
     with solver._options_in_effect():
         solver._snes.setFromOptions()

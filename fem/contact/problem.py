@@ -449,15 +449,11 @@ class SpringBed:
 
     def closing(self, force: float) -> float:
         """Closing displacement at which the bed carries the force [m]."""
-        low, high = 0.0, 1e-3 * self.pad.shape.size[2]
-        # bounded, because a bed beside the object never carries the force
-        while self.force(high) < force and high < 10 * self.pad.shape.size[2]:
-            high *= 2.0
-        # bisection: the bed's force is monotonous but has kinks wherever a column touches
-        for _ in range(60):
-            middle = 0.5 * (low + high)
-            low, high = (middle, high) if self.force(middle) < force else (low, middle)
-        return high
+        order = np.argsort(self.height)
+        height, area = self.height[order], self.pad.node_area[order]
+        # the force is convex, so that of the columns that touch is the largest that the lowest k columns would have
+        volume = force * self.pad.share / self.pad.modulus_per_thickness
+        return float(((volume + np.cumsum(area * height)) / np.cumsum(area)).min())
 
     def guess(self, closing: float) -> FloatArray:
         """Vector of unknowns: columns shortened affinely, so that no element starts inverted, and their pressures."""

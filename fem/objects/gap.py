@@ -53,7 +53,6 @@ class GapFunction(Protocol):
 
     def gap(self, x: FloatArray) -> Gap:
         """``(g (n,), normal (n, 3), hessian (n, 3, 3))`` at the points ``x (n, 3)`` [m, -, 1/m]; g > 0 outside."""
-        ...
 
 
 class GapObject(GapFunction, Protocol):
@@ -62,19 +61,15 @@ class GapObject(GapFunction, Protocol):
     @property
     def bounds(self) -> FloatArray:
         """Lower and upper corner of the object, ``(2, 3)`` [m]."""
-        ...
 
     def first_touch(self, pose: Pose, points: FloatArray, reach: float) -> float:
         """Distance [m] along the approach at which the first of the pad's ``points (n, 3)`` meets the object."""
-        ...
 
     def surface(self) -> Surface:
         """Points ``(k, 3)`` [m] and triangles ``(m, 3)`` for drawing."""
-        ...
 
     def near(self, pose: Pose, lower: FloatArray, upper: FloatArray, element: float | None = None) -> GapFunction:
         """Gap function for use inside a box of the pad's frame, by a pad with elements of this size [m]."""
-        ...
 
 
 class Analytic(GapFunction):
