@@ -1,9 +1,14 @@
-"""Pad materials: stress and tangent of each law at one material point.
+"""Pad materials: stress and tangent of each law at one material point, and the loops over elements that call them.
 
 Every law is one function ``law(F, B, J, par, P, A)``: from the deformation gradient ``F``, its inverse ``B`` and its
 determinant ``J`` it writes the first Piola-Kirchhoff stress ``P = dW/dF`` [Pa] and, where ``A`` has entries, the
 tangent ``A[i, J, k, L] = dP[i, J] / dF[k, L]`` [Pa].  A new material is one more such function, a line in ``stress``
-and one in ``LAWS``.
+and one in ``LAWS``. The loops stand beside the laws because numba's cache looks at the file of a function alone.
+
+Element arrays keep the node index last and contiguous, so that the innermost loop over the nodes of an element becomes
+vector instructions; local unknowns are therefore ordered component first, ``(3, nodes)``.
+Arithmetic is strict IEEE: with relaxed rules the last bits depend on whether code was compiled now or loaded from the
+cache, and a study would not be the same to the bit; these loops gain nothing from them.
 """
 
 from __future__ import annotations
@@ -17,21 +22,28 @@ from softjaw.friction.patch import FloatArray
 
 
 @njit(cache=True)
+def transposed_product(M, N):
+    """``M^T N`` of two 3 x 3 matrices, without a call to BLAS."""
+    out = np.empty((3, 3))
+    for i in range(3):
+        for j in range(3):
+            out[i, j] = M[0, i] * N[0, j] + M[1, i] * N[1, j] + M[2, i] * N[2, j]
+    return out
+
+
+@njit(cache=True)
 def blatz_ko(F, B, J, par, P, A):
     """Foam of Blatz and Ko: ``W = G/2 (tr C^-1 + 2 J - 5)``, ``P = G (J F^-T - F^-T C^-1)``; ``par = [G]``."""
     G = par[0]
-    M, N, D = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    M = transposed_product(B.T, B.T)  # C^-1
+    D = transposed_product(B, M)
     for i in range(3):
         for j in range(3):
-            M[i, j] = B[i, 0] * B[j, 0] + B[i, 1] * B[j, 1] + B[i, 2] * B[j, 2]  # C^-1
-            N[i, j] = B[0, i] * B[0, j] + B[1, i] * B[1, j] + B[2, i] * B[2, j]  # b^-1
-    for i in range(3):
-        for j in range(3):
-            D[i, j] = B[0, i] * M[0, j] + B[1, i] * M[1, j] + B[2, i] * M[2, j]
             P[i, j] = G * (J * B[j, i] - D[i, j])
     # a residual asks for the stress alone, and the tangent costs several times as much
     if A.size == 0:
         return
+    N = transposed_product(B, B)  # b^-1
     for i in range(3):
         for j in range(3):
             for k in range(3):
@@ -126,16 +138,6 @@ def principal(C):
 
 
 @njit(cache=True)
-def _transposed_product(M, N):
-    """``M^T N`` of two 3 x 3 matrices, without a call to BLAS."""
-    out = np.empty((3, 3))
-    for i in range(3):
-        for j in range(3):
-            out[i, j] = M[0, i] * N[0, j] + M[1, i] * N[1, j] + M[2, i] * N[2, j]
-    return out
-
-
-@njit(cache=True)
 def hyperfoam(F, B, J, par, P, A):
     """Storakers' hyperfoam in principal stretches ``l``; ``par = [nu, mu_1, alpha_1, mu_2, alpha_2, ...]``.
 
@@ -144,7 +146,7 @@ def hyperfoam(F, B, J, par, P, A):
     """
     beta = par[0] / (1.0 - 2.0 * par[0])
     # rotations keep eigenvectors at right angles also where stretches are nearly equal
-    c, V = principal(_transposed_product(F, F))
+    c, V = principal(transposed_product(F, F))
     stretch = np.sqrt(c)
     s, ds = np.zeros(3), np.zeros((3, 3))  # second Piola-Kirchhoff S_a and dS_a / dl_b
     for term in range((par.size - 1) // 2):
@@ -156,7 +158,7 @@ def hyperfoam(F, B, J, par, P, A):
             ds[a, a] += 2.0 * mu / alpha * ((alpha - 2.0) * power + 2.0 * volume) / (c[a] * stretch[a])
             for b in range(3):
                 ds[a, b] += 2.0 * mu * beta * volume / (c[a] * stretch[b])
-    FV = _transposed_product(F.T, V)
+    FV = transposed_product(F.T, V)
     for i in range(3):
         for j in range(3):
             P[i, j] = FV[i, 0] * s[0] * V[j, 0] + FV[i, 1] * s[1] * V[j, 1] + FV[i, 2] * s[2] * V[j, 2]
@@ -164,7 +166,7 @@ def hyperfoam(F, B, J, par, P, A):
         return
     A[:] = 0.0
     VT = np.ascontiguousarray(V.T)
-    S = _transposed_product(VT, VT * s.reshape(3, 1))
+    S = transposed_product(VT, VT * s.reshape(3, 1))
     shear = np.zeros((3, 3))
     for a in range(3):
         for b in range(3):
@@ -203,6 +205,93 @@ def stress(law, F, B, J, par, P, A):
         neo_hookean(F, B, J, par, P, A)
     else:
         linear(F, B, J, par, P, A)
+
+
+@njit(cache=True)
+def _gradient(u, dN, nodes, F, B):
+    """Deformation gradient and its inverse at one point; returns ``det F``."""
+    for i in range(3):
+        for j in range(3):
+            value = 1.0 if i == j else 0.0
+            for a in range(nodes):
+                value += u[i, a] * dN[j, a]
+            F[i, j] = value
+    return inverted(F, B)
+
+
+@njit(cache=True)
+def smallest_det(u, dN):
+    """Smallest ``det F`` over all points of all elements [-]."""
+    F, B = np.empty((3, 3)), np.empty((3, 3))
+    smallest = np.inf
+    for e in range(dN.shape[0]):
+        for q in range(dN.shape[1]):
+            smallest = min(smallest, _gradient(u[e], dN[e, q], dN.shape[3], F, B))
+    return smallest
+
+
+@njit(cache=True, inline="always")
+def _elements(law, par, u, dN, w, nodes, r, K):
+    """Residual and, where ``K`` has entries, tangent of every element; returns the smallest ``det F``."""
+    tangent = K.size > 0
+    F, B, P, T = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, nodes))
+    A = np.empty((3, 3, 3, 3)) if tangent else np.empty((0, 0, 0, 0))
+    smallest = np.inf
+    for e in range(w.shape[0]):
+        r[e] = 0.0
+        if tangent:
+            K[e] = 0.0
+        for q in range(w.shape[1]):
+            g = dN[e, q]
+            J = _gradient(u[e], g, nodes, F, B)
+            smallest = min(smallest, J)
+            stress(law, F, B, J, par, P, A)
+            # the node loop is innermost and contiguous, so that it becomes vector instructions
+            dv = w[e, q]
+            for i in range(3):
+                p0, p1, p2 = dv * P[i, 0], dv * P[i, 1], dv * P[i, 2]
+                for a in range(nodes):
+                    r[e, i, a] += p0 * g[0, a] + p1 * g[1, a] + p2 * g[2, a]
+            if not tangent:
+                continue
+            for i in range(3):
+                for k in range(i, 3):  # the tangent is symmetric: blocks below the diagonal follow
+                    for j in range(3):
+                        a0, a1, a2 = dv * A[i, j, k, 0], dv * A[i, j, k, 1], dv * A[i, j, k, 2]
+                        for b in range(nodes):
+                            T[j, b] = a0 * g[0, b] + a1 * g[1, b] + a2 * g[2, b]
+                    for a in range(nodes):
+                        g0, g1, g2 = g[0, a], g[1, a], g[2, a]
+                        for b in range(nodes):
+                            K[e, i, a, k, b] += g0 * T[0, b] + g1 * T[1, b] + g2 * T[2, b]
+        if tangent:
+            for i in range(3):
+                for k in range(i):
+                    K[e, i, :, k] = K[e, k, :, i].T
+    return smallest
+
+
+@njit(cache=True)
+def elements(law, par, u, dN, w, r, K):
+    """Residual ``r`` and tangent ``K`` of hexahedra; returns the smallest ``det F`` [-].
+
+    ``law, par``: as of `Material`; ``u (n, 3, nodes)``: displacements [m]; ``dN (n, points, 3, nodes)``: reference
+    gradients [1/m]; ``w (n, points)``: reference volumes [m^3]; out: ``r (n, 3, nodes)`` [N] and ``K (n, 3, nodes,
+    3, nodes)`` [N/m], with size 0 ``r`` alone.
+    """
+    # constant node counts let the compiler unroll
+    if u.shape[2] == 8:
+        return _elements(law, par, u, dN, w, 8, r, K)
+    return _elements(law, par, u, dN, w, 27, r, K)
+
+
+@njit(cache=True)
+def tangents(law, par, F):
+    """Tangents of the law ``(n, 3, 3, 3, 3)`` [Pa] at the deformation gradients ``F (n, 3, 3)``."""
+    B, P, A = np.empty((3, 3)), np.empty((3, 3)), np.empty((len(F), 3, 3, 3, 3))
+    for n in range(len(F)):
+        stress(law, F[n], B, inverted(F[n], B), par, P, A[n])
+    return A
 
 
 LAWS = {"blatz_ko": 0, "hyperfoam": 1, "neo_hookean": 2, "linear": 3}

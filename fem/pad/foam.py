@@ -1,134 +1,15 @@
-"""Compiled loops over elements and face points: where the assembly time goes.
-
-Element arrays keep the node index last and contiguous, so that the innermost loop over the nodes of an element becomes
-vector instructions; local unknowns are therefore ordered component first, ``(3, nodes)``.
-Arithmetic is strict IEEE: with relaxed rules the last bits depend on whether code was compiled now or loaded from the
-cache, and a study would not be the same to the bit; these loops gain nothing from them.
-"""
+"""The foam of a pad: forces, stiffness and strains in terms of its unknowns."""
 
 from __future__ import annotations
 
-import hashlib
-from pathlib import Path
-
 import numpy as np
-from numba import njit
 
-from softjaw.fem import materials
 from softjaw.fem.assembly import gather, pairs
-from softjaw.fem.materials import inverted, stress
+from softjaw.fem.materials import elements, smallest_det, tangents
 from softjaw.fem.pad.mesh import Pad
 from softjaw.friction.patch import FloatArray
 
 SMALLEST_DET = 0.05  # a Newton step is shortened before an element is compressed further than this
-
-
-@njit(cache=True)
-def _gradient(u, dN, nodes, F, B):
-    """Deformation gradient and its inverse at one point; returns ``det F``."""
-    for i in range(3):
-        for j in range(3):
-            value = 1.0 if i == j else 0.0
-            for a in range(nodes):
-                value += u[i, a] * dN[j, a]
-            F[i, j] = value
-    return inverted(F, B)
-
-
-@njit(cache=True)
-def smallest_det(u, dN):
-    """Smallest ``det F`` over all points of all elements [-]."""
-    F, B = np.empty((3, 3)), np.empty((3, 3))
-    smallest = np.inf
-    for e in range(dN.shape[0]):
-        for q in range(dN.shape[1]):
-            smallest = min(smallest, _gradient(u[e], dN[e, q], dN.shape[3], F, B))
-    return smallest
-
-
-@njit(cache=True, inline="always")
-def _elements(law, par, u, dN, w, nodes, r, K):
-    """Residual and, where ``K`` has entries, tangent of every element; returns the smallest ``det F``."""
-    tangent = K.size > 0
-    F, B, P, T = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, nodes))
-    A = np.empty((3, 3, 3, 3)) if tangent else np.empty((0, 0, 0, 0))
-    smallest = np.inf
-    for e in range(w.shape[0]):
-        for i in range(3):
-            for a in range(nodes):
-                r[e, i, a] = 0.0
-        if tangent:
-            for i in range(3):
-                for a in range(nodes):
-                    for k in range(3):
-                        for b in range(nodes):
-                            K[e, i, a, k, b] = 0.0
-        for q in range(w.shape[1]):
-            g = dN[e, q]
-            J = _gradient(u[e], g, nodes, F, B)
-            smallest = min(smallest, J)
-            stress(law, F, B, J, par, P, A)
-            # the node loop is innermost and contiguous, so that it becomes vector instructions
-            dv = w[e, q]
-            for i in range(3):
-                p0, p1, p2 = dv * P[i, 0], dv * P[i, 1], dv * P[i, 2]
-                for a in range(nodes):
-                    r[e, i, a] += p0 * g[0, a] + p1 * g[1, a] + p2 * g[2, a]
-            if not tangent:
-                continue
-            for i in range(3):
-                for k in range(i, 3):  # the tangent is symmetric: blocks below the diagonal follow
-                    for j in range(3):
-                        a0, a1, a2 = dv * A[i, j, k, 0], dv * A[i, j, k, 1], dv * A[i, j, k, 2]
-                        for b in range(nodes):
-                            T[j, b] = a0 * g[0, b] + a1 * g[1, b] + a2 * g[2, b]
-                    for a in range(nodes):
-                        g0, g1, g2 = g[0, a], g[1, a], g[2, a]
-                        for b in range(nodes):
-                            K[e, i, a, k, b] += g0 * T[0, b] + g1 * T[1, b] + g2 * T[2, b]
-        if tangent:
-            for i in range(3):
-                for k in range(i):
-                    for a in range(nodes):
-                        for b in range(nodes):
-                            K[e, i, a, k, b] = K[e, k, b, i, a]
-    return smallest
-
-
-def _bound_to(laws):
-    """Loops that call the material laws, compiled anew whenever the laws' source ``laws`` is another.
-
-    numba's cache looks at the file of a function alone, and at its closure; without this the laws of an older version
-    would go on being used.
-    """
-
-    @njit(cache=True)
-    def elements(law, par, u, dN, w, r, K):
-        """Residual ``r`` and tangent ``K`` of hexahedra; returns the smallest ``det F`` [-].
-
-        ``law, par``: as of `Material`; ``u (n, 3, nodes)``: displacements [m]; ``dN (n, points, 3, nodes)``: reference
-        gradients [1/m]; ``w (n, points)``: reference volumes [m^3]; out: ``r (n, 3, nodes)`` [N] and ``K (n, 3, nodes,
-        3, nodes)`` [N/m], with size 0 ``r`` alone.
-        """
-        if len(laws) == 0:  # read here, so that it enters the key of the cache
-            return np.nan
-        # constant node counts let the compiler unroll
-        if u.shape[2] == 8:
-            return _elements(law, par, u, dN, w, 8, r, K)
-        return _elements(law, par, u, dN, w, 27, r, K)
-
-    @njit(cache=True)
-    def tangents(law, par, F):
-        """Tangents of the law ``(n, 3, 3, 3, 3)`` [Pa] at the deformation gradients ``F (n, 3, 3)``."""
-        B, P, A = np.empty((3, 3)), np.empty((3, 3)), np.empty((len(F) if len(laws) > 0 else 0, 3, 3, 3, 3))
-        for n in range(len(A)):
-            stress(law, F[n], B, inverted(F[n], B), par, P, A[n])
-        return A
-
-    return elements, tangents
-
-
-elements, tangents = _bound_to(hashlib.sha256(Path(materials.__file__).read_bytes()).hexdigest())
 
 
 class Foam:

@@ -10,7 +10,7 @@ their shears sampled at the centre, the transverse shears at the middles of the 
 Num. Meth. Eng. 21, 1985, which removes shear locking), and the thickness strain at the nodes, which has no Poisson
 coupling with the others (so no thickness locking, and no inner unknowns). Terms of order thickness/radius are left out.
 
-Arithmetic is strict IEEE, as in ``fem.pad.foam``.
+Arithmetic is strict IEEE, as in ``fem.materials``.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ directors, ``y (8, 3)``. At its points an element looks at vectors ``P_i = sum_a
     e_s = sum_m w_sm P_i . P_j        (i, j) = PAIRS[s, m],
 
 so that its first derivative is ``sum_m w_sm (c_i P_j + c_j P_i)`` and its second ``sum_m w_sm (c_i c_j + c_j c_i)``.
-Arithmetic is strict IEEE, as in ``fem.pad.foam``.
+Arithmetic is strict IEEE, as in ``fem.materials``.
 """
 
 from __future__ import annotations

@@ -14,11 +14,11 @@ from pathlib import Path
 
 import numpy as np
 
+from softjaw.fem import materials as element_kernel
 from softjaw.fem.contact.press import Press
 from softjaw.fem.materials import material
 from softjaw.fem.objects.gap import Pose
 from softjaw.fem.objects.shapes import EllipticCylinder
-from softjaw.fem.pad import foam as element_kernel
 from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.pad.shape import PadShape
 from softjaw.study.case.model import Finger, touching

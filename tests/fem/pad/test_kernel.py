@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
+from softjaw.fem import materials as kernel
 from softjaw.fem.contact.rigid import RigidProblem
 from softjaw.fem.materials import material
-from softjaw.fem.pad import foam as kernel
+from softjaw.fem.pad.foam import Foam
 from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.pad.shape import PadShape
 
@@ -100,7 +101,7 @@ def test_tangent_is_the_derivative_of_the_force(pad, name):
 
 
 def measures(pad, law, F, directions):
-    foam = kernel.Foam(Pad(pad.shape, law))
+    foam = Foam(Pad(pad.shape, law))
     foam._displacements = lambda x: x
     u = pad.nodes @ (np.asarray(F) - np.eye(3)).T
     return foam.strains(np.ascontiguousarray(u[pad.element_nodes].transpose(0, 2, 1)), np.asarray(directions))[1:]
