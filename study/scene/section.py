@@ -24,6 +24,30 @@ Errors = Iterator[InitErrorDetails]  # what a rule yields
 Place = tuple[str, int | None]  # a file and a line of it, or an override
 Tables = Mapping[str, Mapping[str, FieldInfo]]  # keys of every section, by its name
 MOST_LISTED = 50  # problems in one message
+RENAMED = {  # keys of earlier versions, and what stands for them
+    "accuracy.cost_file": "accuracy.target",
+    "accuracy.e_n": "accuracy.target",
+    "candidates.count": "candidates.sampled",
+    "candidates.refine_within": "accuracy.target",
+    "candidates.solve_best": "candidates.sampled",
+    "effects.limit_surface": "limit_surface.model",
+    "gripper.alpha": "gripper.terms_kpa",
+    "gripper.shear_moduli_kpa": "gripper.terms_kpa",
+    "limit_surface.wrench_samples": "run.patches",  # from which `softjaw.friction_wrench` has them
+    "object.base": "object.open_ends",
+    "object.open_top": "object.open_ends",
+    "object.wall_heights_mm": "effects.object",  # a mesh with a handle is rigid
+    "object.wall_profile_mm": "object.wall_mm",
+    "output": "run.patches",
+    "score.length_scale": "score.object_length_mm",
+    "score.torque_scale": "score.contact_length_mm",
+    "uncertainty.mesh": "accuracy.meshes",
+    "uncertainty.mu": "uncertainty.spread",
+    "uncertainty.pose_deg": "uncertainty.spread",
+    "uncertainty.pose_mm": "uncertainty.spread",
+    "uncertainty.shear_modulus_percent": "uncertainty.spread",
+    "uncertainty.wall_thickness_percent": "uncertainty.spread",
+}
 HEADER = re.compile(r"\s*(\[\[?)([\w.\"' -]+)\]\]?\s*(?:#.*)?$")
 KEY = re.compile(r"""\s*([\w.\"' -]+?)\s*=""")
 NAME = re.compile(r""""[^"]*"|'[^']*'|[^.\s]+""")
@@ -183,6 +207,8 @@ def _expectation(entry: ErrorDetails, path: KeyPath) -> str:
 def _right_key(path: KeyPath, tables: Tables) -> str:
     """What to write instead of an unknown key or section."""
     key, (stem, _) = str(path[-1]), split_unit(str(path[-1]))
+    if new := RENAMED.get(key_text(path)):
+        return f"write `{new}`"
     if len(path) == 1 and (near := closest(key, list(tables))):
         return f"did you mean [{near}]?"
     keys = list(dict.fromkeys(k for name, table in tables.items() if name == path[0] for k in table))

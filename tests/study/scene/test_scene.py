@@ -8,7 +8,9 @@ import pytest
 from pydantic import ValidationError
 
 from softjaw.study.scene import Scene, SceneError, load_scene, parse_scene
+from softjaw.study.scene.model import tables_of
 from softjaw.study.scene.objects import SHAPES
+from softjaw.study.scene.section import RENAMED
 from tests.study.launching import ROOT, launch
 
 JOBS = sorted((ROOT / "jobs").glob("*.toml"))
@@ -82,6 +84,15 @@ def test_a_wrong_line_is_named_with_its_key_value_and_remedy(row):
     assert p.expected
     assert remedy in p.remedy
     assert str(p).startswith(f"ball.toml:{line}: {key}: found {found}, expected {p.expected}")
+
+
+def test_a_key_of_an_earlier_version_is_answered_with_the_one_that_stands_for_it():
+    tables = tables_of({"object": {"shape": "revolution"}})
+    remedies = {p.key: p.remedy for p in problems(BOTTLE, *(f"{k if '.' in k else f'{k}.file'}=1" for k in RENAMED))}
+    for old, new in RENAMED.items():
+        section, key = new.split(".")
+        assert key in tables[section]
+        assert f"`{new}`" in remedies[old]
 
 
 # What is put in place of what; the line and key that are named, and the value found.
@@ -198,6 +209,7 @@ def test_overrides_replace_values_which_are_in_si_units_and_hyperfoam_fills_in_i
     assert scene.gripper.pad_size == (0.05, 0.022, 0.015)
     assert scene.gripper.shear_modulus == 40e3
     assert scene.object.profile == ((0, 0.03), (0.05, 0.03), (0.1, 0.02), (0.15, 0.012))
+    assert scene.object.extent == 0.15
     assert scene.score.object_length_mm == "per_axis"
     assert parse_scene(body('shape = "plane"\nthickness_mm = 20'), overrides=["candidates.angles_deg=[0]"])
     massive = parse_scene(BALL, "ball.toml", ["object.mass_g=250", "task.centre_of_mass_mm=[0, 0, 5]"])
@@ -215,8 +227,8 @@ def test_overrides_replace_values_which_are_in_si_units_and_hyperfoam_fills_in_i
     [["friction.mu=5"], ["load.normal_force_n=[500]"], ["gripper.material=linear", "gripper.poisson_ratio=0.49"]],
 )
 def test_values_that_are_seldom_meant_are_allowed_with_a_warning(overrides):
-    assert len([*parse_scene(BALL, overrides=overrides).warnings()]) == 1
-    assert not [*parse_scene(BALL).warnings()]
+    assert len(parse_scene(BALL, overrides=overrides).warnings) == 1
+    assert not parse_scene(BALL).warnings
 
 
 def test_combinations_of_a_sweep_that_make_no_scene_are_named_and_too_many_refused():
@@ -280,7 +292,7 @@ def test_a_mesh_is_looked_for_beside_the_scene_and_counts_by_its_bytes(tmp_path)
 @pytest.mark.parametrize("path", JOBS, ids=[p.stem for p in JOBS])
 def test_shipped_scenes_load_without_warnings_and_survive_being_written_out(path):
     scene = load_scene(path)
-    assert not [*scene.warnings()]
+    assert not scene.warnings
     again = parse_scene(scene.effective_toml(), "elsewhere/again.toml")
     assert again == scene
     assert again.digest == scene.digest
