@@ -143,8 +143,12 @@ class Scene(SceneSection):
         """
         return load_scene(file, overrides)
 
-    def warnings(self) -> Iterator[str]:
+    @property
+    def warnings(self) -> tuple[str, ...]:
         """Sentences about values that are allowed but seldom meant."""
+        return tuple(self._warnings())
+
+    def _warnings(self) -> Iterator[str]:
         mu, g, force = self.friction.mu, self.gripper, self.load.normal_force[-1]
         if mu > 2:
             yield f"friction.mu = {mu:g} is large: foam on plastic has about 0.8, and the paper's highest is 2"

@@ -209,7 +209,6 @@ def test_overrides_replace_values_which_are_in_si_units_and_hyperfoam_fills_in_i
     assert scene.gripper.pad_size == (0.05, 0.022, 0.015)
     assert scene.gripper.shear_modulus == 40e3
     assert scene.object.profile == ((0, 0.03), (0.05, 0.03), (0.1, 0.02), (0.15, 0.012))
-    assert scene.object.extent == 0.15
     assert scene.score.object_length_mm == "per_axis"
     assert parse_scene(body('shape = "plane"\nthickness_mm = 20'), overrides=["candidates.angles_deg=[0]"])
     massive = parse_scene(BALL, "ball.toml", ["object.mass_g=250", "task.centre_of_mass_mm=[0, 0, 5]"])
