@@ -138,7 +138,7 @@ def of_patch(name: str, contacts: list[Contact]) -> Iterator[Row]:
     c = contacts[0]
     for level in SURFACES:
         found = fit_surface(c, "ccm", LimitSurfaceKeys(model=level))
-        yield "limit surface", f"{name}, {level}", found.errors_fitted.Erad, np.nan, 1, off(volume(c, found), 1.0)
+        yield "limit surface", f"{name}, {level}", found.fit_error_own.Erad, np.nan, 1, off(volume(c, found), 1.0)
 
 
 def rigid_scenes() -> Iterator[tuple[str, Scene]]:

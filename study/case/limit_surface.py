@@ -29,15 +29,17 @@ from softjaw.study.scene.sections import LimitSurfaceKeys as Choice
 FloatArray = NDArray[np.float64]
 INDEPENDENT = 377  # motions that a fit is judged by and does not see
 SIX_MOTIONS = 2048  # motions that a 6-D ellipsoid is fitted to
+# attributes of a fit that are stored for each friction model
+PER_MODEL = ("matrix", "coefficients", "certificate", "fit_flag", "fit_error", "fit_error_own", "fit_error_ellipsoid")
 STANDS_IN, ELLIPSOID, AS_FITTED, PROGRAMME = range(4)  # certificates, as study.quantities says
 
 
 class SurfaceFit(NamedTuple):
     """Limit surface of a contact in one friction model, with what it was fitted to.
 
-    ``wrench (samples, 6)`` are the wrenches of the fitted motions for mu = 1 [N, N m]; ``errors_fitted`` is the fit
-    error on those motions, ``fit_error`` and ``ellipsoid_fit_error`` are those of the surface and of the ellipsoid from
-    three motions on others, ``overclaim`` and ``ellipsoid_overclaim`` the largest shares by which they claim too much.
+    ``wrench (samples, 6)`` are the wrenches of the fitted motions for mu = 1 [N, N m]; ``fit_error_own`` is the fit
+    error on those motions, ``fit_error`` and ``fit_error_ellipsoid`` are those of the surface and of the ellipsoid from
+    three motions on others, ``overclaim`` and ``overclaim_ellipsoid`` the largest shares by which they claim too much.
     """
 
     rho: float
@@ -45,15 +47,31 @@ class SurfaceFit(NamedTuple):
     surface: LimitSurface
     certificate: int
     wrench: FloatArray
-    errors_fitted: FitErrors
+    fit_error_own: FitErrors
     fit_error: FitErrors
-    ellipsoid_fit_error: FitErrors
+    fit_error_ellipsoid: FitErrors
     overclaim: float
-    ellipsoid_overclaim: float
+    overclaim_ellipsoid: float
 
     def body(self, mu: float) -> LimitSurface:
         """The surface in ``(f_x, f_y, tau_z)`` per unit of S [-, -, m]."""
         return self.surface.scaled(mu * np.array([1.0, 1.0, self.rho]))
+
+    @property
+    def matrix(self) -> FloatArray:
+        """Matrix ``A (3, 3)`` of an ellipsoid ``w A w = 1``; NaN for other surfaces, and for flat ones."""
+        surface = self.surface
+        return surface.A if isinstance(surface, Ellipsoid) and surface.rank == 3 else np.full((3, 3), np.nan)
+
+    @property
+    def coefficients(self) -> FloatArray:
+        """Coefficients ``(15,)`` of a quartic, in the order of `lsfit.form.exponents`; NaN for other surfaces."""
+        return self.surface.coefficients if isinstance(self.surface, Quartic) else np.full(15, np.nan)
+
+    @property
+    def fit_flag(self) -> int:
+        """How the surface was fitted, `lsfit.ellipsoid.FitFlag`; 0 for a quartic."""
+        return int(getattr(self.surface, "flag", 0))
 
 
 def fit_surface(contact: Contact, model: str, choice: Choice) -> SurfaceFit:
@@ -129,16 +147,6 @@ def fit_flag(fits: Sequence[Mapping[str, SurfaceFit]]) -> int:
     return Flag.NO_FIT * any(b.certificate == STANDS_IN for finger in fits for b in finger.values())
 
 
-def matrix(surface: LimitSurface) -> FloatArray:
-    """Matrix ``A (3, 3)`` of an ellipsoid ``w A w = 1``; NaN for other surfaces, and for flat ones."""
-    return surface.A if isinstance(surface, Ellipsoid) and surface.rank == 3 else np.full((3, 3), np.nan)
-
-
-def coefficients(surface: LimitSurface) -> FloatArray:
-    """Coefficients ``(15,)`` of a quartic, in the order of `lsfit.form.exponents`; NaN for other surfaces."""
-    return surface.coefficients if isinstance(surface, Quartic) else np.full(15, np.nan)
-
-
 def _fit_error(surface: LimitSurface, W: FloatArray, T: FloatArray) -> FitErrors:
     """Fit error with the angle in rad; NaN where a flat body has no value at the samples."""
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -150,17 +158,10 @@ def _fit_error(surface: LimitSurface, W: FloatArray, T: FloatArray) -> FitErrors
 
 def surface_values(contacts: Sequence[Contact], fits: Sequence[Mapping[str, SurfaceFit]], six: bool) -> dict[str, Any]:
     """What is stored of both fingers' surfaces, keyed as in ``study.quantities``."""
-    every = [list(finger.values()) for finger in fits]
-    per_model = {
-        "matrix": lambda b: matrix(b.surface),
-        "coefficients": lambda b: coefficients(b.surface),
-        "certificate": lambda b: b.certificate,
-        "fit_flag": lambda b: int(getattr(b.surface, "flag", 0)),
-        "fit_error": lambda b: b.fit_error,
-        "fit_error_own": lambda b: b.errors_fitted,
-        "fit_error_ellipsoid": lambda b: b.ellipsoid_fit_error,
+    values: dict[str, Any] = {
+        f"limit_surface/{name}": [[getattr(fit, name) for fit in finger.values()] for finger in fits]
+        for name in PER_MODEL
     }
-    values = {f"limit_surface/{name}": [[of(b) for b in finger] for finger in every] for name, of in per_model.items()}
     curved = [finger["ccm"] for finger in fits]
     if six:
         sixes = [six_ellipsoid(c.local, c.rho, c.unit_limits["ccm"].S) for c in contacts]
@@ -169,9 +170,9 @@ def surface_values(contacts: Sequence[Contact], fits: Sequence[Mapping[str, Surf
     return values | {
         "limit_surface/rho": [b.rho for b in curved],
         "maps/fit_error": np.max([b.fit_error.Erad for b in curved]),
-        "maps/fit_error_ellipsoid": np.max([b.ellipsoid_fit_error.Erad for b in curved]),
+        "maps/fit_error_ellipsoid": np.max([b.fit_error_ellipsoid.Erad for b in curved]),
         "maps/overclaim": np.max([b.overclaim for b in curved]),
-        "maps/overclaim_ellipsoid": np.max([b.ellipsoid_overclaim for b in curved]),
+        "maps/overclaim_ellipsoid": np.max([b.overclaim_ellipsoid for b in curved]),
     }
 
 
@@ -195,10 +196,8 @@ def six_quartic(contact: Contact, model: str, samples: int) -> tuple[LimitSurfac
     W, T = _six_samples(contact.local, contact.rho, S, model, samples + INDEPENDENT)
     fitted_to, others = slice(samples), slice(samples, None)
     surface = span_quartic(W[fitted_to], T[fitted_to])
-    errors = fit_error(surface, W[others], T[others])
     size = contact.mu * S * np.repeat([1.0, contact.rho], 3)
-    errors = errors._replace(Edir=float(np.radians(errors.Edir)))
-    return surface.scaled(size), errors, overclaim(surface, W[others])
+    return surface.scaled(size), _fit_error(surface, W[others], T[others]), overclaim(surface, W[others])
 
 
 def _six_samples(patch: ContactPatch, rho: float, S: float, model: str, count: int) -> tuple[FloatArray, FloatArray]:
