@@ -203,24 +203,15 @@ def _time(plan: Plan, scene: Any, path: Path, ranks: int) -> str:
 def _estimated_time(plan: Plan, scene: Any, ranks: int) -> str:
     """Time before anything is solved: of elements and springs, for walls the middle between their levels."""
     on = f"on {ranks} rank{'s' * (ranks > 1)}"
-    times = _wall_seconds(plan, scene)
-    if not times:
+    if not shells(scene):
         seconds = makespan(plan.in_parts(estimated(plan.tried)), ranks)
         return f"about {duration(START_S + seconds)} {on}, estimated on a bed of springs"
-    paths = [plan.layout.shape[-1] * (1.25 if scene.accuracy.meshes > 1 else 1.0)] * len(plan.tried)
-    low, high = (each * makespan(paths, ranks) for each in (times[0], times[-1]))
-    if low == high:
-        return f"about {duration(START_S + low)} {on} ({scene.effects.object.replace('_', ' ')})"
-    ends = f"{duration(low)} if all candidates are rigid, {duration(high)} if all take the costliest shell"
-    return f"about {duration(START_S + math.sqrt(low * high))} {on} ({ends})"
-
-
-def _wall_seconds(plan: Plan, scene: Any) -> list[float]:
-    """Seconds of a force at the levels that a wall may be solved with, rising; empty where that is not known."""
-    if not (plan.tried and shells(scene)):
-        return []
-    pads, shell = (SECONDS_PER_UNKNOWN * size for size in wall_unknowns(scene))
-    return [pads + shell] if scene.effects.object.endswith("shell") else [pads, pads + shell]
+    pads, shell = wall_unknowns(scene)
+    # between rigid candidates and shells where the scene leaves that open
+    size = pads + shell if scene.effects.object.endswith("shell") else math.sqrt(pads * (pads + shell))
+    forces = plan.layout.shape[-1] * (1.25 if scene.accuracy.meshes > 1 else 1.0)
+    seconds = SECONDS_PER_UNKNOWN * size * makespan([forces] * len(plan.tried), ranks)
+    return f"about {duration(START_S + seconds)} {on}, estimated from the size of pads and wall"
 
 
 def free_bytes(path: Path) -> int:
