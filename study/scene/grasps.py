@@ -6,10 +6,10 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr
+from pydantic import BeforeValidator, Field, PrivateAttr
 
 from softjaw.study.scene.objects import LARGEST_MM, Plate, Shape, Span, SphereShape
-from softjaw.study.scene.section import Direction, Errors, SceneSection, Text, Vector, once_and_rising, wrong
+from softjaw.study.scene.section import RISING, Direction, Errors, SceneSection, Text, Vector, wrong
 from softjaw.study.scene.sections import Gripper
 from softjaw.study.units import converted
 
@@ -55,26 +55,19 @@ class Candidates(SceneSection):
     stations: int | None = Field(
         None, ge=2, le=10_000, description="number of stations, spread evenly from the first to the last of stations_mm"
     )
-    stations_mm: (
-        Annotated[
-            tuple[float, ...], Field(strict=False, min_length=1, max_length=10_000), AfterValidator(once_and_rising)
-        ]
-        | None
-    ) = Field(
+    stations_mm: Annotated[tuple[float, ...], Field(min_length=1, max_length=10_000), RISING] | None = Field(
         None,
         description="stations along the object's axis; with `stations` the first and the last",
         examples=[[25, 50, 75]],
     )
-    angles_deg: Annotated[
-        tuple[Angle, ...], Field(strict=False, min_length=1, max_length=3600), AfterValidator(once_and_rising)
-    ] = Field((0.0, 90.0), description="angles about the axis", examples=[[0, 90]])
+    angles_deg: Annotated[tuple[Angle, ...], Field(min_length=1, max_length=3600), RISING] = Field(
+        (0.0, 90.0), description="angles about the axis", examples=[[0, 90]]
+    )
     roll_deg: Angle = Field(
         0.0, description="turn of the gripper about the approach; 0 has the long side along the axis, or as in poses"
     )
     shift_mm: float = Field(0.0, ge=-200, le=200, description="shift of the gripper along the pads' long side")
-    poses: tuple[GraspPose, ...] = Field(
-        (), strict=False, max_length=100_000, description="explicit grasps", examples=[POSE]
-    )
+    poses: tuple[GraspPose, ...] = Field((), max_length=100_000, description="explicit grasps", examples=[POSE])
     sampled: int | None = Field(
         None, ge=1, le=1000, description="looks for so many distinct grasps itself: places that face each other"
     )

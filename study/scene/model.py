@@ -47,7 +47,6 @@ from softjaw.study.scene.sections import (
 from softjaw.study.scene.text import flat, parse_toml, read_text, toml_text
 
 Option = str | int | float | bool
-Numbers = Annotated[tuple[int | float, ...], Field(strict=False)]  # one value of a key that takes a list
 WATCHING = ("monitor", "view", "converged_reason")  # PETSc options that only print
 WAYS = ("stations", "stations_mm", "poses", "sampled")  # of giving candidates: an override of one replaces the others
 NOT_SWEPT = (  # they change which datasets a file has and how large they are, or no number of a case
@@ -87,7 +86,7 @@ class Scene(SceneSection):
     task: TaskKeys = Field(default_factory=TaskKeys)
     run: Run = Field(default_factory=Run)
     petsc: dict[str, Option] = Field(default_factory=dict, description="options of the contact solver, contact_...")
-    sweep: dict[str, Annotated[tuple[str | int | float | Numbers, ...], Field(strict=False, min_length=1)]] = Field(
+    sweep: dict[str, Annotated[tuple[str | int | float | tuple[int | float, ...], ...], Field(min_length=1)]] = Field(
         default_factory=dict,
         description='lists of values by dotted key, as in "object.semi_axis_b_mm" = [10, 20]',
         json_schema_extra={"additionalProperties": True},  # the dotted keys may stand without quotes
@@ -362,31 +361,35 @@ def _scene(
     if isinstance(data.get("sweep"), dict):
         data["sweep"] = flat(data["sweep"])  # dotted keys mean the same with and without quotes
     given: dict[KeyPath, Place] = {}
-    problems = put_overrides(data, overrides, given)
+    problems, lines = put_overrides(data, overrides, given), lines_of(text)
+
+    def place(key: KeyPath) -> Place:
+        """An override before the file, whose value it replaces; of the file the line of the nearest key."""
+        above = [key[:n] for n in range(len(key), 0, -1)]
+        spelled = [(k[0], *str(k[1]).split("."), *k[2:]) if k[0] == "sweep" and k[1:] else k for k in above]
+        line = next((lines[k] for pair in zip(above, spelled, strict=True) for k in pair if k in lines), None)
+        return next((given[k] for k in above if k in given), (str(path), line))
+
     if check_files and (trouble := filled_in(data, path.parent)):
         key, found, expected = trouble
-        line = lines_of(text).get(tuple(key.split(".")))
-        where = given.get(tuple(key.split(".")), (str(path), line))
-        problems.append(Problem(*where, key, shown(found), expected, ""))
+        problems.append(Problem(*place(tuple(key.split("."))), key, shown(found), expected, ""))
     # Before the checks, which want to see what depends on the file's name and on the sweep.
     _fill_in(data, path)
     try:
-        scene = Scene.model_validate(data, context=check_files)
+        scene = Scene.model_validate(_tuples(data), context=check_files)
     except ValidationError as error:
-        lines = lines_of(text)
-
-        def place(key: KeyPath) -> Place:
-            """An override before the file, whose value it replaces; of the file the line of the nearest key."""
-            above = [key[:n] for n in range(len(key), 0, -1)]
-            spelled = [(k[0], *str(k[1]).split("."), *k[2:]) if k[0] == "sweep" and k[1:] else k for k in above]
-            line = next((lines[k] for pair in zip(above, spelled, strict=True) for k in pair if k in lines), None)
-            return next((given[k] for k in above if k in given), (str(path), line))
-
         problems += problems_of(error, data, tables_of(data), place)
     if problems:
         # Problems of the file first and from top to bottom, as an editor goes through them.
         raise SceneError(sorted(problems, key=lambda p: (p.file != str(path), p.line or 0)))
     return scene
+
+
+def _tuples(value: Any) -> Any:
+    """A copy of tables with tuples instead of lists."""
+    if isinstance(value, Mapping):
+        return {key: _tuples(member) for key, member in value.items()}
+    return tuple(map(_tuples, value)) if isinstance(value, list) else value
 
 
 def _fill_in(data: dict[str, Any], path: Path) -> None:

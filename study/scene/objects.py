@@ -21,7 +21,6 @@ Length = Annotated[float, Field(gt=0)]
 Modulus = Annotated[float, Field(gt=0, le=1000)]
 Strength = Annotated[float, Field(gt=0, le=1e5)]
 Ratio = Annotated[float, Field(ge=0, le=0.49)]
-Triple = Annotated[tuple[Length, Length, Length], Field(strict=False)]
 
 
 class Shape(SceneSection):
@@ -67,7 +66,7 @@ class Shape(SceneSection):
 class Walled(Shape):
     """Shapes that can have a thin wall: ``wall_mm`` makes them hollow, and the wall gives way under the pads."""
 
-    wall_mm: Length | Annotated[tuple[Point, ...], Field(strict=False, min_length=2, max_length=500)] | None = Field(
+    wall_mm: Length | Annotated[tuple[Point, ...], Field(min_length=2, max_length=500)] | None = Field(
         None, description="wall thickness, or pairs [z, thickness] with rising z; without it the object is rigid"
     )
     base_wall_mm: Length | None = Field(None, description="thickness of a flat bottom; that of the wall if left out")
@@ -157,7 +156,7 @@ class BoxShape(Shape):
 
     SIZE_KEYS = ("size_mm",)
     shape: Literal["box"]
-    size_mm: Triple = Field(description="size along x, y and z", examples=[[60, 40, 120]])
+    size_mm: tuple[Length, Length, Length] = Field(description="size along x, y and z", examples=[[60, 40, 120]])
     edge_radius_mm: float = Field(gt=0, description="radius of the edges and corners")
 
     def _geometry(self) -> tuple[int, dict[str, Span]]:
@@ -189,7 +188,6 @@ class RevolutionShape(Walled):
     SIZE_KEYS = ("profile_mm",)
     shape: Literal["revolution"]
     profile_mm: tuple[Point, ...] = Field(
-        strict=False,
         min_length=4,
         max_length=2000,
         description="outline as points [z, radius] with rising z",
@@ -222,7 +220,7 @@ class SectionTable(SceneSection):
     a_mm: float = Field(ge=0, description="semi-axis along x; 0 is allowed for the first and the last section")
     b_mm: Length | None = Field(None, description="semi-axis along y; that along x if left out")
     exponent: float = Field(2.0, ge=2, le=20, description="2 for an ellipse, more for a rounded rectangle")
-    shift_mm: Point = Field((0.0, 0.0), strict=False, description="place of the section's middle, [x, y]")
+    shift_mm: Point = Field((0.0, 0.0), description="place of the section's middle, [x, y]")
 
 
 class Sections(Walled):
@@ -231,7 +229,7 @@ class Sections(Walled):
     SIZE_KEYS = ("sections",)
     shape: Literal["sections"]
     sections: tuple[SectionTable, ...] = Field(
-        strict=False, min_length=4, max_length=500, description="cross-sections from bottom to top"
+        min_length=4, max_length=500, description="cross-sections from bottom to top"
     )
 
     def _geometry(self) -> tuple[int, dict[str, Span]]:

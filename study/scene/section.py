@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from typing import Annotated, Any, Self
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError, model_validator
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 
@@ -137,8 +137,9 @@ def _one_line(text: str) -> str:
 
 
 Text = Annotated[str, AfterValidator(_one_line)]
-Point = Annotated[tuple[float, float], Field(strict=False)]
-Vector = Annotated[tuple[float, float, float], Field(strict=False)]
+RISING = AfterValidator(once_and_rising)
+Point = tuple[float, float]
+Vector = tuple[float, float, float]
 Direction = Annotated[Vector, AfterValidator(_direction)]
 
 

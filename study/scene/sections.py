@@ -8,25 +8,21 @@ from collections.abc import Mapping
 from contextlib import suppress
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import Field, model_validator
 
 from softjaw.fem.pad.halving import halved
 from softjaw.study.grippers import PRESETS
 from softjaw.study.messages import shown
 from softjaw.study.scene.objects import Shape, Walled
-from softjaw.study.scene.section import Direction, Errors, Point, SceneSection, Vector, once_and_rising, wrong
+from softjaw.study.scene.section import RISING, Direction, Errors, Point, SceneSection, Vector, wrong
 from softjaw.study.scene.text import flat
 from softjaw.study.units import in_si
 
 Count = Annotated[int, Field(ge=2, le=400)]
-Counts = Annotated[tuple[Count, Count, Count], Field(strict=False)]
 Extent = Annotated[float, Field(ge=0, le=500)]
-Extents = Annotated[tuple[Extent, Extent], Field(strict=False)]
 FingerSide = Annotated[float, Field(ge=1, le=1000)]
-FingerSize = Annotated[tuple[FingerSide, FingerSide], Field(strict=False)]
 Force = Annotated[float, Field(gt=0, le=1000)]
 Grading = Annotated[float, Field(ge=0.05, le=20)]
-Gradings = Annotated[tuple[Grading, Grading, Grading], Field(strict=False)]
 WallSize = Annotated[float, Field(ge=0.2, le=50)]
 MOST_ELEMENTS, LARGEST_ASPECT = 1_000_000, 20.0
 UNCERTAIN = ("object", "gripper", "friction", "candidates", "task")  # sections whose numbers may be
@@ -53,25 +49,29 @@ class Gripper(SceneSection):
     material: Literal["blatz_ko", "hyperfoam", "neo_hookean", "linear"] = Field("blatz_ko", description="material law")
     shear_modulus_kpa: float = Field(40.0, ge=0.01, le=1e6, description="initial shear modulus of the pad")
     poisson_ratio: float = Field(0.25, ge=0, le=0.4999, description="Poisson's ratio of the pad; Blatz-Ko foam: 0.25")
-    terms_kpa: Annotated[tuple[Point, ...], Field(strict=False, max_length=6)] = Field(
-        (), description="terms of hyperfoam, pairs of exponent and shear modulus", examples=[[[-2, 40]]]
+    terms_kpa: tuple[Point, ...] = Field(
+        (), max_length=6, description="terms of hyperfoam, pairs of exponent and shear modulus", examples=[[[-2, 40]]]
     )
-    elements: Counts = Field((20, 10, 6), description="elements of the whole pad along its length, width and thickness")
+    elements: tuple[Count, Count, Count] = Field(
+        (20, 10, 6), description="elements of the whole pad along its length, width and thickness"
+    )
     element: Literal["hex8", "hex27"] = Field("hex8", description="trilinear or triquadratic elements")
-    grading: Gradings = Field(
+    grading: tuple[Grading, Grading, Grading] = Field(
         (1.0, 1.0, 1.0), description="size of elements at the pad's ends, sides and back over that at its middle"
     )
     max_opening_mm: float | None = Field(
         None, gt=0, le=1000, description="largest distance of the pads' faces; wider grasps are not solved"
     )
-    finger_size_mm: FingerSize | None = Field(
+    finger_size_mm: tuple[FingerSide, FingerSide] | None = Field(
         None,
         description="length and width of what carries a pad, left out where it is the pad's own",
         examples=[[60, 25]],
     )
     sheet_thickness_mm: float = Field(2.0, ge=0.05, le=100, description="thickness of the backing plate")
     sheet_modulus_gpa: float = Field(200.0, ge=1e-3, le=2000, description="Young's modulus of the plate; steel: 200")
-    sheet_support_mm: Extents = Field((20.0, 10.0), description="length and width of the plate's middle that is held")
+    sheet_support_mm: tuple[Extent, Extent] = Field(
+        (20.0, 10.0), description="length and width of the plate's middle that is held"
+    )
     tilt_stiffness_nm_per_rad: float | None = Field(
         None, ge=1e-3, le=1e5, description="moment per angle of a mount that lets the pad tilt; left out: it does not"
     )
@@ -83,7 +83,7 @@ class Gripper(SceneSection):
         if not isinstance(data, dict) or data.get("material") != "hyperfoam":
             return data
         if "terms_kpa" not in data:
-            return {**data, "terms_kpa": [[-2.0, data.get("shear_modulus_kpa", 40.0)]]}
+            return {**data, "terms_kpa": ((-2.0, data.get("shear_modulus_kpa", 40.0)),)}
         with suppress(TypeError, ValueError):  # of terms that are refused
             return {"shear_modulus_kpa": sum(modulus for _, modulus in data["terms_kpa"]), **data}
         return data
@@ -191,9 +191,9 @@ class Friction(SceneSection):
 class Load(SceneSection):
     """What the fingers press with."""
 
-    normal_force_n: Annotated[
-        tuple[Force, ...], Field(strict=False, min_length=1, max_length=1000), AfterValidator(once_and_rising)
-    ] = Field(description="normal forces per finger", examples=[[1, 2, 5]])
+    normal_force_n: Annotated[tuple[Force, ...], Field(min_length=1, max_length=1000), RISING] = Field(
+        description="normal forces per finger", examples=[[1, 2, 5]]
+    )
 
 
 class ScoreKeys(SceneSection):
