@@ -265,7 +265,6 @@ class EffectChoice:
         """e_n of the weaker finger [m], payload [kg] and quality, NaN where that cannot be told."""
         e_n = min(c.limits["ccm"].e_n for c in contacts)
         settings = settings_of(self.solver.scene, build_object(self.solver.scene.object))
-        assert settings.task is not None
         try:
             held = payload_alone(contacts, PAYLOAD_MOTIONS, settings.task)["maps/payload"]
             return e_n, held, quality(contacts, settings)

@@ -138,8 +138,7 @@ def _all(contacts: Sequence[Any], settings: EvaluationSettings) -> dict[str, Any
 def _grasp(contacts: Sequence[Contact], settings: EvaluationSettings) -> dict[str, Any]:
     """Quality of the ellipsoids and payload ``(1,)`` in the curved model."""
     values = {"maps/quality": quality(contacts, settings)}
-    if settings.task:
-        values |= payload_alone(contacts, settings.surface.samples, settings.task)
+    values |= payload_alone(contacts, settings.surface.samples, settings.task)
     return {key: [value] for key, value in values.items()}
 
 

@@ -47,16 +47,15 @@ class EvaluationSettings:
     """What is computed from two contacts.
 
     ``arms`` (3,) array or float: lengths by which the arms of forces are divided along x, y and z of the object's
-    frame, or one for all [m]. ``torques``: length by which torques about the normals are divided [m]. ``surface``:
-    section ``[limit_surface]`` of a scene. ``task``: what is to be held; with it the payload is computed.
-    ``epsilon_everywhere, six, sampled``: whether to find epsilon in any pose, 6-D ellipsoids, and to keep the sampled
-    wrenches.
+    frame, or one for all [m]. ``torques``: length by which torques about the normals are divided [m]. ``task``: what is
+    to be held. ``surface``: section ``[limit_surface]`` of a scene. ``epsilon_everywhere, six``: whether to find
+    epsilon in any pose, and 6-D ellipsoids.
     """
 
     arms: ArrayLike
     torques: float
+    task: Task
     surface: Choice = field(default_factory=Choice)
-    task: Task | None = None
     epsilon_everywhere: bool = False
     six: bool = False
 
@@ -82,7 +81,7 @@ def lengths(scene: Scene, obj: Any) -> tuple[FloatArray, float]:
 def settings_of(scene: Scene, obj: Any) -> EvaluationSettings:
     """What a scene asks for."""
     return EvaluationSettings(
-        *lengths(scene, obj), scene.limit_surface, task_of(scene, obj),
+        *lengths(scene, obj), task_of(scene, obj), scene.limit_surface,
         epsilon_everywhere=scene.score.epsilon == "everywhere",
         six=scene.effects.wrench == "6-D",
     )  # fmt: skip
@@ -104,12 +103,9 @@ def evaluate(
     alike = second.patch is first.patch
     fits.append(fits[0] if alike else {m: fit_surface(second, m, settings.surface) for m in MODELS})
     scores, best = _scores(contacts, fits, settings)
-    values = _friction_values(contacts) | scores | surface_values(contacts, fits, settings.six)
-    values["maps/flags"] = pose_flags(contacts) | raised(best.flag) | fit_flag(fits)
-    if settings.task:
-        payloads, flag = payload_values(contacts, fits, settings.task)
-        values |= payloads
-        values["maps/flags"] |= flag
+    payloads, flag = payload_values(contacts, fits, settings.task)
+    values = _friction_values(contacts) | scores | surface_values(contacts, fits, settings.six) | payloads
+    values["maps/flags"] = pose_flags(contacts) | raised(best.flag) | fit_flag(fits) | flag
     return values, fits
 
 
