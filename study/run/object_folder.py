@@ -18,7 +18,7 @@ from typing import Any
 from softjaw.fem.objects.mesh_file import ENDINGS
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.result.index import INDEX
-from softjaw.study.scene.model import Scene, file_digest, load_scene, parse_scene, put_overrides
+from softjaw.study.scene.model import Scene, file_digest, load_scene, put_overrides
 from softjaw.study.scene.objects import Mesh
 from softjaw.study.scene.text import parse_toml, read_text
 
@@ -56,8 +56,7 @@ class ObjectFolder:
 
         Raises `SceneError` with everything that is wrong.
         """
-        path = Path(self.scene_file)
-        return parse_scene(read_text(path), path, self.overrides_of(self.objects[0]), check_files=False)
+        return load_scene(self.scene_file, self.overrides_of(self.objects[0]), check_files=False)
 
 
 def folder_of(scene_file: str, overrides: Sequence[str]) -> ObjectFolder | None:

@@ -337,10 +337,9 @@ def file_digest(file: str) -> str:
     return _stamped_digest(file, (status.st_mtime_ns, status.st_size))
 
 
-def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
-    """The scene of a file, with ``section.key=value`` overrides put in; see `Scene.from_file`."""
-    path = Path(path)
-    return parse_scene(read_text(path), path, overrides)
+def load_scene(path: Path | str, overrides: Sequence[str] = (), check_files: bool = True) -> Scene:
+    """The scene of a file, with ``section.key=value`` overrides put in; see `Scene.from_file` and `parse_scene`."""
+    return parse_scene(read_text(Path(path)), path, overrides, check_files)
 
 
 def parse_scene(
@@ -358,10 +357,11 @@ def _scene(
     data: dict[str, Any], text: str, path: Path, overrides: Sequence[str] = (), check_files: bool = True
 ) -> Scene:
     """The scene of tables that stand in a text, if any, of the file ``path``."""
-    if isinstance(data.get("sweep"), dict):
-        data["sweep"] = flat(data["sweep"])  # dotted keys mean the same with and without quotes
     given: dict[KeyPath, Place] = {}
     problems, lines = put_overrides(data, overrides, given), lines_of(text)
+    for table, name in ((data, "sweep"), (data.get("uncertainty"), "spread")):
+        if isinstance(table, dict) and isinstance(table.get(name), dict):
+            table[name] = flat(table[name])  # dotted keys mean the same with and without quotes
 
     def place(key: KeyPath) -> Place:
         """An override before the file, whose value it replaces; of the file the line of the nearest key."""

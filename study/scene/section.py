@@ -24,30 +24,24 @@ Errors = Iterator[InitErrorDetails]  # what a rule yields
 Place = tuple[str, int | None]  # a file and a line of it, or an override
 Tables = Mapping[str, Mapping[str, FieldInfo]]  # keys of every section, by its name
 MOST_LISTED = 50  # problems in one message
-RENAMED = {  # keys of earlier versions, and what stands for them
-    "accuracy.cost_file": "accuracy.target",
-    "accuracy.e_n": "accuracy.target",
-    "candidates.count": "candidates.sampled",
-    "candidates.refine_within": "accuracy.target",
-    "candidates.solve_best": "candidates.sampled",
-    "effects.limit_surface": "limit_surface.model",
-    "gripper.alpha": "gripper.terms_kpa",
-    "gripper.shear_moduli_kpa": "gripper.terms_kpa",
-    "limit_surface.wrench_samples": "run.patches",  # from which `softjaw.friction_wrench` has them
-    "object.base": "object.open_ends",
-    "object.open_top": "object.open_ends",
-    "object.wall_heights_mm": "effects.object",  # a mesh with a handle is rigid
-    "object.wall_profile_mm": "object.wall_mm",
-    "output": "run.patches",
-    "score.length_scale": "score.object_length_mm",
-    "score.torque_scale": "score.contact_length_mm",
-    "uncertainty.mesh": "accuracy.meshes",
-    "uncertainty.mu": "uncertainty.spread",
-    "uncertainty.pose_deg": "uncertainty.spread",
-    "uncertainty.pose_mm": "uncertainty.spread",
-    "uncertainty.shear_modulus_percent": "uncertainty.spread",
-    "uncertainty.wall_thickness_percent": "uncertainty.spread",
-}
+FORMER = {  # keys, and those of earlier versions that they stand for
+    "accuracy.meshes": ("uncertainty.mesh",),
+    "accuracy.target": ("accuracy.cost_file", "accuracy.e_n", "candidates.refine_within"),
+    "candidates.sampled": ("candidates.count", "candidates.solve_best"),
+    "effects.object": ("object.wall_heights_mm",),  # a mesh with a handle is rigid
+    "gripper.terms_kpa": ("gripper.alpha", "gripper.shear_moduli_kpa"),
+    "limit_surface.model": ("effects.limit_surface",),
+    "object.open_ends": ("object.base", "object.open_top"),
+    "object.wall_mm": ("object.wall_profile_mm",),
+    "run.patches": ("output", "limit_surface.wrench_samples"),  # from which `softjaw.friction_wrench` has them
+    "score.contact_length_mm": ("score.torque_scale",),
+    "score.object_length_mm": ("score.length_scale",),
+    "uncertainty.spread": (
+        "uncertainty.mu", "uncertainty.pose_deg", "uncertainty.pose_mm", "uncertainty.shear_modulus_percent",
+        "uncertainty.wall_thickness_percent",
+    ),
+}  # fmt: skip
+RENAMED = {old: new for new, olds in FORMER.items() for old in olds}
 HEADER = re.compile(r"\s*(\[\[?)([\w.\"' -]+)\]\]?\s*(?:#.*)?$")
 KEY = re.compile(r"""\s*([\w.\"' -]+?)\s*=""")
 NAME = re.compile(r""""[^"]*"|'[^']*'|[^.\s]+""")

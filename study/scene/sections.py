@@ -15,7 +15,6 @@ from softjaw.study.grippers import PRESETS
 from softjaw.study.messages import shown
 from softjaw.study.scene.objects import Shape, Walled
 from softjaw.study.scene.section import RISING, Direction, Errors, Point, SceneSection, Vector, wrong
-from softjaw.study.scene.text import flat
 from softjaw.study.units import in_si
 
 Count = Annotated[int, Field(ge=2, le=400)]
@@ -322,14 +321,6 @@ class Uncertainty(SceneSection):
         description="half-widths of 95 % intervals by dotted key, in the key's unit",
         examples=[{"friction.mu": 0.08}],
     )
-
-    @model_validator(mode="before")
-    @classmethod
-    def _dotted(cls, data: Any) -> Any:
-        """Dotted keys mean the same with and without quotes."""
-        if isinstance(data, dict) and isinstance(data.get("spread"), dict):
-            return data | {"spread": flat(data["spread"])}
-        return data
 
     def inputs(self, means: Mapping[str, float]) -> list[dict[str, float]]:
         """Samples of independent normal inputs about their means, by key.
