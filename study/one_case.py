@@ -164,7 +164,8 @@ def solved_case(
     """Solve one case; arguments and errors as for `softjaw.press`."""
     _refuse_open_questions(scene)
     scene, number = _asked(with_mass(scene), station, angle, candidate, pose)
-    scene, k = _at_force(scene, force)
+    forces, k = _joined(scene.load.normal_force_n, _number("force", force, "N"))
+    scene = scene.with_values({"load.normal_force_n": forces})
     try:
         check_object(scene)
         check_candidates(scene)
@@ -264,12 +265,6 @@ def _joined(values: Sequence[float], value: float) -> tuple[list[float], int]:
 def _with_candidates(scene: Scene, table: dict[str, Any]) -> Scene:
     """The scene with these candidates."""
     return Scene.of_tables(scene.effective() | {"candidates": table})
-
-
-def _at_force(scene: Scene, force: float) -> tuple[Scene, int]:
-    """The scene with the force among its own, and the force's position."""
-    forces, k = _joined(scene.load.normal_force_n, _number("force", force, "N"))
-    return scene.with_values({"load.normal_force_n": forces}), k
 
 
 def grasp_pose(pose: Any) -> Mapping[str, Any]:

@@ -206,16 +206,12 @@ def axes(scene: Scene) -> list[Axis]:
         station = Axis("station", np.array(where.station_values), "m", "station along the object's axis")
         angle = Axis("angle", np.array(where.angles), "rad", "angle about the object's axis")
     force = Axis("normal_force", np.array(scene.load.normal_force), "N", "normal force per finger")
-    return [*_sweep_axes(scene.sweep), *_realisation_axis(scene), station, angle, force]
-
-
-def _realisation_axis(scene: Scene) -> list[Axis]:
-    """The scene's own inputs and every sample of the uncertain ones; no axis where none is uncertain."""
-    if len(realisations := scene.realisations) == 1:
-        return []
-    texts = (", ".join(f"{key} = {value:g}" for key, value in inputs.items()) for inputs in realisations[1:])
-    numbers = np.arange(len(realisations), dtype=float)
-    return [Axis(REALISATION, numbers, "", "sample of the uncertain inputs", ("as given", *texts))]
+    own = [station, angle, force]
+    if samples := scene.realisations[1:]:
+        texts = (", ".join(f"{key} = {value:g}" for key, value in inputs.items()) for inputs in samples)
+        numbers = np.arange(1.0 + len(samples))
+        own.insert(0, Axis(REALISATION, numbers, "", "sample of the uncertain inputs", ("as given", *texts)))
+    return [*_sweep_axes(scene.sweep), *own]
 
 
 def _sweep_axes(sweep: Mapping[str, Sequence[Any]]) -> list[Axis]:

@@ -35,10 +35,7 @@ FACING = math.radians(0.5)  # misalignment up to which the closed form is off by
 EPSILON_GAP = 1e-2  # relative gap between the bounds of epsilon
 LIMITS = (("f_x", "f_x_max"), ("f_y", "f_y_max"), ("tau_z", "tau_z_max"))  # attribute, quantity
 ECCENTRICITIES = ("e_n", "e_n_ratio", "e_n_projected")  # attributes and quantities alike
-PLANAR = (
-    ("pcm", ""),
-    ("pcm_projected", "_pcm_projected"),
-)  # planar model, suffix of the quantities that compare with it
+PLANAR = {"pcm": "", "pcm_projected": "_pcm_projected"}  # suffixes of the quantities that compare with these models
 Fits = Mapping[str, SurfaceFit]  # by friction model
 
 
@@ -150,7 +147,7 @@ def overestimates(contacts: Sequence[Contact]) -> dict[str, float]:
     """Share of each planar model's claim that the curved contact cannot carry, for both forces and the torque."""
     shares = {}
     for name, _ in LIMITS:
-        for planar, suffix in PLANAR:
+        for planar, suffix in PLANAR.items():
             pairs = [(getattr(c.limits["ccm"], name), getattr(c.limits[planar], name)) for c in contacts]
             # NaN where the planar model carries nothing: there is no claim to compare with.
             shares[f"{name}_overestimate{suffix}"] = max(1.0 - f / p if p > 0 else np.nan for f, p in pairs)

@@ -105,7 +105,8 @@ class _ObjectsRun:
         for n, row in ((n, self._rows[n]) for n in batch):
             known = {name: row[name] for name in ("file", "mesh", "key", "mass")}
             self._rows[n] = index.blank_row(row["object"], state=index.STOPPED, **known)
-        self._store(f"objects {self._ended + 1} to {self._ended + len(batch)} of {len(self._rows)}")
+        ended = sum(row["state"] in index.ENDED for row in self._rows)
+        self._store(f"objects {ended + 1} to {ended + len(batch)} of {len(self._rows)}")
         answers, stopped = self._divide(batch, self._prepared)
         failed = {n: answer for n, answer in answers.items() if not isinstance(answer, Part)}
         for n, (state, reason) in failed.items():
@@ -231,10 +232,6 @@ class _ObjectsRun:
         return sorted(together, key=lambda item: item.number if isinstance(item, Part) else item[0])
 
     # --- the index ----------------------------------------------------------------------------------------------------
-
-    @property
-    def _ended(self) -> int:
-        return sum(row["state"] in index.ENDED for row in self._rows)
 
     def _store(self, text: str = "") -> None:
         if text and self._comm.rank == 0:
