@@ -34,32 +34,16 @@ from softjaw.study.export.cases import MEANING
 from softjaw.study.export.selection import GripperFrame, RankedGrasp
 from softjaw.study.ranking import task_keys
 from softjaw.study.table import plain
+from softjaw.study.templates import template
 from softjaw.study.units import UNITS
 
 # of every gripper of the format; others have the hand's own
 CLOSING = {"graspgen": "x", "acronym": "x", "webdataset": "x"}
-LEAST_WAY = WAY / 2  # of approach and retreat [m] that is enough
 
 
-def as_isaac_grasp(found: Sequence[RankedGrasp], gripper: GripperFrame, ds: xr.Dataset) -> str:
+def as_isaac_grasp(grasps: Sequence[RankedGrasp], gripper: GripperFrame, ds: xr.Dataset) -> str:
     """An isaac_grasp file; what it has no field for stands in comments."""
-    made: dict[str, Any] = {"#": _about(ds, gripper), "format": "isaac_grasp", "format_version": 1.0}
-    for key, name in (("object_frame", gripper.object_frame), ("gripper_frame", gripper.hand.frame)):
-        made |= {key: name, f"{key}_link": name}
-    made["grasps"] = {grasp.name: _isaac_grasp(grasp) for grasp in found}
-    return yaml_text(made)
-
-
-def _isaac_grasp(grasp: RankedGrasp) -> dict[str, Any]:
-    x, y, z, w = grasp.quaternion.tolist()
-    return {
-        "#": grasp.remark,
-        "confidence": grasp.merit,
-        "position": grasp.origin.tolist(),
-        "orientation": {"w": w, "xyz": [x, y, z]},
-        "cspace_position": grasp.hold.closed_joints,
-        "pregrasp_cspace_position": grasp.hold.open_joints,
-    }
+    return _yaml("grasp.isaac_grasp", grasps, gripper, ds)
 
 
 def as_graspgen(grasps: Sequence[RankedGrasp], gripper: GripperFrame, ds: xr.Dataset, folder: str = ".") -> str:
@@ -90,51 +74,14 @@ def as_graspgen(grasps: Sequence[RankedGrasp], gripper: GripperFrame, ds: xr.Dat
     return json.dumps(made, indent=1)
 
 
-def as_moveit(found: Sequence[RankedGrasp], gripper: GripperFrame, ds: xr.Dataset) -> str:
+def as_moveit(grasps: Sequence[RankedGrasp], gripper: GripperFrame, ds: xr.Dataset) -> str:
     """A list of moveit_msgs/Grasp under ``grasps``; what a message has no field for stands in comments."""
-    return yaml_text({"#": _about(ds, gripper), "grasps": [_moveit(grasp, gripper) for grasp in found]})
+    return _yaml("grasp.moveit", grasps, gripper, ds)
 
 
-def _moveit(grasp: RankedGrasp, gripper: GripperFrame) -> dict[str, Any]:
-    pose = {
-        "position": dict(zip("xyz", grasp.origin.tolist(), strict=True)),
-        "orientation": dict(zip("xyzw", grasp.quaternion.tolist(), strict=True)),
-    }
-    return {
-        "#": grasp.remark,
-        "id": grasp.name,
-        "pre_grasp_posture": _posture(grasp.hold.open_joints, []),
-        "grasp_posture": _posture(grasp.hold.closed_joints, [grasp.force]),
-        "grasp_pose": {"header": _header(gripper.object_frame), "pose": pose},
-        "grasp_quality": grasp.merit,
-        "pre_grasp_approach": _way(gripper, 1.0),
-        "post_grasp_retreat": _way(gripper, -1.0),
-        "post_place_retreat": _way(gripper, -1.0),
-        "max_contact_force": grasp.force,
-        "allowed_touch_objects": [],
-    }
-
-
-def _header(frame: str) -> dict[str, Any]:
-    return {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": frame}
-
-
-def _posture(joints: dict[str, float], effort: list[float]) -> dict[str, Any]:
-    """A trajectory_msgs/JointTrajectory of one point."""
-    point = {
-        "positions": list(joints.values()),
-        "velocities": [],
-        "accelerations": [],
-        "effort": effort * len(joints),
-        "time_from_start": {"sec": 1, "nanosec": 0},
-    }
-    return {"header": _header(""), "joint_names": list(joints), "points": [point]}
-
-
-def _way(gripper: GripperFrame, z: float) -> dict[str, Any]:
-    """A moveit_msgs/GripperTranslation along the gripper's own z axis."""
-    direction = {"header": _header(gripper.hand.frame), "vector": {"x": 0.0, "y": 0.0, "z": z}}
-    return {"direction": direction, "desired_distance": WAY, "min_distance": LEAST_WAY}
+def _yaml(name: str, grasps: Sequence[RankedGrasp], gripper: GripperFrame, ds: xr.Dataset) -> str:
+    about = _about(ds, gripper).splitlines()
+    return template(name).render(about=about, grasps=grasps, gripper=gripper, flow=flow, zip=zip, WAY=WAY)
 
 
 def _about(ds: xr.Dataset, gripper: GripperFrame) -> str:
@@ -148,47 +95,16 @@ def _about(ds: xr.Dataset, gripper: GripperFrame) -> str:
     )
 
 
-# --- YAML as readers of versions 1.1 and 1.2 take it ------------------------------------------------------------------
+def flow(value: Any) -> str:
+    """A value in one line of YAML: JSON, but for the numbers that YAML 1.1 would take for texts.
 
-
-def yaml_text(value: Any, indent: int = 0) -> str:
-    """Mappings as blocks, lists of numbers in one line; every number is one for readers of YAML 1.1 and 1.2.
-
-    A text in the key ``#`` is a comment, on lines of its own.
-
-    >>> print(yaml_text({"a": {"b": [1.0, 1e-5], "c": "on", "#": "note"}, "d": []}))
-    a:
-      b: [1.0, 1.0e-05]
-      c: "on"
-      # note
-    d: []
-    """
-    pad, lines = " " * indent, []
-    for key, held in value.items():
-        if key == "#":
-            lines += [f"{pad}# {line}" for line in str(held).splitlines()]
-        elif isinstance(held, dict) and held:
-            lines += [f"{pad}{key}:", yaml_text(held, indent + 2)]
-        elif isinstance(held, list | tuple) and held and isinstance(held[0], dict):
-            blocks = [yaml_text(member, indent + 2) for member in held]
-            lines += [f"{pad}{key}:", *(f"{pad}- {block.lstrip()}" for block in blocks)]
-        else:
-            lines.append(f"{pad}{key}: {_flow(held)}")
-    return "\n".join(lines)
-
-
-def _flow(value: Any) -> str:
-    """A value in one line: JSON, which is YAML, but for the numbers that YAML 1.1 would take for texts.
-
-    >>> _flow(2e-7), _flow("2e-7"), _flow({"w": 1.0, "xyz": [0.0, 5e-324]})
+    >>> flow(2e-7), flow("2e-7"), flow({"w": 1.0, "xyz": [0.0, 5e-324]})
     ('2.0e-07', '"2e-7"', '{w: 1.0, xyz: [0.0, 5.0e-324]}')
     """
     if isinstance(value, dict):
-        return f"{{{', '.join(f'{key}: {_flow(held)}' for key, held in value.items())}}}"
-    if isinstance(value, list | tuple):
-        return f"[{', '.join(map(_flow, value))}]"
+        return f"{{{', '.join(f'{key}: {flow(held)}' for key, held in value.items())}}}"
+    if isinstance(value, list):
+        return f"[{', '.join(map(flow, value))}]"
     if isinstance(value, float) and not math.isfinite(value):
         return ".nan" if math.isnan(value) else f"{'-' * (value < 0)}.inf"
-    if isinstance(value, float):
-        return re.sub(r"^(-?\d+)e", r"\1.0e", repr(value))
-    return json.dumps(value)
+    return re.sub(r"^(-?\d+)e", r"\1.0e", repr(value)) if isinstance(value, float) else json.dumps(value)

@@ -17,13 +17,13 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any
 
-import jinja2
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from softjaw.study.export.rigid_body import DENSITY, RigidBody, places
 from softjaw.study.export.selection import FloatArray, RankedGrasp
 from softjaw.study.messages import USAGE, StudyError
+from softjaw.study.templates import template
 
 RADIUS = 0.01  # of the ball that stands for a pad [m]: any will do, because it touches at one point
 PAD_MASS = 0.02  # [kg]: friction does not depend on it
@@ -146,15 +146,14 @@ def heading(grasp: RankedGrasp, body: RigidBody) -> list[str]:
     return [line.replace("--", "- -") for line in lines]  # two dashes would end a comment of XML
 
 
-def rendered(template: str, grasp: RankedGrasp, body: RigidBody, **parts: Any) -> str:
+def rendered(file: str, grasp: RankedGrasp, body: RigidBody, **parts: Any) -> str:
     """The file of a grasp that a simulator opens, from a template of `study.templates` and what is its own."""
     made, weighed = cell(grasp, body.down), carried(grasp, body)
     fingers = [*enumerate(made.contacts, start=1)]
     moments, axes = np.linalg.eigh(weighed.inertia)
     axes[:, 2] *= np.linalg.det(axes)  # a rotation, no reflection
     inertia = {f"i{'xyz'[i]}{'xyz'[j]}": weighed.inertia[i, j] for i in range(3) for j in range(i, 3)}
-    loader = jinja2.Environment(loader=jinja2.PackageLoader("softjaw.study"), trim_blocks=True, lstrip_blocks=True)
-    return loader.get_template(template).render(
+    return template(file).render(
         grasp=grasp, body=weighed, heading=heading(grasp, body), cell=made, fingers=fingers,
         moments=moments, axes=axes, inertia=inertia, numbers=numbers, places=places, RADIUS=RADIUS, PLATE=PLATE,
         PAD_MASS=PAD_MASS, **parts,
