@@ -33,8 +33,9 @@ from __future__ import annotations
 import numpy as np
 
 from softjaw.study.export.point_contact import PointContact, cell, numbers, rendered
-from softjaw.study.export.rigid_body import RigidBody, weight
+from softjaw.study.export.rigid_body import RigidBody
 from softjaw.study.export.selection import FloatArray, RankedGrasp, quaternion
+from softjaw.study.units import GRAVITY
 
 ALONG = 1e-6  # sine between a tangent and an axis of the contact below which they are one
 STIFF = 'solref="0.004 1" solimp="0.9999 0.9999 0.001"'
@@ -70,7 +71,7 @@ def as_mjcf(grasp: RankedGrasp, body: RigidBody) -> str:
         middle = contact.pad_origin - body.pad[2] / 2 * contact.pad_rotation[:, 2] - contact.origin
         return contact.rotation.T @ contact.pad_rotation, contact.rotation.T @ middle
 
-    gravity = cell(grasp, body.down).rotation @ weight(1.0, body)
+    gravity = cell(grasp, body.down).rotation @ (GRAVITY * body.down)
     parts = {"pose": _pose, "foam": foam, "friction": friction, "stiff": STIFF, "hidden": HIDDEN}
     return rendered("grasp.xml", grasp, body, gravity=gravity, **parts)
 

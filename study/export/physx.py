@@ -51,7 +51,7 @@ def as_usd(grasp: RankedGrasp, body: RigidBody) -> str:
         frame = np.column_stack([first, np.cross(third, first), third])
         return frame, made.contacts[f - 1].rotation.T @ frame
 
-    down = made.rotation @ body.down / np.linalg.norm(body.down)
+    down = made.rotation @ body.down
     parts = {
         "tuple": lambda *values: f"({numbers(*values).replace(' ', ', ')})",
         "turn": lambda rotation: np.roll(quaternion(rotation), 1),  # USD writes the real part first

@@ -19,7 +19,6 @@ from softjaw.study.messages import OTHER_FILE, StudyError
 from softjaw.study.result.read import axes_of
 from softjaw.study.result.read import scene_of as scene_at
 from softjaw.study.scene import Scene, SceneError
-from softjaw.study.units import GRAVITY
 
 FloatArray = NDArray[np.float64]
 DENSITY = 1000.0  # of an object without `object.mass_g` [kg/m^3], as simulators have it
@@ -27,15 +26,14 @@ DENSITY = 1000.0  # of an object without `object.mass_g` [kg/m^3], as simulators
 
 @dataclass(frozen=True, eq=False)
 class RigidBody:
-    """An object: ``points (k, 3)`` [m], ``triangles (m, 3)``, ``mass`` [kg], ``centre (3,)`` of mass [m].
+    """An object: its ``surface`` [m], ``mass`` [kg], ``centre (3,)`` of mass [m].
 
     ``inertia (3, 3)`` is about the centre of mass [kg m^2]. ``weighed`` says whether the scene gives the mass, and
     ``down (3,)`` is the direction of the weight, -z where the scene asks for every one. ``pad (3,)`` has the length,
     width and thickness of the pads that hold it [m].
     """
 
-    points: FloatArray
-    triangles: NDArray[np.int64]
+    surface: Trimesh
     mass: float
     weighed: bool
     centre: FloatArray
@@ -75,12 +73,8 @@ def body_of(ds: xr.Dataset, case: dict[str, Any]) -> RigidBody:
     mass = DENSITY * solid.volume if shape.mass is None else shape.mass
     inertia = solid.moment_inertia * mass / solid.volume
     down, pad = np.array(scene.task.direction or (0.0, 0.0, -1.0)), np.array(scene.gripper.pad_size)
-    return RigidBody(points, triangles, mass, shape.mass is not None, centre, inertia, down, pad)
-
-
-def weight(mass: float, body: RigidBody) -> FloatArray:
-    """Weight ``(3,)`` [N] of a mass [kg] in the direction in which the body's own pulls."""
-    return mass * GRAVITY * body.down / np.linalg.norm(body.down)
+    down /= np.linalg.norm(down)
+    return RigidBody(surface, mass, shape.mass is not None, centre, inertia, down, pad)
 
 
 def places(values: NDArray[Any]) -> str:

@@ -32,7 +32,6 @@ from xml.sax.saxutils import escape
 
 import numpy as np
 from scipy.spatial.transform import Rotation
-from trimesh import Trimesh
 
 from softjaw.study.export.point_contact import PAD_MASS, RADIUS, PointContact, cell, numbers, rendered
 from softjaw.study.export.rigid_body import RigidBody
@@ -57,7 +56,7 @@ def as_sdf(grasp: RankedGrasp, body: RigidBody, mesh: str = "object.stl") -> str
 
 def as_stl(body: RigidBody) -> bytes:
     """The object's surface as a binary STL file [m], in the frame of its own file."""
-    return bytes(Trimesh(body.points, body.triangles, process=False).export(file_type="stl"))
+    return bytes(body.surface.export(file_type="stl"))
 
 
 def _pose(rotation: FloatArray, origin: FloatArray) -> str:

@@ -9,7 +9,6 @@ import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
 from vtkmodules.util.numpy_support import vtk_to_numpy
-from vtkmodules.vtkCommonCore import vtkLogger, vtkOutputWindow, vtkStringOutputWindow
 
 from softjaw.study.messages import OTHER_FILE, StudyError, closest
 from softjaw.study.patch.faces import ReadPatch, checked, corner_geometry
@@ -57,19 +56,12 @@ def read_vtk(path: Path, reading: Reading) -> ReadPatch:
 def _grid(path: Path) -> Any:
     """The data set of a file as an unstructured grid; VTK's own complaints become one sentence."""
     # VTK writes its complaints past Python's streams
-    before, complaints = vtkOutputWindow.GetInstance(), vtkStringOutputWindow()
-    vtkOutputWindow.SetInstance(complaints)
-    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
-    try:
+    with pv.vtk_verbosity("off"), pv.VtkErrorCatcher(send_to_logging=False) as complaints:
         reader = pv.get_reader(path).reader
-        able = reader.CanReadFile(str(path))
-        if able:
+        if able := reader.CanReadFile(str(path)):
             reader.Update()
-    finally:
-        vtkOutputWindow.SetInstance(before)
-        vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_INFO)
     grid = pv.wrap(reader.GetOutput())
-    if not able or complaints.GetOutput() or grid is None:
+    if not able or complaints.events or grid is None:
         kind = path.suffix[1:].upper()
         raise StudyError(OTHER_FILE, f"{path}: damaged or no {kind} file; write it again, from ParaView as {kind}")
     if isinstance(grid, pv.PolyData):

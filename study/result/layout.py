@@ -71,8 +71,8 @@ class Header:
 class Layout:
     """The file of one study: its axes, the faces of a patch and what of the quantities it holds.
 
-    No ``faces``: patches are not stored. ``has`` names what of `NEEDS` the scene asks for besides two meshes and
-    patches. ``rounds`` is what each round of a run added: stations [mm], poses as `study.run.refine.Place`, or cases
+    No ``faces``: patches are not stored. ``has`` names what of `NEEDS` the scene asks for besides patches.
+    ``rounds`` is what each round of a run added: stations [mm], poses as `study.run.refine.Place`, or cases
     that are solved on a finer mesh, by the numbers of their point of a sweep, candidate and force. ``stored`` are the
     paths of the columns in an existing file, which may be others than those of this version; empty for a new one.
     ``derived`` are quantities over some of the axes that are filled once, after all rows.
@@ -80,7 +80,6 @@ class Layout:
 
     axes: tuple[Axis, ...]
     faces: int
-    meshes: int = 1
     derived: tuple[Quantity, ...] = ()
     has: tuple[str, ...] = ()
     rounds: tuple[tuple[float | tuple[int, int, int] | tuple[float, ...], ...], ...] = ()
@@ -120,7 +119,7 @@ class Layout:
     @cached_property
     def asked(self) -> tuple[Quantity, ...]:
         """All quantities that this version stores for such a scene."""
-        return quantities((*self.has, *[NEEDS[0]] * (self.meshes > 1), *[NEEDS[-1]] * bool(self.faces)))
+        return quantities((*self.has, *[NEEDS[-1]] * bool(self.faces)))
 
     @property
     def rows(self) -> int:
@@ -193,7 +192,8 @@ def layout_of(text: str) -> Layout:
     axes = tuple(replace(axis, values=np.asarray(axis.values, float)) for axis in layout.axes)
     if len(axes) < 3 or not all(axis.values.ndim == 1 and np.isfinite(axis.values).all() for axis in axes):
         raise ValueError("its axes are not those of a study")
-    return replace(layout, axes=axes)
+    older = (NEEDS[0],) * (json.loads(text).get("meshes", 1) > 1)  # a field of its own in files of before
+    return replace(layout, axes=axes, has=(*older, *layout.has))
 
 
 def header_of(text: str, scene: str) -> Header:

@@ -231,7 +231,7 @@ def _attributes(result: Result) -> dict[str, Any]:
         "title": result.title, "file": str(result.path), "layout_version": VERSION, "digest": result.digest,
         "scene": result.scene, "scene_file": header.scene_file, "overrides": header.overrides,
         "petsc_options": header.petsc_options, "definitions": result.definitions, "report": result.report,
-        "provenance": result.sessions, "has": layout.has, "meshes": layout.meshes,
+        "provenance": result.sessions, "has": layout.has,
         "patches": "patch/pressure" in {c.key for c in layout.columns}, "poses": not result.axes[-3].units,
         "derived": tuple(q.name for q in layout.derived),
         "object_rotation": np.eye(3), "object_origin": np.zeros(3), "rejected": np.zeros((0, 10)),

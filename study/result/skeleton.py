@@ -197,24 +197,17 @@ def report_bytes(text: str) -> np.ndarray:
 
 
 def _create_dataset(file: h5py.File, dataset: Dataset, packed: bool) -> None:
-    plist = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+    plist, packing = h5py.h5p.create(h5py.h5p.DATASET_CREATE), {}
     if packed:
-        plist.set_chunk(_chunk(dataset))
-        plist.set_shuffle()
-        plist.set_deflate(DEFLATE_LEVEL)
-    else:
-        # Contiguous and allocated at once: only so can ranks write independently of each other.
-        plist.set_layout(h5py.h5d.CONTIGUOUS)
+        packing = {"chunks": _chunk(dataset), "shuffle": True, "compression": DEFLATE_LEVEL}
+    else:  # contiguous and allocated at once: only so can ranks write independently of each other
         plist.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
     # Filled now: a case that is never written reads as not computed, not as what the disk held.
     plist.set_fill_time(h5py.h5d.FILL_TIME_ALLOC)
     strings = dataset.dtype.kind == "S"
-    if not strings:  # text is filled with zero bytes anyway
-        plist.set_fill_value(np.array(dataset.fill, dataset.dtype))
     dtype = h5py.string_dtype("utf-8", dataset.dtype.itemsize) if strings else dataset.dtype
-    space = h5py.h5s.create_simple(dataset.shape)
-    h5py.h5d.create(file.id, dataset.path.encode(), h5py.h5t.py_create(dtype, logical=True), space, plist)
-    made = file[dataset.path]
+    fill = None if strings else dataset.fill  # text is filled with zero bytes anyway
+    made = file.create_dataset(dataset.path, dataset.shape, dtype, fillvalue=fill, dcpl=plist, **packing)
     for key, value in dataset.attributes.items():
         _write_attribute(made, key, value)
     _attach_scales(made, dataset.scales)

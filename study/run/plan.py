@@ -100,7 +100,7 @@ def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = (), r
         labels=tuple(candidate.label for candidate in grasps.candidates(scene)),
         about=_about(scene),
     )
-    layout = Layout(axes, faces, scene.accuracy.meshes, tuple(derived(scene)), has(scene), rounds)
+    layout = Layout(axes, faces, tuple(derived(scene)), has(scene), rounds)
     return Plan(layout, header, tuple(units))
 
 
@@ -126,8 +126,9 @@ def _with_meshes(unit: Any, scene: Any, rounds: Rounds) -> Any:
 
 
 def has(scene: Any) -> tuple[str, ...]:
-    """Which of `study.quantities.NEEDS` besides two meshes and patches a scene asks for."""
-    asked = {"six components": scene.effects.wrench == "6-D", "mass": scene.object.mass_g is not None}
+    """Which of `study.quantities.NEEDS` besides patches a scene asks for."""
+    asked = {"two meshes": scene.accuracy.meshes > 1, "six components": scene.effects.wrench == "6-D"}
+    asked["mass"] = scene.object.mass_g is not None
     asked["task"] = asked["mass"] or scene.task.direction is not None
     asked["wall"] = has_wall(scene.object)
     asked["finer meshes"] = scene.accuracy.target is not None

@@ -99,7 +99,7 @@ LIES = {
     "a layout that is deep": text("layout", DEEP),
     "patches that are not there": options(faces=10**6),
     "derived elsewhere": options(derived=[{**DERIVED, "name": "../../x"}]),
-    "two meshes": options(meshes=2),
+    "two meshes": options(has=["two meshes"]),
     "states that do not exist": values("study/status/code", 7),
     "NaN everywhere": no_numbers,
     "scene that is deep": text("scene", "a = " + DEEP),

@@ -71,7 +71,7 @@ def make(
     ``datasets`` come last, by their path below ``/study`` with ``__`` for ``/``: arrays, or functions of what is there.
     """
     axes = axes or grid_axes()
-    layout = Layout(axes, 0, meshes, derived=derived, rounds=added)
+    layout = Layout(axes, 0, derived, ("two meshes",) * (meshes > 1), added)
     fresh(path, layout, Header("d" * 64, scene, "made", "made.toml", labels=labels))
     grid = np.meshgrid(*(axis.values for axis in axes), indexing="ij")
     e_n = np.broadcast_to(formula(*grid), layout.shape)

@@ -149,7 +149,7 @@ def test_a_scene_that_asks_for_one_thing_alone_has_lengths_for_all_its_datasets(
 
 
 def test_every_dataset_says_what_it_is(tmp_path):
-    layout = small(meshes=2, has=NEEDS[1:])
+    layout = small(has=NEEDS)
     create(tmp_path / "whole.hdf", layout, HEADER)
     seen = set()
 
@@ -185,7 +185,7 @@ def test_an_axis_of_two_values_has_a_name_beside_an_uneven_one_and_damage_in_a_d
     assert axes_of(uneven, range(3)) == ["station", "angle", "normal_force"]
     assert axes_of(uneven, (0, 1)) == ["station", "."]
     axes = (axis("object_radius", 3, "m"), *small().axes)
-    layout = Layout(axes, 0, 2, (Quantity("slope", ("object_radius",), "1", "slope", "a slope", "derived"),))
+    layout = Layout(axes, 0, (Quantity("slope", ("object_radius",), "1", "slope", "a slope", "derived"),), NEEDS[:1])
     create(tmp_path / "s.hdf", layout, HEADER)
     with open_result(tmp_path / "s.hdf") as read:
         assert read.layout.shape == (3, 5, 2, 3)
@@ -236,7 +236,7 @@ def test_a_result_that_does_not_fit_is_a_bug_a_full_disk_told_and_only_an_own_fi
         verify(path, small(), replace(HEADER, digest="xyz"))
     assert caught.value.code == OTHER_FILE
     with pytest.raises(StudyError):
-        verify(path, small(meshes=2), HEADER)
+        verify(path, small(has=NEEDS[:1]), HEADER)
 
 
 @pytest.mark.parametrize("spoil", [

@@ -202,7 +202,7 @@ def test_maps_show_every_case_in_both_models_with_crosses_for_failed_ones(ordina
 
 
 def test_values_have_their_error_and_a_chosen_candidate_stands_beside_the_best_one(tmp_path):
-    layout = Layout(axes(), 0, meshes=2)
+    layout = Layout(axes(), 0, has=("two meshes",))
     path = make(tmp_path / "two.hdf", layout, **{"maps/e_n_error": 0.0042, "maps/tau_z_max_error": 0.011})
     with open_result(path) as result:
         (folded,) = tables.every_case(judge(dataset(result)))
