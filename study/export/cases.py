@@ -19,24 +19,8 @@ from softjaw.study.table import Column, Table, plain
 from softjaw.study.table import as_csv as rendered
 
 XYZ, WRENCH = ("x", "y", "z"), ("f_x", "f_y", "tau_z")
-NINE = tuple(f"{row}_{column}" for row in XYZ for column in XYZ)
-# Name, unit of every component, names of the components; of each finger, in the frame of the object's own file.
-FINGER: tuple[tuple[str, str | tuple[str, ...], tuple[str, ...]], ...] = (
-    ("pose_origin", "m", XYZ),
-    ("pose_rotation", "", NINE),
-    ("frame_origin", "m", XYZ),
-    ("frame_axes", "", NINE),
-    ("f_x_max", "N", ()),
-    ("f_y_max", "N", ()),
-    ("tau_z_max", "N m", ()),
-    ("S", "N", ()),
-    ("F_N", "N", ()),
-    ("semi_axes", ("N", "N", "N m"), WRENCH),
-    ("unit", ("N", "N", "N m"), WRENCH),
-    ("coefficients", "", MONOMIALS),
-    ("matrix", "", tuple(f"{row}_{column}" for row in WRENCH for column in WRENCH)),
-    ("certificate", "", ()),
-)
+NINE, SQUARE = (tuple(f"{row}_{column}" for row in names for column in names) for names in (XYZ, WRENCH))
+FORCES = ("N", "N", "N m")
 MEANING = {
     "pose": "x = pose_rotation x_pad + pose_origin at first touch, in the frame of the object's own file",
     "frame": "contact frame in the same frame: origin, and rows x, y, N with N into the object",
@@ -67,27 +51,33 @@ def cases(
             "message": str(messages[index]),
             "flags": int(flags[index]),
             "maps": {name: values[index] for name, values in maps.items()},
-            "fingers": [{name: values[index][f] for name, values in fingers.items()} for f in range(FINGERS)],
+            "fingers": [{name: values[index][f] for name, (values, *_) in fingers.items()} for f in range(FINGERS)],
         }
 
 
-def _fingers(ds: xr.Dataset, model: str) -> dict[str, np.ndarray]:
-    """What `FINGER` lists, in its order, over axes and finger."""
+def _fingers(ds: xr.Dataset, model: str) -> dict[str, tuple[np.ndarray, str | tuple[str, ...], tuple[str, ...]]]:
+    """By name of what a finger has: values over axes and finger, unit of every component, names of the components.
+
+    In the frame of the object's own file.
+    """
     of_model = ds.sel(model=model)
     R, o = ds.finger_pose_rotation.values, ds.finger_pose_origin.values
     S, rho = ds.finger_S.values, ds.limit_surface_rho.values
     muS = ds.finger_f_x_max.sel(model="pcm").values  # the planar model's friction is mu S in every direction
+    unit = muS[..., None] * np.stack([np.ones_like(rho), np.ones_like(rho), rho], axis=-1)
+    limits = (("f_x_max", "N"), ("f_y_max", "N"), ("tau_z_max", "N m"))
+    fitted = (("coefficients", MONOMIALS), ("matrix", SQUARE), ("certificate", ()))
     return {
-        "pose_origin": o,
-        "pose_rotation": R,
-        "frame_origin": np.einsum("...ij,...j->...i", R, ds.finger_frame_origin.values) + o,
-        "frame_axes": ds.finger_frame_axes.values @ np.swapaxes(R, -1, -2),
-        **{name: of_model[f"finger_{name}"].values for name in ("f_x_max", "f_y_max", "tau_z_max")},
-        "S": S,
-        "F_N": ds.finger_F_N.values,
-        "semi_axes": of_model.limit_surface_semi_axes.values * S[..., None],
-        "unit": muS[..., None] * np.stack([np.ones_like(rho), np.ones_like(rho), rho], axis=-1),
-        **{name: of_model[f"limit_surface_{name}"].values for name in ("coefficients", "matrix", "certificate")},
+        "pose_origin": (o, "m", XYZ),
+        "pose_rotation": (R, "", NINE),
+        "frame_origin": (np.einsum("...ij,...j->...i", R, ds.finger_frame_origin.values) + o, "m", XYZ),
+        "frame_axes": (ds.finger_frame_axes.values @ np.swapaxes(R, -1, -2), "", NINE),
+        **{name: (of_model[f"finger_{name}"].values, force, ()) for name, force in limits},
+        "S": (S, "N", ()),
+        "F_N": (ds.finger_F_N.values, "N", ()),
+        "semi_axes": (of_model.limit_surface_semi_axes.values * S[..., None], FORCES, WRENCH),
+        "unit": (unit, FORCES, WRENCH),
+        **{name: (of_model[f"limit_surface_{name}"].values, "", parts) for name, parts in fitted},
     }
 
 
@@ -97,7 +87,7 @@ def as_json(ds: xr.Dataset, model: str = "ccm", listed: Iterable[dict[str, Any]]
     ``flags`` are those of the file, ``flag_words`` also those that the safe force range adds to listed cases.
     """
     units: dict[str, Any] = {axis.name: axis.units for axis in axes_of(ds)} | maps_in(ds)
-    units |= {name: unit for name, unit, _ in FINGER}
+    units |= {name: unit for name, (_, unit, _) in _fingers(ds, model).items()}
     rows = []
     for case in cases(ds, model) if listed is None else listed:
         place, words = case["place"], [flag.word for flag in flags_in(case["flags"])]
@@ -114,7 +104,7 @@ def as_csv(ds: xr.Dataset, model: str = "ccm", listed: Iterable[dict[str, Any]] 
     columns += [Column(name) for name in ("label", "state", "message", "flags")]
     columns += [Column(name, unit) for name, unit in maps_in(ds).items() if name != "flags"]
     of_finger = []
-    for name, unit, parts in FINGER:
+    for name, (_, unit, parts) in _fingers(ds, model).items():
         units = [unit] * max(len(parts), 1) if isinstance(unit, str) else unit
         names = [f"{name}.{part}" for part in parts] or [name]
         of_finger += [Column(n, u) for n, u in zip(names, units, strict=True)]

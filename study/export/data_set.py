@@ -29,7 +29,7 @@ from softjaw.study.export.cases import MEANING, cases
 from softjaw.study.export.selection import GripperFrame, gripper_frame, holds
 from softjaw.study.flags import LOST
 from softjaw.study.messages import USAGE, StudyError, beside, write_file
-from softjaw.study.quantities import DONE, NO_GRASP, STATES
+from softjaw.study.quantities import BY_KEY, DONE, NO_GRASP, STATES
 from softjaw.study.ranking import judged, task_keys
 from softjaw.study.result.index import read_index, write_arrays
 from softjaw.study.result.read import maps_in, open, scene_of
@@ -41,6 +41,7 @@ VALID_SHARE = 5  # one object in so many is for validation
 SHARD = 100  # objects of a shard
 SPLITS = ("train", "valid")
 MAPS = ("payload", "quality", "e_n", "f_x_max", "f_y_max", "tau_z_max", "opening", "opening_loaded")
+UNITS_OF = {"transforms": "m", "force": "N", **{name: BY_KEY[f"maps/{name}"].unit for name in MAPS}}
 SURFACE = ("frame_origin", "frame_axes", "semi_axes", "unit", "coefficients", "matrix")  # of each finger
 Arrays = dict[str, np.ndarray]
 
@@ -94,7 +95,7 @@ def write_data_set(index: Path, out: Path, form: str, gripper: GripperFrame) -> 
         write_file(out / "splits" / f"{split}.txt", "".join(f"{file}\n" for file in files), folders=True)
     about = {"format": form, "grasps": whole, "successful": good, "splits": {k: len(v) for k, v in listed.items()},
              "gripper": {"name": gripper.hand.frame, "approach_axis": "z", "closing_axis": gripper.along},
-             "units": _units(), "meaning": MEANING, "states": STATES,
+             "units": UNITS_OF, "meaning": MEANING, "states": STATES,
              "object_in_gripper": "holds, does no harm, and this gripper can take it"}
     write_file(out / "data-set.json", json.dumps(about, indent=1))
     counts = " and ".join(f"{len(files)} for {split}" for split, files in listed.items())
@@ -161,11 +162,6 @@ def _webdataset(out: Path, stack: ExitStack) -> Writer:
 
 
 FORMS = {"graspgen": _graspgen, "acronym": _acronym, "webdataset": _webdataset}
-
-
-def _units() -> dict[str, str]:
-    lengths = dict.fromkeys(("opening", "opening_loaded", "e_n", "transforms"), "m")
-    return {**lengths, "force": "N", "f_x_max": "N", "f_y_max": "N", "tau_z_max": "N m", "payload": "kg"}
 
 
 def _objects(index: Path, gripper: GripperFrame) -> Iterator[ObjectGrasps]:

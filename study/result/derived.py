@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from softjaw.study.case.build import geometry
 from softjaw.study.case.candidates import axes
 from softjaw.study.case.result import UNDECIDED
-from softjaw.study.quantities import DONE, FORCE_RANGE, Quantity
+from softjaw.study.quantities import FORCE_RANGE, Quantity
 from softjaw.study.scene import Scene
 
 FloatArray = NDArray[np.float64]
@@ -64,22 +64,20 @@ def finalise(writer: Any, scene: Scene) -> None:
         writer.write_derived("b_over_a", b / a)
         writer.write_derived("apex_curvature", a / b**2)
     forces = np.asarray(scene.load.normal_force)
-    done = writer.codes().reshape(writer.layout.shape) == DONE
     if LOW in wanted:
-        factor = np.where(done, writer.read("safety_factor/ccm"), np.nan)
+        factor = writer.read("safety_factor/ccm")
         writer.write_derived(LOW, first_crossing(forces, factor, scene.task.safety))
-        known = scene.accuracy.meshes > 1
-        stated = np.where(done, writer.read("payload_error/payload_error"), np.nan) if known else np.zeros(done.shape)
+        stated = writer.read("payload_error/payload_error") if scene.accuracy.meshes > 1 else 0.0
         writer.write_derived(LOW_ERROR, crossing_error(forces, factor, scene.task.safety, stated))
     if HIGH in wanted:
-        writer.write_derived(HIGH, _largest(writer, scene, forces, done))
+        writer.write_derived(HIGH, _largest(writer, scene, forces))
 
 
-def _largest(writer: Any, scene: Scene, forces: FloatArray, done: NDArray[np.bool_]) -> FloatArray:
+def _largest(writer: Any, scene: Scene, forces: FloatArray) -> FloatArray:
     """Largest force that the wall bears; NaN where it was taken as rigid, so that nothing is known of it."""
     dent: float | None = getattr(scene.object, "allowed_dent", None)
     limits = {"indentation": dent, "wall_stress": geometry().material_of(scene.object).yield_strength}
-    values = {name: np.where(done, writer.read(f"{name}/{name}"), np.nan) for name in limits}
+    values = {name: writer.read(f"{name}/{name}") for name in limits}
     known = np.isfinite(values["indentation"])
     solved = np.where(known.any(axis=-1), np.where(known, forces, 0.0).max(axis=-1), np.nan)
     crossings = [first_crossing(forces, values[name], most) for name, most in limits.items() if most is not None]

@@ -9,7 +9,7 @@ import pytest
 
 import softjaw
 from softjaw.friction.motion import fibonacci_twists
-from softjaw.study.export.cases import FINGER, MEANING, as_csv, as_json, cases
+from softjaw.study.export.cases import MEANING, as_csv, as_json, cases
 from softjaw.study.lookup import GraspMap
 from tests.study.formula_results import ANGLES, FORCES, STATIONS, grid_axes, make, window, without_result
 
@@ -53,4 +53,3 @@ def test_an_exported_surface_is_the_one_that_is_looked_up(tmp_path):
     assert one["coefficients"] @ powers == pytest.approx(surface.value(w), rel=1e-12)
     assert one["semi_axes"] == pytest.approx(GraspMap(path).at(0, 0, FORCES[2]).semi_axes()[0])
     assert case["maps"]["force_high"] == 4.0
-    assert list(one) == [name for name, _, _ in FINGER]

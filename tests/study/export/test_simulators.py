@@ -95,7 +95,7 @@ def test_the_surface_beside_a_model_of_gazebo_is_the_object_and_physx_slips_at_t
     (tmp_path / "object.stl").write_bytes(as_stl(body(path)))
     mesh = trimesh.load(tmp_path / "object.stl")
     assert mesh.volume * 1000 == pytest.approx(body(path).mass, rel=1e-4)
-    assert mesh.bounds == pytest.approx(np.stack([body(path).points.min(axis=0), body(path).points.max(axis=0)]))
+    assert mesh.bounds == pytest.approx(body(path).surface.bounds)
     grasp = deepcopy(all_grasps(path, 4.0)[0])
     grasp.case["fingers"][1]["F_N"] = np.float64(0.0)
     with pytest.raises(StudyError, match="0 N"):
@@ -134,7 +134,7 @@ def test_usd_reads_the_stage(path):
     down = UsdPhysics.Scene(stage.GetPrimAtPath("/grasp/scene")).GetGravityDirectionAttr().Get()
     assert list(down) == pytest.approx((cell(grasp).rotation @ [0, 0, -1]).tolist(), abs=1e-6)
     surface = UsdGeom.Mesh(stage.GetPrimAtPath("/grasp/object/surface"))
-    assert np.array(surface.GetPointsAttr().Get()) == pytest.approx(held.points, abs=1e-6)
+    assert np.array(surface.GetPointsAttr().Get()) == pytest.approx(np.asarray(held.surface.vertices), abs=1e-6)
     for f, contact in enumerate(cell(grasp).contacts, start=1):
         joint = UsdPhysics.PrismaticJoint(stage.GetPrimAtPath(f"/grasp/close{f}"))
         for rotation, here in ((np.eye(3), joint.GetLocalRot0Attr()), (contact.rotation, joint.GetLocalRot1Attr())):
