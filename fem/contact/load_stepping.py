@@ -1,7 +1,7 @@
 """Load stepping: from one converged contact state to the next, by force control or by displacement control.
 
-`Stepping` goes there in one step where Newton's method can; `Following` keeps to the path of equilibria of a pad on a
-rigid object, so that no force leads off it.
+`Stepping` goes there in one step where Newton's method can, or keeps to the path of equilibria of a pad on a rigid
+object, so that no force leads off it.
 
 Where a force has several equilibria, Newton's method finds the one that its start leads to. So the start has to be
 near: a step of the force is as long as the tangent of the path foretells at most `LONGEST` of closing, and its state
@@ -68,6 +68,20 @@ class Work:
     halvings: int = 0
 
 
+@dataclass(frozen=True)
+class _Place:
+    """A state on the path: unknowns, force [N], largest strain, stability, and the tangent.
+
+    That is the change of the unknowns per force [m/N], None where it is not known.
+    """
+
+    x: FloatArray
+    force: float
+    strain: float
+    stable: bool
+    tangent: FloatArray | None
+
+
 @dataclass
 class Stepping:
     """Steps of one problem.
@@ -84,6 +98,8 @@ class Stepping:
         Whether the iterate that a failed solve ended at keeps the laws of contact to `ALTERNATING` and may pass.
     deepest : float
         Closing displacement at which the backing plate would be in a rigid object [m].
+    followed : RigidProblem, optional
+        The problem once more where its path of equilibria is followed.
     """
 
     problem: ContactProblem
@@ -92,10 +108,17 @@ class Stepping:
     watch: Callable[[FloatArray, float], None] = lambda x, force: None
     near: Callable[[FloatArray], bool] = lambda x: False
     deepest: float = np.inf
+    followed: RigidProblem | None = None
     jumped: bool = False  # whether a step is known to have left the path of equilibria
     off: float = 0.0  # residual over the force on the meshed part where the last state is near enough only
     closed: bool = False  # whether displacement control was needed
     residual: float = RESIDUAL
+    _last: _Place | None = None
+
+    def __post_init__(self) -> None:
+        """With complementarity the factors at hand are those of a part of the tangent, and tell nothing of a path."""
+        if self.followed and self.followed.complementarity:
+            self.followed = None
 
     def solve(
         self, x: FloatArray, control: Control, work: Work, most: int | None = None, growth: float = np.inf
@@ -128,39 +151,6 @@ class Stepping:
             raise ConvergenceError(f"the backing plate would be in the object, {1e3 * closing:.4g} mm from first touch")
         return x
 
-    def step_to(
-        self, x: FloatArray, reached: float, force: float, work: Work, *, by_displacement: bool = True
-    ) -> FloatArray:
-        """From the state at ``reached`` [N] to ``force``: at once, by halves, or (``by_displacement``) by closing."""
-        fraction, done = 1.0, 0.0
-        while done < 1.0:
-            goal = min(1.0, done + fraction)
-            # the last target is the force itself, not a sum that rounding leaves beside it
-            target = force if goal == 1.0 else reached + goal * (force - reached)
-            try:
-                x = self.solve(x, Control(force=target), work, self.most)
-            except ConvergenceError:
-                # halves only: the length that worked last is kept, because the rest of the way is not easier
-                fraction *= 0.5
-                if fraction < SHORTEST_PART:
-                    if not by_displacement:
-                        raise
-                    return self.displacement_control(x, force, work)
-                continue
-            self.watch(x, target)
-            done = goal
-        return x
-
-    def from_near(self, start: FloatArray, force: float, work: Work) -> FloatArray:
-        """State at a force [N] by one Newton solve from ``start``, which has come along the path on another mesh.
-
-        Raises
-        ------
-        ConvergenceError
-            Where there is none near it.
-        """
-        return self.solve(start, Control(force=force), work, self.most, DIVERGED)
-
     def displacement_control(
         self,
         x: FloatArray,
@@ -175,6 +165,7 @@ class Stepping:
         The forces of the steps are appended to ``forces``. Steps are halved down to a part ``shortest`` of the longest.
         """
         problem, failures, self.closed = self.problem, 0, True
+        ended: Exception
         # a failed step is halved and an easy one lengthened, so the first length only has to be safe
         step, low = min(0.02 * self.problem.thickness, longest), (x, problem.normal_force(x))
         peak = low[1], problem.closing(x)
@@ -192,27 +183,24 @@ class Stepping:
                 if forces is not None:
                     forces.append(high[1])
                 low, step, peak = high, min(1.5 * step, longest), max(peak, (high[1], problem.closing(high[0])))
-            except SpentError:
-                if falls([peak[0], low[1]]):
-                    raise self._limit(peak, low, force) from None
-                raise
+            except SpentError as error:
+                ended = error
+                break
             except ConvergenceError as error:
                 step, failures = 0.5 * step, failures + 1
                 if step < least or failures > 20:
-                    if falls([peak[0], low[1]]):
-                        raise self._limit(peak, low, force) from error
-                    raise ConvergenceError(f"stuck at {low[1]:.4g} N of {force:.4g} N: {error}") from error
+                    ended = ConvergenceError(f"stuck at {low[1]:.4g} N of {force:.4g} N: {error}")
+                    break
+        else:
+            reached = f"reached {low[1]:.4g} N after {MOST_STEPS} steps"
+            ended = NotReachedError(f"the force stays below {force:.4g} N: {reached}")
         if falls([peak[0], low[1]]):
-            raise self._limit(peak, low, force)
-        raise NotReachedError(f"the force stays below {force:.4g} N: reached {low[1]:.4g} N after {MOST_STEPS} steps")
-
-    def _limit(self, peak: tuple[float, float], low: State, force: float) -> NotReachedError:
-        """What to say where the force has a maximum: its force [N] and closing displacement [m], and the last state."""
-        return NotReachedError(
-            f"the force stays below {force:.4g} N: it has a maximum of {peak[0]:.4g} N at a closing displacement of "
-            f"{1e3 * peak[1]:.4g} mm and falls to {low[1]:.4g} N at {1e3 * self.problem.closing(low[0]):.4g} mm, a "
-            "limit point of the pad on this mesh"
-        )
+            ended = NotReachedError(
+                f"the force stays below {force:.4g} N: it has a maximum of {peak[0]:.4g} N at a closing displacement "
+                f"of {1e3 * peak[1]:.4g} mm and falls to {low[1]:.4g} N at {1e3 * problem.closing(low[0]):.4g} mm, a "
+                "limit point of the pad on this mesh"
+            )
+        raise ended
 
     def _land(self, low: State, high: State, force: float, work: Work) -> FloatArray:
         """State at ``force`` between two on the path; Newton's method may jump to one further on, which is refused."""
@@ -229,6 +217,8 @@ class Stepping:
     def first(self, closing: float, force: float, work: Work) -> State:
         """First state in contact and its force, by displacement control near ``closing``; force has no start."""
         failure, best = "no force yet", None
+        # not further in than where a first contact is certain to be on the path
+        closing = min(closing, 0.25 * self.problem.thickness) if self.followed else closing
         # too deep a start does not converge, too shallow a one has no force: look in between
         for _ in range(12):
             try:
@@ -252,38 +242,10 @@ class Stepping:
             f"{failure}"
         )
 
-
-@dataclass(frozen=True)
-class _Place:
-    """A state on the path: unknowns, force [N], largest strain, stability, and the tangent.
-
-    That is the change of the unknowns per force [m/N], None where it is not known.
-    """
-
-    x: FloatArray
-    force: float
-    strain: float
-    stable: bool
-    tangent: FloatArray | None
-
-
-@dataclass
-class Following(Stepping):
-    """Steps that stay on the path; parameters and attributes as for `fem.contact.load_stepping.Stepping`."""
-
-    problem: RigidProblem
-    _last: _Place | None = None
-
-    def first(self, closing: float, force: float, work: Work) -> State:
-        """As `Stepping.first`, not further in than where a first contact is certain to be on the path."""
-        return super().first(min(closing, 0.25 * self.problem.thickness), force, work)
-
     def step_to(
         self, x: FloatArray, reached: float, force: float, work: Work, *, by_displacement: bool = True
     ) -> FloatArray:
-        """As `Stepping.step_to`, along the path."""
-        if self.problem.complementarity:  # the factors at hand are those of a part of the tangent
-            return super().step_to(x, reached, force, work, by_displacement=by_displacement)
+        """From the state at ``reached`` [N] to ``force``: at once, by parts, or (``by_displacement``) by closing."""
         here = self._begin(x, reached, work)
         done, cut = 0.0, 1.0
         while done < 1.0:
@@ -309,9 +271,10 @@ class Following(Stepping):
                 if cut > 1.0 / 1024.0 and not self._foretold(here, target - here.force) <= SHORTEST_FORETOLD:
                     cut, work.halvings = 0.5 * cut, work.halvings + 1
                     continue
-                if leaves:
-                    self._jump(target, by_displacement)
-                self.jumped |= forks
+                # the path was left before this force; refused where the caller has something else to try
+                if leaves and not by_displacement:
+                    raise ConvergenceError(f"the pad jumps at {target:.4g} N")
+                self.jumped |= leaves or forks
             self.watch(x, target)
             done, cut = goal, min(1.0, 2.0 * cut) if allowed < 1.0 else cut
             # the tangent costs a triangular solve, and behind the last step nobody asks for it
@@ -320,13 +283,18 @@ class Following(Stepping):
         return here.x
 
     def from_near(self, start: FloatArray, force: float, work: Work) -> FloatArray:
-        """As `Stepping.from_near`; refused where a path from first contact need not lead to the state."""
+        """State at a force [N] by one Newton solve from ``start``, which has come along the path on another mesh.
+
+        Raises
+        ------
+        ConvergenceError
+            Where there is none near it, or where a path that is followed from first contact need not lead to it.
+        """
         # Newton iterations from the state of a coarser mesh; good starts take 4 to 7
-        x = self.solve(start, Control(force=force), work, self.most or 12, DIVERGED)
-        folds = self.problem.largest_strain(x) - self.problem.largest_strain(start) > FOLD
-        # with a part of the tangent alone nothing tells whether the state is stable
-        here = None if self.problem.complementarity else self._place(x, force, None)
-        if folds or (here is not None and not here.stable):
+        most = self.most or (12 if self.followed else None)
+        x = self.solve(start, Control(force=force), work, most, DIVERGED)
+        here = self._place(x, force, None)
+        if here.strain - self._strain(start) > FOLD or not here.stable:
             work.halvings += 1
             raise ConvergenceError(ASTRAY.format(force=force))
         self._last = here
@@ -335,10 +303,10 @@ class Following(Stepping):
     def _begin(self, x: FloatArray, reached: float, work: Work) -> _Place:
         """Place at ``reached`` [N] on the path of this problem; the state there may be another one's."""
         # the tangent of the path needs factors, and these are at hand only where the last solve ended
-        known = self.solver.is_at(x)
+        known = self.followed is not None and self.solver.is_at(x)
         if known and self._last is not None and self._last.x is x:
             return replace(self._last, tangent=self._tangent(x))
-        if not known:
+        if self.followed and not known:
             try:
                 # another problem's state is not quite this one's: solve here, or go without a tangent if that fails
                 x, known = self.solve(x, Control(force=reached), work, self.most), True
@@ -348,17 +316,22 @@ class Following(Stepping):
         self.jumped |= not here.stable
         return here
 
+    def _strain(self, x: FloatArray) -> float:
+        """Largest strain; 0 where no path is followed."""
+        return self.followed.largest_strain(x) if self.followed else 0.0
+
     def _place(self, x: FloatArray, force: float, tangent: FloatArray | None) -> _Place:
-        strain = self.problem.largest_strain(x)
+        strain = self._strain(x)
         # foam that is strained little does not buckle: the check's factorisation is spared
         return _Place(x, force, strain, strain <= STRAINED or self._stable(x), tangent)
 
     def _tangent(self, x: FloatArray) -> FloatArray | None:
-        """Tangent of the path at the state at which the last solve ended."""
-        return self.problem.path_tangent(x, self.solver.answer)
+        """Tangent of the path at the state at which the last solve ended; None where it is not followed."""
+        return self.followed.path_tangent(x, self.solver.answer) if self.followed else None
 
     def _stable(self, x: FloatArray) -> bool:
-        entries, held = self.problem.symmetric_tangent(x)
+        assert self.followed is not None
+        entries, held = self.followed.symmetric_tangent(x)
         # every node in contact has one as a multiplier; any more is a direction of instability
         return self.solver.negative_eigenvalues(entries) == held
 
@@ -386,21 +359,18 @@ class Following(Stepping):
         """Whether the state ``ahead`` is not the one that the path leads to from ``here``."""
         if here.tangent is not None:
             # displacements and closing only: the bound is a distance in space, which pressures are not
-            off = (ahead.x - here.x - (ahead.force - here.force) * here.tangent)[: self.problem.closing_dof + 1]
+            assert self.followed is not None
+            off = (ahead.x - here.x - (ahead.force - here.force) * here.tangent)[: self.followed.closing_dof + 1]
             if np.abs(off).max() > STRAY * self.problem.thickness:
                 return True
         # strain that grows while the force hardly does is a fold of the foam's surface, not a larger contact
         grown = ahead.strain - here.strain
         return grown > max(FOLDING, FOLDS * abs(np.log(ahead.force / here.force)))
 
-    def _jump(self, force: float, by_displacement: bool) -> None:
-        """Note that the path was left before a force [N], or refuse it where the caller has something else to try."""
-        if not by_displacement:
-            raise ConvergenceError(f"the pad jumps at {force:.4g} N")
-        self.jumped = True
-
     def _past_limit(self, here: _Place, force: float, work: Work) -> FloatArray:
         """State at ``force`` by displacement control; the force may fall in between, which it does beyond a limit."""
+        if not self.followed:
+            return self.displacement_control(here.x, force, work)
         forces = [here.force]
         x = self.displacement_control(here.x, force, work, STRAY * self.problem.thickness, forces)
         self.jumped |= falls(forces)

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from softjaw.fem.contact.checks import ALTERNATING, check, explained, refuse_fall
-from softjaw.fem.contact.load_stepping import RESIDUAL, Following, State, Stepping, Work
+from softjaw.fem.contact.load_stepping import RESIDUAL, State, Stepping, Work
 from softjaw.fem.contact.path import LoadPath, OnPath, Pressed
 from softjaw.fem.contact.problem import Control, Gap
 from softjaw.fem.contact.rigid import RigidProblem
@@ -42,9 +42,6 @@ class Press(LoadPath[RigidProblem]):
         The same pad with other gaps, the best first, for forces at which ``pad`` has no solution.
     mu : float, optional
         Friction coefficient; without it no friction acts back on the pressures.
-    stepping : type, optional
-        How to get from one force to the next: along the path of equilibria, or in one step where Newton's method can,
-        as with friction.
     stride : int
         As in `fem.contact.path.LoadPath`.
     """
@@ -54,9 +51,8 @@ class Press(LoadPath[RigidProblem]):
 
     def __init__(
         self, pad: Pad, gap: Gap, options: dict[str, Any] | None = None, fallbacks: Sequence[Pad] = (),
-        mu: float | None = None, stepping: type[Stepping] | None = None, stride: int = 1,
+        mu: float | None = None, stride: int = 1,
     ) -> None:  # fmt: skip
-        self.stepping = stepping or (Following if mu is None else Stepping)
         super().__init__([partial(RigidProblem, p, gap, mu) for p in (pad, *fallbacks)], options, stride)
 
     @property
@@ -74,9 +70,11 @@ class Press(LoadPath[RigidProblem]):
         self._last = np.zeros(self.problem.size), 0.0
 
     def _steps(self) -> Stepping:
-        return self.stepping(
-            self.problem, self.solver, watch=self._watch, near=self._keeps_laws,
-            deepest=self.problem.thickness,
+        problem = self.problem
+        # with friction there is no one path of equilibria to keep to
+        return Stepping(
+            problem, self.solver, watch=self._watch, near=self._keeps_laws, deepest=problem.thickness,
+            followed=problem if problem.friction is None else None,
         )  # fmt: skip
 
     def _keeps_laws(self, x: FloatArray) -> bool:

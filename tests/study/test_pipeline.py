@@ -339,7 +339,7 @@ def test_contacts_beside_each_other_are_flagged_although_their_normals_are_paral
 
 def test_a_state_that_depends_on_the_load_path_is_flagged_from_the_jump_on(monkeypatch):
     jumps = lambda steps, here, ahead: here.force < 2.9 < ahead.force  # noqa: E731
-    monkeypatch.setattr("softjaw.fem.contact.load_stepping.Following._leaves", jumps)
+    monkeypatch.setattr("softjaw.fem.contact.load_stepping.Stepping._leaves", jumps)
     found = solved(OVAL, 'accuracy.contact="nodal"', forces="[2, 4, 5]")
     for _, path in found:
         assert [bool(int(result.values["maps/flags"]) & Flag.JUMPED) for result in path] == [False, True, True]
