@@ -30,14 +30,12 @@ class Pattern:
         slots[(rows >= 0) & (columns >= 0)] = np.searchsorted(self.keys, self._keys(rows, columns))
         return slots
 
-    def grow(self, rows: IntArray, columns: IntArray) -> IntArray | None:
-        """Store these entries too; returns where each old entry has moved to, or None if nothing was new."""
+    def grow(self, rows: IntArray, columns: IntArray) -> IntArray:
+        """Store these entries too; returns where each old entry has moved to."""
         wanted = np.unique(self._keys(rows, columns))
         place = np.minimum(np.searchsorted(self.keys, wanted), len(self.keys) - 1)
         # `searchsorted` may point behind the last key, hence the minimum above; such a key is new anyway
         new = wanted[self.keys[place] != wanted]
-        if not len(new):
-            return None
         old = self.keys
         self._set(np.sort(np.concatenate([old, new]), kind="stable"))  # merges two sorted runs in linear time
         return np.searchsorted(self.keys, old).astype(np.int32)

@@ -25,10 +25,8 @@ def exponents(dimension: int, degree: int) -> IntArray:
     >>> exponents(2, 2).tolist()
     [[2, 0], [1, 1], [0, 2]]
     """
-    E = np.zeros((math.comb(dimension + degree - 1, degree), dimension), dtype=np.int64)
-    for row, variables in zip(E, combinations_with_replacement(range(dimension), degree), strict=True):
-        # a variable may occur several times, which plain indexed addition would count once
-        np.add.at(row, list(variables), 1)
+    variables = combinations_with_replacement(range(dimension), degree)
+    E = np.array([np.bincount(chosen, minlength=dimension) for chosen in variables])
     # cached: whoever wrote to it would change every later result
     E.flags.writeable = False
     return E

@@ -106,14 +106,11 @@ class Quartic(LimitSurface):
 
     def _starts(self, T: FloatArray) -> FloatArray:
         """Samples of the surface from which to search, the highest along each row of ``T``."""
-        Y, starts = self._surface_points, np.empty_like(T)
-        # bounds the memory of the product with all samples
-        for part in range(0, len(T), 10_000):
-            along = T[part : part + 10_000] @ Y.T
-            # the body is even, so samples of half a sphere do: the sign tells the side
-            row, column = np.arange(len(along)), np.abs(along).argmax(axis=1)
-            starts[part : part + 10_000] = Y[column] * np.sign(along[row, column])[:, None]
-        return starts
+        Y = self._surface_points
+        along = T @ Y.T
+        # the body is even, so samples of half a sphere do: the sign tells the side
+        row, column = np.arange(len(along)), np.abs(along).argmax(axis=1)
+        return Y[column] * np.sign(along[row, column])[:, None]
 
     @cached_property
     def _from_round(self) -> FloatArray:

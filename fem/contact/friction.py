@@ -155,21 +155,18 @@ class Anchor:
     Attributes
     ----------
     at, traction : (n, 3) arrays
-        Places of the points [m], and tractions [Pa].
+        Places of the points, on a wall less its displacement where they faced it [m], and tractions [Pa].
     closed : (n,) array of bool
         Whether the point pressed.
-    wall : (n, 3) array, optional
-        Displacements of the wall's material points that they faced [m].
-    nodes, N : (n, 4) arrays, optional
-        Where these lie on the wall.
+    nodes, N : (n, 4) arrays
+        Nodes of the wall's elements that they faced and shape functions there; of a rigid object None.
     """
 
     at: FloatArray
     traction: FloatArray
     closed: NDArray[np.bool_]
-    wall: FloatArray | None = None
-    nodes: NDArray[np.int32] | None = None
-    N: FloatArray | None = None
+    nodes: Any = None
+    N: Any = None
 
 
 class Friction:

@@ -7,7 +7,7 @@ per node of the contact face, with ``kappa = E / thickness`` so that all unknown
     R_u     = r_int(u) - int N_a (p n - t) dA                 p = sum N_i p_i, t: friction that acts back, if any
     R_delta = force on the backing plate - F                  (force)
               s (mean closing - its goal), and the difference of both plates' forces   (closing displacement)
-    R_l     = kappa [A_i l_i - max(0, A_i l_i - G_i)]         G_i = int N_i g dA   (active set)
+    R_l     = kappa min(A_i l_i, G_i)                         G_i = int N_i g dA   (active set)
               kappa G_i   with   l_i >= 0                     (complementarity)
 
 All rows are forces [N].  ``A_i = int N_i dA``, all integrals are over the reference area, and ``p`` is the nominal
@@ -148,11 +148,6 @@ class Finger:
         """Active set ``(n,)`` at the state ``x`` with these weighted gaps [m^3]."""
         return self.area * x[self.pressures] - weighted_gap > 0.0
 
-    def contact_rows(self, x: FloatArray, weighted_gap: FloatArray) -> FloatArray:
-        """Residual of complementarity ``(n,)`` [N]: zero where pressure or gap is and the other is not negative."""
-        pressed = self.area * x[self.pressures]
-        return self.kappa * (pressed - np.maximum(0.0, pressed - weighted_gap))
-
 
 @dataclass
 class Evaluated:
@@ -255,8 +250,10 @@ class ContactProblem(ABC):
         for f, c, (inner, _) in zip(self.fingers, contacts, foam, strict=True):
             force = -np.einsum("qa,fqi->fia", f.pad.face_N, (c.load @ f.R).reshape(*f.pad.face_area.shape, 3))
             R[f.unknowns] = inner + gather(f.local_dofs, force, f.pad.size)
+            # zero where pressure or gap is and the other is not negative
+            smaller = np.minimum(f.area * x[f.pressures], c.weighted)
             # vinewtonrsls keeps the pressures at their bounds itself; it needs the gap alone
-            R[f.pressures] = f.kappa * c.weighted if self.complementarity else f.contact_rows(x, c.weighted)
+            R[f.pressures] = f.kappa * (c.weighted if self.complementarity else smaller)
         self._active_set = np.concatenate([c.active for c in contacts])
         self._drive(x, R)
         return R

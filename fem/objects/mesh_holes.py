@@ -42,18 +42,14 @@ def with_holes_filled(points: FloatArray, triangles: IntArray) -> tuple[IntArray
         # the border of a triangle that stands alone is no hole
         if new is None or any(tuple(sorted(t)) in present for t in new.tolist()):
             continue
-        places.append(f"{across * 1e3:.3g} mm near {named_place(x.mean(axis=0))}")
+        middle = ", ".join(f"{v:.4g}" for v in x.mean(axis=0))
+        places.append(f"{across * 1e3:.3g} mm near ({middle}) m of the file's frame")
         # the filling of the next hole must not use an edge of this one a third time
         taken.update(map(tuple, np.sort(edges_of(new), axis=1).tolist()))
         parts.append(new)
     more = "; ..." if len(places) > 3 else ""
     notes = [f"small holes filled: {len(places)} ({'; '.join(places[:3])}{more})"] if places else []
     return np.concatenate(parts), notes
-
-
-def named_place(x: FloatArray) -> str:
-    """A point for a message."""
-    return f"({', '.join(f'{v:.4g}' for v in x)}) m of the file's frame"
 
 
 def border_loops(triangles: IntArray) -> list[list[int]]:

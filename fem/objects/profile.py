@@ -56,11 +56,6 @@ class Curve:
         d1, d2 = self.derivative(s, 1), self.derivative(s, 2)
         return (d1[:, 1] * d2[:, 0] - d1[:, 0] * d2[:, 1]) / np.linalg.norm(d1, axis=1) ** 3
 
-    def inner(self, per_piece: int) -> FloatArray:
-        """Parameters of ``per_piece`` points on each piece, with its start and without its end."""
-        t = np.arange(per_piece) / per_piece
-        return (self.breaks[:-1, None] + np.diff(self.breaks)[:, None] * t).ravel()
-
 
 def joined(curves: list[Curve]) -> Curve:
     """Curves one behind the other as one."""

@@ -61,7 +61,16 @@ class Revolution(Analytic):
 
     @cached_property
     def _places(self) -> FloatArray:
-        return _places(self.curve)
+        """Parameters of a polyline that turns by a small angle from vertex to vertex and keeps every break."""
+        curve = self.curve
+        h = np.diff(curve.breaks)
+        inner = (curve.breaks[:-1, None] + h[:, None] * (np.arange(16) / 16)).ravel()
+        speed = np.linalg.norm(curve.derivative(inner, 1), axis=1)
+        # segments follow the turn, not the length: a straight run needs one, a rim many
+        turn = (np.abs(curve.curvature(inner)) * speed).reshape(-1, 16).max(axis=1) * h
+        n = np.maximum(1, np.ceil(turn / TURN)).astype(int)
+        steps = [start + length * np.arange(k) / k for start, length, k in zip(curve.breaks[:-1], h, n, strict=True)]
+        return np.concatenate([*steps, curve.breaks[-1:]])
 
     @cached_property
     def _line(self) -> FloatArray:
@@ -89,18 +98,6 @@ class Revolution(Analytic):
         phi = np.linspace(0, 2 * np.pi, 48, endpoint=False)
         points = np.stack([r * np.cos(phi), r * np.sin(phi), z + 0 * phi], axis=-1).reshape(-1, 3)
         return points, grid_triangles(len(s), 48, closed=True)
-
-
-def _places(curve: Curve) -> FloatArray:
-    """Parameters of a polyline that turns by a small angle from vertex to vertex and keeps every break."""
-    h = np.diff(curve.breaks)
-    inner = curve.inner(16).reshape(-1, 16)
-    speed = np.linalg.norm(curve.derivative(inner.ravel(), 1), axis=1).reshape(inner.shape)
-    # segments follow the turn, not the length: a straight run needs one, a rim many
-    turn = (np.abs(curve.curvature(inner.ravel())).reshape(inner.shape) * speed).max(axis=1) * h
-    n = np.maximum(1, np.ceil(turn / TURN)).astype(int)
-    steps = [start + length * np.arange(k) / k for start, length, k in zip(curve.breaks[:-1], h, n, strict=True)]
-    return np.concatenate([*steps, curve.breaks[-1:]])
 
 
 def _check_line(line: FloatArray) -> None:

@@ -45,9 +45,8 @@ class Opening:
         bound = np.maximum(0.3 * np.abs(x).max(axis=0), 1e-6)
         self._near = np.unique(mesh.number[x > bound])
         back = np.unique(mesh.number[x < -bound])
-        self._across = None if mesh.symmetry[0] else back
-        if self._across is not None:
-            self._across = back[cKDTree(self._inner[back, 1:]).query(self._inner[self._near, 1:])[1]]
+        nearest = cKDTree(self._inner[back, 1:]).query(self._inner[self._near, 1:])[1]
+        self._across = None if mesh.symmetry[0] else back[nearest]
         self._undeformed = self._apart(np.zeros(mesh.X.size * 2))
         self.last = 1.0, 0.0
 

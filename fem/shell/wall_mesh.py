@@ -91,12 +91,8 @@ def along(
 
 def around(surface: OuterSurface, size: MeshSize, symmetry: tuple[bool, bool]) -> FloatArray:
     """Grid lines round the body; the sizes are true at the middle of the gripped heights."""
-    begin, end = {
-        (False, False): (0.0, 2 * np.pi),
-        (False, True): (0.0, np.pi),
-        (True, False): (-0.5 * np.pi, 0.5 * np.pi),
-        (True, True): (0.0, 0.5 * np.pi),
-    }[bool(symmetry[0]), bool(symmetry[1])]
+    begin = -0.5 * np.pi if symmetry[0] and not symmetry[1] else 0.0
+    end = begin + 2.0 * np.pi * 0.5 ** sum(symmetry)
     s = surface.station(0.5 * sum(size.heights))
     fine = np.linspace(0, 4 * np.pi, 2881) - 2 * np.pi
     speed = np.linalg.norm(surface.jets(fine, s)[:, 1], axis=1)

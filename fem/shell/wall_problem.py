@@ -200,8 +200,6 @@ class WallProblem(ContactProblem):
         before = np.empty((len(pick), 0), np.int32)
         if self.friction is not None:
             anchor, held = self.friction.anchors[k], self._dragged(k, f, c)[pick]
-            assert anchor.nodes is not None
-            assert anchor.N is not None
             slip = self.traction(k, x, c, derivatives=True)
             t, by_motion, by_normal, by_pressure = (v[pick] * held.reshape(-1, *[1] * (v.ndim - 1)) for v in slip)
             force, by_lam, pad = force + t, by_lam + by_pressure, slice(3 * N.shape[1])
@@ -229,7 +227,6 @@ class WallProblem(ContactProblem):
         each = [self._couplings(k, f, c) for k, (f, c) in enumerate(zip(self.fingers, contacts, strict=True))]
         rows, columns = zip(*(part for couplings in each for part in couplings), strict=True)
         moved = self.pattern.grow(np.concatenate(rows), np.concatenate(columns))
-        assert moved is not None
 
         def move(slots: IntArray) -> IntArray:
             return np.where(slots >= 0, moved[slots], -1).astype(np.int32)
@@ -247,7 +244,6 @@ class WallProblem(ContactProblem):
         if self.friction is not None:
             # and the nodes of the wall that points are dragged along
             dragged, nodes = self._dragged(k, f, c), self.friction.anchors[k].nodes
-            assert nodes is not None
             now, before = self.wall_dofs(c.surface.nodes[dragged]), self.wall_dofs(nodes[dragged])
             rows = np.concatenate([f.dofs.reshape(len(f.nodes), -1)[facets[dragged]], now], axis=1)
             couplings.append(pairs(rows[:, :, None], before[:, None, :]))
@@ -267,18 +263,19 @@ class WallProblem(ContactProblem):
     def _untouched(self, f: Finger) -> Anchor:
         open_face = super()._untouched(f)
         n = len(open_face.at)
-        return replace(open_face, wall=open_face.at, nodes=np.zeros((n, 4), np.int32), N=np.zeros((n, 4)))
+        return replace(open_face, nodes=np.zeros((n, 4), np.int32), N=np.zeros((n, 4)))
 
     def _anchor(self, f: Finger, x: FloatArray, c: Evaluated) -> Anchor:
-        nodes, N = c.surface.nodes, c.surface.N
-        wall = np.einsum("na,nai->ni", N, self.model.outer(x[: self.model.size])[0][nodes])
-        return replace(super()._anchor(f, x, c), wall=wall, nodes=nodes, N=N)
+        faced = replace(super()._anchor(f, x, c), nodes=c.surface.nodes, N=c.surface.N)
+        return replace(faced, at=faced.at - self._displaced(x, faced))
 
     def _moved(self, x: FloatArray, c: Evaluated, anchor: Anchor) -> FloatArray:
-        assert anchor.N is not None
-        assert anchor.nodes is not None
+        return super()._moved(x, c, anchor) - self._displaced(x, anchor)
+
+    def _displaced(self, x: FloatArray, anchor: Anchor) -> FloatArray:
+        """Displacements ``(n, 3)`` of the wall's material points that the pad's points faced last [m]."""
         v, _ = self.model.outer(x[: self.model.size])
-        return super()._moved(x, c, anchor) - np.einsum("na,nai->ni", anchor.N, v[anchor.nodes]) + anchor.wall
+        return np.asarray(np.einsum("na,nai->ni", anchor.N, v[anchor.nodes]))
 
     def _dragged(self, k: int, f: Finger, c: Evaluated) -> NDArray[np.bool_]:
         """Points whose traction changes with anything."""

@@ -214,7 +214,7 @@ def test_an_elliptic_cylinder_ends_as_a_tube_does_rims_continue_curved_ends_and_
     # The vase's wall flares at its open ends; the rim takes over direction and curvature and stays about a circle.
     z = MM * np.linspace(0, 100, 11)
     vase = Revolution(np.stack([z, 0.03 + 4 * (z - 0.05) ** 2], axis=1), rim=0.003)
-    assert np.abs(vase.curve.curvature(vase.curve.inner(50))).max() < 3 / 0.003
+    assert np.abs(vase.curve.curvature(np.linspace(0.0, vase.curve.breaks[-1], 2000))).max() < 3 / 0.003
     s = vase.curve.breaks[1:-1]
     assert vase.curve.curvature(s) == pytest.approx(vase.curve.curvature(s - 1e-12), abs=1e-3)
     tip = Revolution([[0, 0], [0.05, 0.03]])
