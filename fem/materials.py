@@ -286,12 +286,47 @@ def elements(law, par, u, dN, w, r, K):
 
 
 @njit(cache=True)
-def tangents(law, par, F):
-    """Tangents of the law ``(n, 3, 3, 3, 3)`` [Pa] at the deformation gradients ``F (n, 3, 3)``."""
-    B, P, A = np.empty((3, 3)), np.empty((3, 3)), np.empty((len(F), 3, 3, 3, 3))
-    for n in range(len(F)):
-        stress(law, F[n], B, inverted(F[n], B), par, P, A[n])
-    return A
+def strains(law, par, u, dN, directions):
+    """Smallest ``det F``, largest ``|principal stretch - 1|`` and smallest eigenvalue of the acoustic tensor [Pa].
+
+    The acoustic tensor ``Q[i, k] = A[i, J, k, L] m_J m_L`` is formed at the first point of every element for the unit
+    ``directions (k, 3)``: positive means strongly elliptic (no localisation), infinite that none is given.
+    """
+    F, B, P, A, C = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3, 3, 3)), np.empty((3, 3))
+    smallest, largest, ellipticity = np.inf, 0.0, np.inf
+    for e in range(dN.shape[0]):
+        for q in range(dN.shape[1]):
+            J = _gradient(u[e], dN[e, q], dN.shape[3], F, B)
+            smallest = min(smallest, J)
+            C[:] = transposed_product(F, F)
+            # no principal stretch is farther from 1 than C is from the identity
+            size2 = 0.0
+            for i in range(3):
+                size2 += (C[i, i] - 1.0) ** 2
+                for j in range(i):
+                    size2 += 2.0 * C[i, j] ** 2
+            if size2 > largest * largest:
+                # rounding can leave the smallest eigenvalue of a crushed element below zero
+                for value in principal(C)[0]:
+                    largest = max(largest, abs(np.sqrt(max(value, 0.0)) - 1.0))
+            # one point per element: loss of ellipticity is a warning, and the tensor in many directions is dear
+            if q > 0 or len(directions) == 0:
+                continue
+            stress(law, F, B, J, par, P, A)
+            for m in directions:
+                for i in range(3):
+                    for k in range(3):
+                        C[i, k] = 0.0
+                        for j in range(3):
+                            for n in range(3):
+                                C[i, k] += A[i, j, k, n] * m[j] * m[n]
+                # only where the smallest so far, taken off the diagonal, leaves no positive definite matrix
+                a, b, c = C[0, 0] - ellipticity, C[1, 1] - ellipticity, C[2, 2] - ellipticity
+                minor = a * b - C[0, 1] ** 2
+                det = c * minor - a * C[1, 2] ** 2 - b * C[0, 2] ** 2 + 2.0 * C[0, 1] * C[1, 2] * C[0, 2]
+                if not (a > 0.0 and minor > 0.0 and det > 0.0):
+                    ellipticity = min(ellipticity, principal(C)[0].min())
+    return smallest, largest, ellipticity
 
 
 LAWS = {"blatz_ko": 0, "hyperfoam": 1, "neo_hookean": 2, "linear": 3}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from softjaw.fem.assembly import gather, pairs
-from softjaw.fem.materials import elements, smallest_det, tangents
+from softjaw.fem.materials import elements, smallest_det, strains
 from softjaw.fem.pad.mesh import Pad
 from softjaw.friction.patch import FloatArray
 
@@ -67,19 +67,12 @@ class Foam:
     def strains(self, x: FloatArray, directions: FloatArray) -> tuple[float, float, float]:
         """Smallest ``det F``, largest ``|principal stretch - 1|`` and smallest eigenvalue of the acoustic tensor.
 
-        The acoustic tensor ``Q[i, k] = A[i, J, k, L] m_J m_L`` is formed at the first point of every element for the
-        given unit ``directions (k, 3)`` and divided by the shear modulus: positive means strongly elliptic (no
-        localisation).
+        The acoustic tensor, see ``fem.materials.strains``, is formed for unit ``directions (k, 3)`` and divided by the
+        shear modulus.
         """
-        u, dN, law = self._displacements(x), self.pad.dN, self.pad.material
-        F = np.eye(3) + np.einsum("eia,eqja->eqij", u, dN)
-        # rounding can leave the smallest eigenvalue of a crushed element below zero
-        stretch = np.sqrt(np.maximum(np.linalg.eigvalsh(F.swapaxes(-1, -2) @ F), 0.0))
-        # one point per element: loss of ellipticity is a warning, and the tensor in 24 directions is dear
-        A = tangents(law.number, law.parameters, np.ascontiguousarray(F[:, 0]))
-        Q = np.einsum("mj,eijkm->emik", directions, np.einsum("eijkl,ml->eijkm", A, directions))
-        ellipticity = np.linalg.eigvalsh(Q).min(initial=np.inf) / law.shear_modulus
-        return smallest_det(u, dN), float(np.abs(stretch - 1.0).max()), float(ellipticity)
+        law = self.pad.material
+        det, strain, lowest = strains(law.number, law.parameters, self._displacements(x), self.pad.dN, directions)
+        return det, strain, lowest / law.shear_modulus
 
     def _evaluate(self, x: FloatArray, K: FloatArray) -> float:
         law, pad = self.pad.material, self.pad
