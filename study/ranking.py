@@ -4,18 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import product
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from softjaw.study.case.reach import FREE, clearest, hand_axes, opened, refused
 from softjaw.study.case.result import TIE
 from softjaw.study.flags import BORNE, LOST, Flag, flags_in
-from softjaw.study.quantities import DONE, LEAST_FORCE, REALISATION
-from softjaw.study.result.read import at_force, half_width, stated_error, values_of
+from softjaw.study.grippers import Hand, gripper_file
+from softjaw.study.messages import StudyError
+from softjaw.study.quantities import DONE, LEAST_FORCE, LISTED, REALISATION
+from softjaw.study.result.read import at_force, half_width, scene_of, stated_error, values_of
 from softjaw.study.scene.text import scene_table
 
 FloatArray = NDArray[np.float64]
@@ -302,3 +307,70 @@ def borne_level(status: np.ndarray, flags: np.ndarray) -> int | None:
     """
     borne = ((status == DONE) & (flags & BORNE == 0)).reshape(-1, status.shape[-1]).any(axis=0)
     return int(np.flatnonzero(borne)[-1]) if borne.any() else None
+
+
+# --- the decisions that everything shown rests on --------------------------------------------------------------------
+
+
+def judge(
+    ds: xr.Dataset,
+    chosen: tuple[int, ...] | None = None,
+    force: float | None = None,
+    by: str | None = None,
+    top: int = LISTED,
+    lines: bool = True,
+) -> xr.Dataset:
+    """The dataset at a force [N] with `judged` flags and decisions as attributes.
+
+    ``score``: the map that grasps are ranked by; ``level`` and ``why``: the force level that is shown, and why it is
+    that one; ``best``: index of the best case there, or None; ``chosen``: the case that was asked for; ``reach``: of
+    the ``top`` places (of grasps where not ``lines``) the direction from which the scene's hand comes, see
+    `approach_of`. Those that it does not reach are ranked last, and the next ones are looked at.
+
+    Raises `ValueError` for a force outside of the solved ones.
+    """
+    hand, reach = hand_of(ds), dict(ds.attrs.get("reach", {}))
+    about = {"title": ds.attrs.get("title") or Path(ds.attrs.get("file", "")).stem, "chosen": chosen, "reach": reach}
+    while True:
+        flags = ds["flags"].values.copy()
+        flags.reshape(-1, flags.shape[-1])[[c for c, approach in reach.items() if approach == ()]] |= Flag.OUT_OF_REACH
+        found, k, why = at_level(ds.assign(flags=(ds.status.dims, flags, ds["flags"].attrs)), force)
+        score = score_of(found, by or ds.attrs.get("score"))
+        found = found.assign(flags=(ds.status.dims, judged(found), ds["flags"].attrs))
+        ranks = places = ranked(found, k, score).tolist()
+        if lines and hand:
+            places = [place.best for place in distinct(found, ranks, rank_values(found, score, k), k, top)]
+        marks = found["flags"].values[..., k].ravel()
+        new = [c for c in places[: top or None] if c not in reach and not marks[c] & LOST]
+        if not new or hand is None:
+            best = index_of(found, ranks[0], k) if ranks else None
+            return found.assign_attrs(about, score=score, level=k, why=why, best=best)
+        reach |= {c: approach_of(found, c, k, hand) for c in new}
+
+
+def index_of(ds: xr.Dataset, candidate: int, k: int) -> tuple[int, ...]:
+    """Index of a candidate's case at a force level."""
+    return (*map(int, np.unravel_index(candidate, ds.status.shape[:-1])), k)
+
+
+def hand_of(ds: xr.Dataset) -> Hand | None:
+    """The hand of the gripper that the scene names; None where it names none, or where its file is not there now."""
+    name = task_keys(ds, "gripper").get("preset")
+    with suppress(StudyError):
+        return gripper_file(name)[1] if name else None
+    return None
+
+
+def approach_of(ds: xr.Dataset, candidate: int, k: int, hand: Hand) -> tuple[float, ...] | None:
+    """Direction from which a hand comes to a case; empty where it does not reach it, None where that is not known."""
+    index = index_of(ds, candidate, k)
+    opening, pad = float(values_of(ds, "opening")[index]), ds["finger_pose_rotation"].values[index][0]
+    try:
+        scene = scene_of(ds, index)
+        wide, _, depth = opened(hand, scene.gripper, opening)
+        middle = ds["finger_pose_origin"].values[index].mean(axis=0)
+        approach, room = clearest(scene, hand, hand.closing, pad, middle, wide, depth)
+    except (ValueError, OSError):  # the object is not there now
+        return None
+    free = room >= FREE and not refused(hand, scene.gripper, opening, ds["normal_force"].values[k])
+    return tuple(hand_axes(pad, approach, "x")[:, 2].tolist()) if free else ()

@@ -22,9 +22,9 @@ from jobs.figures import contacts, studies, surfaces
 from softjaw.study import pictures
 from softjaw.study.cli import main as softjaw
 from softjaw.study.messages import DONE, SOME_FAILED, USAGE, StudyError, complain, first_rank, write_file
+from softjaw.study.ranking import judge
 from softjaw.study.result.layout import DONE as CASE_DONE
 from softjaw.study.result.read import open
-from softjaw.study.show.grasps import judge
 
 EVERY, DPI = "all", 140
 

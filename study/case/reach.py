@@ -15,7 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.study.case.build import own_frame, surface_triangles
+from softjaw.study.case.result import TIE
 from softjaw.study.grippers import APPROACHES, Hand
+from softjaw.study.units import shown_text
 
 FloatArray = NDArray[np.float64]
 OPENED_MORE = 0.02  # the fingers open beyond first touch before a grasp [m]
@@ -100,6 +102,13 @@ def opened(hand: Hand, gripper: Any, opening: float, wider: float = OPENED_MORE)
     return min(opening + wider, max(most, opening)), most, hand.depth(opening + foam)
 
 
+def refused(hand: Hand, gripper: Any, opening: float, force: float) -> list[str]:
+    """Why a gripper cannot take a grasp wherever it comes from: its opening [m] or its force [N]."""
+    most, (low, high) = opened(hand, gripper, opening)[1], hand.force_n
+    words = [f"wider than the {shown_text(most, 'm')} that it opens"] * (opening > most * (1 + TIE))
+    return words + [f"a force beyond its {low:g} to {high:g} N"] * (not low <= force <= high)
+
+
 def clearance(points: FloatArray, corners: FloatArray) -> float:
     """Least distance [m] of points ``(n, 3)`` from boxes ``(k, 2, 3)``; negative as deep as a point is inside.
 
@@ -112,6 +121,20 @@ def clearance(points: FloatArray, corners: FloatArray) -> float:
         distance = np.linalg.norm(np.maximum(outside, 0.0), axis=1) + np.minimum(outside.max(axis=1), 0.0)
         least = min(least, float(distance.min()))
     return least
+
+
+def clearest(
+    scene: Any, hand: Hand, along: str, pad: FloatArray, middle: FloatArray, wide: float, depth: float
+) -> tuple[str, float]:
+    """The approach of a hand, and its clearance [m]; parameters as for `rooms`.
+
+    It is the one from above, if the hand is `FREE` there, else the clearest. `ValueError, OSError`: no object is there.
+    """
+    room = rooms(surface_points(scene.object), hand, along, pad, middle, scene.gripper.pad_size, wide, depth)
+    weight = np.array(scene.task.direction or (0.0, 0.0, -1.0))
+    down = {name: float(hand_axes(pad, name, "x")[:, 2] @ weight / np.linalg.norm(weight)) for name in room}
+    approach = chosen_approach(room, down)
+    return approach, room[approach]
 
 
 def chosen_approach(clearances: dict[str, float], down: dict[str, float]) -> str:

@@ -7,13 +7,13 @@ from functools import partial
 from pathlib import Path
 
 from softjaw.study.messages import USAGE, StudyError, beside, write_file
+from softjaw.study.ranking import judge
 from softjaw.study.result.index import index_path
 from softjaw.study.result.read import open
 from softjaw.study.show import objects
 from softjaw.study.show.best_grasps import best, best_text
 from softjaw.study.show.compare import compare as compared
 from softjaw.study.show.compare import compare_text
-from softjaw.study.show.grasps import judge
 from softjaw.study.show.watch import file_look
 from softjaw.study.show.watch import watch as watched
 from softjaw.study.table import rendered, terminal_width

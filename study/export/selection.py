@@ -24,8 +24,7 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from softjaw.study.case.reach import FREE, OPENED_MORE, chosen_approach, hand_axes, opened, rooms, surface_points
-from softjaw.study.case.result import TIE
+from softjaw.study.case.reach import FREE, OPENED_MORE, clearest, hand_axes, opened, refused
 from softjaw.study.export.cases import cases
 from softjaw.study.export.rigid_body import scene_of
 from softjaw.study.flags import LOST, flag_words, flags_in
@@ -205,30 +204,18 @@ def holds(ds: xr.Dataset, case: dict[str, Any], gripper: GripperFrame) -> dict[s
     hand, maps, force = gripper.hand, case["maps"], case["place"]["normal_force"]
     scene = scene_of(ds, case)
     foam, opening = 2 * scene.gripper.pad_thickness, float(maps["opening"])
-    wide, most, depth = opened(hand, scene.gripper, opening, gripper.wider)
-    closed, (low, high) = float(maps["opening_loaded"]) + foam, hand.force_n
-    beyond = [f"wider than the {shown_text(most, 'm')} that it opens"] * (opening > most * (1 + TIE))
-    beyond += [f"a force beyond its {low:g} to {high:g} N"] * (not low <= force <= high)
-    joints = hand.values(wide + foam), hand.values(closed), depth
+    wide, _, depth = opened(hand, scene.gripper, opening, gripper.wider)
+    beyond, closed = refused(hand, scene.gripper, opening, force), float(maps["opening_loaded"]) + foam
+    joints, pad = (hand.values(wide + foam), hand.values(closed), depth), case["fingers"][0]["pose_rotation"]
     if gripper.approach:
         return dict.fromkeys(gripper.approach, Hold(*joints, tuple(beyond)))
-    approach, room = _clearest(scene, case, gripper, wide, depth)
-    beyond += ["the hand meets the object from every side"] * (room < FREE and not beyond)
-    return {approach: Hold(*joints, tuple(beyond))}
-
-
-def _clearest(scene: Any, case: dict[str, Any], gripper: GripperFrame, wide: float, depth: float) -> tuple[str, float]:
-    """The approach from above, if hand and object are apart there, else the clearest one, and its clearance [m]."""
     try:
-        points = surface_points(scene.object)
+        approach, room = clearest(scene, hand, gripper.along, pad, _middle(case), wide, depth)
     except (ValueError, OSError) as error:
         text = f"the object cannot be built, so that no approach can be chosen: {error}; name one with --approach"
         raise StudyError(USAGE, text) from error
-    weight, pad = np.array(scene.task.direction or (0.0, 0.0, -1.0)), case["fingers"][0]["pose_rotation"]
-    room = rooms(points, gripper.hand, gripper.along, pad, _middle(case), scene.gripper.pad_size, wide, depth)
-    down = {name: float(hand_axes(pad, name, "x")[:, 2] @ weight / np.linalg.norm(weight)) for name in room}
-    approach = chosen_approach(room, down)
-    return approach, room[approach]
+    beyond += ["the hand meets the object from every side"] * (room < FREE and not beyond)
+    return {approach: Hold(*joints, tuple(beyond))}
 
 
 def usable(grasps: Sequence[RankedGrasp]) -> tuple[list[RankedGrasp], str]:

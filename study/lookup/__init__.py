@@ -29,7 +29,7 @@ from softjaw.study.lookup.interpolation import (
 )
 from softjaw.study.lookup.point import INSIDE, JUMP, NO_RESULT, OUTSIDE, SNAP, GraspPoint
 from softjaw.study.quantities import BY_KEY, DONE, checked_model
-from softjaw.study.ranking import judged, ranked, shown_level
+from softjaw.study.ranking import judge, ranked
 from softjaw.study.result.read import KINDS, axes_of, contact_kinds, maps_in, scene_of, values_of
 from softjaw.study.result.read import open as open_dataset
 from softjaw.study.result.store import place_text
@@ -83,6 +83,7 @@ class GraspMap:
         station, angle, force = self.file_axes[-3:]
         self.index = _sweep_point(self.file_axes[:-3], dict(where or {}))
         self.data = ds.isel(dict(zip(ds.status.dims, self.index, strict=False)), drop=True)
+        self.data = self.data.assign_attrs(point=self.index)
         self.status = self.data.status.values
         #: unit and definition of everything that `value` knows
         self.quantities = {name: (unit, ds[name].definition) for name, unit in maps_in(ds).items()}
@@ -135,19 +136,15 @@ class GraspMap:
         by : str, optional
             "payload" (default), "quality", "e_n", "epsilon", or "force": the least that holds the object's mass.
         force : float, optional
-            Solved force [N] at which they are ranked, and which the points have. By default that of ``softjaw show``;
-            where the object's mass is known each point then has its own force to use.
+            Force [N] at which they are ranked, solved or between two, and which the points have. By default that of
+            ``softjaw show``; where the object's mass is known each point then has its own force to use.
         """
-        ds, (stations, angles, forces) = self.data, (axis.values for axis in self.file_axes[-3:])
-        flags = judged(ds)
-        k, _ = shown_level(ds, flags) if force is None else (int(np.abs(forces - force).argmin()), "")
-        if force is not None and not np.isclose(forces[k], force):
-            raise ValueError(f"force is {force:g}: solved are {', '.join(f'{f:g}' for f in forces)} N")
-        order = ranked(ds, k, by)[:n]
-        each = force is None and "force_low" in ds
-        low = ds["force_low"].values.ravel() if each else np.full(self.status[..., k].size, np.nan)
+        ds = judge(self.data, force=force, by=by, top=n, lines=False)
+        k, (stations, angles, _) = ds.attrs["level"], (axis.values for axis in self.file_axes[-3:])
+        forces, each = ds["normal_force"].values, force is None and "force_low" in ds
+        low = ds["force_low"].values.ravel() if each else np.full(self.status[..., 0].size, np.nan)
         points = []
-        for i in order:
+        for i in ranked(ds, k, ds.attrs["score"])[:n]:
             station, angle = np.unravel_index(i, self.status.shape[:-1])
             use = forces[k] if np.isnan(low[i]) else max(low[i], forces[0])
             points.append(self.point(int(station) if self.by_poses else stations[station], angles[angle], use))

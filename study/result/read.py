@@ -149,7 +149,7 @@ def scene_of(ds: xr.Dataset, index: Sequence[int] = ()) -> Scene:
 
     Raises `SceneError`: this version cannot read it.
     """
-    return _scene_at(ds.attrs["scene"], tuple(index[: len(ds.status.dims) - 3]))
+    return _scene_at(ds.attrs["scene"], ds.attrs.get("point") or tuple(index[: len(ds.status.dims) - 3]))
 
 
 @lru_cache(maxsize=64)

@@ -24,7 +24,7 @@ from softjaw.study import messages, quantities
 from softjaw.study.case.result import TimeLimitError
 from softjaw.study.flags import LOST, flag_words
 from softjaw.study.messages import NoGraspError, StudyError, shortened
-from softjaw.study.ranking import judged, ranked, shown_level
+from softjaw.study.ranking import judge
 from softjaw.study.result import index
 from softjaw.study.result.read import dataset, values_of
 from softjaw.study.result.skeleton import rewrite
@@ -283,8 +283,8 @@ def _why(error: BaseException, limit: float) -> tuple[str, str]:
 
 def row_of(result: Any) -> Row:
     """What the index says of an open result file."""
-    ds = dataset(result)
-    status, flags = ds.status.values, judged(ds)
+    ds = judge(dataset(result))
+    status, flags = ds.status.values, ds.flags.values
     done, failed = (status == quantities.DONE), (status == quantities.FAILED)
     row: Row = {"cases": int(status.size), "done": int(done.sum()), "failed": int(failed.sum())}
     row |= {"seconds": float(np.nansum(ds["work_seconds_total"].values)), "reason": _reason(ds, flags, done)}
@@ -293,9 +293,8 @@ def row_of(result: Any) -> Row:
     usable = done & (flags & LOST == 0)
     if not usable.any():
         return row | {"state": index.FAILED if failed.any() and not done.any() else index.NO_GRASP}
-    k = shown_level(ds, flags)[0]
-    best = int(ranked(ds, k)[0])
-    at = (*(int(i) for i in np.unravel_index(best, status.shape[:-1])), k)
+    at = ds.attrs["best"]
+    k, best = at[-1], int(np.ravel_multi_index(at[:-1], status.shape[:-1]))
     maps = {name: name for name in ("payload", "opening", "e_n", "quality", "payload_error") if name in ds}
     row |= {name: float(values_of(ds, name)[at]) for name in maps}
     row |= {"force": float(ds.normal_force.values[k]), "best": best, "grasps": int(usable[..., k].sum())}

@@ -14,10 +14,10 @@ from softjaw.friction.patch import NEGLIGIBLE
 from softjaw.study.case.result import TIE
 from softjaw.study.flags import LOST, OF_FILE, Flag, flag_words, flags_in
 from softjaw.study.quantities import BY_KEY, FORCE_RANGE, LEAST_FORCE, LISTED, MAIN, MODELS, STATES, map_row
-from softjaw.study.ranking import distinct, passed_over, rank_values, score_of, sure, task_keys
+from softjaw.study.ranking import distinct, index_of, judge, passed_over, rank_values, score_of, sure, task_keys
 from softjaw.study.result.layout import DONE
 from softjaw.study.result.read import axes_of, dataset, values_of
-from softjaw.study.show.grasps import Index, at, candidate_of, forces, index_of, judge, note, order, place
+from softjaw.study.show.grasps import Index, at, candidate_of, forces, note, order, place
 from softjaw.study.show.places import folded_text, named, short_name, side_text, spot
 from softjaw.study.show.status import (
     MOST_PLACES,

@@ -6,18 +6,14 @@ grasp are shown. A case is named by its index ``(..., station, angle, force)`` o
 
 from __future__ import annotations
 
-from contextlib import suppress
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from softjaw.study.flags import LOST, OF_FILE, Flag, flag_words, flags_in
-from softjaw.study.grippers import APPROACHES, Hand, gripper_file
-from softjaw.study.messages import StudyError
-from softjaw.study.quantities import FORCE_RANGE, LISTED, MAIN, MODELS, NO_GRASP, STATES
-from softjaw.study.ranking import at_level, distinct, judged, rank_values, ranked, score_of, task_keys
+from softjaw.study.flags import OF_FILE, Flag, flag_words, flags_in
+from softjaw.study.quantities import FORCE_RANGE, MAIN, MODELS, NO_GRASP, STATES
+from softjaw.study.ranking import index_of, ranked
 from softjaw.study.result.layout import DONE, FAILED
 from softjaw.study.result.read import axes_of
 from softjaw.study.result.store import place_text, value_text
@@ -33,64 +29,6 @@ MORE = ("epsilon", "safety_factor", "F_N", "S", "contact_area", "p_max", "closin
 LIMITS = {"force_balance": 1e-6, "adhesion": 1e-6, "penetration": 1e-6, "complementarity": 1e-6, "min_det_f": 0.0,
           "ellipticity": 0.0}  # fmt: skip
 ABOVE = ("min_det_f", "ellipticity")
-
-
-def judge(
-    ds: xr.Dataset,
-    chosen: Index | None = None,
-    force: float | None = None,
-    by: str | None = None,
-    top: int = LISTED,
-    lines: bool = True,
-) -> xr.Dataset:
-    """The dataset at a force [N] with judged flags (`study.ranking.judged`) and decisions as attributes.
-
-    ``score``: the map that grasps are ranked by; ``level`` and ``why``: the force level that is shown, and why it is
-    that one; ``best``: index of the best case there, or None; ``chosen``: the case that was asked for; ``reach``: of
-    the ``top`` places (of grasps where not ``lines``) the direction from which the scene's hand comes, see
-    `approach_of`. Those that it does not reach are ranked last, and the next ones are looked at.
-
-    Raises `ValueError` for a force outside of the solved ones.
-    """
-    hand, reach = hand_of(ds), dict(ds.attrs.get("reach", {}))
-    about = {"title": ds.attrs.get("title") or Path(ds.attrs.get("file", "")).stem, "chosen": chosen, "reach": reach}
-    while True:
-        flags = ds["flags"].values.copy()
-        flags.reshape(-1, flags.shape[-1])[[c for c, approach in reach.items() if approach == ()]] |= Flag.OUT_OF_REACH
-        found, k, why = at_level(ds.assign(flags=(ds.status.dims, flags, ds["flags"].attrs)), force)
-        score = score_of(found, by or ds.attrs.get("score"))
-        found = found.assign(flags=(ds.status.dims, judged(found), ds["flags"].attrs))
-        found = found.assign_attrs(about, score=score, level=k, why=why)
-        ranks = order(found, k)
-        places = [candidate_of(ds, index) for index in ranks]
-        if lines and hand:
-            places = [place.best for place in distinct(found, places, rank_values(found, score, k), k, top)]
-        marks = found["flags"].values[..., k].ravel()
-        new = [c for c in places[: top or None] if c not in reach and not marks[c] & LOST]
-        if not new or hand is None:
-            return found.assign_attrs(best=next(iter(ranks), None))
-        reach |= {c: approach_of(found, index_of(found, c, k), hand) for c in new}
-
-
-def hand_of(ds: xr.Dataset) -> Hand | None:
-    """The hand of the gripper that the scene names; None where it names none, or where its file is not there now."""
-    name = task_keys(ds, "gripper").get("preset")
-    with suppress(StudyError):
-        return gripper_file(name)[1] if name else None
-    return None
-
-
-def approach_of(ds: xr.Dataset, index: Index, hand: Hand) -> tuple[float, ...] | None:
-    """Direction from which a hand comes to a case; empty where it does not reach it, None where that is not known."""
-    from softjaw.study.export import cases, selection  # with PETSc, which is slow to load
-
-    frame = selection.GripperFrame(hand, ())
-    try:
-        ((approach, hold),) = selection.holds(ds, next(cases.cases(ds, MODELS[0], [index])), frame).items()
-    except StudyError:  # the object is not there now
-        return None
-    axis, sign = APPROACHES[approach]
-    return () if hold.unfit else tuple((sign * ds["finger_pose_rotation"].values[index][0][:, axis]).tolist())
 
 
 def field(ds: xr.Dataset, name: str, model: str = "ccm") -> Any:
@@ -170,11 +108,6 @@ def forces(ds: xr.Dataset) -> np.ndarray:
 def candidate_of(ds: xr.Dataset, index: Index) -> int:
     """Number of a case's candidate, counted over sweeps, stations and angles."""
     return int(np.ravel_multi_index(index[:-1], ds.status.shape[:-1]))
-
-
-def index_of(ds: xr.Dataset, candidate: int, k: int) -> Index:
-    """Index of a candidate's case at a force level."""
-    return (*unravelled(candidate, ds.status.shape[:-1]), k)
 
 
 def unravelled(position: int, shape: tuple[int, ...]) -> Index:

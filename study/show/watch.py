@@ -17,13 +17,12 @@ from rich.text import Text
 from softjaw.study.messages import DONE as ENDED
 from softjaw.study.messages import SOME_FAILED, STOPPED
 from softjaw.study.quantities import DONE, FAILED, MAIN, MISSING
-from softjaw.study.ranking import ranked
+from softjaw.study.ranking import index_of, ranked
 from softjaw.study.result.lock import holder
 from softjaw.study.result.read import dataset
 from softjaw.study.result.store import open_result, place_text
 from softjaw.study.run.progress import Progress
 from softjaw.study.show.best_grasps import value_text
-from softjaw.study.show.grasps import index_of
 from softjaw.study.show.status import RESUME, lasted, reasons
 from softjaw.study.table import terminal_width
 

@@ -13,10 +13,11 @@ from softjaw.friction.motion import fibonacci_twists
 from softjaw.friction.wrench import friction_limits
 from softjaw.lsfit.ellipsoid import Ellipsoid
 from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, SOME_FAILED, USAGE, StudyError
+from softjaw.study.ranking import judge
 from softjaw.study.result.layout import DONE
 from softjaw.study.result.read import dataset, open
 from softjaw.study.result.store import open_result
-from softjaw.study.show.grasps import field, judge
+from softjaw.study.show.grasps import field
 from softjaw.study.show.stored_surface import StoredSurface
 from tests.generators import cylinder_grid
 from tests.study.formula_results import grid_axes, make

@@ -8,9 +8,9 @@ from typing import Any
 
 from softjaw.study import page
 from softjaw.study.messages import StudyError, write_file
+from softjaw.study.ranking import judge
 from softjaw.study.result.index import SOLVED, read_index
 from softjaw.study.result.read import open
-from softjaw.study.show.grasps import judge
 from softjaw.study.show.objects import counts_text, index_table
 from softjaw.study.show.report.tables import best_grasps
 from softjaw.study.show.report.writing import the_answer

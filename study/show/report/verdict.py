@@ -10,10 +10,11 @@ import xarray as xr
 
 from softjaw.study.flags import BORNE
 from softjaw.study.quantities import MISSING, MODEL_NAMES, MODELS
+from softjaw.study.ranking import judge
 from softjaw.study.result.read import axes_of
 from softjaw.study.result.store import value_text
 from softjaw.study.show.best_grasps import best_text
-from softjaw.study.show.grasps import Index, at, flagged, flags_of, judge, reason_lines, spoken
+from softjaw.study.show.grasps import Index, at, flagged, flags_of, reason_lines, spoken
 from softjaw.study.show.status import state_counts
 from softjaw.study.table import number
 

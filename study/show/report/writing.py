@@ -13,9 +13,10 @@ import xarray as xr
 from softjaw.study.messages import CANNOT_WRITE, StudyError, write_file
 from softjaw.study.page import Block, Section, answer, box, page, text
 from softjaw.study.quantities import DONE, FAILED, NO_GRASP
+from softjaw.study.ranking import judge
 from softjaw.study.result.read import open
 from softjaw.study.show.best_grasps import answer as answer_lines
-from softjaw.study.show.grasps import Index, field, forces, judge
+from softjaw.study.show.grasps import Index, field, forces
 from softjaw.study.show.report import contact, curves, maps, tables, verdict
 from softjaw.study.show.view.model import Place, View, view_of
 from softjaw.study.show.view.object3d import object_block

@@ -17,7 +17,8 @@ import xarray as xr
 from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, USAGE, StudyError, beside
 from softjaw.study.pictures import COLOURS, INK, SOFT
 from softjaw.study.quantities import DONE, FAILED, MISSING, NO_GRASP
-from softjaw.study.show.grasps import Index, field, forces, judge, label_of
+from softjaw.study.ranking import judge
+from softjaw.study.show.grasps import Index, field, forces, label_of
 from softjaw.study.show.object_surface import NOBODY
 from softjaw.study.show.stored_surface import COMPONENTS, weaker
 from softjaw.study.show.view.model import ARROW_MM, CROSSED, FORCE, NEUTRAL, OPEN, PAD, View, maps_of, view_of

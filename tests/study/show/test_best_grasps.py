@@ -9,12 +9,14 @@ from scipy.spatial.transform import Rotation
 
 from softjaw.study.cli import main
 from softjaw.study.flags import Flag
+from softjaw.study.lookup import GraspMap
 from softjaw.study.quantities import MODELS, quantities
-from softjaw.study.ranking import distinct
+from softjaw.study.ranking import distinct, judge
 from softjaw.study.result import read
 from softjaw.study.result.layout import DONE, FAILED
+from softjaw.study.result.store import open_result
+from softjaw.study.run.objects import row_of
 from softjaw.study.show.best_grasps import best, force_to_use, safe_range
-from softjaw.study.show.grasps import judge
 from softjaw.study.show.status import grouped
 from softjaw.study.table import MOST_NOTES, NOTE, as_csv, as_json
 from tests.study import formula_results
@@ -238,6 +240,9 @@ def test_a_grasp_that_the_hand_of_the_scene_does_not_reach_comes_last(tmp_path, 
     table = best(ds, lines=True)
     assert stations(table) == order
     assert judge(ds).attrs["best"] == (int(order[0]), 0, 1)
+    assert [point.place[0, 0] for point in GraspMap(path).best(2)] == order
+    with open_result(path) as result:
+        assert row_of(result)["best"] == order[0]
     assert any("p00" in note for note in table.notes) == (order[0] == 1.0)
 
 

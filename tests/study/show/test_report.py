@@ -16,12 +16,13 @@ from softjaw.study.flags import Flag
 from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, StudyError
 from softjaw.study.page import answer, box, bullets, details, heading, page, table, text, verbatim
 from softjaw.study.quantities import Axis
+from softjaw.study.ranking import judge
 from softjaw.study.result.layout import Layout
 from softjaw.study.result.read import dataset
 from softjaw.study.result.store import open_result
 from softjaw.study.show import best_grasps
 from softjaw.study.show.best_grasps import best
-from softjaw.study.show.grasps import at, judge, order
+from softjaw.study.show.grasps import at, order
 from softjaw.study.show.report import curves, tables, verdict
 from softjaw.study.show.report.writing import build, write_report
 from tests.study.formula_results import OBJECT, grid_axes, written

@@ -7,10 +7,11 @@ from softjaw.lsfit.ellipsoid import Ellipsoid
 from softjaw.lsfit.form import exponents, monomials
 from softjaw.lsfit.quartic import Quartic
 from softjaw.study.quantities import MONOMIALS
+from softjaw.study.ranking import judge
 from softjaw.study.result.layout import Layout
 from softjaw.study.result.read import dataset
 from softjaw.study.result.store import open_result
-from softjaw.study.show.grasps import field, judge
+from softjaw.study.show.grasps import field
 from softjaw.study.show.report.contact import limit_surfaces
 from softjaw.study.show.stored_surface import circle, shadow_outline, stored_surface
 from softjaw.study.show.view.model import View

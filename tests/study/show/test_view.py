@@ -17,10 +17,11 @@ from softjaw.fem.objects.shapes import EllipticCylinder
 from softjaw.study.cli import main
 from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, USAGE, StudyError
 from softjaw.study.quantities import ALONG, AROUND
+from softjaw.study.ranking import judge
 from softjaw.study.result.layout import REPORT_BYTES
 from softjaw.study.result.read import dataset
 from softjaw.study.result.store import open_result
-from softjaw.study.show.grasps import judge, order
+from softjaw.study.show.grasps import order
 from softjaw.study.show.object_surface import NOBODY, Cells, areas, between, coloured, cut, moved, pressed
 from softjaw.study.show.report.verdict import plain_report
 from softjaw.study.show.view.model import View, quantity_of, view_of

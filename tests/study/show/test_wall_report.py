@@ -11,7 +11,7 @@ from softjaw.study import pipeline
 from softjaw.study.case.effects import EffectChoice
 from softjaw.study.case.solver import FINE, CandidateSolver
 from softjaw.study.flags import Flag
-from softjaw.study.ranking import borne_level, judged, ranking
+from softjaw.study.ranking import borne_level, judge, judged, ranking
 from softjaw.study.result import derived
 from softjaw.study.result.layout import DONE, FAILED
 from softjaw.study.result.read import dataset
@@ -21,7 +21,7 @@ from softjaw.study.result.write import ResultWriter, record
 from softjaw.study.run.plan import make_plan, memory, wall_unknowns
 from softjaw.study.scene import parse_scene
 from softjaw.study.show.best_grasps import best, safe_range
-from softjaw.study.show.grasps import at, field, judge
+from softjaw.study.show.grasps import at, field
 from softjaw.study.show.object_surface import undeformed
 from softjaw.study.show.report import curves, maps, tables, writing
 from softjaw.study.show.view.model import View, view_of
