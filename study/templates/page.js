@@ -113,6 +113,6 @@ function object3d(div, all) {
   });
   // the bars at the left keep clear of the object on a narrow screen, too
   const {domain} = div.layout.scene, high = domain && domain.x ? domain.x[1] : 1;
-  div.layout.scene.domain = {...domain, x: [Math.min(0.3 * high, 75 / div.clientWidth), high]};
+  div.layout.scene.domain = {...domain, x: [Math.min(0.3 * high, 95 / div.clientWidth), high]};
   return paint();
 }

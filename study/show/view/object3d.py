@@ -151,6 +151,8 @@ def _traces(whole: bool) -> list[Any]:
 
 
 def _camera(view: View, index: Index) -> dict[str, Any]:
+    """Where it is seen from; a little below its middle, so that the names of its axes stay in the picture."""
     eye, up = view.eye(index)
-    at = {"eye": dict(zip("xyz", (1.75 * eye).tolist(), strict=True)), "up": dict(zip("xyz", up.tolist(), strict=True))}
+    places = {"eye": 1.75 * eye, "up": up, "center": np.array([0.0, 0.0, -0.08])}
+    at = {name: dict(zip("xyz", place.tolist(), strict=True)) for name, place in places.items()}
     return {**at, "projection": {"type": "orthographic"}}
