@@ -25,7 +25,6 @@ from softjaw.study.units import shown, shown_unit
 
 GAP = 2  # characters between columns
 PAPER = 80  # characters in a line of a text that is not for a terminal
-NOTE = 110  # characters in a note below a table
 MOST_NOTES = 3  # below a table in a terminal; the other renderings have all
 LONGEST_CELL = 24  # characters
 Row = dict[str, Any]
@@ -148,14 +147,6 @@ def wrapped(text: str, width: int, indent: str = "", more: str = "") -> str:
         text, max(width, 40), initial_indent=indent, subsequent_indent=indent + more,
         break_long_words=False, break_on_hyphens=False,
     )  # fmt: skip
-
-
-def noted(head: str, clauses: Sequence[str]) -> str:
-    """One line on what to do: its head, and as many of the clauses, the first one always, as a line has room for."""
-    line = f"{head}: {clauses[0]}"
-    for clause in clauses[1:]:
-        line += f"; {clause}" * (len(line) + len(clause) + 2 <= NOTE)
-    return line
 
 
 def hanging(text: str, width: int) -> str:

@@ -30,12 +30,12 @@ from softjaw.study.show.status import (
     time_split,
     unfinished,
 )
-from softjaw.study.table import Column, Row, Table, as_text, noted, number, terminal_width, with_error, wrapped
-from softjaw.study.units import GRAVITY, in_si, shown, shown_text, shown_unit
+from softjaw.study.table import PAPER, Column, Row, Table, as_text, number, terminal_width, with_error, wrapped
+from softjaw.study.units import in_si, shown, shown_text, shown_unit
 
 NOTES_WIDTH, OTHERS_WIDTH, LABEL_WIDTH = 13, 16, 20  # characters
 MU_ERROR = 0.1  # of mu, by which it is off where nothing is known of it
-LEVER, LEVER_SHARE = 1e-3, 0.1  # [m] and loss of payload, below which the lever of the weight is not worth a word
+PLANAR_E_N = f"e_n_{MODELS[1]}"  # column
 BRIEF = ("payload", "opening", "quality", "e_n")  # maps of a table in a terminal
 FINER = Flag.COARSE | Flag.NO_FIT | Flag.NO_CORNERS | Flag.NODAL | Flag.LEFT_OUT  # what a finer mesh or effect cures
 
@@ -67,7 +67,9 @@ def best(
     marks = ds["flags"].values[tuple(np.array(listed, int).reshape(-1, ds.status.ndim).T)]
     table = case_table(ds, listed, True, maps, common(marks) if maps is BRIEF else 0)
     if not found:
-        return Table(f"no candidate is solved at {forces(ds)[k]:g} N{_solved_elsewhere(ds)}", table.columns, ())
+        solved = np.any(ds.status.values == DONE, axis=tuple(range(ds.status.ndim - 1)))
+        others_ = ", ".join(f"{f:g} N" for f in forces(ds)[solved]) or "none"
+        return Table(f"no candidate is solved at {forces(ds)[k]:g} N; forces with one: {others_}", table.columns, ())
     rows = [row | {"others": folded_text(ds, place)} for row, place in zip(table.rows, places, strict=False)]
     others = [Column("others", programs=False, wrap=OTHERS_WIDTH)] * any(row["others"] for row in rows)
     columns = [replace(column, drop=0) if column.name == score else column for column in table.columns]
@@ -115,7 +117,8 @@ def case_table(
     middles = ds["finger_pose_origin"].values.mean(axis=-2) if poses and "finger_pose_origin" in ds else None
     columns += [Column(axis, "m", people=False) for axis in "xyz"] * (middles is not None)
     quantities = _map_columns(ds, maps)
-    values = {c.name: values_of(ds, *_of_model(ds, c.name)) for c in quantities}
+    values = {c.name: values_of(ds, c.name) for c in quantities if c.name in ds}
+    values[PLANAR_E_N] = values_of(ds, "e_n", MODELS[1])
     bounds = [name for name in FORCE_RANGE if name in ds]
     columns += [*quantities, *(Column(name, "N", people=False) for name in bounds)]
     columns += [Column("safe_forces", "N", "safe forces", programs=False)] * bool(bounds)
@@ -143,14 +146,9 @@ def _map_columns(ds: xr.Dataset, maps: Collection[str]) -> list[Column]:
         columns.append(Column(name, q.unit, q.symbol, error, drop=least * (least > 1)))
         columns += [Column(error, ds[error].units, people=False)] if error else []
         if name == "e_n" and maps is not BRIEF:
-            columns.append(Column(f"e_n_{MODELS[1]}", q.unit, drop=len(maps)))
+            columns.append(Column(PLANAR_E_N, q.unit, drop=len(maps)))
     extra = [name for name in ("misalignment", "pad_elements") if name in ds and maps is MAIN]
     return [*columns, *(Column(name, ds[name].units, drop=99) for name in extra)]
-
-
-def _of_model(ds: xr.Dataset, column: str) -> tuple[str, str]:
-    """Name of a column's map and the friction model that it is of."""
-    return ("e_n", MODELS[1]) if column == f"e_n_{MODELS[1]}" else (column, MODELS[0])
 
 
 def safe_range(ds: xr.Dataset, index: Index) -> str:
@@ -179,9 +177,9 @@ def certainty(ds: xr.Dataset, places: Sequence[int], score: str, k: int) -> str:
     if not apart:
         return ""
     if apart[0] is None:
-        return "whether the first place is better than the second is not known: not all have an error yet"
+        return "places 1 and 2 cannot be compared: one has no error yet"
     alike = max((n for n, better in enumerate(apart, start=2) if better is False), default=0)
-    return f"places 1 to {alike} are equal within errors" if alike else "place 1 is the best beyond the errors"
+    return f"places 1 to {alike} are equal within errors" if alike else "place 1 is best beyond errors"
 
 
 def common(marks: np.ndarray) -> int:
@@ -191,31 +189,29 @@ def common(marks: np.ndarray) -> int:
 
 
 def _notes(ds: xr.Dataset, accuracy: Sequence[str], marks: np.ndarray) -> list[str]:
-    """At most three lines by what to do about them: how exact, which flags to look at, what is left out or last."""
-    raised = flags_in(int(np.bitwise_or.reduce(marks, initial=0)))
-    count = {flag: int(np.count_nonzero(marks & flag)) for flag in raised if flag != Flag.OUT_OF_REACH}
+    """At most three lines by what to do about them: how exact, which flags to look at, what is left out or last.
 
-    def counted(some: int) -> list[str]:
-        known = sorted((flag for flag in count if flag & some), key=lambda flag: (-count[flag], flag))
-        return [f"{flag.word} ({count[flag]} of {len(marks)})" for flag in known] + [f.sentence for f in known[:1]]
-
-    gone = [short_name(ds, c) for c, approach in ds.attrs["reach"].items() if approach == ()]
-    parts = {"accuracy": [*filter(None, accuracy), *counted(FINER)], "look at": counted(~FINER),
+    Each has its first clause, and of the others what a line of a terminal has room for.
+    """
+    count = {flag: int(np.count_nonzero(marks & flag)) for flag in Flag if flag != Flag.OUT_OF_REACH}
+    raised = sorted(filter(count.get, count), key=lambda flag: (-count[flag], flag))
+    words = {flag: f"{flag.word} ({count[flag]} of {len(marks)})" for flag in raised}
+    faults = [flag for flag in raised if not flag & FINER]
+    parts = {"accuracy": [*filter(None, accuracy), *(words[flag] for flag in raised if flag & FINER)],
+             "look at": [f"{words[f]}{f': {f.sentence}' * (len(faults) == 1)}" for f in faults],
              "left out": no_grasps(ds.status.values[..., ds.attrs["level"]])}  # fmt: skip
-    if gone:
+    if gone := [short_name(ds, c) for c, approach in ds.attrs["reach"].items() if approach == ()]:
         hand = Path(task_keys(ds, "gripper")["preset"]).stem
         more = f" and {len(gone) - MOST_PLACES} more" * (len(gone) > MOST_PLACES)
         last = f"out of the reach of {hand}, so last: {', '.join(gone[:MOST_PLACES])}{more}"
         parts["left out"] = [last, *parts["left out"]]
-    return [noted(head, clauses) for head, clauses in parts.items() if clauses]
-
-
-def _solved_elsewhere(ds: xr.Dataset) -> str:
-    """Which other forces have solved cases."""
-    solved = np.any(ds.status.values == DONE, axis=tuple(range(ds.status.ndim - 1)))
-    if not solved.any():
-        return ", nor at any other force"
-    return f"; --force takes {', '.join(f'{f:g}' for f in ds.normal_force.values[solved])}"
+    lines = []
+    for head, (first, *clauses) in ((head, clauses) for head, clauses in parts.items() if clauses):
+        line = f"{head}: {first}"
+        for clause in clauses:
+            line += f"; {clause}" * (len(line) + len(clause) + 2 <= PAPER)
+        lines.append(line)
+    return lines
 
 
 # --- the answer ------------------------------------------------------------------------------------------------------
@@ -226,15 +222,14 @@ def answer(ds: xr.Dataset, index: Index) -> dict[str, tuple[str, str]]:
 
     ``index`` is its case at the force that is shown, of a dataset that `study.show.grasps.judge` gave.
     """
-    there, name = spot(ds, index), place(ds, index)
-    nameless = ds.attrs["poses"] and there.part and not named(ds)
-    words = ", ".join(text for text in (there.part, there.beside) if text)
-    lines = {"where": (there.part, f"{there.beside} ({name})") if nameless else (name, words)}
+    (part, beside), name = spot(ds, index), place(ds, index)
+    nameless = ds.attrs["poses"] and part and not named(ds)
+    lines = {"where": (part, f"{beside} ({name})") if nameless else (name, ", ".join(filter(None, (part, beside))))}
     if np.isfinite(opening := at(ds, "opening", index)):
         approach = ds.attrs["reach"].get(candidate_of(ds, index))
         hand = f", the hand comes {side_text(np.array(approach))}" if approach else ""
         lines["opening"] = (shown_text(opening, "m", 3), f"at first touch{hand}")
-    lines |= {"force": _force(ds, index), "holds": _held(ds, index), "limit": ("", _limit(ds, index, there.lever))}
+    lines |= {"force": _force(ds, index), "holds": _held(ds, index), "limit": ("", _limit(ds, index))}
     return {key: value for key, value in lines.items() if any(value)}
 
 
@@ -279,32 +274,24 @@ def _held(ds: xr.Dataset, index: Index) -> tuple[str, str]:
     """What is held at the force shown, and what its error covers."""
     if not np.isfinite(at(ds, "payload", index)):
         return "", ""
-    every = "in the direction of its weight" if _aims(ds) else "pulled in any direction"
+    aims = task_keys(ds).get("weight_direction", "worst") != "worst"
+    every = "in the direction of its weight" if aims else "pulled in any direction"
     every += f" at {forces(ds)[index[-1]]:g} N" * ("force_low" in ds)
-    covers = "error not known: accuracy.meshes = 2 gives it"
+    covers = "error not known"
     if "payload_interval" in ds:
         covers = "±: uncertain inputs, 95 %"
     elif np.isfinite(at(ds, "payload_error", index)):
-        covers = "±: mesh and method, not mu or stiffness"
+        covers = "±: mesh and method"
     return value_text(ds, "payload", index, 3, unit=True), f"{every} ({covers})"
 
 
-def _aims(ds: xr.Dataset) -> bool:
-    """Whether the weight pulls in one direction."""
-    return task_keys(ds).get("weight_direction", "worst") != "worst"
-
-
-def _limit(ds: xr.Dataset, index: Index, lever: float) -> str:
-    """Why a grasp holds no more: what lies beyond its force, the lever of the weight, better grasps that fail."""
+def _limit(ds: xr.Dataset, index: Index) -> str:
+    """Why a grasp holds no more: what lies beyond its force, and better grasps that fail."""
     k, high = index[-1], float(ds["force_high"].values[index[:-1]]) if "force_high" in ds else np.nan
     if high < forces(ds)[-1] * (1 - NEGLIGIBLE):
         parts = [f"the wall, which bears {high:.3g} N at most"]
     else:
         parts = [f"friction at {forces(ds)[k]:g} N{_beyond(ds, index)}"]
-    lost = without_lever(ds, index) - at(ds, "payload", index)
-    if lever > LEVER and lost > LEVER_SHARE * at(ds, "payload", index):
-        parts.append(f"the weight acts {shown_text(lever, 'm', 2)} beside the pads, which costs some"
-                     f" {shown_text(lost, 'kg', 2)}")  # fmt: skip
     done = np.flatnonzero(ds["status"].values[..., k].ravel() == DONE)
     name = ds.attrs["score"] if ds.attrs["score"] != LEAST_FORCE else score_of(ds)
     values = rank_values(ds, name, k)[done]
@@ -324,22 +311,6 @@ def _beyond(ds: xr.Dataset, index: Index) -> str:
     held = f"it holds {value_text(ds, 'payload', last, 3, unit=True)}" * bool(np.isfinite(at(ds, "payload", last)))
     more = lost or held
     return f"; at {forces(ds)[-1]:g} N {more}" if more else ""
-
-
-def without_lever(ds: xr.Dataset, index: Index) -> float:
-    """Mass [kg] that a grasp would hold without torque; NaN where the fingers do not share their force.
-
-    Along the closing direction a pull takes from one finger, whose friction then bears half of what acts across it:
-    W (t / f + |c| / F_N) = 2, with the share t of the pull across the closing direction and c along it.
-    """
-    f, F_N = np.array([at(ds, "f_x_max", index), at(ds, "f_y_max", index)]), at(ds, "F_N", index)
-    if task_keys(ds).get("drive", "shared") != "shared" or not np.isfinite([*f, F_N]).all() or not f.min() * F_N > 0:
-        return float("nan")
-    if not _aims(ds):
-        return float(2.0 / np.hypot(1.0 / f.min(), 1.0 / F_N) / GRAVITY)
-    pull = np.array(task_keys(ds)["weight_direction"], float)
-    *across, along = pull / np.linalg.norm(pull) @ ds["finger_pose_rotation"].values[index][0]
-    return float(2.0 / (np.linalg.norm(across / f) + abs(along) / F_N) / GRAVITY)
 
 
 def pads(ds: xr.Dataset, index: Index) -> dict[str, Any]:

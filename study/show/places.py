@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -43,24 +42,16 @@ def named(ds: xr.Dataset) -> bool:
     return any(label != f"p{i:02d}" for i, label in enumerate(ds.label.values[..., 0].ravel()))
 
 
-class Spot(NamedTuple):
-    """A grasp on its object in words: on which part, where from the centre of mass, and how far that is [m]."""
-
-    part: str
-    beside: str
-    lever: float
-
-
-def spot(ds: xr.Dataset, index: Index) -> Spot:
-    """Where a grasp lies on its object; without words where the file does not tell the object."""
+def spot(ds: xr.Dataset, index: Index) -> tuple[str, str]:
+    """On which part of its object a grasp lies, and where from the centre of mass; empty where that is not known."""
     origin, turn = (field(ds, f"finger_pose_{name}") for name in ("origin", "rotation"))
     try:
         scene = scene_of(ds, index)
         body = ds.attrs if "object_bounds" in ds.attrs else centroid_and_bounds(scene.object)
     except (SceneError, ValueError, OSError, AttributeError):
-        return Spot("", "", math.nan)
+        return "", ""
     if origin is None or turn is None or not np.isfinite(turn[index]).all():
-        return Spot("", "", math.nan)
+        return "", ""
     middle, closing = origin[index].mean(axis=0), turn[index][0, :, 2]
     given = scene.task.centre_of_mass
     offset = middle - (body["object_centroid"] if given is None else np.array(given))
@@ -72,14 +63,14 @@ def spot(ds: xr.Dataset, index: Index) -> Spot:
         along = int(np.abs(ds.attrs["object_rotation"][:, 2]).argmax())
         alike = ", any angle alike" * (scene.axis_symmetry == 0)
         part = f"{_third(body['object_bounds'], middle, [along])} of the object{alike}"
-    return Spot(part, _beside(offset), float(np.linalg.norm(offset)))
+    return part, _beside(offset)
 
 
 def _sides(bounds: np.ndarray, middle: np.ndarray, closing: np.ndarray) -> str:
     """On which sides of an object the pads press, and where on these."""
     axis, extents = int(np.abs(closing).argmax()), np.ptp(bounds, axis=0)
     if abs(closing[axis]) < ALONG_AXIS:
-        return f"on the sides, closing along ({', '.join(f'{x + 0.0:.2g}' for x in np.round(closing, 2))})"
+        return f"on the sides, closing {side_text(closing)}"
     rank = int(np.sum(extents < extents[axis] * (1 - SAME_EXTENT)))
     alone = np.sum(np.abs(extents - extents[axis]) <= SAME_EXTENT * extents[axis]) == 1
     third = _third(bounds, middle, [other for other in range(3) if other != axis])

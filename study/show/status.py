@@ -35,7 +35,7 @@ from softjaw.study.table import (
 
 MOST_PLACES = 2
 LONG = 120  # characters of a message, beyond which a text shows its first clause
-NO_ERRORS = "errors are not known; accuracy.meshes = 2 in the scene gives them"
+NO_ERRORS = "no errors known; accuracy.meshes = 2 in the scene gives them"
 RESUME = "run the same command again to resume"
 Index = tuple[int, ...]
 
@@ -152,12 +152,12 @@ def largest_error(
         return [f"errors: none of {solved} solved cases has one"]
     worst = tuple(map(int, np.unravel_index(int(np.nanargmax(known)), status.shape)))
     name, target = aim(cases)
-    parts = [f"{name} errors up to {100 * known[worst]:.2g} % ({place_text(axes, labels, worst)})"]
+    parts = [f"{name} errors up to {100 * known[worst]:.2g} %"]
     if above := int(np.count_nonzero(misses(known, target))):
         parts.append(f"{above} of {count} above {100 * target:g} %")
     if count < solved:
         parts.append(f"{solved - count} of {solved} have none")
-    return parts
+    return [*parts, f"the largest at {place_text(axes, labels, worst)}"]
 
 
 # --- counts and reasons ----------------------------------------------------------------------------------------------
