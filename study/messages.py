@@ -115,11 +115,6 @@ def complain(error: StudyError) -> int:
     return error.code
 
 
-def say(text: str) -> None:
-    """Print a text that may hold parts of files from elsewhere."""
-    print(printable(text))
-
-
 @contextmanager
 def beside(path: Path, folders: bool = False, part: Path | None = None) -> Iterator[Path]:
     """A place to write to, renamed to ``path`` when it is on disk; with ``folders`` those that are missing are made.

@@ -39,19 +39,9 @@ def box(texts: Iterable[str], look: str) -> Block:
     return {"kind": "box", "texts": list(texts), "look": look}
 
 
-def answer(lines: Iterable[tuple[str, str, str]]) -> Block:
-    """Few large values with their names, and a text below each."""
-    return {"kind": "answer", "lines": list(lines)}
-
-
 def bullets(texts: Iterable[str]) -> Block:
     """A list."""
     return {"kind": "bullets", "texts": list(texts)}
-
-
-def verbatim(words: str) -> Block:
-    """A text as it stands in a file."""
-    return {"kind": "pre", "text": words}
 
 
 def details(summary: str, blocks: Sequence[Block]) -> Block:
@@ -91,11 +81,6 @@ def objects(caption: str, columns: Sequence[tuple[str, str]], rows: Sequence[Blo
     """
     made = [row | {"image": base64.b64encode(row["image"]).decode()} for row in rows]
     return {"kind": "objects", "caption": caption, "head": columns, "rows": made}
-
-
-def link(words: str, target: str) -> Block:
-    """A line that leads to a file beside the page."""
-    return {"kind": "link", "text": words, "target": target}
 
 
 def plot(figure: Any, caption: str, alt: str, height: int = 360) -> Block:

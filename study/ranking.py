@@ -284,29 +284,17 @@ def shown_level(ds: Any, flags: np.ndarray) -> tuple[int, str]:
     ``flags``: as `judged` gives them.
     """
     forces, done = ds["normal_force"].values, ds["status"].values == DONE
-    usable = np.flatnonzero(((flags & LOST == 0) & done).reshape(-1, len(forces)).any(axis=0))
-    if "force_low" in ds and len(usable):
-        return int(usable[0]), "the lowest solved force at which a grasp holds the object"
-    if flags[done].any() and (flags[done] & BORNE).any() and (k := borne_level(ds["status"].values, flags)) is not None:
+    solved, borne, usable = ((done & (flags & bad == 0)).reshape(-1, len(forces)) for bad in (0, BORNE, LOST))
+    if "force_low" in ds and usable.any():
+        return int(np.flatnonzero(usable.any(axis=0))[0]), "the lowest solved force at which a grasp holds the object"
+    if (flags[done] & BORNE).any() and borne.any():
+        k = int(np.flatnonzero(borne.any(axis=0))[-1])
         return k, "the highest at which a grasp does no harm" if k < len(forces) - 1 else LARGEST
-    by_level = done.reshape(-1, len(forces))
-    if not by_level.any():
-        return len(forces) - 1, LARGEST
-    k = int(np.flatnonzero(by_level.any(axis=0))[-1])
     # one failed case must not move all grasps to another force, nor a few that went far
-    shared = np.flatnonzero(2 * by_level.sum(axis=0) > by_level.any(axis=1).sum())
-    if len(shared) and shared[-1] < k:
-        return int(shared[-1]), "the largest that most candidates were solved at"
-    return k, LARGEST
-
-
-def borne_level(status: np.ndarray, flags: np.ndarray) -> int | None:
-    """Highest force level at which some solved grasp is neither too weak nor too strong; None where all forces are.
-
-    ``status`` and ``flags`` are over all cases, the last axis being the force.
-    """
-    borne = ((status == DONE) & (flags & BORNE == 0)).reshape(-1, status.shape[-1]).any(axis=0)
-    return int(np.flatnonzero(borne)[-1]) if borne.any() else None
+    shared = np.flatnonzero(2 * solved.sum(axis=0) > solved.any(axis=1).sum())
+    last = np.flatnonzero(solved.any(axis=0))[-1] if solved.any() else len(forces) - 1
+    k = int(shared[-1]) if len(shared) else int(last)
+    return k, LARGEST if k == last else "the largest that most candidates were solved at"
 
 
 # --- the decisions that everything shown rests on --------------------------------------------------------------------

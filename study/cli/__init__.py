@@ -13,7 +13,7 @@ from typing import Any
 
 from softjaw.study.cli.options import program
 from softjaw.study.doctor import keep_compiled_loops, pin_threads
-from softjaw.study.messages import BUG, CANNOT_WRITE, DONE, STOPPED, USAGE, StudyError, complain, say
+from softjaw.study.messages import BUG, CANNOT_WRITE, DONE, STOPPED, USAGE, StudyError, complain, printable
 from softjaw.study.run.limits import is_out_of_memory, no_room, require_room
 
 UNWRITABLE = {errno.EPIPE, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}  # what standard output can answer
@@ -72,7 +72,7 @@ def command(options: Namespace) -> int:
         options.scene_read = _module("cli.quick").scene_of(options)
     answer = getattr(_module(options.module), options.command)(options)
     if isinstance(answer, str):
-        say(answer)
+        print(printable(answer))
         return DONE
     return int(answer or DONE)
 

@@ -34,15 +34,18 @@ FORMATS = {  # of export: what stands in the file
     "vtk": "maps on the object and all pads with their pressure, for ParaView (.vtm)",
 }
 
-def number(expected: str = "a number", least: float = -math.inf) -> Callable[[str], float]:
-    """A type of finite numbers from ``least``; ``expected`` says what they are."""
 
-    def value(text: str) -> float:
+def number(
+    expected: str = "a number", least: float = -math.inf, most: float = math.inf, kind: type = float
+) -> Callable[[str], Any]:
+    """A type of finite numbers from ``least`` to ``most``; ``expected`` says what they are."""
+
+    def value(text: str) -> Any:
         try:
-            given = float(text)
+            given = kind(text)
         except ValueError:
             given = math.nan
-        if not (math.isfinite(given) and given >= least):
+        if not (math.isfinite(given) and least <= given <= most):
             raise ArgumentTypeError(f"found {text}, expected {expected}")
         return given
 
@@ -54,13 +57,7 @@ POSITIVE = number("a number above 0", math.ulp(0.0))
 
 def whole(least: int) -> Callable[[str], int]:
     """A type of whole numbers from ``least`` to a million."""
-
-    def count(text: str) -> int:
-        if not (text.strip().lstrip("+-").isdigit() and least <= int(text) <= MILLION):
-            raise ArgumentTypeError(f"found {text}, expected a whole number from {least} to {MILLION}")
-        return int(text)
-
-    return count
+    return number(f"a whole number from {least} to {MILLION}", least, MILLION, int)
 
 
 def several(
@@ -100,7 +97,7 @@ def candidate(text: str) -> int:
     >>> candidate("p07"), candidate("12")
     (7, 12)
     """
-    return int(text.removeprefix("p").removeprefix("s"))
+    return int(text.lstrip("ps"))
 
 
 def _option(*names: str, **settings: Any) -> tuple[tuple[str, ...], dict[str, Any]]:
@@ -118,8 +115,7 @@ OPTIONS = {
     "ranks": _option("-n", type=several(whole(1), "whole numbers, such as 16,64"), default=(1,), dest="ranks",
                      metavar="RANKS", help="ranks (default 1); 16,64,256: replay a finished study on each"),
     "repeat": _option("--repeat", type=whole(1), default=1, metavar="K", help="replay K times as many candidates"),
-    "result": _option("-o", metavar="FILE", dest="output",
-                      help="result file (default: results/<scene>.hdf, of cost results/<scene>-cost.hdf)"),
+    "result": _option("-o", metavar="FILE", dest="output", help="result file (default: results/<scene>.hdf)"),
     "retry": _option("--retry-failed", action="store_true", help="solve failed cases again"),
     "file": _option("file", metavar="FILE", help="result file (.hdf)"),
     "results": _option("file", metavar="FILE", help="result file (.hdf), or a folder of results"),
@@ -128,8 +124,7 @@ OPTIONS = {
                      help="seconds between updates (default 2)"),
     "json": _option("--json", action="store_const", const="json", dest="form", help="as JSON, SI units"),
     "csv": _option("--csv", action="store_const", const="csv", dest="form", help="as CSV, SI units"),
-    "format": _option("--format", choices=tuple(FORMATS), dest="form", metavar="FORMAT",
-                      help="one of those below"),
+    "format": _option("--format", choices=tuple(FORMATS), dest="form", metavar="FORMAT", help="one of those below"),
     "force": _option("--force", type=POSITIVE, metavar="N", help=NORMAL_FORCE),
     "level": _option("--force", type=number(), metavar="N", help="force level nearest to N [N]"),
     "by": _option("--by", choices=RANKED_BY, help="what ranks grasps; force: the least that holds (default payload)"),
@@ -156,17 +151,14 @@ OPTIONS = {
                        " the same form: frame, joints, stroke, forces, palm and fingers"),
     "wider": _option("--wider", type=number("a number, 0 or above", 0.0), default=20.0, metavar="MM",
                      help="how far the gripper opens beyond first touch (default 20)"),
-    "frame": _option("--frame", default="object", metavar="NAME",
-                     help="name of the object's frame (default object)"),
+    "frame": _option("--frame", default="object", metavar="NAME", help="name of the object's frame (default object)"),
     "kind": _option("kind", choices=tuple(KINDS), help="what to start from"),
-    "name": _option("-o", metavar="NAME", dest="name",
-                    help="name of both files, also with a folder (default: the kind, or the name of the mesh)"),
+    "name": _option("-o", metavar="NAME", dest="name", help="name of both files (default: the kind, or the mesh's)"),
     "mesh": _option("--mesh", metavar="FILE", help="mesh of the object: .stl, .obj, .ply, .off, .glb, .gltf or .3mf"),
     "mesh unit": _option("--unit", choices=("mm", "cm", "m", "inch"), help="unit of the mesh (default of glTF: m)"),
     "axis": _option("--axis", choices=("x", "y", "z"), help="axis along which grasps lie (default: the longest)"),
     "replace": _option("--force", action="store_true", help="replace existing files"),
-    "field": _option("file", metavar="FILE",
-                     help="CSV with one face per line, or VTU / VTP; columns: docs/pressure-fields.md"),
+    "field": _option("file", metavar="FILE", help="pressures as CSV, VTU or VTP; columns: docs/pressure-fields.md"),
     "pad": _option("scene", metavar="SCENE", nargs="?", help="with --deformed: scene file (TOML), whose pad is solved"),
     "deformed": _option("--deformed", action="store_true",
                         help="FILE holds points of the pad's deformed face (CSV with x, y, z), or of a contour (y, z)"),

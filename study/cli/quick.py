@@ -6,6 +6,7 @@ import json
 import time
 from argparse import Namespace
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from softjaw.study.case.build import build_object, check_object, geometry, mesh_
 from softjaw.study.case.candidates import check_candidates, with_sampled_grasps
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.run.estimate import START_S, estimated, scaling_text
-from softjaw.study.run.object_folder import Listed, ObjectFolder, folder_of
+from softjaw.study.run.object_folder import ObjectFolder, folder_of
 from softjaw.study.run.plan import free_bytes, make_plan, memory, plan_text
 from softjaw.study.run.progress import duration
 from softjaw.study.run.shares import makespan
@@ -86,40 +87,31 @@ def plan(options: Namespace) -> str:
 
 def objects_text(folder: ObjectFolder, out: Path, ranks: int) -> str:
     """Objects, cases, disk, memory and time on so many ranks."""
-    objects = folder.objects
+    objects, planned = folder.objects, []
     some = objects[:: -(-len(objects) // PLANNED)]
-    planned = [made for listed in some if (made := _planned(folder, listed)) is not None]
+    scale, begin = len(objects) / len(some), time.perf_counter()
+    for listed in some:
+        with suppress(StudyError):
+            scene = with_sampled_grasps(folder.scene(listed))
+            planned.append((make_plan(scene, folder.scene_file, folder.overrides_of(listed)), memory(scene)))
+    preparing = scale * (time.perf_counter() - begin) / ranks
     rows = {"objects": f"{len(objects)}, of which {len(some)} were looked at"}
     if planned:
-        scale = len(objects) / len(some)
-        cases, space, planning, needs = (list(part) for part in zip(*(made[:4] for made in planned), strict=True))
-        paths = [seconds for made in planned for seconds in made[4]]
+        paths = [seconds for made, _ in planned for seconds in estimated(made.tried)]
         many = paths * max(1, round(scale))
         solving = makespan(many, ranks) * scale * len(paths) / len(many)
-        preparing = scale * sum(planning) / ranks
-        free = free_bytes(out / "index.hdf")
+        cases, space = (scale * sum(getattr(made.layout, name) for made, _ in planned) for name in ("rows", "nbytes"))
+        need, free = max(needs for _, needs in planned), free_bytes(out / "index.hdf")
         rows |= {
-            "cases": f"about {scale * sum(cases):.0f}",
-            "disk": f"about {scale * sum(space) / 1e6:.3g} MB in {out}" + f", {free / 1e9:.1f} GB free" * (free >= 0),
-            "memory": f"roughly {max(needs) / 1e9:.1g} GB on each rank, {max(needs) * ranks / 1e9:.2g} GB on {ranks}",
+            "cases": f"about {cases:.0f}",
+            "disk": f"about {space / 1e6:.3g} MB in {out}" + f", {free / 1e9:.1f} GB free" * (free >= 0),
+            "memory": f"roughly {need / 1e9:.1g} GB on each rank, {need * ranks / 1e9:.2g} GB on {ranks}",
             "time": f"about {duration(START_S + preparing + solving)} on {ranks} rank{'s' * (ranks > 1)}, "
             f"{duration(preparing)} of it for sampling grasps; estimated on a bed of springs",
         }
     if len(planned) < len(some):
         rows["no grasp"] = f"{len(some) - len(planned)} of {len(some)}: they are rows of the index, with the reason"
     return "\n".join(aligned(rows))
-
-
-def _planned(folder: ObjectFolder, listed: Listed) -> tuple[int, int, float, float, list[float]] | None:
-    """Cases, bytes on disk, seconds of planning, bytes of memory and seconds of each load path of an object."""
-    begin = time.perf_counter()
-    try:
-        scene = with_sampled_grasps(folder.scene(listed))
-        made = make_plan(scene, folder.scene_file, folder.overrides_of(listed))
-    except StudyError:
-        return None
-    spent = time.perf_counter() - begin
-    return made.layout.rows, made.layout.nbytes, spent, memory(scene), estimated(made.tried)
 
 
 def schema(_options: Namespace) -> str:

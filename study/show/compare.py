@@ -59,7 +59,8 @@ def compare(one: xr.Dataset, other: xr.Dataset, quantity: str = "e_n", model: st
     columns += [Column("a", units), Column("b", units), Column("difference", units, "b-a"), Column("relative"),
                 Column("error", units, "errors", digits=2, people=judged),
                 Column("beyond_error", "", "exceeds\nerrors", people=judged)]  # fmt: skip
-    facts = {"files": {"a": str(one.file), "b": str(other.file)}, "settings": _settings(*pair), "axes": axes,
+    facts = {"files": {"a": str(one.file), "b": str(other.file)}, "axes": axes,
+             "settings": [{"key": key, "a": a, "b": b} for key, a, b in changes(one.scene, other.scene)],
              "states": {words: int(cases.sum()) for words, cases in states.items()}, "quantity": quantity,
              "summary": [_summary(name, _values(pair, name, model)) for name in names
                          if map_row(name).rank or name == quantity]}  # fmt: skip
@@ -87,17 +88,9 @@ def compare_text(table: Table, top: int = 10, width: int = PAPER) -> str:
     return "\n".join([*lines, "", as_text(summary, width), "", as_text(cases, width)])
 
 
-def _settings(one: xr.Dataset, other: xr.Dataset) -> list[Row] | None:
-    """Settings that differ; None where the scene of a file cannot be read."""
-    try:
-        return [{"key": key, "a": a, "b": b} for key, a, b in changes(one.scene, other.scene)]
-    except ValueError:
-        return None
-
-
-def _setting_lines(settings: list[Row] | None, width: int) -> list[str]:
+def _setting_lines(settings: list[Row], width: int) -> list[str]:
     if not settings:
-        return ["settings: no difference" if settings == [] else "settings: the scene of a file cannot be read"]
+        return ["settings: no difference"]
     rows = [{"key": row["key"], **{f: value_text(row[f]) for f in "ab"}} for row in settings]
     columns = [Column("key", label="setting", wrap=width // 2), Column("a"), Column("b")]
     more = len(rows) - MOST_SETTINGS

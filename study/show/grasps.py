@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from softjaw.study.flags import OF_FILE, Flag, flag_words, flags_in
+from softjaw.study.flags import OF_FILE, flag_words
 from softjaw.study.quantities import FORCE_RANGE, MAIN, MODELS, NO_GRASP, STATES
 from softjaw.study.ranking import index_of, ranked
 from softjaw.study.result.layout import DONE, FAILED
@@ -120,36 +120,26 @@ def order(ds: xr.Dataset, k: int) -> list[Index]:
     return [index_of(ds, int(c), k) for c in ranked(ds, k, ds.attrs["score"])]
 
 
-def flags_of(ds: xr.Dataset, index: Index) -> list[Flag]:
-    """Flags of a case."""
-    return flags_in(int(ds.variables["flags"].values[index]))
-
-
-def check(ds: xr.Dataset, name: str, index: Index) -> float:
-    """A check of the worse finger, NaN if there is none."""
-    name = f"check_{name}"
-    found = ds.variables[name].values[index] if name in ds.variables else np.array([np.nan])
-    worst = np.min if name.removeprefix("check_") in ABOVE else np.max
-    # A finger without a check must not hide that of the other.
-    return float(worst(found[np.isfinite(found)])) if np.isfinite(found).any() else float("nan")
-
-
 def passes(name: str, value: float) -> bool:
     """Whether a check holds."""
     return value > LIMITS[name] if name in ABOVE else value <= LIMITS[name]
 
 
 def flagged(ds: xr.Dataset, index: Index) -> list[str]:
-    """Checks that a case does not pass, with their values."""
-    values = {name: check(ds, name, index) for name in LIMITS}
-    return [f"{spoken(n)} {number(v)}" for n, v in values.items() if np.isfinite(v) and not passes(n, v)]
+    """Checks that a case does not pass, with their values at the worse finger."""
+    listed = []
+    for name in (name for name in LIMITS if f"check_{name}" in ds.variables):
+        # A finger without a check must not hide that of the other.
+        worst = (np.fmin if name in ABOVE else np.fmax).reduce(ds.variables[f"check_{name}"].values[index])
+        listed += [f"{spoken(name)} {number(worst)}"] * bool(np.isfinite(worst) and not passes(name, worst))
+    return listed
 
 
 def note(ds: xr.Dataset, index: Index, known: int = 0) -> str:
     """Why a case has no result; the checks that a solved one misses, and its flags but for ``known`` ones."""
     state = ds.variables["status"].values[index]
     if state == FAILED or state in NO_GRASP:
-        return str(ds.variables["message"].values[index]) or "no reason was given"
+        return str(ds.variables["message"].values[index])
     if state != DONE:
         return ""
     words = flag_words(int(ds["flags"].values[index]) & ~known)

@@ -53,7 +53,10 @@ def surface_of(scene: Any, axes: Any, feet: Feet = ()) -> Surface:
     else:
         middle = middle_of(scene)
         corners = middle.straightened(corners) if middle else corners
-        corners, cell = coloured(corners, cells_of(scene, axes, scene.object.axis_symmetry))
+        length, width = scene.gripper.pad_size[:2]
+        c, s = abs(math.cos(scene.candidates.roll)), abs(math.sin(scene.candidates.roll))
+        size = c * length + s * width, c * width + s * length
+        corners, cell = coloured(corners, Cells(axes[-3].values, axes[-2].values, scene.object.axis_symmetry, *size))
         corners = middle.straightened(corners, -1.0) if middle else corners
         if has_wall(scene.object):
             kept = ~_lid(scene.object, corners)
@@ -84,14 +87,6 @@ def pressed(corners: np.ndarray, feet: Feet, size: tuple[float, float]) -> tuple
         corners = np.concatenate([corners[~near], pieces])
         cell = np.concatenate([cell[~near], np.where(met, candidate, NOBODY)])
     return corners, cell
-
-
-def cells_of(scene: Any, axes: Any, symmetry: int) -> Cells:
-    """The candidates of a scene as cells on the surface."""
-    length, width = scene.gripper.pad_size[:2]
-    c, s = abs(math.cos(scene.candidates.roll)), abs(math.sin(scene.candidates.roll))
-    stations, angles = (axes[k].values for k in (-3, -2))
-    return Cells(stations, angles, symmetry, c * length + s * width, c * width + s * length)
 
 
 def edges(values: np.ndarray, alone: float = 1.0) -> np.ndarray:

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from softjaw.fem.shell.wall_material import wall_material
-from softjaw.study.case.build import axis_span, has_wall, listed_accuracy, told
+from softjaw.study.case.build import axis_span, geometry, has_wall, listed_accuracy, told
 from softjaw.study.units import UNITS, shown, shown_text
 
 
@@ -67,17 +66,11 @@ def wall_text(shape: Any) -> str:
     """Thickness, material and support of an object's wall; empty for a rigid object."""
     if not has_wall(shape):
         return ""
-    name = None if shape.wall_material == "custom" else shape.wall_material
-    found = wall_material(
-        name, young_modulus=shape.young_modulus, poisson_ratio=shape.wall_poisson_ratio,
-        yield_strength=shape.yield_strength,
-    )  # fmt: skip
-    given = shape.thicknesses_mm
+    found, given = geometry().material_of(shape), shape.thicknesses_mm
     thickness = f"{min(given):g}" if min(given) == max(given) else f"{min(given):g} to {max(given):g}"
-    strength = shown_text(found.yield_strength, "Pa", 6) if found.yield_strength else ""
-    strength = f", yields at {strength}" if strength else ", yield strength unknown"
+    strength = f"yields at {shown_text(found.yield_strength, 'Pa', 6)}" if found.yield_strength else "strength unknown"
     words = [
-        f"{thickness} mm {shape.wall_material} ({found.young_modulus / UNITS['gpa'].size:g} GPa{strength})",
+        f"{thickness} mm {shape.wall_material} ({found.young_modulus / UNITS['gpa'].size:g} GPa, {strength})",
         shape.support,
         "open top" if shape.open_top else "closed top",
         f"indentation up to {shape.allowed_dent_mm:g} mm allowed" if shape.allowed_dent_mm else "any indentation",

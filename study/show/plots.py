@@ -85,9 +85,8 @@ def segments(ends: np.ndarray, colour: str, names: str = "") -> go.Scatter:
                       hoverinfo="skip", showlegend=False, **look)  # fmt: skip
 
 
-def scene(unit: str = "mm", names: Sequence[str] = ("x", "y", "z"), **more: Any) -> dict[str, Any]:
+def scene(names: Sequence[str] = ("x [mm]", "y [mm]", "z [mm]"), **more: Any) -> dict[str, Any]:
     """Settings of a panel in three dimensions, seen without perspective so that lengths can be compared."""
-    titles = {a: {"text": f"{name} [{unit}]" if unit else name} for a, name in zip("xyz", names, strict=True)}
     look = {"gridcolor": GRID, "backgroundcolor": "white", "nticks": 5}
-    axes = {f"{a}axis": {"title": title, **look} for a, title in titles.items()}
+    axes = {f"{a}axis": {"title": {"text": name}, **look} for a, name in zip("xyz", names, strict=True)}
     return {"aspectmode": "data", "camera": {"projection": {"type": "orthographic"}}, **axes, **more}

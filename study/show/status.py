@@ -34,8 +34,7 @@ from softjaw.study.table import (
 )
 
 MOST_PLACES = 2
-LONG = 120  # characters of a message, beyond which a text shows its first clause
-NO_ERRORS = "no errors known; accuracy.meshes = 2 in the scene gives them"
+NO_ERRORS = "no errors known; accuracy.meshes = 2 gives them"
 RESUME = "run the same command again to resume"
 Index = tuple[int, ...]
 
@@ -183,13 +182,10 @@ def no_grasps(codes: NDArray[np.integer]) -> list[str]:
     return [f"{count} {STATES[state]}" for state, count in known.items() if count]
 
 
-def grouped(
-    status: NDArray[np.integer], messages: Any, flags: Callable[[], Any], brief: bool = False
-) -> list[Reason]:
+def grouped(status: NDArray[np.integer], messages: Any, flags: Callable[[], Any]) -> list[Reason]:
     """Reasons of failed cases, of what is no grasp, and notes on solved cases, each state's most frequent one first.
 
-    Messages that differ in their numbers only are of one kind; of a solved case each flag counts by itself. ``brief``
-    takes the first clause of long messages.
+    Messages that differ in their numbers only are of one kind; of a solved case each flag counts by itself.
     """
     kinds: dict[tuple[int, str], Reason] = {}
     marks: Any = None
@@ -203,8 +199,6 @@ def grouped(
             more = text.removeprefix(flag_sentences(value)).removeprefix("; ")
             texts = [*(flag.sentence for flag in flags_in(value)), *[more] * bool(more)]
         for message in texts:
-            if brief and len(message) > LONG:
-                message = re.split("[;:] ", message)[0]
             kind = re.sub(r"[-+]?\d[\d.]*(e[-+]?\d+)?", "#", message)
             kinds.setdefault((state, kind), Reason(state, message, [])).cases.append(index)
     order = (FAILED, *NO_GRASP, DONE)
@@ -212,14 +206,14 @@ def grouped(
     return sorted(listed, key=lambda reason: (order.index(reason.state), -len(reason.cases)))
 
 
-def reasons_in(result: Any, brief: bool = False) -> list[Reason]:
+def reasons_in(result: Any) -> list[Reason]:
     """The same of an open result file."""
-    return grouped(result.status, result.messages, lambda: result.read("flags/flags"), brief)
+    return grouped(result.status, result.messages, lambda: result.read("flags/flags"))
 
 
 def reasons(result: Any, width: int = PAPER, notes: bool = True) -> list[str]:
     """The most frequent reasons, one line each; ``notes``: also of solved cases."""
-    found = [reason for reason in reasons_in(result, brief=True) if notes or reason.state != DONE]
+    found = [reason for reason in reasons_in(result) if notes or reason.state != DONE]
     lines = [reason.text(result.axes, result.labels) for reason in found[:MOST_NOTES]]
     rest = found[MOST_NOTES:]
     cases = sum(len(reason.cases) for reason in rest)

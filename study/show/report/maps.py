@@ -58,15 +58,10 @@ def ticks(ds: xr.Dataset, position: int, by_name: bool = True) -> tuple[Any, dic
 def different_angles(ds: xr.Dataset) -> list[int]:
     """Angles whose maps are not those of an earlier angle (images by symmetry)."""
     different: list[int] = []
-    arrays = [np.moveaxis(a, -2, 0) for name in FIRST if (a := field(ds, name)) is not None]
-    states = np.moveaxis(ds.status.values, -2, 0)
-    for j in range(len(states)):
-        same = any(
-            np.array_equal(states[i], states[j])
-            and all(np.allclose(a[i], a[j], rtol=1e-9, atol=0, equal_nan=True) for a in arrays)
-            for i in different
-        )
-        different += [] if same else [j]
+    arrays = [np.moveaxis(a, -2, 0) for a in (ds.status.values, *(field(ds, name) for name in FIRST)) if a is not None]
+    for j in range(ds.sizes["angle"]):
+        same = (all(np.allclose(a[i], a[j], rtol=1e-9, atol=0, equal_nan=True) for a in arrays) for i in different)
+        different += [] if any(same) else [j]
     return different
 
 

@@ -56,7 +56,7 @@ def _object(folder: Path, row: Row) -> tuple[bytes, list[page.Block]]:
     blocks = [*filter(None, [the_answer(ds)]), *best_grasps(ds)]
     report = Path(row["file"]).with_suffix(".html")
     if (folder / report).exists():
-        blocks.append(page.link(f"report on {row['object']}", report.as_posix()))
+        blocks.append({"kind": "link", "text": f"report on {row['object']}", "target": report.as_posix()})
     else:
         blocks.append(page.text(f"softjaw report {folder / row['file']}: all maps, contacts and definitions", "note"))
     return thumbnail(View(ds, best[:-3]), best) if (best := ds.attrs["best"]) else b"", blocks

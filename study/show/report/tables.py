@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from softjaw.study.page import Block, block_of, bullets, details, table, text, verbatim
+from softjaw.study.page import Block, block_of, bullets, details, table, text
 from softjaw.study.quantities import EFFECTS, FORCE_RANGE, PARTS, REASONS
 from softjaw.study.ranking import largest
 from softjaw.study.show.best_grasps import best, case_table
@@ -69,7 +69,7 @@ def every_case(ds: xr.Dataset) -> list[Block]:
     return [details(f"All {count} cases as a table", [block_of(replace(cases, title=title))])]
 
 
-def checks(ds: xr.Dataset) -> Block:
+def checks(ds: xr.Dataset) -> list[Block]:
     """The worst value of each check over all solved cases, and where it was found."""
     rows = []
     for name in (*LIMITS, "max_strain"):
@@ -81,10 +81,9 @@ def checks(ds: xr.Dataset) -> Block:
         limit = f"> {LIMITS[name]:g}" if name in ABOVE else f"≤ {number(LIMITS[name])}" if name in LIMITS else "-"
         state = "-" if name not in LIMITS else "passed" if passes(name, worst) else "not passed"
         rows.append([spoken(name), number(worst), limit, state, place(ds, index[:-1], force=True)])
-    if not rows:
-        return text("No checks are stored.", "note")
     heads = ["check", "worst value", "should be", "", "worst case"]
-    return table("Checks of the contact solutions, worst of all solved cases and fingers", heads, rows, texts=(0, 3, 4))
+    title = "Checks of the contact solutions, worst of all solved cases and fingers"
+    return [table(title, heads, rows, texts=(0, 3, 4))] if rows else []
 
 
 def wall(shape: Any) -> Block:
@@ -104,10 +103,8 @@ def effects(ds: xr.Dataset) -> list[Block]:
         change = field(ds, f"effect_{name}_change")
         moved = "" if change is None or not np.isfinite(change).any() else _percent(change)
         rows.append([spoken(name), shown, span, moved, "" if reason is None else _counted(reason, REASONS)])
-    if not rows:
-        return [text("No effects are stored.", "note")]
     heads = ["effect", "level", "indicator", "e_n moves by", "reason"]
-    return [table("Effects that were simulated", heads, rows, texts=(0, 1, 3, 4))]
+    return [table("Effects that were simulated", heads, rows, texts=(0, 1, 3, 4))] if rows else []
 
 
 def _percent(change: np.ndarray) -> str:
@@ -149,14 +146,13 @@ def scene(ds: xr.Dataset) -> list[Block]:
     about = ds.attrs
     named = {"file": about["scene_file"], "overrides": ", ".join(about["overrides"]), "digest": about["digest"],
              "petsc options": about["petsc_options"]}  # fmt: skip
-    return [bullets(f"{name}: {given}" for name, given in named.items() if given), verbatim(about["scene"])]
+    listed = bullets(f"{name}: {given}" for name, given in named.items() if given)
+    return [listed, {"kind": "pre", "text": about["scene"]}]
 
 
 def provenance(ds: xr.Dataset) -> list[Block]:
     """Sessions, programs and machines."""
     sessions = ds.attrs["provenance"]
-    if not sessions:
-        return [text("No session is recorded.", "note")]
-    rows = [[name.replace("_", " "), *(str(s[name]) for s in sessions)] for name in sessions[0]]
+    rows = [[spoken(name), *(str(s[name]) for s in sessions)] for name in (sessions[0] if sessions else ())]
     head = ["session", *map(str, range(1, len(sessions) + 1))]
-    return [table("Sessions", head, rows, wide=range(len(head)))]
+    return [table("Sessions", head, rows, wide=range(len(head)))] if rows else []

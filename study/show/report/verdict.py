@@ -8,30 +8,27 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from softjaw.study.flags import BORNE
+from softjaw.study.flags import BORNE, flags_in
 from softjaw.study.quantities import MISSING, MODEL_NAMES, MODELS
 from softjaw.study.ranking import judge
 from softjaw.study.result.read import axes_of
 from softjaw.study.result.store import value_text
 from softjaw.study.show.best_grasps import best_text
-from softjaw.study.show.grasps import Index, at, flagged, flags_of, reason_lines, spoken
+from softjaw.study.show.grasps import Index, at, flagged, reason_lines, spoken
 from softjaw.study.show.status import state_counts
 from softjaw.study.table import number
 
 CAVEAT = (
-    "The paper publishes neither the pad dimensions of its gripper nor the numbers behind its figures. The dimensions "
-    "used here are in the scene below. Absolute numbers of its figures can therefore not be reproduced, only "
-    "trends: in the paper, differences between the models grow with curvature, and torque and e_n grow with force."
+    "The paper publishes neither its gripper's pad dimensions nor the numbers behind its figures. The dimensions are in"
+    " the scene below. Only trends can be compared: models differ more with curvature, torque and e_n grow with force."
 )
 TOP, MOST_REASONS, WIDTH = 5, 10, 120  # of the plain text in the file: grasps, messages, characters
 READING = """How to read the file
-All values are SI. Every dataset has its unit, its label and its definition as attributes. Friction models: ccm lets
-every face resist in its own plane (curved contact model), pcm and pcm_projected are planar models with the pressure sum
-S and with the normal force F_N. NaN: there is no value, and /study/status/code (0 missing, 1 done, 2 failed) and
-/study/status/message say why. Candidates are counted over stations and angles, the angle running fastest. /study/scene
-is the scene with all settings, /study/provenance/sessions lists programs and machine. Plots: h5web, silx or NeXpy open
-at the map of payload; 'softjaw export --format vtk' writes the object with its maps and the pads with their pressure
-for ParaView."""
+All values are SI. Every dataset has its unit, its label and its definition as attributes. ccm lets every face resist in
+its own plane (curved contact model); pcm and pcm_projected are planar models with the pressure sum S and with the
+normal force F_N. NaN: no value; /study/status/code (0 missing, 1 done, 2 failed) and /study/status/message say why.
+Candidates are counted over stations and angles, the angle running fastest. /study/scene has all settings.
+h5web, silx and NeXpy plot the maps; 'softjaw export --format vtk' writes files for ParaView."""
 ASCII = {"\N{MULTIPLICATION SIGN}": "x", "±": "+-"}
 
 
@@ -73,7 +70,7 @@ def warnings(ds: xr.Dataset) -> list[str]:
         found.append(f"This study is unfinished: {missing} cases are not computed, so a better grasp may be found.")
     if index is None:
         return found
-    if reasons := [flag.sentence for flag in flags_of(ds, index) if flag & BORNE]:
+    if reasons := [flag.sentence for flag in flags_in(int(ds.flags.values[index])) if flag & BORNE]:
         found.append(f"Every grasp at this force carries a warning. Best one: {'; '.join(reasons)}.")
     if failed := flagged(ds, index):
         found.append(f"The best case does not pass its checks: {', '.join(failed)}.")

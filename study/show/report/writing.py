@@ -11,11 +11,11 @@ from pathlib import Path
 import xarray as xr
 
 from softjaw.study.messages import CANNOT_WRITE, StudyError, write_file
-from softjaw.study.page import Block, Section, answer, box, page, text
+from softjaw.study.page import Block, Section, box, page, text
 from softjaw.study.quantities import DONE, FAILED, NO_GRASP
 from softjaw.study.ranking import judge
 from softjaw.study.result.read import open
-from softjaw.study.show.best_grasps import answer as answer_lines
+from softjaw.study.show.best_grasps import answer
 from softjaw.study.show.grasps import Index, field, forces
 from softjaw.study.show.report import contact, curves, maps, tables, verdict
 from softjaw.study.show.view.model import Place, View, view_of
@@ -54,7 +54,7 @@ def build(ds: xr.Dataset, candidate: int | None = None, place: Place = (None, No
         *(cases(view) if ds.attrs["best"] is not None else []),
         ("effects", "What was simulated", [*tables.effects(ds), text(verdict.CAVEAT, "note")]),
         ("cost", "Convergence and cost",
-         [*tables.reasons(ds, DONE), tables.checks(ds), *tables.time_split(ds)]),
+         [*tables.reasons(ds, DONE), *tables.checks(ds), *tables.time_split(ds)]),
         ("cases", "All cases", tables.every_case(ds)),
         ("definitions", "Definitions", tables.definitions(ds)),
         ("provenance", "Provenance", tables.provenance(ds)),
@@ -68,8 +68,7 @@ def the_answer(ds: xr.Dataset) -> Block | None:
     """The best grasp at a glance: where, how wide, how hard, what it holds, why no more."""
     if ds.attrs["best"] is None:
         return None
-    lines = answer_lines(ds, ds.attrs["best"])
-    return answer((name, *value) for name, value in lines.items())
+    return {"kind": "answer", "lines": [(name, *value) for name, value in answer(ds, ds.attrs["best"]).items()]}
 
 
 def best_grasps(ds: xr.Dataset) -> list[Block]:

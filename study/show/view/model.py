@@ -109,7 +109,7 @@ class View:
     def _feet(self) -> Iterator[tuple[int, Pose, float]]:
         """Pads of explicit poses at the force that is nearest to the one shown, the best grasp first."""
         names, seen = ("finger_pose_rotation", "finger_pose_origin", "finger_closing"), set[int]()
-        if not self.ds.attrs["poses"] or any(name not in self.ds for name in names):
+        if not self.ds.attrs["poses"]:
             return
         level = self.ds.attrs["level"]
         for k in sorted(range(len(forces(self.ds))), key=lambda k: abs(k - level)):

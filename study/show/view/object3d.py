@@ -40,7 +40,7 @@ def object_block(
     made.update_layout(meta={"object3d": content}, scene=plots.scene(camera=_camera(view, index)))
     if whole:
         made.update_layout(scene={"domain": {"x": [0, 0.66]}})
-        made.update_layout(scene2=plots.scene("", NAMES, aspectmode="cube", domain={"x": [0.7, 1], "y": [0.2, 0.8]}))
+        made.update_layout(scene2=plots.scene(NAMES, aspectmode="cube", domain={"x": [0.7, 1], "y": [0.2, 0.8]}))
     gone = [f"pads of the {left_out} worst cases are left out, or the page would be too large"] * bool(left_out)
     legend = ". ".join(line[:1].upper() + line[1:] for line in (*view.legend(index, motion), *gone))
     caption = f"Choose quantity and normal force above, click a place for its grasp, drag to turn. {legend}."

@@ -127,12 +127,12 @@ def corners_of(centres: np.ndarray) -> np.ndarray:
 def pads_of(ds: xr.Dataset, gripper: Any, index: Index, faces: Faces) -> list[Pad]:
     """Both pads at a case with its stored ``faces``; empty where it is not solved or the scene cannot be read."""
     names = ("pose_rotation", "pose_origin", "closing", "frame_axes", "frame_origin")
-    if at(ds, "status", index) != DONE or gripper is None or any(f"finger_{name}" not in ds for name in names):
+    if at(ds, "status", index) != DONE or gripper is None:
         return []
     stored = [ds.variables[f"finger_{name}"].values[index] for name in names]
     if not all(np.isfinite(s).all() for s in stored):
         return []
-    deepest = ds.variables["check_penetration_depth"].values[index] if "check_penetration_depth" in ds else np.zeros(2)
+    deepest = ds.variables["check_penetration_depth"].values[index]
     pads = [_pad(gripper, {n: v[k] for n, v in faces.items()}, *(s[k] for s in stored)) for k in (0, 1)]
     return [replace(pad, lift=LIFT + float(d)) for pad, d in zip(pads, np.nan_to_num(deepest), strict=True)]
 

@@ -5,6 +5,7 @@ Lengths are drawn in mm and pressures in kPa; files are in SI units.
 
 from __future__ import annotations
 
+from contextlib import closing
 from io import BytesIO
 from pathlib import Path
 from textwrap import fill
@@ -35,8 +36,8 @@ BAR = {"vertical": True, "height": 0.36, "width": 0.045, "title_font_size": 15, 
 def save_picture(view: View, index: Index, path: Path, quantity: str, motion: str) -> None:
     """Write a case as PNG: the object on the left, its values and the limit surface on the right; needs no screen."""
     groups = [(slice(0, 2), slice(0, 2))]
-    with pv.vtk_verbosity("off"):  # it warns of every kind of screen that is not there
-        plotter = pv.Plotter(off_screen=True, window_size=SIZE, shape=(2, 3), groups=groups, border=False)
+    made = pv.Plotter(off_screen=True, window_size=SIZE, shape=(2, 3), groups=groups, border=False)
+    with pv.vtk_verbosity("off"), closing(made) as plotter:  # VTK warns of every kind of screen that is not there
         plotter.set_background("white", all_renderers=True)
         plotter.subplot(0, 2)
         lines = [view.ds.attrs["title"], *view.summary(index, quantity), "", *view.legend(index, motion)]
@@ -49,10 +50,7 @@ def save_picture(view: View, index: Index, path: Path, quantity: str, motion: st
         _pads(plotter, view, index, motion)
         look(plotter, *view.eye(index), 0.9)
         plotter.add_axes(color=INK, viewport=(0.8, 0.0, 1.0, 0.25))
-        try:
-            plotter.screenshot(path)
-        finally:
-            plotter.close()
+        plotter.screenshot(path)
 
 
 def thumbnail(view: View, index: Index) -> bytes:
@@ -60,17 +58,13 @@ def thumbnail(view: View, index: Index) -> bytes:
     body, pads, image = view.surface, view.pads(index), BytesIO()
     if not len(body.triangles) or not pads:
         return b""
-    with pv.vtk_verbosity("off"):
-        plotter = pv.Plotter(off_screen=True, window_size=(SMALL, SMALL))
+    with pv.vtk_verbosity("off"), closing(pv.Plotter(off_screen=True, window_size=(SMALL, SMALL))) as plotter:
         plotter.set_background("white")
         surface(plotter, 1e3 * body.points, body.triangles, color=BODY)
         for pad in pads:
             faces(plotter, 1e3 * np.concatenate([pad.quads(), pad.sides()]), color=FINGER, lighting=True)
         look(plotter, *view.eye(index))
-        try:
-            plotter.screenshot(image)
-        finally:
-            plotter.close()
+        plotter.screenshot(image)
     return image.getvalue()
 
 

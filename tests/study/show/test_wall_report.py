@@ -11,7 +11,7 @@ from softjaw.study import pipeline
 from softjaw.study.case.effects import EffectChoice
 from softjaw.study.case.solver import FINE, CandidateSolver
 from softjaw.study.flags import Flag
-from softjaw.study.ranking import borne_level, judge, judged, ranking
+from softjaw.study.ranking import judge, judged, ranking, shown_level
 from softjaw.study.result import derived
 from softjaw.study.result.layout import DONE, FAILED
 from softjaw.study.result.read import dataset
@@ -121,8 +121,9 @@ def test_cases_outside_their_window_are_judged_by_the_force():
     ds = ds.assign(force_low=("angle", [2.0]), force_high=("angle", [3.0])).assign_coords(model=["ccm"])
     flags = judged(ds)
     assert flags.tolist() == [[Flag.TOO_WEAK, 0, 0, Flag.TOO_STRONG]]
-    assert borne_level(np.full((1, 4), DONE), flags) == 2
-    assert borne_level(np.full((1, 4), DONE), flags | Flag.TOO_WEAK) is None
+    ds = ds.drop_vars("force_low").assign(status=(over, np.full((1, 4), DONE)))
+    assert shown_level(ds, flags)[0] == 2
+    assert shown_level(ds, flags | Flag.TOO_WEAK)[0] == 3
     assert ranking(np.array([4.0, 1, 2, 5]), flags[0]).tolist() == [2, 1, 3, 0]
 
 
