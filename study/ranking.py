@@ -19,7 +19,7 @@ from softjaw.study.case.result import TIE
 from softjaw.study.flags import BORNE, LOST, Flag, flags_in
 from softjaw.study.grippers import Hand, gripper_file
 from softjaw.study.messages import StudyError
-from softjaw.study.quantities import DONE, LEAST_FORCE, LISTED, REALISATION
+from softjaw.study.quantities import DONE, LEAST_FORCE, LISTED
 from softjaw.study.result.read import at_force, half_width, scene_of, stated_error, values_of
 from softjaw.study.scene.text import scene_table
 
@@ -119,7 +119,7 @@ class Sure:
     """Values of some grasps and how far off they may be.
 
     ``value, error`` (n,) arrays: ``error`` is the stated one; NaN where it is not known. ``samples`` (n, m) array:
-    values with samples of the uncertain inputs, the same for all grasps; none where no input is uncertain.
+    values with samples of the uncertain inputs, the same for all grasps; a zero where no input is uncertain.
     """
 
     value: FloatArray
@@ -129,7 +129,7 @@ class Sure:
     @property
     def half_width(self) -> FloatArray:
         """All of it together, ``(n,)``."""
-        return np.hypot(self.error, _half_width(self.samples))
+        return np.hypot(self.error, half_width(self.samples))
 
     def apart(self, i: int, j: int) -> bool | None:
         """Whether grasp ``i`` is better than ``j`` beyond the errors of their difference; None where not known.
@@ -137,15 +137,9 @@ class Sure:
         Inputs move all grasps at once, so it is the difference that has an interval. A difference within `TIE` of the
         values is none, also where nothing is said to be in error.
         """
-        error = np.hypot(np.hypot(self.error[i], self.error[j]), _half_width(self.samples[i] - self.samples[j]))
+        error = np.hypot(np.hypot(self.error[i], self.error[j]), half_width(self.samples[i] - self.samples[j]))
         least = TIE * max(abs(self.value[i]), abs(self.value[j]))
         return None if np.isnan(error) else bool(self.value[i] - self.value[j] > error + least)
-
-
-def _half_width(samples: FloatArray) -> FloatArray:
-    if not samples.shape[-1]:
-        return np.zeros(samples.shape[:-1])
-    return half_width(xr.DataArray(samples, dims=[*(f"dim_{i}" for i in range(samples.ndim - 1)), REALISATION])).values
 
 
 def sure(ds: xr.Dataset, name: str, k: int) -> Sure | None:
@@ -156,7 +150,7 @@ def sure(ds: xr.Dataset, name: str, k: int) -> Sure | None:
     if error is None and samples is None:
         return None
     of_mesh = np.zeros(values.shape) if error is None else error[..., k].ravel()
-    inputs = np.empty((len(values), 0)) if samples is None else samples.values[..., k, :].reshape(len(values), -1)
+    inputs = np.zeros((len(values), 1)) if samples is None else samples.values[..., k, :].reshape(len(values), -1)
     return Sure(values, of_mesh, inputs)
 
 

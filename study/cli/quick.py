@@ -10,6 +10,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from softjaw.study.case.build import build_object, check_object, geometry, mesh_notes, told, with_mass
 from softjaw.study.case.candidates import check_candidates, with_sampled_grasps
 from softjaw.study.messages import USAGE, StudyError
@@ -35,25 +37,21 @@ def init(options: Namespace) -> str:
 def _measured(options: Namespace) -> start.Measured:
     """What a scene should say about a mesh that a study can take."""
 
-    def shape(axis: str) -> Mesh:
+    def built(axis: str) -> tuple[Mesh, Any, list[float]]:
+        """The mesh as an object with this axis, and its extents [mm]."""
         # Absolute, because the scene that is written may lie in another folder.
         mesh = str(Path(options.mesh).absolute())
-        return Mesh.model_validate({"shape": "mesh", "mesh": mesh, "unit": options.unit, "axis": axis})
-
-    def sides(axis: str) -> dict[str, float]:
-        """Extents [mm] along the axes of the object."""
-        bounds: Any = build_object(shape(axis)).bounds
-        return dict(zip("xyz", (1e3 * (bounds[1] - bounds[0])).tolist(), strict=True))
-
-    def remark(axis: str, station: float) -> str:
-        middle = geometry().middle_of(shape(axis), in_si("pad_length_mm", start.PAD_LENGTH))
-        return middle.remark(in_si("station_mm", station), in_si("half_mm", start.PAD_LENGTH / 2))
+        shape = Mesh.model_validate({"shape": "mesh", "mesh": mesh, "unit": options.unit, "axis": axis})
+        made: Any = build_object(shape)
+        return shape, made, (1e3 * np.ptp(made.bounds, axis=0)).tolist()
 
     try:
-        axis = options.axis or start.longest(sides("z"))
-        extents = tuple(sides(axis).values())
-        stations = tuple(s for s in start.heights(extents[2]) if not remark(axis, s))
-        return axis, extents, stations, mesh_notes(build_object(shape(axis)))
+        axis = options.axis or start.longest(dict(zip("xyz", built("z")[2], strict=True)))
+        shape, made, extents = built(axis)
+        middle = geometry().middle_of(shape, in_si("pad_length_mm", start.PAD_LENGTH))
+        half = in_si("half_mm", start.PAD_LENGTH / 2)
+        stations = (s for s in start.heights(extents[2]) if not middle.remark(in_si("station_mm", s), half))
+        return axis, tuple(extents), tuple(stations), mesh_notes(made)
     except (ValueError, OSError) as error:
         raise StudyError(USAGE, f"--mesh: {error}") from error
 

@@ -9,6 +9,8 @@ from typing import Any, TextIO
 
 import numpy as np
 
+from softjaw.study.messages import DONE as ENDED
+from softjaw.study.messages import SOME_FAILED, STOPPED
 from softjaw.study.quantities import DONE, FAILED, MISSING, NO_GRASP
 
 
@@ -27,6 +29,11 @@ def duration(seconds: float) -> str:
         return f"{minutes} min {rest} s"
     hours, minutes = divmod(minutes, 60)
     return f"{hours} h {minutes} min" if hours < 48 else f"{hours // 24} d {hours % 24} h"
+
+
+def code_of(codes: np.ndarray) -> int:
+    """The exit code of a run that ends with these states."""
+    return STOPPED if np.any(codes == MISSING) else SOME_FAILED if np.any(codes == FAILED) else ENDED
 
 
 MIN_CASES, MOST_CASES, MIN_SECONDS = 5, 50, 3.0  # cases and seconds from the first case on, before a rest is foretold

@@ -20,7 +20,7 @@ from typing import Any, TypeVar
 import numpy as np
 from mpi4py import MPI
 
-from softjaw.study.messages import CANNOT_WRITE, DONE, SOME_FAILED, STOPPED, StudyError, make_folders
+from softjaw.study.messages import CANNOT_WRITE, STOPPED, StudyError, make_folders
 from softjaw.study.quantities import DONE as CASE_DONE
 from softjaw.study.result import provenance
 from softjaw.study.result.layout import FAILED, MISSING
@@ -31,7 +31,7 @@ from softjaw.study.result.write import MESH, Files, ResultWriter, codes_on, veri
 from softjaw.study.run.limits import GRACE, Stopper, limited_memory
 from softjaw.study.run.load_path import PathSolver, give_up, rows_again, settle
 from softjaw.study.run.plan import Plan
-from softjaw.study.run.progress import Progress
+from softjaw.study.run.progress import Progress, code_of
 from softjaw.study.run.refine import Rounds, round_text
 from softjaw.study.run.schedule import Claims, LostRanks
 from softjaw.study.run.shares import divided
@@ -312,11 +312,6 @@ def finish(work: Work, writer: ResultWriter, name: str) -> None:
         done=int(np.sum(codes == CASE_DONE)),
         failed=failed,
     )
-
-
-def code_of(codes: np.ndarray) -> int:
-    """The exit code of a run that ends with these states."""
-    return STOPPED if np.any(codes == MISSING) else SOME_FAILED if np.any(codes == FAILED) else DONE
 
 
 def print_summary(work: Work, path: Path) -> None:

@@ -16,11 +16,12 @@ from softjaw.study.ranking import falling
 from softjaw.study.result.layout import DONE
 from softjaw.study.result.read import axes_of, stated_error, values_of
 from softjaw.study.scene.text import changes, value_text
+from softjaw.study.show.overview import listed
 from softjaw.study.table import PAPER, Column, Row, Table, as_text, with_unit, wrapped
 from softjaw.study.units import shown, shown_unit
 
 FloatArray = NDArray[np.float64]
-MOST_SETTINGS, MOST_VALUES = 12, 8  # that a text lists
+MOST_SETTINGS = 12  # that a text lists
 Pair = tuple[xr.Dataset, xr.Dataset]
 
 
@@ -54,7 +55,7 @@ def compare(one: xr.Dataset, other: xr.Dataset, quantity: str = "e_n", model: st
     hidden = [name for name in (*few, station, angle) if len(axes[name]["common"]) < 2]
     hidden += [] if labels is None else [station, angle]
     columns = [Column(name, axis["units"], digits=5, people=name not in hidden) for name, axis in axes.items()]
-    columns += [Column("label", wrap=MOST_VALUES * 3)] * (labels is not None)
+    columns += [Column("label", wrap=24)] * (labels is not None)
     judged = any(value is not None for value in values["beyond_error"].ravel())
     columns += [Column("a", units), Column("b", units), Column("difference", units, "b-a"), Column("relative"),
                 Column("error", units, "errors", digits=2, people=judged),
@@ -118,9 +119,7 @@ def _matched(one: xr.Dataset, other: xr.Dataset) -> tuple[dict[str, Row], Pair]:
             same = np.array(a.options)[:, None] == np.array(b.options)
         only = a.values[~same.any(axis=1)], b.values[~same.any(axis=0)]
         if not same.any():
-            lists = (", ".join(f"{v:.6g}" for v in values[:5]) for values in only)
-            text = " and ".join(f"{values} in {ds.file}" for values, ds in zip(lists, (one, other), strict=True))
-            raise StudyError(USAGE, f"no common {a.name} [{a.units or '-'}]: {text}; there is nothing to compare")
+            raise StudyError(USAGE, f"{one.file} and {other.file} have no common {a.name}: nothing to compare")
         at = np.nonzero(same)
         pair = pair[0].isel({a.name: at[0]}), pair[1].isel({a.name: at[1]})
         axes[a.name] = {"units": a.units, "common": a.values[at[0]], "only_a": only[0], "only_b": only[1]}
@@ -131,9 +130,8 @@ def _left_out(name: str, axis: dict[str, Any]) -> list[str]:
     lines = []
     for letter in "ab":
         if len(values := axis[f"only_{letter}"]):
-            texts = [f"{shown(v, axis['units']):.5g}" for v in values]
-            texts = texts if len(texts) <= MOST_VALUES else [*texts[:3], "...", texts[-1], f"({len(texts)} values)"]
-            lines.append(f"{name} only in {letter}, left out: {' '.join(texts)} {shown_unit(axis['units'])}".rstrip())
+            text = listed(shown(values, axis["units"]).tolist(), shown_unit(axis["units"]))
+            lines.append(f"{name} only in {letter}, left out: {text}")
     return lines
 
 
@@ -182,13 +180,11 @@ def _shown_summary(row: Row) -> Row:
 def _verdict(pair: Pair, name: str, model: str, values: dict[str, Any]) -> list[str]:
     """How many differences of the quantity that was asked for exceed the errors; or which file states none."""
     row = _summary(name, values)
-    silent = " and ".join(x for x, ds in zip("ab", pair, strict=True) if _error(ds, name, model) is None)
+    silent = " or ".join(x for x, ds in zip("ab", pair, strict=True) if _error(ds, name, model) is None)
     if not row["compared"]:
         return []
     if silent:
-        states = "states" if len(silent) == 1 else "state"
-        text = f"whether the differences exceed the errors is not known: {silent} {states} no error of {name}"
-        return [f"{text}; accuracy.meshes = 2 in a scene gives the errors of e_n and of the friction limits"]
+        return [f"no error of {name} in {silent}; accuracy.meshes = 2 in its scene gives that of many maps"]
     open_ = row["compared"] - row["judged"]
     more = f", {open_} could not be judged" * (open_ > 0)
     both = f"exceed the errors of both files together{more}"

@@ -16,7 +16,7 @@ def scene_text(scene: Any, file: str) -> str:
     name = f" '{o.name}'" if getattr(o, "name", None) else ""
     where = "sampled grasps" if c.sampled else "explicit poses"
     if not c.poses and not c.sampled:
-        where = f"at {_list([*c.station_values_mm], 'mm')} along the axis, {_list(c.angles_deg, 'deg')} about it"
+        where = f"at {listed([*c.station_values_mm], 'mm')} along the axis, {listed(c.angles_deg, 'deg')} about it"
     size = " x ".join(f"{shown(s, 'm'):g}" for s in g.pad_size)
     mesh = " x ".join(map(str, g.elements))
     levels = [f"{key} {value}" for key, value in scene.effects.model_dump().items()]
@@ -25,9 +25,9 @@ def scene_text(scene: Any, file: str) -> str:
         "mesh": getattr(o, "mesh", ""),  # the effective path, wherever the scene's leads
         "wall": wall_text(o),
         "candidates": f"{most}{c.total} {where}",
-        "forces": _list(scene.load.normal_force_n, "N"),
+        "forces": listed(scene.load.normal_force_n, "N"),
         "friction": f"mu = {scene.friction.mu:g}; CCM, PCM and PCM scaled by F_N",
-        "sweep": "; ".join(f"{key}: {_list(values)}" for key, values in scene.sweep.items()),
+        "sweep": "; ".join(f"{key}: {listed(values)}" for key, values in scene.sweep.items()),
         "cases": f"{most}{scene.cases}",
         "refinement": f"at most {c.refine} more cases" if c.refine else "",
         "pad": f"{size} mm, {g.material}, {g.shear_modulus_kpa:g} kPa, {mesh} elements ({g.element})",
@@ -89,12 +89,15 @@ def _extent(shape: Any) -> str:
     return f"{text} (the file's {shape.axis}, counted from the mesh's lowest point; x and y from the middle)"
 
 
-def _list(values: Sequence[Any], unit: str = "") -> str:
-    texts = [f"{v:g}" if isinstance(v, float) else str(v) for v in values]
-    if len(texts) > 6:
-        texts = [*texts[:2], "...", texts[-1], f"({len(values)} values)"]
-        return f"{', '.join(texts[:-1])} {unit} {texts[-1]}".replace("  ", " ")
-    return f"{', '.join(texts)} {unit}".rstrip()
+def listed(values: Sequence[Any], unit: str = "") -> str:
+    """Values with their unit; of many the first ones, the last one, and how many there are.
+
+    >>> listed([1.0, 2.5], "mm"), listed([*range(9)])
+    ('1, 2.5 mm', '0, 1, ..., 8 (9 values)')
+    """
+    texts, count = [f"{v:.5g}" if isinstance(v, float) else str(v) for v in values], len(values)
+    texts = texts if count <= 6 else [*texts[:2], "...", texts[-1]]
+    return f"{', '.join(texts)} {unit}".rstrip() + f" ({count} values)" * (count > 6)
 
 
 def aligned(rows: dict[str, str]) -> list[str]:

@@ -14,10 +14,9 @@ import plotly.graph_objects as go
 from plotly.colors import get_colorscale
 from plotly.subplots import make_subplots
 
-from softjaw.study.pictures import COLOURS, INK, SOFT, span
+from softjaw.study.pictures import COLOURS, INK, SOFT
 from softjaw.study.quantities import MODEL_NAMES
 
-__all__ = ["INK", "SOFT", "span"]  # besides what is defined here
 GRID, EMPTY = "#e3e6e8", "#e7e9eb"
 MODELS = {  # name, colour, line, marker
     "ccm": (MODEL_NAMES["ccm"], "#12436d", "solid", "circle"),

@@ -14,14 +14,12 @@ from rich.console import Console
 from rich.live import Live
 from rich.text import Text
 
-from softjaw.study.messages import DONE as ENDED
-from softjaw.study.messages import SOME_FAILED, STOPPED
 from softjaw.study.quantities import DONE, FAILED, MAIN, MISSING
 from softjaw.study.ranking import index_of, ranked
 from softjaw.study.result.lock import holder
 from softjaw.study.result.read import dataset
 from softjaw.study.result.store import open_result, place_text
-from softjaw.study.run.progress import Progress
+from softjaw.study.run.progress import Progress, code_of
 from softjaw.study.show.best_grasps import value_text
 from softjaw.study.show.status import RESUME, lasted, reasons
 from softjaw.study.table import terminal_width
@@ -78,7 +76,7 @@ def file_look(path: Path) -> Look:
             rounds = len(result.layout.added)
             counts = f"{progress.line(codes)}{f', round {rounds} of further grasps' * bool(rounds)}"
             if not runner:
-                return [counts, *_end(result, codes)], _code(codes)
+                return [counts, *_end(result, codes)], code_of(codes)
             title = f" ({result.title})" * bool(result.title)
             since = lasted(result.sessions[-1]["start"]) if result.sessions else ""
             about = f"{result.path}{title}: {runner}{f', for {since}' * bool(since)}"
@@ -86,12 +84,6 @@ def file_look(path: Path) -> Look:
             return [counts, about, best_so_far(result, codes), *failures], None
 
     return look
-
-
-def _code(codes: np.ndarray) -> int:
-    if (codes == MISSING).any():
-        return STOPPED
-    return SOME_FAILED if (codes == FAILED).any() else ENDED
 
 
 def _end(result: Any, codes: np.ndarray) -> list[str]:

@@ -10,6 +10,7 @@ import xarray as xr
 
 from softjaw.study.flags import Flag
 from softjaw.study.page import Block, heading, label, plot
+from softjaw.study.pictures import SOFT
 from softjaw.study.quantities import MODELS
 from softjaw.study.show import plots
 from softjaw.study.show.grasps import (
@@ -79,7 +80,7 @@ def _models(ds: xr.Dataset, position: int, index: Index, mu: float | None) -> Bl
         error = field(ds, f"{name}_error")
         plots.lines(made, x, by_model, row, column, None if error is None else by_model["ccm"] * error[cut])
         if name in OVER_F and mu is not None:
-            made.add_hline(mu, line={"color": plots.SOFT, "width": 1, "dash": "dash"}, row=row, col=column)
+            made.add_hline(mu, line={"color": SOFT, "width": 1, "dash": "dash"}, row=row, col=column)
     made.update_xaxes(**settings, row=2)
     bars = HALF_AS_FINE if field(ds, "e_n_error") is not None else ""
     rule = f" Dashed grey: mu = {mu:g}." if mu is not None else ""
@@ -194,7 +195,7 @@ def wall_section(view: View, index: Index) -> Block | None:
     made = plots.figure(1, 2, ("along the axis, through both fingers", f"across it at {1e3 * before[0, j, 2]:.4g} mm"))
     half = len(before) // 2
     for points, name, dash in ((before, "undeformed", "dash"), (before + u, "deformed", "solid")):
-        look = {"color": plots.SOFT if dash == "dash" else "#12436d", "dash": dash}
+        look = {"color": SOFT if dash == "dash" else "#12436d", "dash": dash}
         upright = np.concatenate([points[half, ::-1], points[0]])
         ring = np.concatenate([points[:, j], points[:1, j]])
         for column, (x, y) in enumerate(((upright[:, 2], upright @ out), (ring @ beside, ring @ out)), start=1):

@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 
 from softjaw.study.page import Block, label, plot
+from softjaw.study.pictures import SOFT, span
 from softjaw.study.quantities import FAILED, FIRST, MISSING, MODELS, NO_GRASP, TABLE
 from softjaw.study.show import plots
 from softjaw.study.show.grasps import (
@@ -124,7 +125,7 @@ def _on_cells(made: Any, ds: xr.Dataset, cuts: Any, x: int, y: int) -> None:
         for which, symbol, size in MARKS:
             i, j = np.nonzero(np.isin(states, which))
             if i.size:
-                look = {"symbol": symbol, "size": size, "color": plots.SOFT}
+                look = {"symbol": symbol, "size": size, "color": SOFT}
                 made.add_scatter(x=[xv[n] for n in j], y=[yv[n] for n in i], mode="markers", marker=look,
                                  hoverinfo="skip", row=row, col=column)  # fmt: skip
     titles = xs.pop("title_text"), ys.pop("title_text")
@@ -149,7 +150,7 @@ def _button(ds: xr.Dataset, name: str, cuts: Any, x: int, y: int) -> dict[str, A
     axes = [str(ds.status.dims[a]) for a in (x, y)]
     (xl, xu), (yl, yu) = ((spoken(axis), shown_unit(ds[axis].units)) for axis in axes)
     hover = f"{xl} %{{x}} {xu}, {yl} %{{y}} {yu}<br>{label(title)}: %{{z:.4g}}<br>%{{customdata}}<extra></extra>"
-    low, high = plots.span(np.concatenate([a.ravel() for a in z]))
+    low, high = span(np.concatenate([a.ravel() for a in z]))
     rows = [None if not np.isfinite(a).any() else a.tolist() for a in z]
     axis = {"colorscale": plots.colours(name), "cmin": low, "cmax": high, "colorbar": plots.bars(label(title))}
     return {"label": label(title), "method": "update",

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
-from typing import Any
 
 from softjaw.study import page
 from softjaw.study.messages import StudyError, write_file
@@ -16,7 +14,7 @@ from softjaw.study.show.report.tables import best_grasps
 from softjaw.study.show.report.writing import the_answer
 from softjaw.study.show.view.model import View
 from softjaw.study.show.view.solids import thumbnail
-from softjaw.study.table import Row, with_unit
+from softjaw.study.table import Row, plain, with_unit
 from softjaw.study.units import shown_unit
 
 
@@ -33,7 +31,7 @@ def write_objects_page(index: Path, out: Path) -> Path:
     for row in table.rows:
         image, blocks = _object(index.parent, row) if row["state"] in SOLVED else (b"", [])
         anchor = f"object-{row['object']}" if blocks else ""
-        cells = [(table.cell(row, c), _sorted_by(row[c.name])) for c in columns]
+        cells = [(table.cell(row, c), plain(row[c.name])) for c in columns]
         listed.append({"cells": cells, "anchor": anchor, "image": image, "alt": f"best grasp of {row['object']}"})
         sections.append((anchor, row["object"], blocks))
     note = "Click on the head of a column to sort by it, on an object for its best grasps."
@@ -41,10 +39,6 @@ def write_objects_page(index: Path, out: Path) -> Path:
     title = f"{index.parent.name}: where to grasp {len(rows)} objects"
     subtitle = f"{counts_text(rows)}; {about.get('scene_file', '')}"
     return write_file(out, page.page(title, subtitle, [("objects", "", gallery), *sections]))
-
-
-def _sorted_by(value: Any) -> Any:
-    return "" if isinstance(value, float) and math.isnan(value) else value
 
 
 def _object(folder: Path, row: Row) -> tuple[bytes, list[page.Block]]:
@@ -57,6 +51,4 @@ def _object(folder: Path, row: Row) -> tuple[bytes, list[page.Block]]:
     report = Path(row["file"]).with_suffix(".html")
     if (folder / report).exists():
         blocks.append({"kind": "link", "text": f"report on {row['object']}", "target": report.as_posix()})
-    else:
-        blocks.append(page.text(f"softjaw report {folder / row['file']}: all maps, contacts and definitions", "note"))
     return thumbnail(View(ds, best[:-3]), best) if (best := ds.attrs["best"]) else b"", blocks

@@ -15,6 +15,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from softjaw.study.page import Block, Section, label, page, plot, text
+from softjaw.study.pictures import INK
 from softjaw.study.quantities import ALONG, AROUND
 from softjaw.study.result.layout import DONE
 from softjaw.study.show import plots
@@ -141,7 +142,7 @@ def _traces(whole: bool) -> list[Any]:
         go.Mesh3d(intensitymode="cell", hoverinfo="skip", colorbar=low, colorscale=plots.colours("pressure"),
                   **plots.FLAT),
         go.Mesh3d(hoverinfo="skip", color=PAD, opacity=0.35, **plots.FLAT),
-        go.Scatter3d(mode="lines", hoverinfo="skip", line={"color": plots.INK, "width": 5}),
+        go.Scatter3d(mode="lines", hoverinfo="skip", line={"color": INK, "width": 5}),
         go.Scatter3d(mode="lines", hoverinfo="skip", line={"color": FORCE, "width": 4}),
         go.Scatter3d(mode="markers", hoverinfo="skip", marker={"color": FORCE, "size": 2.5}),
     ]  # fmt: skip
