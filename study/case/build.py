@@ -18,6 +18,7 @@ from softjaw.fem.pad.shape import PadShape
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.quantities import LISTED_TARGET
 from softjaw.study.scene import Scene
+from softjaw.study.scene.grasps import listed
 from softjaw.study.scene.sections import Accuracy, Gripper
 from softjaw.study.units import converted, in_si
 
@@ -198,7 +199,7 @@ def _check_stations(scene: Scene, mesh: Any) -> None:
     if beside:
         raise StudyError(
             USAGE,
-            f"candidates: found stations off the object, {', '.join(f'{s:g}' for s in beside[:5])} mm; expected {low:g}"
+            f"candidates: found stations off the object, {listed(beside)} mm; expected {low:g}"
             f" to {high:g} mm, the mesh along its axis {mesh.axis}, counted from its lowest point; change the stations"
             " or object.unit",
         )
@@ -254,8 +255,8 @@ def _remarks(scene: Scene) -> Iterator[str]:
         at.setdefault(middle.remark(station, half), []).append(mm)
     for remark, places in at.items():
         if remark:
-            listed = ", ".join(f"{mm:g}" for mm in places[:4]) + ", ..." * (len(places) > 4)
-            yield f"candidates: at {len(places)} of {len(where.station_values_mm)} stations ({listed} mm) {remark}"
+            count, stations = len(places), len(where.station_values_mm)
+            yield f"candidates: at {count} of {stations} stations ({listed(places)} mm) {remark}"
 
 
 def forces_apart(scene: Scene) -> bool:

@@ -319,8 +319,7 @@ class EffectChoice:
             return self.solver.case(k, self.levels, self._share_left_out(k))
         try:
             # a wall whose coarse load path with friction has ended: the fine one takes long to end, too
-            walled = self.solver.walled and self.levels.object.endswith("shell")
-            if walled and forces_apart(self.solver.scene):
+            if self.levels.object.endswith("shell") and forces_apart(self.solver.scene):
                 self.solver.solve(k, COARSE, coupled)
             return self.solver.case(k, coupled, self._share_left_out(k))
         except (ConvergenceError, CheckError) as error:

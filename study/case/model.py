@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -79,6 +79,11 @@ class Finger:
     pose: Pose
     surface: GapFunction
     hole_share: float = 0.0
+
+    @property
+    def half_turned(self) -> Finger:
+        """In the frame that half a turn about the approach gives the pad: x and y change their signs."""
+        return replace(self, pose=Pose(self.pose.rotation * [-1.0, -1.0, 1.0], self.pose.origin))
 
     def gap(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Signed distance, gradient and Hessian at points of the pad's frame."""

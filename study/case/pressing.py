@@ -18,7 +18,7 @@ from softjaw.fem.shell.wall_mesh import MeshSize
 from softjaw.fem.shell.wall_problem import WallProblem
 from softjaw.friction.patch import ContactPatch
 from softjaw.friction.wrench import FrictionLimits
-from softjaw.study.case.build import has_wall, pad_shape
+from softjaw.study.case.build import pad_shape
 from softjaw.study.case.contact import Contact
 from softjaw.study.case.model import Finger, contact_rules, image_signs, pad_of, press_of, require_planes
 from softjaw.study.case.poses import turn_of_pose
@@ -42,11 +42,7 @@ class PressedContact(Contact):
     """
 
     def __init__(
-        self,
-        scene: Scene,
-        finger: Finger,
-        state: Pressed,
-        signs: tuple[float, float, float] = UPRIGHT,
+        self, scene: Scene, finger: Finger, state: Pressed, signs: tuple[float, float, float] = UPRIGHT
     ) -> None:
         self.finger, self.state, self._signs = finger, state, signs
         self._reduced = scene.friction.used_by_pressing
@@ -239,10 +235,8 @@ def pressing(
 
     ``coarser`` halves the elements of every direction; ``stride`` is that of a load path with friction acting back.
     """
-    if has_wall(scene.object):
-        refuse_along_axis(fingers)
-        if scene.effects.object.endswith("shell"):
-            return OnWall(scene, fingers, coarser, stride)
+    if scene.effects.object.endswith("shell"):
+        return OnWall(scene, fingers, coarser, stride)
     return OnRigid(scene, fingers, poses, coarser, stride)
 
 
@@ -279,7 +273,8 @@ def _grip(scene: Scene, fingers: Sequence[Finger], grasp_frame: Grasp, coarser: 
     coupled = scene.effects.friction_pressure_coupling == "tangential"
     wall, faces = wall_between(body, grasp_frame, scene.gripper.pad_size, mesh, linear=linear)
 
-    gaps = [_gap(f, turned) for f, turned in zip(fingers, grasp_frame.flipped, strict=False)]
+    sides = zip(fingers, grasp_frame.flipped, strict=False)
+    gaps = [(finger.half_turned if flipped else finger).gap for finger, flipped in sides]
 
     def problem(rule: str) -> WallProblem:
         pad = pad_of(scene, grasp_frame.pad_symmetry, rule, coarser)
@@ -288,17 +283,3 @@ def _grip(scene: Scene, fingers: Sequence[Finger], grasp_frame: Grasp, coarser: 
 
     problems = [partial(problem, rule) for rule in contact_rules(scene, walled=True)]
     return Grip(problems, dict(scene.petsc), stride)
-
-
-def _gap(finger: Finger, turned: bool):
-    """Gap function in the frame of the pad as it is solved."""
-    if not turned:
-        return finger.gap
-    # Half a turn about the approach flips x and y, and with them normals and mixed derivatives.
-    sign = [-1.0, -1.0, 1.0]
-
-    def gap(x):
-        g, normal, hessian = finger.gap(x * sign)
-        return g, normal * sign, hessian * [[s * t for t in sign] for s in sign]
-
-    return gap

@@ -9,6 +9,7 @@ ordinary one, with the same bits as a run of its own.
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 import time
@@ -75,42 +76,37 @@ def run_objects(
         while todo := run.todo()[:batch]:
             if not run.solve(todo):
                 break
-        return run.code()
+        return index.code_of(run.rows)
 
 
 class _ObjectsRun:
-    """What all ranks know of a run: a row of the index for every object; ``_mine`` is what this rank has planned."""
+    """What all ranks know of a run: ``rows`` of the index, one an object; ``_mine`` is what this rank has planned."""
 
     def __init__(
         self, folder: ObjectFolder, out: Path, study: Study, work: Work, comm: Any, retry_failed: bool
     ) -> None:
         self._folder, self._out, self._study, self._work, self._comm = folder, out, study, work, comm
         self._retry = retry_failed
-        self._rows = on_rank0(comm, _rows_of, folder, out, retry_failed)
+        self.rows = on_rank0(comm, _rows_of, folder, out, retry_failed)
         self._mine: dict[int, tuple[Plan, Work]] = {}
         self._failed: list[tuple[int, Row]] = []
         self._tried: set[int] = set()
 
     def todo(self) -> list[int]:
         """Numbers of the objects that this run has still to take."""
-        return [n for n, row in enumerate(self._rows) if row["state"] not in index.ENDED and n not in self._tried]
-
-    def code(self) -> int:
-        """The exit code."""
-        return index.code_of(self._rows)
+        return [n for n, row in enumerate(self.rows) if row["state"] not in index.ENDED and n not in self._tried]
 
     def solve(self, batch: list[int]) -> bool:
         """Solve a batch; whether no signal came."""
         self._tried |= set(batch)
-        for n, row in ((n, self._rows[n]) for n in batch):
+        for n, row in ((n, self.rows[n]) for n in batch):
             known = {name: row[name] for name in ("file", "mesh", "key", "mass")}
-            self._rows[n] = index.blank_row(row["object"], state=index.STOPPED, **known)
-        ended = sum(row["state"] in index.ENDED for row in self._rows)
-        self._store(f"objects {ended + 1} to {ended + len(batch)} of {len(self._rows)}")
+            self.rows[n] = index.blank_row(row["object"], state=index.STOPPED, **known)
+        ended = sum(row["state"] in index.ENDED for row in self.rows)
+        self._store(f"objects {ended + 1} to {ended + len(batch)} of {len(self.rows)}")
         answers, stopped = self._divide(batch, self._prepared)
-        failed = {n: answer for n, answer in answers.items() if not isinstance(answer, Part)}
-        for n, (state, reason) in failed.items():
-            self._rows[n] = self._rows[n] | {"state": state, "reason": shortened(reason, REASON_LETTERS)}
+        for n, answer in answers.items():
+            self.rows[n] |= {} if isinstance(answer, Part) else answer
         parts = [answer for answer in answers.values() if isinstance(answer, Part)]
         names = {part.number: part.seconds for part in parts}
         while parts and not stopped:
@@ -120,7 +116,7 @@ class _ObjectsRun:
             parts = self._gathered(part for part in grown if part)
         ends = [self._alone(n, self._ending, n, seconds, stopped) for n, seconds in names.items() if n in self._mine]
         for n, row in self._gathered([*filter(None, ends), *self._failed]):
-            self._rows[n] = row
+            self.rows[n] = row
         self._mine.clear()
         self._failed.clear()
         self._store()
@@ -198,9 +194,7 @@ class _ObjectsRun:
                     print(f"error: {error.message}", file=sys.stderr, flush=True)
                     self._comm.Abort(error.code)
                 raise
-            state, reason = _why(error, self._work.time_limit)
-            row = self._rows[n] | {"state": state, "reason": shortened(reason, REASON_LETTERS)}
-            self._failed.append((n, row))
+            self._failed.append((n, self.rows[n] | _why(error, self._work.time_limit)))
             return None
 
     def _grown(self, part: Part) -> Part | None:
@@ -219,7 +213,7 @@ class _ObjectsRun:
         """The row of an object as its file stands, which is packed if nothing is missing there."""
         path, (plan, _) = self._out / f"{self._folder.objects[n].name}.hdf", self._mine[n]
         with open_result(path) as result:
-            row = self._rows[n] | row_of(result) | {"preparing": seconds}
+            row = self.rows[n] | row_of(result) | {"preparing": seconds}
         if stopped:  # also where no case is missing, a further round may be
             row |= {"state": index.STOPPED, "reason": ""}
         if row["state"] != index.STOPPED:
@@ -237,7 +231,7 @@ class _ObjectsRun:
         if text and self._comm.rank == 0:
             print(text, flush=True)
         about = {"scene_file": self._folder.scene_file, "overrides": "\n".join(self._folder.overrides)}
-        on_rank0(self._comm, index.write_index, self._out / f"{index.INDEX}.hdf", self._rows, about)
+        on_rank0(self._comm, index.write_index, self._out / f"{index.INDEX}.hdf", self.rows, about)
 
 
 def _rows_of(folder: ObjectFolder, out: Path, retry_failed: bool) -> list[Row]:
@@ -252,7 +246,7 @@ def _rows_of(folder: ObjectFolder, out: Path, retry_failed: bool) -> list[Row]:
         try:
             scene = folder.scene(listed)
         except SceneError as error:
-            rows.append(row | {"state": index.REFUSED, "reason": shortened(str(error.problems[0]), REASON_LETTERS)})
+            rows.append(row | _why(error, math.inf))
             continue
         key, mass = key_of(scene), scene.object.mass_g
         if before["key"] not in ("", key) and (out / row["file"]).exists():
@@ -270,15 +264,14 @@ def _settled(writers: Sequence[ResultWriter], parts: Sequence[Part], retry_faile
     return np.concatenate([settle(writer, part.plan.units, part.torn, retry_failed) for writer, part in each])
 
 
-def _why(error: BaseException, limit: float) -> tuple[str, str]:
+def _why(error: BaseException, limit: float) -> Row:
     """State of an object that could not be planned, and why."""
-    if isinstance(error, NoGraspError):
-        return index.NO_GRASP, error.message
-    if isinstance(error, SceneError):
-        return index.REFUSED, str(error.problems[0])
+    state, reason = index.FAILED, sentence(error, limit)
     if isinstance(error, StudyError):
-        return index.REFUSED if error.code == messages.USAGE else index.FAILED, error.message
-    return index.FAILED, sentence(error, limit)
+        state = index.REFUSED if error.code == messages.USAGE else index.FAILED
+        state = index.NO_GRASP if isinstance(error, NoGraspError) else state
+        reason = str(error.problems[0]) if isinstance(error, SceneError) else error.message
+    return {"state": state, "reason": shortened(reason, REASON_LETTERS)}
 
 
 def row_of(result: Any) -> Row:

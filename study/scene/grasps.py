@@ -150,12 +150,13 @@ class Candidates(SceneSection):
         over = [s for s in places if s - half < low - slack or s + half > high + slack]
         if over and not isinstance(shape, Plate | SphereShape):
             yield (
-                f"candidates: at {len(over)} of {len(places)} stations ({_listed(over)} mm) a pad of {2 * half:g} mm"
+                f"candidates: at {len(over)} of {len(places)} stations ({listed(over)} mm) a pad of {2 * half:g} mm"
                 f" meets the edge of the object, which reaches from {low:g} to {high:g} mm"
             )
 
 
-def _listed(places: Sequence[float]) -> str:
+def listed(places: Sequence[float]) -> str:
+    """The first few of some places."""
     return ", ".join(f"{s:g}" for s in places[:4]) + (", ..." if len(places) > 4 else "")
 
 
