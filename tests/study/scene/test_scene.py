@@ -226,8 +226,8 @@ def test_overrides_replace_values_which_are_in_si_units_and_hyperfoam_fills_in_i
     [["friction.mu=5"], ["load.normal_force_n=[500]"], ["gripper.material=linear", "gripper.poisson_ratio=0.49"]],
 )
 def test_values_that_are_seldom_meant_are_allowed_with_a_warning(overrides):
-    assert len([*parse_scene(BALL, overrides=overrides).warnings()]) == 1
-    assert not [*parse_scene(BALL).warnings()]
+    assert len(parse_scene(BALL, overrides=overrides).warnings) == 1
+    assert not parse_scene(BALL).warnings
 
 
 def test_combinations_of_a_sweep_that_make_no_scene_are_named_and_too_many_refused():
@@ -291,7 +291,7 @@ def test_a_mesh_is_looked_for_beside_the_scene_and_counts_by_its_bytes(tmp_path)
 @pytest.mark.parametrize("path", JOBS, ids=[p.stem for p in JOBS])
 def test_shipped_scenes_load_without_warnings_and_survive_being_written_out(path):
     scene = load_scene(path)
-    assert not [*scene.warnings()]
+    assert not scene.warnings
     again = parse_scene(scene.effective_toml(), "elsewhere/again.toml")
     assert again == scene
     assert again.digest == scene.digest
