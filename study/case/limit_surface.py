@@ -43,7 +43,6 @@ class SurfaceFit(NamedTuple):
     """
 
     rho: float
-    ellipsoid: Ellipsoid
     surface: LimitSurface
     certificate: int
     wrench: FloatArray
@@ -94,16 +93,14 @@ def fit_surfaces(
     f_x, f_y, tau_z = limits.per_unit_force
     ellipsoid = three_motion_ellipsoid(f_x, f_y, tau_z / rho, 1.0)
     # a fit is judged by motions that it has not seen
-    fitted_to, others = slice(samples), slice(samples, None)
-    reference, too_much = _fit_error(ellipsoid, W[others], T[others]), overclaim(ellipsoid, W[others])
+    seen, unseen = (W[:samples], T[:samples]), (W[samples:], T[samples:])
+    reference, too_much = _fit_error(ellipsoid, *unseen), overclaim(ellipsoid, unseen[0])
     surfaces = {}
     for kind in kinds:
-        surface, certificate = fitted(ellipsoid, W[fitted_to], T[fitted_to], kind, objective)
-        judged = reference if surface is ellipsoid else _fit_error(surface, W[others], T[others])
-        on_own = _fit_error(surface, W[fitted_to], T[fitted_to])
-        claim = too_much if surface is ellipsoid else overclaim(surface, W[others])
-        errors = on_own, judged, reference, claim, too_much
-        surfaces[kind] = SurfaceFit(rho, ellipsoid, surface, certificate, wrench[:samples], *errors)
+        surface, certificate = fitted(ellipsoid, *seen, kind, objective)
+        errors = _fit_error(surface, *seen), _fit_error(surface, *unseen), reference
+        claims = overclaim(surface, unseen[0]), too_much
+        surfaces[kind] = SurfaceFit(rho, surface, certificate, wrench[:samples], *errors, *claims)
     return surfaces
 
 
@@ -194,10 +191,9 @@ def six_quartic(contact: Contact, model: str, samples: int) -> tuple[LimitSurfac
     """Convex quartic of all six components ``(f, tau)`` [N, N m], with its fit error and overclaim on other motions."""
     S = contact.unit_limits[model].S
     W, T = _six_samples(contact.local, contact.rho, S, model, samples + INDEPENDENT)
-    fitted_to, others = slice(samples), slice(samples, None)
-    surface = span_quartic(W[fitted_to], T[fitted_to])
+    surface, unseen = span_quartic(W[:samples], T[:samples]), (W[samples:], T[samples:])
     size = contact.mu * S * np.repeat([1.0, contact.rho], 3)
-    return surface.scaled(size), _fit_error(surface, W[others], T[others]), overclaim(surface, W[others])
+    return surface.scaled(size), _fit_error(surface, *unseen), overclaim(surface, unseen[0])
 
 
 def _six_samples(patch: ContactPatch, rho: float, S: float, model: str, count: int) -> tuple[FloatArray, FloatArray]:
