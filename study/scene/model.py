@@ -449,6 +449,7 @@ def axis_rules(sweep: Mapping[str, Sequence[Any]], sections: Mapping[str, Any]) 
     models = models_of(getattr(sections.get("object"), "shape", None))
     for key, values in sweep.items():
         section, _, name = key.partition(".")
+        kinds = {type(v) if isinstance(v, str | tuple) else float for v in values}
         if section not in models or name not in models[section].model_fields:
             near = closest(key, [f"{s}.{k}" for s, m in models.items() for k in m.model_fields])
             yield wrong(key, f"a key with a single value, as `{near or 'gripper.pad_width_mm'}`", key)
@@ -456,12 +457,8 @@ def axis_rules(sweep: Mapping[str, Sequence[Any]], sections: Mapping[str, Any]) 
             yield wrong(values, "a key that changes the numbers of cases alone; write a scene for each value", key)
         elif key in OF_FACES and "run" in sections and sections["run"].patches == "all":
             yield wrong(values, 'run.patches = "none" beside it, for faces that differ from case to case', key)
-        elif len(set(values)) < len(values) or len({_kind(v) for v in values}) > 1:
+        elif len(set(values)) < len(values) or len(kinds) > 1:
             yield wrong(values, "numbers, texts or lists, each once", key)
-
-
-def _kind(value: Any) -> type:
-    return type(value) if isinstance(value, str | tuple) else float
 
 
 def _point_rules(sweep: Mapping[str, Sequence[Any]], sections: Mapping[str, Any]) -> Errors:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, get_args
+from typing import Annotated, ClassVar, Literal, get_args
 
 from pydantic import Field, ValidationInfo, field_validator
 
@@ -27,8 +27,6 @@ class Shape(SceneSection):
     """What all shapes share. The object's axis is z."""
 
     SIZE_KEYS: ClassVar[tuple[str, ...]] = ()  # key of the extents, or one key for each of x, y and z
-    if TYPE_CHECKING:
-        shape: str  # a literal of each subclass
     name: Text = Field("", max_length=100, description="name for titles and tables")
     mass_g: Annotated[float, Field(gt=0, le=1e6)] | None = Field(None, description="mass, for the force to use")
     density: Annotated[float, Field(gt=0, le=30_000)] | None = Field(

@@ -135,11 +135,7 @@ def changes(theirs: str, ours: str) -> list[tuple[str, Any, Any]]:
 
 def _values(text: str) -> dict[str, Any]:
     """Values by dotted key, without those that change no result."""
-    try:
-        tables = tomllib.loads(text)
-    except RecursionError as error:
-        raise ValueError("nested too deeply") from error
-    values = flat({name: table for name, table in tables.items() if name != "run"})
+    values = flat({name: table for name, table in parse_toml(text, "scene").items() if name != "run"})
     for pose in values.get("candidates.poses", ()):
         # Labels name candidates and change no result.
         pose.pop("label", None)
@@ -154,7 +150,7 @@ def value_text(value: Any) -> str:
 def scene_table(text: str, section: str) -> dict[str, Any]:
     """A section of a stored scene; empty where there is none, or where somebody wrote another text into the file."""
     try:
-        table = tomllib.loads(text).get(section, {})
-    except (tomllib.TOMLDecodeError, RecursionError):
+        table = parse_toml(text, "scene").get(section, {})
+    except SceneError:
         return {}
     return table if isinstance(table, dict) else {}
