@@ -39,10 +39,8 @@ _STYLE: dict[Any, Any] = {
     "ytick.color": INK,
     "lines.linewidth": 1.6,
     "lines.markersize": 4,
-    "hatch.linewidth": 0.7,
     "svg.hashsalt": "softjaw",  # the same file gives the same page, byte for byte
     "svg.fonttype": "path",
-    "figure.dpi": 100,
 }
 
 

@@ -23,7 +23,15 @@ from softjaw.scoring.quality import Score, grasp_score
 from softjaw.study.case.contact import Contact
 from softjaw.study.case.evaluate import soft
 from softjaw.study.case.limit_surface import STANDS_IN, SurfaceFit, fit_surfaces, six_quartic
-from softjaw.study.patch.answer import FITTED_ON, check_facing, contact_of, exact_surface, grasp_lengths, opposite
+from softjaw.study.patch.answer import (
+    FITTED_ON,
+    SURFACES,
+    check_facing,
+    contact_of,
+    exact_surface,
+    grasp_lengths,
+    opposite,
+)
 from softjaw.study.patch.answer import read_patch as read_file
 from softjaw.study.patch.patch_reader import Reading
 from softjaw.study.quantities import checked_model
@@ -325,8 +333,8 @@ def _body(contact: Contact, kind: str, model: str) -> LimitSurface | ExactSurfac
     """Limit surface of a contact per unit of S [-, -, m]."""
     if kind == "exact":
         return exact_surface(contact, model)
-    if kind not in (*ELLIPSOIDS, "quartic"):
-        raise ValueError(f"surface is {kind!r}: expected one of {', '.join((*ELLIPSOIDS, 'quartic', 'exact'))}")
+    if kind not in SURFACES:
+        raise ValueError(f"surface is {kind!r}: expected one of {', '.join((*SURFACES, 'exact'))}")
     return _fit(contact, kind, model, FITTED_ON).body(contact.mu)
 
 

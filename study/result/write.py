@@ -98,15 +98,10 @@ class ResultWriter:
     def _kept(self, row: int, message: str) -> list[np.ndarray]:
         """The stored values of a row, tried on the mesh that is wanted, with one more message."""
         assert self._wanted is not None
-        values: list[np.ndarray] = []
-        for column, dataset in zip(self.layout.columns, self._columns, strict=True):
-            value = np.asarray(dataset[self._index(row)])
-            if column.key == MESH:
-                value = np.asarray(self._wanted[row], column.dtype)
-            elif column.dtype.kind == "S":
-                known = text_of(bytes(value.item()))
-                value = np.array(text_bytes("; ".join(filter(None, (known, NOT_FINER + message))), MESSAGE_BYTES))
-            values.append(value)
+        values = [np.asarray(dataset[self._index(row)]) for dataset in self._columns]
+        values[[c.key for c in self.layout.columns].index(MESH)] = self._wanted[row]
+        known = text_of(bytes(values[-1].item()))
+        values[-1] = np.array(text_bytes("; ".join(filter(None, (known, NOT_FINER + message))), MESSAGE_BYTES))
         return values
 
     def _store(self, row: int, values: Sequence[np.ndarray], state: int) -> None:
@@ -119,20 +114,17 @@ class ResultWriter:
         if not self._attempts[index]:  # a row that is stored is begun: only such a one may be without its mark
             self._attempts[index] = 1
         # Values, sums, state: a kill in between leaves a row that reads as not computed.
-        for column, dataset, value in zip(self.layout.columns, self._columns, values, strict=True):
-            if column.dtype.kind == "S":
-                dataset[index] = value.astype(dataset.dtype)  # with its encoding
-            elif value.size:
-                _write_block(dataset, index, value)
-        _write_block(self._sums, index, checksums.of_row(self.layout, values, state))
+        for dataset, value in zip(self._columns, values, strict=True):
+            dataset[index] = value.astype(dataset.dtype)  # a text with its encoding
+        self._sums[index] = checksums.of_row(self.layout, values, state)
         self._code[index] = state
 
     def _index(self, row: int) -> tuple[int, ...]:
         return tuple(int(i) for i in np.unravel_index(row, self.layout.shape))
 
     def read(self, path: str) -> np.ndarray:
-        """Any dataset below ``/study`` (``e_n/ccm``)."""
-        return self._file[f"{ROOT}/{path}"][()]
+        """Any dataset by its path below ``/study`` (``e_n/ccm``), or the key of its quantity."""
+        return self._file[self.layout.paths.get(path, f"{ROOT}/{path}")][()]
 
     def result(self) -> Result:
         """The same file for reading; not to be closed by itself."""
@@ -200,14 +192,6 @@ class Files:
         """Close on all ranks."""
         for writer in self.writers:
             writer.close()
-
-
-def _write_block(dataset: h5py.Dataset, index: tuple[int, ...], value: np.ndarray) -> None:
-    """``dataset[index] = value`` for numbers, without what h5py spends on understanding the index."""
-    count = (1,) * len(index) + value.shape
-    place = dataset.id.get_space()
-    place.select_hyperslab(index + (0,) * value.ndim, count)
-    dataset.id.write(h5py.h5s.create_simple(count), place, np.ascontiguousarray(value).reshape(count))
 
 
 def blank(layout: Layout, message: str = "", seconds: float = math.nan) -> list[np.ndarray]:
