@@ -115,6 +115,8 @@ class Quantity:
         What the integers 0, 1, ... of a code mean; -1 is none.
     error : str
         Where two meshes tell the error of a map, what it is: "relative", or "absolute" in the unit; else nothing.
+    of : str
+        The map whose error it is, in whose group it stands.
     """
 
     name: str
@@ -128,6 +130,7 @@ class Quantity:
     rank: int = 0
     meanings: tuple[str, ...] = ()
     error: str = ""
+    of: str = ""
 
     @property
     def key(self) -> str:
@@ -155,6 +158,7 @@ class Quantity:
         return Quantity(
             f"{self.name}_error", (), "" if relative else self.unit, f"{'relative ' * relative}error of {self.name}",
             f"{MESHES}{' (CCM)' * self.by_model}{', over its value' * relative}.", needs=(*self.needs, NEEDS[0]),
+            of=self.name,
         )  # fmt: skip
 
 

@@ -46,6 +46,8 @@ def of_cases(layout: Any) -> Iterator[Dataset]:
         if q.group == "maps":
             parts = {f"{q.key}/{model}": model for model in MODELS} if q.by_model else {q.key: q.name}
             names = {key: f"{ROOT}/{q.name}/{part}" for key, part in parts.items()}
+            if q.of and names[q.key] not in layout.stored:  # files of before have a group for each error
+                names[q.key] = f"{ROOT}/{q.of}/error"
         dims = () if len(names) > 1 else q.dims
         share, (kind, fill) = tuple(layout.lengths[dim] for dim in dims), _stored_as(q)
         for key, path in names.items():

@@ -67,7 +67,7 @@ def finalise(writer: Any, scene: Scene) -> None:
     if LOW in wanted:
         factor = writer.read("safety_factor/ccm")
         writer.write_derived(LOW, first_crossing(forces, factor, scene.task.safety))
-        stated = writer.read("payload_error/payload_error") if scene.accuracy.meshes > 1 else 0.0
+        stated = writer.read("maps/payload_error") if scene.accuracy.meshes > 1 else 0.0
         writer.write_derived(LOW_ERROR, crossing_error(forces, factor, scene.task.safety, stated))
     if HIGH in wanted:
         writer.write_derived(HIGH, _largest(writer, scene, forces))

@@ -100,6 +100,11 @@ class Layout:
         """Paths of the datasets that a row has a checksum for, the state last."""
         return (*(self.stored or (c.path for c in self.columns)), CODE)
 
+    @cached_property
+    def paths(self) -> dict[str, str]:
+        """Path of every column by the key of its quantity."""
+        return {c.key: c.path for c in self.columns}
+
     @property
     def closing(self) -> tuple[str, ...]:
         """What is filled after all rows and has a checksum, by its dataset's name below ``/study``."""

@@ -198,9 +198,9 @@ def _variable(result: Result, q: Quantity) -> xr.Variable:
     """A quantity of all cases."""
     names = result.layout.names
     if q.group == "maps" and q.by_model:
-        values = np.stack([result.read(f"{q.name}/{model}") for model in MODELS], axis=-1)
+        values = np.stack([result.read(f"{q.key}/{model}") for model in MODELS], axis=-1)
     else:
-        values = result.read(f"{q.name}/{q.name}" if q.group == "maps" else q.key)
+        values = result.read(q.key)
     if values.dtype.kind == "f":
         values[result.status != DONE] = np.nan
     return xr.Variable((*names, *q.dims), values, _about(q))

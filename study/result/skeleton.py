@@ -283,7 +283,7 @@ def groups(layout: Layout) -> dict[str, dict[str, Any]]:
     attributes: dict[str, dict[str, Any]] = {"map": plot | first | {"axes": axes_of(layout, layout.shown)}}
     del attributes["map"]["default_slice"]
     for q in layout.quantities:
-        if q.group != "maps":
+        if q.group != "maps" or q.of:
             continue
         several = {"signal": MODELS[0], "auxiliary_signals": list(MODELS[1:])}
         signal = several if q.by_model else {"signal": q.name}

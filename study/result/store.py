@@ -79,8 +79,9 @@ class Result:
         self.file.close()
 
     def read(self, path: str) -> np.ndarray:
-        """A dataset of the layout below ``/study``, for example ``checks/adhesion`` or ``e_n/pcm``."""
-        full = f"{ROOT}/{path}"
+        """A dataset by its path below ``/study`` (``e_n/pcm``), or the key of its quantity (``checks/adhesion``)."""
+        full = self.layout.paths.get(path, f"{ROOT}/{path}")
+        path = full.removeprefix(f"{ROOT}/")
         if self._unchecked or full not in self.layout.summed[:-1]:
             return self.file.values(self._checked(path))
         # States before values: a row that is marked has all its values.

@@ -121,7 +121,7 @@ def unfinished(result: Any) -> bool:
 def largest_stated_error(result: Any) -> str:
     """The largest stated error so far of what the scene's target is for."""
     row = map_row(aim(result)[0]).of_error
-    errors = result.read(f"{row.name}/{row.name}") if row in result.layout.quantities else None
+    errors = result.read(row.key) if row in result.layout.quantities else None
     return "; ".join(largest_error(errors, result, result.axes, result.labels, meshes(result)))
 
 

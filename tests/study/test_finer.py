@@ -86,7 +86,7 @@ def test_the_best_of_a_sampled_study_are_solved_well_with_the_same_bits_on_any_r
     assert differing(runs[2], expected) == []
     with open_result(runs[0]) as result:
         mesh, payload = (result.read(name).reshape(-1, 2) for name in ("work/mesh", "payload/ccm"))
-        error = result.read("payload_error/payload_error").reshape(-1, 2)
+        error = result.read("payload/error").reshape(-1, 2)
         finer = result.layout.finer
     assert (mesh[:, 0] == 0).all()  # the force that is shown is the largest
     assert (mesh[:, 1] > 0).sum() == len(finer) >= LISTED

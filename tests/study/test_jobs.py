@@ -93,4 +93,4 @@ def curvature_costs(result):
         claimed = result.read(f"{name}_overestimate_pcm_projected/{name}_overestimate_pcm_projected")
         assert (claimed <= 1e-12).all(), name
     for name in ("e_n", "tau_z_max", "f_y_overestimate"):
-        assert np.isfinite(result.read(f"{name}_error/{name}_error")).all()
+        assert np.isfinite(result.read(f"{name}/error")).all()

@@ -36,7 +36,7 @@ def test_what_is_linear_is_met_and_the_error_of_a_point_holds_that_of_the_cases(
     assert found.e_n == pytest.approx(linear(*points(300)), rel=1e-12)
     assert found.error("e_n") == pytest.approx(np.zeros(300), abs=1e-15)
     assert found.value("e_n", "pcm") == pytest.approx(1.1 * found.e_n, rel=1e-12)
-    errors = {"e_n_error__e_n_error": 0.02, "opening_loaded_error__opening_loaded_error": 1e-4}
+    errors = {"e_n__error": 0.02, "opening_loaded__error": 1e-4}
     path = make(tmp_path / "two.hdf", meshes=2, opening_loaded__opening_loaded=0.03, **errors)
     point = GraspMap(path).at(0.02, 0.0, 3.0)
     assert point.error("e_n") == pytest.approx(0.02 * point.e_n, rel=1e-12)

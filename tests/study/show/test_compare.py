@@ -22,13 +22,13 @@ SOFTER = SCENE + "[friction]\nmu = 0.5\n"
 @pytest.fixture(scope="module")
 def pair(tmp_path_factory):
     folder = tmp_path_factory.mktemp("compare")
-    a = make(folder / "a.hdf", axes=grid_axes(STATIONS[:4]), meshes=2, e_n_error__e_n_error=0.01)
+    a = make(folder / "a.hdf", axes=grid_axes(STATIONS[:4]), meshes=2, e_n__error=0.01)
 
     def larger(station, angle, force):
         return linear(station, angle, force) * np.where(angle < 0.1, 1.005, 1.1)
 
     shared = grid_axes([*STATIONS[1:4], 0.1], forces=[2.0, 4.0, 5.0])
-    b = make(folder / "b.hdf", larger, shared, SOFTER, meshes=2, e_n_error__e_n_error=0.01, **without_result(2, "slid"))
+    b = make(folder / "b.hdf", larger, shared, SOFTER, meshes=2, e_n__error=0.01, **without_result(2, "slid"))
     return a, b
 
 
