@@ -11,7 +11,7 @@ from scipy.optimize import nnls
 
 from softjaw.lsfit.form import exponents, monomials
 from softjaw.lsfit.samples import FLAT_RATIO, pressed, principal_frame
-from softjaw.lsfit.sos import least_in_cone, quadratic_parts
+from softjaw.lsfit.sos import least_in_cone, parts, quadratic_map
 from softjaw.lsfit.surface import ZERO_SHARE, FitFlag, FloatArray, LimitSurface, rows
 
 MAX_REACH_RATIO = 10.0  # of a fitted surface to the largest sample
@@ -152,7 +152,7 @@ def _quadratic_form(Y: FloatArray) -> tuple[FloatArray, FitFlag]:
     ball = (E == 2).any(axis=1) / r
     N, b = M.T @ M / m, np.full(m, 1 / m) @ M
     a, flag = nearest_solution(N, b, ball)
-    place, triangle = quadratic_parts(r)
+    place, triangle = parts(quadratic_map, r)
     A = (place @ a).reshape(r, r)
     # this eigenvalue belongs to an axis MAX_REACH_RATIO times as long as the farthest sample
     floor = 1 / (MAX_REACH_RATIO * np.linalg.norm(Y, axis=1).max()) ** 2

@@ -15,6 +15,7 @@ Blekherman, Parrilo, "Convex ternary quartics are SOS-convex" (2024).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
 
 import clarabel
@@ -77,21 +78,15 @@ def upper_triangle(A: csr_array) -> csr_array:
 
 
 @lru_cache
-def _maps(dimension: int) -> tuple[FloatArray, csr_array]:
-    A = gram_map(dimension)
-    return A.toarray(), upper_triangle(A)
-
-
-@lru_cache
-def quadratic_parts(dimension: int) -> tuple[FloatArray, csr_array]:
-    """Map from coefficients of a quadratic form to its matrix ``(d * d, k)``, and the upper triangle of that."""
-    A = quadratic_map(dimension)
+def parts(of: Callable[[int], csr_array], dimension: int) -> tuple[FloatArray, csr_array]:
+    """A map from coefficients to a matrix, `gram_map` or `quadratic_map`, in full, and the upper triangle of it."""
+    A = of(dimension)
     return A.toarray(), upper_triangle(A)
 
 
 def gram_matrix(v: FloatArray, free: FloatArray, dimension: int) -> FloatArray:
     """Gram matrix ``(d * d, d * d)`` of the quartic with coefficients ``v (k,)`` and free numbers ``(f,)``."""
-    return (_maps(dimension)[0] @ np.concatenate([v, free])).reshape(dimension**2, dimension**2)
+    return (parts(gram_map, dimension)[0] @ np.concatenate([v, free])).reshape(dimension**2, dimension**2)
 
 
 def convex_least_squares(
@@ -116,7 +111,7 @@ def convex_least_squares(
     H, g = np.zeros((len(ball),) * 2), np.zeros(len(ball))
     H[:k, :k], g[:k] = N, b
     # few samples leave Clarabel short of its own tolerance; what it reached is near enough to be mended below
-    x = least_in_cone(H, g, _maps(dimension)[1], floor)
+    x = least_in_cone(H, g, parts(gram_map, dimension)[1], floor)
     lack = floor / 2 - smallest(gram_matrix(x[:k], x[k:], dimension))
     # a mixture of two sos-convex forms is one, and that of the ball lifts every eigenvalue
     if lack > 0:

@@ -81,39 +81,13 @@ def payload(
     size = float(np.linalg.norm(P[:, :3], axis=1).sum())
     V1, V2 = (np.ascontiguousarray(getattr(c.body, "vertices").T) / size for c in contacts)  # noqa: B009
     C[:, :, 0] /= size
-    grasp = _Grasp(C, V1, V2, KINDS.index(kind))
+    grasp = C, V1, V2, KINDS.index(kind)
     answer = _along(grasp, _unit(direction)) if direction is not None else _worst(grasp)
     return Payload(size * answer.force, size * answer.upper, answer.direction, answer.borne)
 
 
-@dataclass(frozen=True)
-class _Grasp:
-    """Both contacts, forces in units of that of the grasp: ``C (2, 6, 4)``, vertices ``(3, k)``, and the kind."""
-
-    C: FloatArray
-    V1: FloatArray
-    V2: FloatArray
-    kind: int
-
-    def begin(self, rows: FloatArray) -> FloatArray:
-        """Basis that fulfils the rows with the least that no point takes."""
-        m = len(rows) + 1
-        basis = np.zeros((m, 8))
-        # every row but the last, which counts the points, begins with a column of its own
-        basis[:, 7] = np.arange(1, m + 1)
-        first, _ = _farthest(self.C, self.V1, self.V2, self.kind, np.ones(6))
-        basis[-1, :6], basis[-1, 6:] = first, (1.0, 0.0)
-        off = TORQUE_OFFSET * np.sqrt(np.arange(2.0, m + 1)) - rows @ first
-        basis[:-1, 6] = np.where(off < 0, -1.0, 1.0)
-        return basis
-
-    def farthest(self, along: FloatArray, rows: FloatArray, basis: FloatArray) -> tuple[float, FloatArray, FloatArray]:
-        """Support of the section, the point ``(6,)`` that it touches and its basis; -inf where the section is empty."""
-        new = basis.copy()
-        upper, point, missing = _programme(
-            self.C, self.V1, self.V2, self.kind, np.append(along, np.zeros(3)), rows, new
-        )
-        return (upper if missing < ROUNDING_FORCE else -np.inf), point, new
+# both contacts, forces in units of that of the grasp: C (2, 6, 4), vertices (3, k) of each, and the kind
+_Grasp = tuple[FloatArray, FloatArray, FloatArray, int]
 
 
 def _along(grasp: _Grasp, d: FloatArray) -> Payload:
@@ -122,8 +96,9 @@ def _along(grasp: _Grasp, d: FloatArray) -> Payload:
     across = np.linalg.svd(d[None])[2][1:]
     rows = np.zeros((5, 6))
     rows[:3, 3:], rows[3:, :3] = np.eye(3), across
-    most, point, basis = grasp.farthest(-d, rows, grasp.begin(rows))
-    least = -grasp.farthest(d, rows, basis)[0]  # from which load on: 0 or less where none is needed
+    section = _Section(grasp, rows)
+    most, point, basis = section.farthest(-d, section.begin)
+    least = -section.farthest(d, basis)[0]  # from which load on: 0 or less where none is needed
     if most < -ROUNDING_FORCE or least > ROUNDING_FORCE:
         return Payload(0.0, 0.0, d, False)
     return Payload(max(float(-d @ point[:3]), 0.0), max(most, 0.0), d, True)
@@ -131,9 +106,8 @@ def _along(grasp: _Grasp, d: FloatArray) -> Payload:
 
 def _worst(grasp: _Grasp) -> Payload:
     """Largest load in every direction, and one in which a larger one is lost."""
-    rows = np.hstack([np.zeros((3, 3)), np.eye(3)])
-    begin = grasp.begin(rows)
-    search = _Search(grasp, rows)
+    search = _Section(grasp, np.hstack([np.zeros((3, 3)), np.eye(3)]))
+    begin = search.begin
     for u in np.vstack([np.eye(3), -np.eye(3)]):
         begin = search.look(u, begin)
         if search.upper < -ROUNDING_FORCE:
@@ -148,11 +122,22 @@ def _worst(grasp: _Grasp) -> Payload:
     return Payload(force, max(search.upper, 0.0), -search.u, search.upper >= -ROUNDING_FORCE)
 
 
-class _Search:
-    """Points of the section that directions have found, and the least support among them with its direction."""
+class _Section:
+    """Points of W without a part along ``rows (m, 6)``: those that directions have found, and the least support.
+
+    ``upper`` is that support, along ``u``; ``begin (m + 1, 8)``: basis that fulfils the rows with the least that no
+    point takes.
+    """
 
     def __init__(self, grasp: _Grasp, rows: FloatArray) -> None:
-        self.grasp, self.rows = grasp, rows
+        self.grasp, self.rows, m = grasp, rows, len(rows) + 1
+        self.begin = np.zeros((m, 8))
+        # every row but the last, which counts the points, begins with a column of its own
+        self.begin[:, 7] = np.arange(1, m + 1)
+        first, _ = _farthest(*grasp, np.ones(6))
+        self.begin[-1, :6], self.begin[-1, 6:] = first, (1.0, 0.0)
+        off = TORQUE_OFFSET * np.sqrt(np.arange(2.0, m + 1)) - rows @ first
+        self.begin[:-1, 6] = np.where(off < 0, -1.0, 1.0)
         self.points: list[FloatArray] = []
         self.bases: list[FloatArray] = []
         self.upper, self.u = np.inf, np.zeros(3)
@@ -162,9 +147,15 @@ class _Search:
         """Forces ``(n, 3)`` of the points."""
         return np.array(self.points)
 
+    def farthest(self, along: FloatArray, basis: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+        """Support of the section, the point ``(6,)`` that it touches and its basis; -inf where the section is empty."""
+        new = basis.copy()
+        upper, point, missing = _programme(*self.grasp, np.append(along, np.zeros(3)), self.rows, new)
+        return (upper if missing < ROUNDING_FORCE else -np.inf), point, new
+
     def look(self, u: FloatArray, start: FloatArray) -> FloatArray:
         """Add the point that is farthest in a direction; the basis it was found with."""
-        support, point, basis = self.grasp.farthest(u, self.rows, start)
+        support, point, basis = self.farthest(u, start)
         self.points.append(point[:3])
         self.bases.append(basis)
         if support < self.upper:

@@ -175,7 +175,7 @@ def test_few_samples_are_flagged_and_stay_bounded(K):
 
 def test_a_programme_that_is_not_solved_is_an_error():
     """``x >= 1`` and the slope to minus infinity: there is no least value."""
-    _, triangle = sos.quadratic_parts(2)
+    _, triangle = sos.parts(sos.quadratic_map, 2)
     with pytest.raises(FitError):
         sos.least_in_cone(np.zeros((3, 3)), np.ones(3), triangle, 1.0)
 
