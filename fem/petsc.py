@@ -346,13 +346,10 @@ class NonlinearSolver:
 
     def answer(self, right: FloatArray) -> FloatArray:
         """Solution of a linear system with the last solve's last tangent; its factors are at hand."""
-        b, y = self._f.duplicate(), self._f.duplicate()
-        b.array[:] = self._stepped.right_side(right) if self._stepped else right
-        self._snes.getKSP().solve(b, y)
-        solution = y.array.copy()
-        b.destroy()
-        y.destroy()
-        return solution
+        # between two solves nobody reads these vectors
+        self._f.array[:] = self._stepped.right_side(right) if self._stepped else right
+        self._snes.getKSP().solve(self._f, self._x)
+        return self._x.array.copy()
 
     def forget(self) -> None:
         """Let the next solve be that of a new solver."""

@@ -208,16 +208,14 @@ def _six(twist: ArrayLike) -> FloatArray:
     return six
 
 
-# Reordering of sums lets the loop fill the vector registers. Not among the flags: nnan and ninf, which would allow the
-# compiler to drop the test for a face at rest.
-_FAST = frozenset({"reassoc", "contract", "arcp", "nsz"})
 # Speed below which a face is at rest, for motions and arms that move no face faster than some 1: what rounding of both
 # leaves of a speed of 0. Its force would have its full size and a direction of chance.
 REST = 32 * 2.0**-52
-_REST_SQUARED = REST**2
 
 
-@njit(cache=True, fastmath=set(_FAST))
+# Reordering of sums lets the loop fill the vector registers. Not among the flags: nnan and ninf, which would allow the
+# compiler to drop the test for a face at rest.
+@njit(cache=True, fastmath={"reassoc", "contract", "arcp", "nsz"})
 def friction_sums(arm, normal, load, twist, out):  # pragma: no cover - compiled
     """Wrench and dissipation of unit friction for each motion.
 
@@ -239,7 +237,7 @@ def friction_sums(arm, normal, load, twist, out):  # pragma: no cover - compiled
             vx, vy, vz = v0 - o2 * y + o1 * z, v1 + o2 * x - o0 * z, v2 + o0 * y - o1 * x
             cx, cy, cz = ny * vz - nz * vy, nz * vx - nx * vz, nx * vy - ny * vx
             q = cx * cx + cy * cy + cz * cz
-            s = load[i] / math.sqrt(q) if q > _REST_SQUARED else 0.0
+            s = load[i] / math.sqrt(q) if q > REST * REST else 0.0
             fx, fy, fz = s * (cy * nz - cz * ny), s * (cz * nx - cx * nz), s * (cx * ny - cy * nx)
             f0 += fx
             f1 += fy

@@ -111,11 +111,9 @@ def fit_error(model: LimitSurface, W: ArrayLike, T: ArrayLike) -> FitErrors:
     infinite.
     """
     W, motions = (np.asarray(X, float)[pressed(W)] for X in (W, T))
-    P = model.value(W)
-    with np.errstate(divide="ignore"):
-        radius = np.where(P > ZERO_SHARE, P, 0.0) ** (-1 / model.degree)
+    errors = np.abs(model.value(W) - 1), np.abs(radii(model, W) - 1)
     angles = np.degrees(_angles(model.gradient(W), motions, model.span))
-    return FitErrors(float(np.abs(P - 1).mean()), float(np.abs(radius - 1).mean()), float(angles.mean()))
+    return FitErrors(*(float(error.mean()) for error in (*errors, angles)))
 
 
 def overclaim(model: LimitSurface, W: ArrayLike) -> float:
@@ -123,10 +121,14 @@ def overclaim(model: LimitSurface, W: ArrayLike) -> float:
 
     0 where it claims nowhere more, infinite where it has no end. Samples without a wrench are left out.
     """
-    P = model.value(np.asarray(W, float)[pressed(W)])
+    return max(float(radii(model, np.asarray(W, float)[pressed(W)]).max()) - 1.0, 0.0)
+
+
+def radii(model: LimitSurface, W: FloatArray) -> FloatArray:
+    """Factors that bring normalised wrenches ``(m, d)`` onto a surface; infinite where ``P`` is not above rounding."""
+    P = model.value(W)
     with np.errstate(divide="ignore"):
-        radius = np.where(P > ZERO_SHARE, P, 0.0) ** (-1 / model.degree)
-    return max(float(radius.max()) - 1.0, 0.0)
+        return np.where(P > ZERO_SHARE, P, 0.0) ** (-1 / model.degree)
 
 
 def _angles(G: FloatArray, T: FloatArray, span: FloatArray) -> FloatArray:

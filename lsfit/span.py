@@ -31,7 +31,7 @@ from softjaw.lsfit.form import exponents, monomial_gradients, monomials
 from softjaw.lsfit.lowest import lies_above, smallest_value
 from softjaw.lsfit.quartic import Quartic
 from softjaw.lsfit.quartic_fit import convex_quartic
-from softjaw.lsfit.samples import FLAT_RATIO, THIN_RATIO, FitErrors, fit_error
+from softjaw.lsfit.samples import FLAT_RATIO, THIN_RATIO, FitErrors, fit_error, radii
 from softjaw.lsfit.sos import conic_solution, gram_map, quadratic_map, side, upper_triangle
 from softjaw.lsfit.surface import FitError, FitFlag, FloatArray, LimitSurface
 
@@ -199,9 +199,8 @@ def _cones(m: int, d: int, k: int, size: int) -> list:
 
 def refuse_runaway(surface: Quartic | Ellipsoid, Y: FloatArray) -> None:
     """Raise `FitError` if ``surface`` lies twice as far out as the samples ``Y``."""
-    with np.errstate(divide="ignore"):
-        # the median, as single bad samples may lie anywhere
-        median = float(np.median(np.maximum(surface.value(Y), 0.0)) ** (-1 / surface.degree))
+    # the median, as single bad samples may lie anywhere
+    median = float(np.median(radii(surface, Y)))
     if median > 2:
         raise FitError(
             f"the surface lies {median:.3g} times as far out as half of the {len(Y)} samples: give more of them"

@@ -249,7 +249,8 @@ class Stepping:
         here = self._begin(x, reached, work)
         done, cut = 0.0, 1.0
         while done < 1.0:
-            allowed = self._allowed(here, force - reached)
+            # all of a step that nothing is foretold of: NaN compares as false
+            allowed = LONGEST / max(LONGEST, self._foretold(here, force - reached))
             goal = min(1.0, done + cut * allowed)
             target = force if goal == 1.0 else reached + goal * (force - reached)
             try:
@@ -342,12 +343,6 @@ class Stepping:
         # pads get stiffer as the contact spreads: by the root of the force the path is straighter than by the force
         step = -2.0 * here.force * (np.sqrt(force / here.force) - 1.0) * here.tangent
         return here.x - self.problem.shorten(here.x, step) * step
-
-    def _allowed(self, here: _Place, step: float) -> float:
-        """Part of a step [N] that may be made at once; all of it where nothing is foretold."""
-        foretold = self._foretold(here, step)
-        # NaN compares as false: the whole step where nothing is foretold
-        return LONGEST / foretold if foretold > LONGEST else 1.0
 
     def _foretold(self, here: _Place, step: float) -> float:
         """Closing displacement over thickness that the tangent foretells for a step [N]; NaN if unknown."""

@@ -79,18 +79,15 @@ class Press(LoadPath[RigidProblem]):
 
     def _keeps_laws(self, x: FloatArray) -> bool:
         """Whether an iterate that no solve has ended at keeps all laws of contact to `ALTERNATING`."""
-        # vinewtonrsls has another residual, which says nothing of pressures at their bounds
-        if self.problem.complementarity:
-            return False
         residual = self.problem.residual(x)[: self.pad.closing_dof + 1]
-        if not np.isfinite(residual).all():
+        # vinewtonrsls has another residual, which says nothing of pressures at their bounds
+        if self.problem.complementarity or not np.isfinite(residual).all():
             return False
-        force, state = self.problem.normal_force(x), self.problem.contact_state(x)
-        if not force > 0.0:
+        if not (force := self.problem.normal_force(x)) > 0.0:
             return False
         try:
             imbalance = float(np.abs(residual).max()) / self.pad.share
-            check(self.problem.foam, x, state, imbalance, force, RESIDUAL, ALTERNATING)
+            check(self.problem.foam, x, self.problem.contact_state(x), imbalance, force, RESIDUAL, ALTERNATING)
         except CheckError:
             return False
         return True

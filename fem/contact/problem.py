@@ -462,15 +462,10 @@ class SpringBed:
         # foam that hardly changes its volume would start with huge stresses
         # Poisson's ratio above which shortened columns are a worse start than columns that only move
         if pad.material.poisson_ratio <= 0.45:
-            u[:, 2] -= shortening[self._column] * (1.0 + pad.nodes[:, 2] / pad.shape.size[2])
+            i, j = pad.places(pad.nodes[:, :2])  # of the node of the contact face above each: columns are straight
+            u[:, 2] -= shortening[i * pad.contact_grid[1] + j] * (1.0 + pad.nodes[:, 2] / pad.shape.size[2])
         x = np.zeros(pad.size)
         x[pad.dofs[pad.dofs >= 0]] = u[pad.dofs >= 0]
         x[pad.closing_dof] = closing
         x[pad.closing_dof + 1 :] = shortening
         return x
-
-    @cached_property
-    def _column(self) -> NDArray[np.int64]:
-        """For every node the index, in ``contact_nodes``, of the node above it (columns are straight)."""
-        i, j = self.pad.places(self.pad.nodes[:, :2])
-        return i * self.pad.contact_grid[1] + j

@@ -14,7 +14,7 @@ import re
 import warnings
 import zipfile
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from softjaw.fem.errors import MeshError
 
@@ -184,11 +184,6 @@ class _Beside:
     __getitem__ = get
 
 
-def _geometries(scene: Any) -> list[str]:
-    """Names of a scene's bodies, once for each place."""
-    return [scene.graph[node][1] for node in scene.graph.nodes_geometry]
-
-
 def _loaded(path: Path, data: bytes) -> trimesh.Trimesh:
     """The mesh as trimesh reads it: no other file is opened, nothing is changed."""
     import numpy as np
@@ -202,7 +197,10 @@ def _loaded(path: Path, data: bytes) -> trimesh.Trimesh:
             scene = trimesh.load_scene(
                 io.BytesIO(data), file_type=kind, process=False, maintain_order=True, skip_materials=True, **options
             )
-            placed = sum(len(getattr(scene.geometry[name], "faces", ())) for name in _geometries(scene))
+            bodies = [
+                scene.geometry[scene.graph[node][1]] for node in scene.graph.nodes_geometry
+            ]  # once for each place
+            placed = sum(len(getattr(body, "faces", ())) for body in bodies)
             if placed > MOST_FACES:
                 raise ValueError(f"its bodies have {placed} faces, expected at most {MOST_FACES}")
             mesh = scene.to_mesh()

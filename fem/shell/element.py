@@ -16,7 +16,7 @@ Arithmetic is strict IEEE, as in ``fem.materials``.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Generic, TypeVar
+from typing import Generic, TypeVar
 
 import numpy as np
 from scipy.sparse import bsr_matrix
@@ -79,33 +79,23 @@ def patch(X: FloatArray, normal: FloatArray, thickness: float) -> ShellMesh:
     return ShellMesh(X.reshape(-1, 3), np.ascontiguousarray(D.reshape(-1, 3)), grid_elements(number))
 
 
-@dataclass(frozen=True)
-class Elements:
-    """What never changes about the elements of a shell; ``weights`` as in ``fem.shell.element_kernel``.
-
-    ``stiffness`` of the strains: in the middle surface at each Gauss point ``thickness dA E / (1 - nu^2)`` [N], in
-    bending a third of that; of the shear at the centre, the transverse shears on the four sides and the thickness
-    strains. ``start``: the quadratic forms of the reference state, from which strains are differences; ``area``: of
-    each Gauss point [m^2].
-    """
-
-    nodes: IntArray
-    weights: FloatArray
-    stiffness: FloatArray
-    start: FloatArray
-    area: FloatArray
-
-    @property
-    def loops(self) -> tuple[Any, ...]:
-        """Leading arguments of the compiled loops."""
-        return self.nodes, self.weights, self.stiffness, self.start
-
-
-def elements(X: FloatArray, D: FloatArray, nodes: IntArray, young_modulus: float, poisson_ratio: float) -> Elements:
-    """Constants of the elements between nodes at ``X (k, 3)`` with directors ``D (k, 3)`` [m].
+def elements(
+    X: FloatArray, D: FloatArray, nodes: IntArray, young_modulus: float, poisson_ratio: float
+) -> tuple[tuple[IntArray, FloatArray, FloatArray, FloatArray], FloatArray]:
+    """Constants of the elements between nodes at ``X (k, 3)`` with directors ``D (k, 3)`` [m], and their areas.
 
     The element's first direction crossed with its second must point to the side of ``D``. Two neighbouring nodes of an
     element may coincide (a triangle at the middle of a disc).
+
+    Returns
+    -------
+    nodes, weights, stiffness, start
+        ``weights`` as in ``fem.shell.element_kernel``; ``stiffness`` of the strains: in the middle surface at each
+        Gauss point ``thickness dA E / (1 - nu^2)`` [N], in bending a third of that; of the shear at the centre, the
+        transverse shears on the four sides and the thickness strains; ``start``: the quadratic forms of the reference
+        state, from which strains are differences.
+    area : (n, 4) array
+        Of each Gauss point [m^2].
 
     Raises
     ------
@@ -150,7 +140,7 @@ def elements(X: FloatArray, D: FloatArray, nodes: IntArray, young_modulus: float
     stiffness[:, 22:, 22:] = np.einsum("nq,qi,qj->nij", E * volume / h**4, N_G, N_G)
     start = np.zeros((len(nodes), STRAINS))
     kernel.forms(nodes, weights, np.hstack([X, D]), start)
-    return Elements(nodes, weights, stiffness, start, area)
+    return (nodes, weights, stiffness, start), area
 
 
 def _weights(plane: FloatArray, twist: FloatArray) -> FloatArray:
@@ -212,6 +202,8 @@ class Shell(Generic[MeshT]):
     ----------
     springs : (6 k,) array
         Stiffness to ground of every number [N/m], 0 until it is set; the weak springs of a freely held object.
+    loops : tuple
+        Leading arguments of the compiled loops, see `elements`.
     size : int
         ``6 k``.
     start, column : (6 k + 1,), (nnz,) arrays
@@ -222,18 +214,16 @@ class Shell(Generic[MeshT]):
 
     def __init__(self, mesh: MeshT, young_modulus: float, poisson_ratio: float) -> None:
         self.mesh, self.young_modulus, self.poisson_ratio = mesh, float(young_modulus), float(poisson_ratio)
-        self.elements = elements(mesh.X, mesh.D, mesh.elements, self.young_modulus, self.poisson_ratio)
+        self.loops, area = elements(mesh.X, mesh.D, mesh.elements, self.young_modulus, self.poisson_ratio)
         self.size = 6 * len(mesh.X)
         self.springs = np.zeros(self.size)
         self._reference = np.hstack([mesh.X, mesh.D])
-        self.node_area = np.bincount(
-            mesh.elements.ravel(), (self.elements.area @ kernel.N_G).ravel(), minlength=len(mesh.X)
-        )
+        self.node_area = np.bincount(mesh.elements.ravel(), (area @ kernel.N_G).ravel(), minlength=len(mesh.X))
         self._build_pattern()
 
     def _build_pattern(self) -> None:
         """Blocks of 6 x 6 between nodes that share an element."""
-        nodes, n = self.elements.nodes, len(self.mesh.X)
+        nodes, n = self.loops[0], len(self.mesh.X)
         rows, columns = pairs(nodes[:, :, None], nodes[:, None, :])
         graph = Pattern(n, rows, columns)
         count = np.diff(graph.start)
@@ -255,7 +245,7 @@ class Shell(Generic[MeshT]):
     def residual(self, q: FloatArray) -> FloatArray:
         """Inner forces of the state ``q (6 k,)``, springs included: ``(6 k,)`` [N]."""
         out = (self.springs * q).reshape(-1, 6)
-        kernel.residual(*self.elements.loops, self._reference + q.reshape(-1, 6), out)
+        kernel.residual(*self.loops, self._reference + q.reshape(-1, 6), out)
         return out.ravel()
 
     def tangent(self, q: FloatArray, before: FloatArray | None = None) -> FloatArray:
@@ -276,7 +266,7 @@ class Shell(Generic[MeshT]):
         q = q.reshape(-1, 6)
         # an array without rows, so that the compiled loop sees one type
         step = NO_STEP if before is None else q - before.reshape(-1, 6)
-        kernel.tangent(*self.elements.loops, self._reference + q, step, self._place, self._width, values)
+        kernel.tangent(*self.loops, self._reference + q, step, self._place, self._width, values)
         return values
 
     def entries(self, unknown: IntArray) -> tuple[IntArray, IntArray]:

@@ -97,7 +97,8 @@ def grasp(body: ThinWalled, poses: tuple[Pose, Pose], allowed: tuple[bool, bool]
     # an approach along the axis has no angle about it, and any will do
     angle = float(np.arctan2(-approach[1], -approach[0])) if np.hypot(*approach[:2]) > 1e-6 else 0.0
     turned = body.surface.turned(angle)
-    turned_poses = tuple(_turned(pose, angle) for pose in poses)
+    turn = about_z(-angle)
+    turned_poses = tuple(Pose(turn @ pose.rotation, turn @ pose.origin) for pose in poses)
     size = max(np.abs(pose.origin).max() for pose in turned_poses)
 
     def alike(p: Pose, q: Pose) -> bool:
@@ -108,7 +109,8 @@ def grasp(body: ThinWalled, poses: tuple[Pose, Pose], allowed: tuple[bool, bool]
     across = allowed[1] and turned.symmetric[1] and all(_is_own_image(pose, NEGLIGIBLE * size) for pose in turned_poses)
     between = allowed[0] and turned.symmetric[0] and alike(_image(turned_poses[0]), turned_poses[1])
     flipped = tuple(across and pose.rotation[1, 1] < 0 for pose in turned_poses)
-    solved = tuple(_half_turned(p) if flip else p for p, flip in zip(turned_poses, flipped, strict=True))
+    halves = zip(turned_poses, flipped, strict=True)
+    solved = tuple(Pose(p.rotation @ HALF_TURN, p.origin) if flip else p for p, flip in halves)
     n = 1 if between else 2
     return Grasp(angle, solved[:n], flipped[:n], (between, across))
 
@@ -156,16 +158,6 @@ def _footprint(held: Grasp, pad_size: Sequence[float]) -> tuple[float, float, fl
     ends = points[:, 2].min() - margin, points[:, 2].max() + margin, np.abs(points[:, 1]).max() + margin
     low, high, half = (float(np.round(v, 9)) for v in ends)  # alike for candidates that differ by rounding alone
     return low, high, half
-
-
-def _turned(pose: Pose, angle: float) -> Pose:
-    turn = about_z(-angle)
-    return Pose(turn @ pose.rotation, turn @ pose.origin)
-
-
-def _half_turned(pose: Pose) -> Pose:
-    """The pad turned by half a turn about its approach."""
-    return Pose(pose.rotation @ HALF_TURN, pose.origin)
 
 
 def _image(pose: Pose) -> Pose:

@@ -169,10 +169,11 @@ def faces(shell: Shell[BodyMesh], q: FloatArray) -> tuple[FaceState, FaceState]:
 
 def middles(shell: Shell, q: FloatArray) -> tuple[FaceState, FaceState]:
     """Outer and inner face in the middles of the ``n`` elements in the state ``q (6 k,)``."""
-    parts, e = shell.elements, np.empty((len(shell.elements.nodes), kernel.STRAINS))
+    nodes, weights, _, start = shell.loops
+    e = np.empty((len(nodes), kernel.STRAINS))
     x = np.hstack([shell.mesh.X, shell.mesh.D]) + q.reshape(-1, 6)
-    kernel.forms(parts.nodes, parts.weights, x, e)
-    e -= parts.start
+    kernel.forms(nodes, weights, x, e)
+    e -= start
     membrane, bending = (e[:, first : first + 8].reshape(-1, 4, 2).mean(axis=1) for first in (0, 8))
     outer, inner = (
         _state(shell, np.column_stack([membrane + zeta * bending, e[:, 16] + zeta * e[:, 17]])) for zeta in (1.0, -1.0)
