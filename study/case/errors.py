@@ -43,11 +43,7 @@ def mesh_errors(
     coarse mesh that differ too, ``floor`` is a share of the value, `WIDER` for some, and ``left_out`` one of every
     value. ``doubt`` is how many times the distances of meshes count.
     """
-    # of one value for each friction model the curved one's, which comes first; fits would double the time
-    fine_mesh: dict[str, Any] = {key: np.ravel(value)[:1] for key, value in values.items()} | _sums(fine)
-    coarse_mesh: dict[str, Any] = {key: np.ravel(value)[:1] for key, value in other.items()}
-    coarse_mesh |= _grasp(coarse, settings) | _sums(coarse)
-    fine_mesh, coarse_mesh = fine_mesh | _of_faces(fine), coarse_mesh | _of_faces(coarse)
+    fine_mesh, coarse_mesh = _on_mesh(values, fine), _on_mesh(other, coarse) | _grasp(coarse, settings)
     viewed = [_sums(view) | _grasp(view, settings) for view in views]
     compared = [[_all(contacts, settings) for contacts in pair] for pair in pairs]
     errors = {}
@@ -77,7 +73,7 @@ def coarse_errors(
 
     ``values`` are the case's own, ``left_out`` the share of the pressure sum that friction which acted back would add.
     """
-    solved = {key: np.ravel(value)[:1] for key, value in values.items()} | _sums(contacts)
+    solved = _on_mesh(values, contacts)
     viewed = [_sums(view) | _grasp(view, settings) for view in views]
     share, errors = COARSE_FLOOR + OF_TRACTION * left_out, {}
     for q in (q for q in TABLE if q.error and q.key in viewed[0]):
@@ -131,8 +127,16 @@ def distance(value: ArrayLike, other: ArrayLike, kind: str) -> float:
 
 def _all(contacts: Sequence[Any], settings: EvaluationSettings) -> dict[str, Any]:
     """All values that contacts alone tell."""
-    closing = {"maps/closing": [float(np.mean([c.state.closing for c in contacts]))]}
-    return _sums(contacts) | _grasp(contacts, settings) | _of_faces(contacts) | closing
+    closing = np.mean([c.state.closing for c in contacts])
+    return _on_mesh({"maps/closing": closing}, contacts) | _grasp(contacts, settings)
+
+
+def _on_mesh(values: Mapping[str, Any], contacts: Sequence[Contact]) -> dict[str, Any]:
+    """Values of a case, with those of each finger that its contacts alone tell."""
+    # of one value for each friction model the curved one's, which comes first; fits would double the time
+    curved = {key: np.ravel(value)[:1] for key, value in values.items()}
+    faces = {"maps/contact_area": [c.area for c in contacts], "maps/p_max": [c.largest_pressure for c in contacts]}
+    return curved | _sums(contacts) | faces
 
 
 def _grasp(contacts: Sequence[Contact], settings: EvaluationSettings) -> dict[str, Any]:
@@ -140,11 +144,6 @@ def _grasp(contacts: Sequence[Contact], settings: EvaluationSettings) -> dict[st
     values = {"maps/quality": quality(contacts, settings)}
     values |= payload_alone(contacts, settings.surface.samples, settings.task)
     return {key: [value] for key, value in values.items()}
-
-
-def _of_faces(contacts: Sequence[Contact]) -> dict[str, Sequence[float]]:
-    """Quantities that are no sums over a contact, so that only its own faces tell them; of each finger."""
-    return {"maps/contact_area": [c.area for c in contacts], "maps/p_max": [c.largest_pressure for c in contacts]}
 
 
 def _sums(contacts: Sequence[Contact]) -> dict[str, Sequence[float]]:
