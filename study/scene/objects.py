@@ -226,9 +226,7 @@ class Sections(Walled):
 
     SIZE_KEYS = ("sections",)
     shape: Literal["sections"]
-    sections: tuple[SectionTable, ...] = Field(
-        min_length=4, max_length=500, description="cross-sections from bottom to top"
-    )
+    sections: tuple[SectionTable, ...] = Field(min_length=4, max_length=500, description="sections, the lowest first")
 
     def _geometry(self) -> tuple[int, dict[str, Span]]:
         alike = all((s.b_mm or s.a_mm) == s.a_mm and s.exponent == 2.0 for s in self.sections)
@@ -254,9 +252,7 @@ class Mesh(Walled):
     """A triangle mesh from a file."""
 
     shape: Literal["mesh"]
-    mesh: Text = Field(
-        min_length=1, max_length=4000, description=f"file of the mesh ({', '.join(ENDINGS)}), beside the scene file"
-    )
+    mesh: Text = Field(min_length=1, max_length=4000, description=f"mesh file ({', '.join(ENDINGS)}), beside the scene")
     unit: Literal["mm", "cm", "m", "inch"] = Field(description="unit of the mesh file's coordinates")
     axis: Literal["x", "y", "z"] = Field("z", description="axis of the mesh file that becomes the object's axis")
     grid_step_mm: Annotated[float, Field(ge=0.01, le=50)] | Literal["auto"] = Field(

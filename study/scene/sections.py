@@ -68,9 +68,7 @@ class Gripper(SceneSection):
     )
     sheet_thickness_mm: float = Field(2.0, ge=0.05, le=100, description="thickness of the backing plate")
     sheet_modulus_gpa: float = Field(200.0, ge=1e-3, le=2000, description="Young's modulus of the plate; steel: 200")
-    sheet_support_mm: tuple[Extent, Extent] = Field(
-        (20.0, 10.0), description="length and width of the plate's middle that is held"
-    )
+    sheet_support_mm: tuple[Extent, Extent] = Field((20.0, 10.0), description="the plate's held middle, length first")
     tilt_stiffness_nm_per_rad: float | None = Field(
         None, ge=1e-3, le=1e5, description="moment per angle of a mount that lets the pad tilt; left out: it does not"
     )
@@ -177,7 +175,7 @@ class Friction(SceneSection):
 
     mu: float = Field(0.8, ge=0, le=10, description="Coulomb friction coefficient")
     used_by_pressing: bool = Field(
-        False, description="whether the friction that pressing has used is missing for holding (CCM)"
+        False, description="whether friction that pressing uses is missing for holding (CCM)"
     )
 
     def used_rules(self, effects: Effects) -> Errors:
@@ -272,9 +270,7 @@ class Effects(SceneSection):
 class Accuracy(SceneSection):
     """How exactly the contact is solved."""
 
-    meshes: int = Field(
-        2, ge=1, le=2, description="2 solves every case on a coarser mesh too, which tells the error of every number"
-    )
+    meshes: int = Field(2, ge=1, le=2, description="2: each case on a coarser mesh, too, which tells all errors")
     target: float | None = Field(
         None, gt=1e-4, le=0.5, description="largest relative error; a rigid object gets up to two finer meshes for it"
     )
@@ -352,9 +348,7 @@ class Run(SceneSection):
     """Limits for single cases, and what of them is kept. Results do not depend on it."""
 
     patches: Literal["all", "none"] = Field("all", description="whether the pressure on every face is kept")
-    time_limit_s: float = Field(
-        600.0, ge=0.1, le=1e6, description="time after which a case fails; the other cases continue"
-    )
+    time_limit_s: float = Field(600.0, ge=0.1, le=1e6, description="time after which a case fails; the others continue")
     memory_gb: Annotated[float, Field(ge=0.1, le=1e5)] | Literal["auto", "none"] = Field(
         "auto",
         description="memory that the cases of a rank may take; auto is the rank's share of what is free",
