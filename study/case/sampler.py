@@ -142,17 +142,15 @@ def antipodal_grasps(
     others are given where it gets to none.
     """
     surface = np.ascontiguousarray(surface[0]), np.ascontiguousarray(surface[1])
-    offered: list[SampledGrasp] = []
-    seen: list[SampledGrasp] = []
-    over_holes: list[SampledGrasp] = []
+    found: dict[bool | None, list[SampledGrasp]] = {None: [], False: [], True: []}  # by what `offers` says of them
     for grasp, over in offers(surface, jaws, task, seed, samples, lids):
-        (offered if over is None else over_holes if over else seen).append(grasp)
-    # an open box may be held nowhere else
-    seen = seen if any(not grasp.state for grasp in seen) else [*seen, *over_holes]
+        found[over].append(grasp)
+    seen = found[False]
+    if all(grasp.state for grasp in seen):  # an open box may be held nowhere else
+        seen += found[True]
     best = [grasp for grasp in thinned(seen, count, jaws.pad[0], reached) if not grasp.state]
     seen += [climbed(surface, grasp, jaws, task, lids) for grasp in best]
-    seen += offered
-    return thinned(seen, count, jaws.pad[0], reached)
+    return thinned(seen + found[None], count, jaws.pad[0], reached)
 
 
 def offers(

@@ -85,9 +85,8 @@ class Progress:
             return
         self._share, self._printed = share, self._clock()
         text = self.line(codes)
-        stamp = time.strftime("%H:%M:%S")
         # Cleared to the end of the line: a shorter text must not keep the tail of a longer one.
-        self._stream.write(f"\r\x1b[K{text}" if self._live else f"[{stamp}] {text}\n")
+        self._stream.write(f"\r\x1b[K{text}" if self._live else f"[{time.strftime('%H:%M:%S')}] {text}\n")
         self._stream.flush()
 
     def line(self, codes: np.ndarray) -> str:
