@@ -115,6 +115,16 @@ def complain(error: StudyError) -> int:
     return error.code
 
 
+def with_ending(option: str, file: str | Path, *endings: str) -> Path:
+    """The path of a file that an option names.
+
+    Raises `StudyError`: it ends otherwise.
+    """
+    if Path(file).suffix.lower() not in endings:
+        raise StudyError(USAGE, f"{option}: found '{file}', expected a file ending in {' or '.join(endings)}")
+    return Path(file)
+
+
 @contextmanager
 def beside(path: Path, folders: bool = False, part: Path | None = None) -> Iterator[Path]:
     """A place to write to, renamed to ``path`` when it is on disk; with ``folders`` those that are missing are made.

@@ -29,11 +29,6 @@ def text(words: str, look: str = "") -> Block:
     return {"kind": "text", "text": words, "look": look}
 
 
-def heading(words: str) -> Block:
-    """Heading of a part of a section."""
-    return {"kind": "heading", "text": words}
-
-
 def box(texts: Iterable[str], look: str) -> Block:
     """Paragraphs that stand out, as ``verdict`` or ``warn``."""
     return {"kind": "box", "texts": list(texts), "look": look}
@@ -42,11 +37,6 @@ def box(texts: Iterable[str], look: str) -> Block:
 def bullets(texts: Iterable[str]) -> Block:
     """A list."""
     return {"kind": "bullets", "texts": list(texts)}
-
-
-def details(summary: str, blocks: Sequence[Block]) -> Block:
-    """Parts of a page that are folded away until a reader asks for them."""
-    return {"kind": "details", "summary": summary, "blocks": list(blocks)}
 
 
 def table(
@@ -102,10 +92,9 @@ def page(title: str, subtitle: str, sections: Sequence[Section]) -> str:
     made = jinja2.Environment(loader=jinja2.PackageLoader(*FOLDER.rsplit(".", 1)), autoescape=True)
     made.policies["json.dumps_function"] = lambda figure, **_: figure.to_json(validate=False)
     parts = ((anchor, head, [block for block in blocks if block]) for anchor, head, blocks in sections)
-    names = ("anchor", "heading", "blocks")
-    shown: list[dict[str, Any]] = [dict(zip(names, part, strict=True)) for part in parts if part[2]]
+    shown = [part for part in parts if part[2]]
     own = [files(FOLDER).joinpath(name).read_text(encoding="utf-8") for name in ("page.css", "page.js", "objects.js")]
-    kinds = {block["kind"] for section in shown for block in section["blocks"]}
+    kinds = {block["kind"] for _, _, blocks in shown for block in blocks}
     scripts = [get_plotlyjs().replace("</script", "<\\/script"), own[1]] if "plot" in kinds else []
     scripts += [own[2]] if "objects" in kinds else []
     return made.get_template("page.html").render(

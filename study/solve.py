@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from softjaw.study.messages import USAGE, StudyError
+from softjaw.study.messages import with_ending
 from softjaw.study.scene import Scene
 
 if TYPE_CHECKING:
@@ -124,10 +124,7 @@ def run(scene: Scene, file: str | Path, comm: Any = None, *, retry_failed: bool 
     """
     if not isinstance(scene, Scene):
         raise TypeError(f"scene is {scene!r}: expected a Scene, as Scene.from_file(file) gives")
-    path = Path(file)
-    if path.suffix != ".hdf":
-        text = f"file: found '{path}', expected a name that ends in .hdf, which all viewers open"
-        raise StudyError(USAGE, f"{text}; write {str(path.with_name(path.name + '.hdf'))!r}")
+    path = with_ending("file", file, ".hdf")
     os.environ["H5PY_ALWAYS_USE_MPI"] = "1"  # before h5py is imported: its own guess misses some launchers
     try:
         from mpi4py import MPI

@@ -18,7 +18,6 @@ from softjaw.study.run.limits import is_out_of_memory, no_room, require_room
 
 UNWRITABLE = {errno.EPIPE, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}  # what standard output can answer
 SOLVING = ("run", "cost")
-OF_SCENES = ("check", "plan", "run")  # whose scene may name many objects
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -67,7 +66,7 @@ def command(options: Namespace) -> int:
         require_room()
     if options.command == "run":
         os.environ["H5PY_ALWAYS_USE_MPI"] = "1"  # before h5py is imported: its own guess misses srun and single runs
-    options.folder = _module("cli.quick").objects_of(options) if options.command in OF_SCENES else None
+    options.folder = _module("cli.quick").objects_of(options) if "objects" in options else None
     if options.command in SOLVING and not options.folder:  # a wrong scene is refused before the solvers are loaded
         options.scene_read = _module("cli.quick").scene_of(options)
     answer = getattr(_module(options.module), options.command)(options)

@@ -32,8 +32,7 @@ def export(options: Namespace) -> str:
     """Write grasps for planners and simulators; files that were written, or the text itself."""
     index = index_path(options.file)
     if index and options.form not in FORMS:
-        known = ", ".join(FORMS)
-        raise StudyError(USAGE, f"--format: found '{options.form}', expected one of {known} for a folder of objects")
+        raise StudyError(USAGE, f"--format: found '{options.form}', expected {', '.join(FORMS)} for a folder")
     if options.output is None and (index or options.form == "vtk"):
         raise StudyError(USAGE, f"--format {options.form}: name what to write with -o")
     if index:

@@ -298,9 +298,7 @@ def program() -> Program:
     )
     listed = parser.add_subparsers(metavar="COMMAND", required=True, parser_class=Parser)
     for name, text, example, module, options in (command for group in COMMANDS.values() for command in group):
-        examples = [f"{'mpirun -n 8 ' * (name == 'run')}softjaw {example}"]
-        examples += ["softjaw init mesh --mesh jobs/objects/flask.stl --unit mm -o scenes/flask"] * (name == "init")
-        parts = ["\n".join(["example:", *(f"  {line}" for line in examples)])]
+        parts = [f"example:\n  {'mpirun -n 8 ' * (name == 'run')}softjaw {example}"]
         for title, entries in [LISTS[name]] if name in LISTS else []:
             parts.append("\n".join([f"{title}:", *(f"  {entry:<12} {what}" for entry, what in entries.items())]))
         made = listed.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}.",

@@ -14,7 +14,7 @@ import numpy as np
 
 from softjaw.study.case.build import build_object, check_object, geometry, mesh_notes, told, with_mass
 from softjaw.study.case.candidates import check_candidates, with_sampled_grasps
-from softjaw.study.messages import USAGE, StudyError
+from softjaw.study.messages import USAGE, StudyError, with_ending
 from softjaw.study.run.estimate import START_S, estimated, scaling_text
 from softjaw.study.run.object_folder import ObjectFolder, folder_of
 from softjaw.study.run.plan import free_bytes, make_plan, memory, plan_text
@@ -135,12 +135,7 @@ def target(options: Namespace, ending: str = "") -> Path:
     """The result file of a run; refuse names that no viewer would open. By default the scene's name and ``ending``."""
     if options.output is None:
         return Path("results") / f"{Path(options.scene).stem}{ending}.hdf"
-    path = Path(options.output)
-    if path.suffix != ".hdf":
-        better = path / f"{Path(options.scene).stem}.hdf" if path.is_dir() else path.with_name(path.name + ".hdf")
-        text = f"-o: found '{path}', expected a file ending in .hdf, which all viewers open; write -o {better}"
-        raise StudyError(USAGE, text)
-    return path
+    return with_ending("-o", options.output, ".hdf")
 
 
 def results_folder(options: Namespace) -> Path:

@@ -6,7 +6,7 @@ from argparse import Namespace
 from functools import partial
 from pathlib import Path
 
-from softjaw.study.messages import USAGE, StudyError, beside, write_file
+from softjaw.study.messages import USAGE, StudyError, beside, with_ending, write_file
 from softjaw.study.ranking import judge
 from softjaw.study.result.index import index_path
 from softjaw.study.result.read import open
@@ -71,11 +71,8 @@ def view(options: Namespace) -> str:
 
     if options.html is None and options.screenshot is None:
         options.html = str(Path(options.file).with_suffix("")) + "-3d.html"
-    paths = {name: Path(getattr(options, name)) for name in ENDINGS if getattr(options, name) is not None}
-    for name, path in paths.items():
-        if path.suffix.lower() not in ENDINGS[name]:
-            text = f"--{name}: found '{path}', expected a file ending in {' or '.join(ENDINGS[name])}"
-            raise StudyError(USAGE, text)
+    given = {name: getattr(options, name) for name in ENDINGS}
+    paths = {name: with_ending(f"--{name}", file, *ENDINGS[name]) for name, file in given.items() if file is not None}
     shown, index = model.view_of(judge(open(options.file)), *choice(options), options.force)
     quantity = model.quantity_of(shown.ds, options.quantity)
     if "screenshot" in paths:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from softjaw.friction.patch import FloatArray
-from softjaw.study.messages import USAGE, StudyError, write_file
+from softjaw.study.messages import USAGE, StudyError, with_ending, write_file
 from softjaw.study.patch.answer import (
     DEFINITIONS,
     FRICTION,
@@ -52,9 +52,8 @@ def patch(options: Namespace) -> str:
         if getattr(options, name) and not scored:
             option = f"--{name.replace('_', '-')}"
             raise StudyError(USAGE, f"{option}: found without a grasp to score; add --distance MM or --other FILE")
-    if options.picture and not options.picture.lower().endswith(PICTURES):
-        text = f"-o: found {options.picture}, expected a picture's name that ends in {' or '.join(PICTURES)}"
-        raise StudyError(USAGE, f"{text}; for numbers write --json and redirect the output into a file")
+    if options.picture:
+        with_ending("-o", options.picture, *PICTURES)
     reading = Reading(options.unit, options.pressure_unit, options.pressure_name, options.flip_normals)
     mu, long_side = options.mu or FRICTION_COEFFICIENT, options.long_side
     if options.deformed:

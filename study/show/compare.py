@@ -21,7 +21,6 @@ from softjaw.study.table import PAPER, Column, Row, Table, as_text, with_unit, w
 from softjaw.study.units import shown, shown_unit
 
 FloatArray = NDArray[np.float64]
-MOST_SETTINGS = 12  # that a text lists
 Pair = tuple[xr.Dataset, xr.Dataset]
 
 
@@ -94,8 +93,7 @@ def _setting_lines(settings: list[Row], width: int) -> list[str]:
         return ["settings: no difference"]
     rows = [{"key": row["key"], **{f: value_text(row[f]) for f in "ab"}} for row in settings]
     columns = [Column("key", label="setting", wrap=width // 2), Column("a"), Column("b")]
-    more = len(rows) - MOST_SETTINGS
-    return [as_text(Table("", columns, rows[:MOST_SETTINGS]), width)] + [f"and {more} more settings"] * (more > 0)
+    return [as_text(Table("", columns, rows), width)]
 
 
 # --- axes ------------------------------------------------------------------------------------------------------------

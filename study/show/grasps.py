@@ -154,6 +154,6 @@ def stated(ds: xr.Dataset, index: Index) -> str:
 
 def reason_lines(ds: xr.Dataset, *states: int) -> list[str]:
     """Reasons of failed cases and of what is no grasp, and notes on solved ones, alike messages together."""
-    kinds = grouped(ds.status.values, ds.message.values, lambda: ds["flags"].values & OF_FILE)
+    kinds = grouped(ds.status.values, ds.message.values, ds["flags"].values & OF_FILE)
     wanted = (kind for kind in kinds if not states or kind.state in states)
     return [kind.text(axes_of(ds), ds.label.values) for kind in wanted]

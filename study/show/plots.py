@@ -6,7 +6,7 @@ failed cases have crosses.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -48,24 +48,19 @@ def figure(rows: int = 1, columns: int = 1, titles: Sequence[str] = (), **layout
     return made
 
 
-def lines(
-    made: go.Figure, x: Any, by_model: Mapping[str, np.ndarray], row: int, column: int, errors: Any = None
-) -> None:
-    """One line for each friction model, with error bars on that of the CCM; lines without a finite value are left out.
+def line(made: go.Figure, x: Any, y: np.ndarray, look: Sequence[str], row: int, column: int, error: Any = None) -> None:
+    """A line of a figure's panel, counted from 1; left out where it has no finite value.
 
-    ``made``: the figure that gets the lines. ``x`` (k,) array: abscissas. ``by_model`` (dict of (k,) arrays): values of
-    each model; NaN where there is none. ``row, column``: panel, from 1. ``errors`` (k,) array, optional: half lengths
-    of the error bars.
+    ``x, y`` (k,) arrays: NaN where there is none. ``look``: name, colour, line and marker, as `MODELS` has them.
+    ``error`` (k,) array, optional: half lengths of the error bars.
     """
-    for model, y in by_model.items():
-        if not np.isfinite(y).any():
-            continue
-        name, colour, dash, symbol = MODELS[model]
-        half = None if errors is None or model != "ccm" else {"array": np.nan_to_num(np.abs(errors)), "thickness": 1}
+    name, colour, dash, symbol = look
+    if np.isfinite(y).any():
         made.add_scatter(
-            x=x, y=y, name=name, legendgroup=model, mode="lines+markers", error_y=half, row=row, col=column,
+            x=x, y=y, name=name, legendgroup=name, mode="lines+markers", row=row, col=column,
+            error_y=None if error is None else {"array": np.nan_to_num(np.abs(error)), "thickness": 1},
             line={"color": colour, "dash": dash}, marker={"symbol": symbol, "size": 6},
-            showlegend=not any(t.legendgroup == model for t in made.data),
+            showlegend=not any(t.legendgroup == name for t in made.data),
         )  # fmt: skip
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from argparse import Namespace
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from typing import Any, NamedTuple
 
@@ -182,20 +182,18 @@ def no_grasps(codes: NDArray[np.integer]) -> list[str]:
     return [f"{count} {STATES[state]}" for state, count in known.items() if count]
 
 
-def grouped(status: NDArray[np.integer], messages: Any, flags: Callable[[], Any]) -> list[Reason]:
+def grouped(status: NDArray[np.integer], messages: Any, flags: NDArray[Any]) -> list[Reason]:
     """Reasons of failed cases, of what is no grasp, and notes on solved cases, each state's most frequent one first.
 
     Messages that differ in their numbers only are of one kind; of a solved case each flag counts by itself.
     """
     kinds: dict[tuple[int, str], Reason] = {}
-    marks: Any = None
     for row in np.argwhere((messages != "") | (status == FAILED)):
         index = tuple(int(i) for i in row)
         state, text = int(status[index]), str(messages[index])
         texts = [text or "no reason was given"]
         if state == DONE:
-            marks = flags() if marks is None else marks  # read only where it is needed
-            value = int(np.nan_to_num(marks[index]))
+            value = int(np.nan_to_num(flags[index]))
             more = text.removeprefix(flag_sentences(value)).removeprefix("; ")
             texts = [*(flag.sentence for flag in flags_in(value)), *[more] * bool(more)]
         for message in texts:
@@ -208,7 +206,7 @@ def grouped(status: NDArray[np.integer], messages: Any, flags: Callable[[], Any]
 
 def reasons_in(result: Any) -> list[Reason]:
     """The same of an open result file."""
-    return grouped(result.status, result.messages, lambda: result.read("flags/flags"))
+    return grouped(result.status, result.messages, result.read("flags/flags"))
 
 
 def reasons(result: Any, width: int = PAPER, notes: bool = True) -> list[str]:

@@ -19,10 +19,10 @@ from softjaw.study.show.stored_surface import (
     stored_surface,
     weaker,
 )
-from softjaw.study.show.view.model import FORCE, View
+from softjaw.study.show.view.model import FORCE, SLIPS, View
 from softjaw.study.show.view.pads import Pad
 
-SLIPS = {"x": "slip along x", "turn": "turn about z"}
+MOTIONS = ("x", "turn")
 
 
 def patch(view: View, index: Index) -> Block | None:
@@ -35,9 +35,9 @@ def patch(view: View, index: Index) -> Block | None:
     # difference of the fingers' pressures over the largest one that is not drawn twice
     alike = bool(np.abs(one - two).max() <= 1e-3 * top)
     fingers = {"both fingers alike": both[0]} if alike else {f"finger {k}": pad for k, pad in enumerate(both, start=1)}
-    titles = [f"{name}: friction against a {slip}" for name in fingers for slip in SLIPS.values()]
+    titles = [f"{name}: friction against {SLIPS[m]}" for name in fingers for m in MOTIONS]
     made = plots.figure(len(fingers), 2, titles)
-    for (row, pad), (column, motion) in product(enumerate(fingers.values(), start=1), enumerate(SLIPS, start=1)):
+    for (row, pad), (column, motion) in product(enumerate(fingers.values(), start=1), enumerate(MOTIONS, start=1)):
         for trace in pad_face(pad, motion):
             made.add_trace(trace, row=row, col=column)
     scale = {"colorscale": plots.colours("pressure"), "cmin": 0, "cmax": 1e-3 * top}

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from softjaw.study.flags import Flag
-from softjaw.study.page import Block, heading, label, plot
+from softjaw.study.page import Block, label, plot
 from softjaw.study.pictures import SOFT
 from softjaw.study.quantities import MODELS
 from softjaw.study.show import plots
@@ -33,9 +33,9 @@ from softjaw.study.show.view.model import View
 PANELS = ("e_n", "quality", "tau_z_max", "f_x_max", "f_y_max", "closing")
 OVER_F = ("f_x_max", "f_y_max")  # drawn over the normal force
 COMPONENTS = {
-    "f_x": ("along, f_x", "#12436d", "circle"),
-    "f_y": ("across, f_y", "#c05a00", "square"),
-    "tau_z": ("torque, tau_z", "#2a8c82", "triangle-up"),
+    "f_x": ("along, f_x", "#12436d", "solid", "circle"),
+    "f_y": ("across, f_y", "#c05a00", "solid", "square"),
+    "tau_z": ("torque, tau_z", "#2a8c82", "solid", "triangle-up"),
 }
 AGAINST = {"pcm": "against PCM, scaled by S", "pcm_projected": "against PCM, scaled by F_N"}
 HALF_AS_FINE = " Bars: error estimate from two meshes."
@@ -51,10 +51,11 @@ def models(ds: xr.Dataset, roles: dict[str, Index], mu: float | None) -> list[Bl
     """Curves over the force for some cases, and over every axis that is worth it for the first of them."""
     best, blocks = next(iter(roles.values())), []
     for role, index in roles.items():
-        blocks += [heading(f"{role}, over the force: {place(ds, index)}"), _models(ds, len(best) - 1, index, mu)]
+        title = f"{role}, over the force: {place(ds, index)}"
+        blocks += [{"kind": "heading", "text": title}, _models(ds, len(best) - 1, index, mu)]
     for position in worth_a_curve(ds):
-        name = spoken(str(ds.status.dims[position]))
-        blocks += [heading(f"Over the {name}, all else as in the best case"), _models(ds, position, best, mu)]
+        title = f"Over the {spoken(str(ds.status.dims[position]))}, all else as in the best case"
+        blocks += [{"kind": "heading", "text": title}, _models(ds, position, best, mu)]
     return blocks
 
 
@@ -78,7 +79,9 @@ def _models(ds: xr.Dataset, position: int, index: Index, mu: float | None) -> Bl
         by_model = {m: values[cut] * scale for m in (MODELS if name != "closing" else ("ccm",))
                     if (values := field(ds, name, m)) is not None}  # fmt: skip
         error = field(ds, f"{name}_error")
-        plots.lines(made, x, by_model, row, column, None if error is None else by_model["ccm"] * error[cut])
+        for m, y in by_model.items():
+            half = None if error is None or m != "ccm" else y * error[cut]
+            plots.line(made, x, y, plots.MODELS[m], row, column, half)
         if name in OVER_F and mu is not None:
             made.add_hline(mu, line={"color": SOFT, "width": 1, "dash": "dash"}, row=row, col=column)
     made.update_xaxes(**settings, row=2)
@@ -136,12 +139,8 @@ def _differences(ds: xr.Dataset, name: str, x: np.ndarray, lines: dict[Any, Any]
     made = plots.figure(1, len(shown_models), [AGAINST[m] for m in shown_models])
     order = np.argsort(x)
     for (model, key), (values, error) in lines.items():
-        text, colour, symbol = COMPONENTS[key]
-        column = shown_models.index(model) + 1
-        bars = None if error is None else {"array": 100 * np.abs(np.nan_to_num(error))[order], "thickness": 1}
-        made.add_scatter(x=x[order], y=100 * values[order], error_y=bars, name=text, legendgroup=key, row=1, col=column,
-                         mode="lines+markers", line={"color": colour}, marker={"symbol": symbol, "size": 6},
-                         showlegend=column == 1)  # fmt: skip
+        half = None if error is None else 100 * error[order]
+        plots.line(made, x[order], 100 * values[order], COMPONENTS[key], 1, shown_models.index(model) + 1, half)
     made.update_xaxes(title_text=label(name)).update_yaxes(title_text="1 - CCM / PCM [%]")
     made.update_layout(legend={"y": -0.25})
     fine = HALF_AS_FINE if any(e is not None for _, e in lines.values()) else ""

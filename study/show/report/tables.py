@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from softjaw.study.page import Block, block_of, bullets, details, table, text
+from softjaw.study.page import Block, block_of, bullets, table, text
 from softjaw.study.quantities import EFFECTS, FORCE_RANGE, PARTS, REASONS
 from softjaw.study.ranking import largest
 from softjaw.study.show.best_grasps import best, case_table
@@ -65,8 +65,8 @@ def every_case(ds: xr.Dataset) -> list[Block]:
         summary = f"The {count} cases are too many to be listed here; softjaw export writes all of them."
         return [text(summary, "note")]
     cases = case_table(ds, np.ndindex(ds.status.shape), maps=[n for n in choices(ds, SHOWN[0]) if n not in FORCE_RANGE])
-    title = f"All {count} cases (CCM, weaker finger)"
-    return [details(f"All {count} cases as a table", [block_of(replace(cases, title=title))])]
+    folded = block_of(replace(cases, title=f"All {count} cases (CCM, weaker finger)"))
+    return [{"kind": "details", "summary": f"All {count} cases as a table", "blocks": [folded]}]
 
 
 def checks(ds: xr.Dataset) -> list[Block]:
@@ -137,7 +137,8 @@ def definitions(ds: xr.Dataset) -> list[Block]:
     rows = [[str(name), v.attrs.get("units", ""), f"{v.attrs['long_name']}. {v.attrs['definition']}"]
             for name, v in ds.data_vars.items() if v.attrs.get("definition")]  # fmt: skip
     head = ["variable", "unit (SI)", "meaning"]
-    listed_rows = details("All datasets", [table("What the numbers mean", head, rows, (0, 1), (2,))])
+    folded = table("What the numbers mean", head, rows, (0, 1), (2,))
+    listed_rows = {"kind": "details", "summary": "All datasets", "blocks": [folded]}
     return [text(" ".join(intro.split())), listed_rows]
 
 

@@ -77,12 +77,11 @@ def best_grasps(ds: xr.Dataset) -> list[Block]:
     return [box(texts, look) for texts, look in boxes if texts] + tables.best_grasps(ds)
 
 
-def the_object(view: View, best: Index) -> Block | None:
+def the_object(view: View, best: Index) -> Block:
     """The object in three dimensions with the pads of the best and of the chosen grasp at every force."""
     shown = [i for i in (best, view.ds.attrs["chosen"]) if i and i[:-3] == view.point]
     cases = dict.fromkeys((*i[:-1], k) for i in shown for k in range(len(forces(view.ds))))
-    block = object_block(view, best, view.ds.attrs["score"], "x", list(cases))
-    return block or (text(f"{view.note[:1].upper()}{view.note[1:]}.", "note") if view.note else None)
+    return object_block(view, best, view.ds.attrs["score"], "x", list(cases))
 
 
 def wall(view: View, best: Index) -> list[Block | None]:

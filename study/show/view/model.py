@@ -24,6 +24,7 @@ from softjaw.study.scene import SceneError
 from softjaw.study.show.best_grasps import value_text
 from softjaw.study.show.grasps import Index, candidate_of, field, forces, order, place, quantity, stated, unravelled
 from softjaw.study.show.object_surface import Surface, moved, on_wall, surface_of, undeformed
+from softjaw.study.show.overview import listed
 from softjaw.study.show.stored_surface import body, stored_surface, weaker
 from softjaw.study.show.view.pads import Faces, Pad, pads_of
 
@@ -131,10 +132,9 @@ class View:
 
     def displacement(self, index: Index) -> tuple[np.ndarray, float] | None:
         """Displacement of the wall's places ``(AROUND, ALONG, 3)`` and the angle they begin at, if stored."""
-        rotation = field(self.ds, "finger_pose_rotation") if self.walled else None
-        if rotation is None or not np.isfinite(self._places[index[-3:]]).all():
+        if not self.walled or not np.isfinite(self._places[index[-3:]]).all():
             return None
-        approach = rotation[index][0][:, 2] @ self.placed.rotation
+        approach = self.ds["finger_pose_rotation"].values[index][0][:, 2] @ self.placed.rotation
         angle = float(np.arctan2(-approach[1], -approach[0])) if np.hypot(*approach[:2]) > 1e-6 else 0.0
         before = undeformed(self.scene.object, angle)
         if before is None:
@@ -143,8 +143,7 @@ class View:
 
     def moved(self, index: Index) -> np.ndarray:
         """The surface's points ``(n, 3)``, moved with the wall of a case where the file has it."""
-        found = self.displacement(index) if self.wall is not None else None
-        x = self.surface.points
+        found, x = self.displacement(index), self.surface.points
         return x if found is None or self.wall is None else x + moved(self.wall, *found)
 
     # --- a case ---
@@ -230,9 +229,8 @@ def _check_station(ds: xr.Dataset, station: float | None) -> None:
     if station is None:
         return
     if max(places[0] - station, station - places[-1]) > max(np.diff(places), default=0.0) + 1e-9:
-        found, low, high = (f"{1e3 * value:.6g}" for value in (station, places[0], places[-1]))
-        expected = f"{low} to {high} mm, the stations of this file" if low != high else f"{low} mm, the only station"
-        raise StudyError(USAGE, f"--at: found {found} mm, expected {expected}")
+        known = listed((1e3 * places).tolist(), "mm")
+        raise StudyError(USAGE, f"--at: found {1e3 * station:.6g} mm, expected a station of this file: {known}")
 
 
 def _nearest(ds: xr.Dataset, best: Index, where: Place, k: int) -> Index:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
-from softjaw.study.page import Block, Section, label, page, plot, text
+from softjaw.study.page import Block, label, page, plot, text
 from softjaw.study.pictures import INK
 from softjaw.study.quantities import ALONG, AROUND
 from softjaw.study.result.layout import DONE
@@ -28,13 +28,13 @@ MOST = 24_000_000  # bytes of pads, walls and limit surfaces; beyond it, those o
 
 def object_block(
     view: View, index: Index, quantity: str, motion: str, cases: Sequence[Index], whole: bool = False
-) -> Block | None:
-    """The figure as a part of a page, with the geometry of some cases; None where there is nothing to draw.
+) -> Block:
+    """The figure as a part of a page, with the geometry of some cases; why there is none where nothing can be drawn.
 
     ``whole`` adds the limit surface of the weaker finger.
     """
     if not len(view.surface.points):
-        return None
+        return text(f"{view.note[:1].upper()}{view.note[1:]}.", "warn")
     content, left_out = payload(view, index, quantity, cases, motion, whole)
     made = go.Figure([*_traces(whole)])
     made.update_layout(template="none", margin={"l": 0, "r": 0, "t": 10, "b": 0}, uirevision="keep", showlegend=False)
@@ -54,8 +54,7 @@ def view_page(view: View, index: Index, quantity: str, motion: str) -> str:
     levels = sorted(range(len(forces(view.ds))), key=lambda k: abs(k - index[-1]))
     cases = [index, *(i for k in levels for i in order(view.ds, k) if i[:-3] == view.point)]
     block = object_block(view, index, quantity, motion, list(dict.fromkeys(cases)), whole=True)
-    sections: list[Section] = [("object", "", [block or text(view.note[:1].upper() + view.note[1:] + ".", "warn")])]
-    return page(view.ds.attrs["title"], view.summary(index, quantity)[0], sections)
+    return page(view.ds.attrs["title"], view.summary(index, quantity)[0], [("object", "", [block])])
 
 
 def payload(

@@ -13,7 +13,6 @@ from softjaw.study.result.layout import DONE
 from softjaw.study.show.grasps import Index, at
 
 LIFT = 2e-4  # how far off the object contact faces are drawn, besides where they overlap it [m]
-MOTIONS = ("x", "y", "turn")
 Faces = dict[str, np.ndarray]
 
 
@@ -104,7 +103,7 @@ class Pad:
         if motion == "turn":
             v = np.cross(self.frame[2], c - self.origin)
         else:
-            v = np.broadcast_to(self.frame[MOTIONS.index(motion)], c.shape)
+            v = np.broadcast_to(self.frame["xy".index(motion)], c.shape)
         v = v - np.einsum("ki,ki->k", v, n)[:, None] * n
         size = np.linalg.norm(v, axis=1, keepdims=True)
         return c, load[:, None] * np.divide(v, size, out=np.zeros_like(v), where=size > 1e-12)

@@ -15,7 +15,7 @@ import numpy as np
 import pyvista as pv
 import xarray as xr
 
-from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, USAGE, StudyError, beside
+from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, StudyError, beside, with_ending
 from softjaw.study.pictures import COLOURS, INK, SOFT
 from softjaw.study.quantities import DONE, FAILED, MISSING, NO_GRASP
 from softjaw.study.ranking import judge
@@ -25,7 +25,6 @@ from softjaw.study.show.stored_surface import COMPONENTS, weaker
 from softjaw.study.show.view.model import ARROW_MM, CROSSED, FORCE, NEUTRAL, OPEN, PAD, View, maps_of, view_of
 from softjaw.study.show.view.pads import Pad
 
-ENDINGS = (".vtm", ".vtp")
 SIZE, SMALL = (1400, 900), 208
 BODY, FINGER = "#b8c7d4", "#ed8c40"
 LIGHT = {"ambient": 0.62, "diffuse": 0.42, "specular": 0.0}  # colours have to be those of the bar
@@ -199,8 +198,7 @@ def write_vtk(ds: xr.Dataset, path: Path, force: float | None = None) -> Path:
 
     Raises `StudyError`: the ending is another, the file cannot be written, or the object cannot be drawn.
     """
-    if path.suffix.lower() not in ENDINGS:
-        raise StudyError(USAGE, f"-o: found '{path}', expected a file ending in {' or '.join(ENDINGS)}")
+    with_ending("-o", path, ".vtm", ".vtp")
     view, index = view_of(judge(ds), None, (None, None), force)
     if not len(view.surface.triangles):
         raise StudyError(OTHER_FILE, f"{ds.attrs['file']}: {view.note or 'there is no object to write'}")

@@ -72,7 +72,7 @@ def test_flags_are_counted_words_or_bits_and_messages_that_differ_in_numbers_are
     assert all(len(note) <= PAPER for note in table.notes if "; " in note)
     status = np.array([FAILED, DONE, FAILED, DONE])
     messages = np.array(["residual 1e-3", f"{Flag.HOLE.sentence}; slow", "residual 2.5", Flag.HOLE.sentence])
-    kinds = grouped(status, messages, lambda: np.full(4, int(Flag.HOLE)))
+    kinds = grouped(status, messages, np.full(4, int(Flag.HOLE)))
     assert [(kind.state, len(kind.cases), kind.message) for kind in kinds] == [
         (FAILED, 2, "residual 1e-3"), (DONE, 2, Flag.HOLE.sentence), (DONE, 1, "slow"),
     ]  # fmt: skip
