@@ -259,14 +259,12 @@ def at_level(ds: Any, force: float | None = None) -> tuple[Any, int, str]:
     """
     forces = ds["normal_force"].values
     if force is None:
-        k, why = shown_level(ds, judged(ds))
-        return ds, k, why
+        return ds, *shown_level(ds, judged(ds))
     near = np.flatnonzero(np.isclose(forces, force))
     if near.size:
         return ds, int(near[0]), ""
-    at = at_force(ds, force)
-    low, high = (forces[i] for i in (np.searchsorted(forces, force) - 1, np.searchsorted(forces, force)))
-    return at, 0, f"by straight lines from {low:g} to {high:g} N"
+    k = int(np.searchsorted(forces, force))
+    return at_force(ds, force), 0, f"by straight lines from {forces[k - 1]:g} to {forces[k]:g} N"
 
 
 def shown_level(ds: Any, flags: np.ndarray) -> tuple[int, str]:

@@ -17,7 +17,7 @@ from trimesh.intersections import slice_faces_plane
 
 from softjaw.fem.objects.gap import Pose
 from softjaw.friction.patch import NEGLIGIBLE
-from softjaw.study.case.build import has_wall, middle_of, outer_surface, surface_triangles
+from softjaw.study.case.build import middle_of, outer_surface, surface_triangles
 from softjaw.study.quantities import ALONG, AROUND
 
 FINER = 6  # places between those of the file among which the nearest is searched
@@ -58,9 +58,8 @@ def surface_of(scene: Any, axes: Any, feet: Feet = ()) -> Surface:
         size = c * length + s * width, c * width + s * length
         corners, cell = coloured(corners, Cells(axes[-3].values, axes[-2].values, scene.object.axis_symmetry, *size))
         corners = middle.straightened(corners, -1.0) if middle else corners
-        if has_wall(scene.object):
-            kept = ~_lid(scene.object, corners)
-            corners, cell = corners[kept], cell[kept]
+        kept = ~_lid(scene.object, corners)
+        corners, cell = corners[kept], cell[kept]
     # After the cuts, corners of neighbours differ by rounding: 1 nm makes them one point again.
     rows = np.column_stack([np.round(corners.reshape(-1, 3), 9), np.repeat(cell, 3)])
     points, inverse = np.unique(rows, axis=0, return_inverse=True)
@@ -237,11 +236,8 @@ def undeformed(shape: Any, angle: float) -> np.ndarray | None:
 
 def _lid(shape: Any, corners: np.ndarray) -> np.ndarray:
     """Triangles that close the top of an object that is open there: its surface is that of a solid."""
-    wall = None
-    if getattr(shape, "open_top", False) and shape.shape != "mesh":
-        wall = on_wall(shape, corners.reshape(-1, 3))
-    if wall is None:
+    if not getattr(shape, "open_top", False) or shape.shape == "mesh":
         return np.zeros(len(corners), bool)
-    z = corners[..., 2]
+    wall, z = np.asarray(on_wall(shape, corners.reshape(-1, 3))), corners[..., 2]
     # The upper half only: a bottom belongs to the object, a lid does not.
     return np.isnan(wall[:, 0]).reshape(-1, 3).any(axis=1) & (z.mean(axis=1) > 0.5 * (z.min() + z.max()))

@@ -33,19 +33,19 @@ def index_table(path: Path, top: int = 0) -> Table:
     rows, about = index.read_index(path)
     rows = [{key: math.nan if value == -1 else value for key, value in row.items()} for row in rows]
     order = sorted(rows, key=lambda row: (-np.nan_to_num(row["payload"], nan=-1.0), row["object"]))
-    facts = {"folder": str(path.parent), "scene_file": about.get("scene_file", ""), **_counts(rows)}
+    facts = {"folder": str(path.parent), "scene_file": about.get("scene_file", "")}
+    facts |= {state.replace(" ", "_"): count for state, count in _counts(rows).items()}
     return Table(f"{path.parent}: {counts_text(rows)}", SHOWN, order[: top or None], (), facts, "objects")
 
 
-def _counts(rows: list[Row]) -> dict[str, Any]:
+def _counts(rows: list[Row]) -> dict[str, int]:
     counts = Counter(row["state"] for row in rows)
-    return {state.replace(" ", "_"): counts[state] for state in index.STATES if counts[state]}
+    return {state: counts[state] for state in index.STATES if counts[state]}
 
 
 def counts_text(rows: list[Row]) -> str:
     """How many objects there are in each state."""
-    counts = _counts(rows)
-    return f"{len(rows)} objects, " + ", ".join(f"{n} {state.replace('_', ' ')}" for state, n in counts.items())
+    return f"{len(rows)} objects, " + ", ".join(f"{n} {state}" for state, n in _counts(rows).items())
 
 
 def status_text(path: Path, width: int) -> str:

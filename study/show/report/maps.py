@@ -91,9 +91,8 @@ def _maps(ds: xr.Dataset, index: Index, x: int, y: int, over: int, panels: list[
     titles = [f"{plots.MODELS[m][0]}, {level}" for level in levels for m in models]
     height = max(110, min(26 * ds.status.shape[y] + 60, 240))
     total = 110 + height * len(panels)
-    gap = min(0.45 * height, 70) / (total - 110) if len(panels) > 1 else 0.1
     made = plots.figure(len(panels), 2, titles, shared_xaxes=True, shared_yaxes=True, horizontal_spacing=0.05,
-                        vertical_spacing=min(gap, 0.9 / max(len(panels) - 1, 1)))  # fmt: skip
+                        vertical_spacing=min(0.45 * height, 70) / (total - 110))  # fmt: skip
     cuts = [(m, (*index[:over], p, *index[over + 1 :])) for p in panels for m in models]
     buttons = [_button(ds, name, cuts, x, y) for name in _names(ds)]
     for k in range(len(cuts)):

@@ -101,16 +101,11 @@ def effects(ds: xr.Dataset) -> list[Block]:
         low, high = (number(np.nan if indicator is None else f(indicator)) for f in (np.nanmin, np.nanmax))
         span = low if low == high else f"{low} to {high}"
         change = field(ds, f"effect_{name}_change")
-        moved = "" if change is None or not np.isfinite(change).any() else _percent(change)
+        known = [] if change is None else 100.0 * change[np.isfinite(change)]
+        moved = f"{min(known):+.2g} to {max(known):+.2g} % ({len(known)} measured)" if len(known) else ""
         rows.append([spoken(name), shown, span, moved, "" if reason is None else _counted(reason, REASONS)])
     heads = ["effect", "level", "indicator", "e_n moves by", "reason"]
     return [table("Effects that were simulated", heads, rows, texts=(0, 1, 3, 4))] if rows else []
-
-
-def _percent(change: np.ndarray) -> str:
-    """Range of relative changes, and how many there are."""
-    known = 100.0 * change[np.isfinite(change)]
-    return f"{known.min():+.2g} to {known.max():+.2g} % ({known.size} measured)"
 
 
 def _counted(codes: np.ndarray, meaning: tuple[str, ...]) -> str:

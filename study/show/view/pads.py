@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -131,12 +131,11 @@ def pads_of(ds: xr.Dataset, gripper: Any, index: Index, faces: Faces) -> list[Pa
     stored = [ds.variables[f"finger_{name}"].values[index] for name in names]
     if not all(np.isfinite(s).all() for s in stored):
         return []
-    deepest = ds.variables["check_penetration_depth"].values[index]
-    pads = [_pad(gripper, {n: v[k] for n, v in faces.items()}, *(s[k] for s in stored)) for k in (0, 1)]
-    return [replace(pad, lift=LIFT + float(d)) for pad, d in zip(pads, np.nan_to_num(deepest), strict=True)]
+    lifts = LIFT + np.nan_to_num(ds.variables["check_penetration_depth"].values[index])
+    return [_pad(gripper, {n: v[k] for n, v in faces.items()}, lifts[k], *(s[k] for s in stored)) for k in (0, 1)]
 
 
-def _pad(gripper: Any, faces: Faces, R: Any, o: Any, closing: Any, axes: Any, origin: Any) -> Pad:
+def _pad(gripper: Any, faces: Faces, lift: Any, R: Any, o: Any, closing: Any, axes: Any, origin: Any) -> Pad:
     length, width, thickness = gripper.pad_size
     x, y = 0.5 * length * np.array([-1, 1, 1, -1]), 0.5 * width * np.array([-1, -1, 1, 1])
     per_side = 3 if gripper.element == "hex27" else 2
@@ -154,6 +153,6 @@ def _pad(gripper: Any, faces: Faces, R: Any, o: Any, closing: Any, axes: Any, or
     }
     return Pad(
         **{name: points @ R.T + o for name, points in placed.items()}, frame=axes @ R.T, rotation=R, position=o,
-        lift=LIFT, normal=faces["normal"].reshape(*grid, 3) @ R.T, pressure=faces["pressure"].reshape(grid),
+        lift=lift, normal=faces["normal"].reshape(*grid, 3) @ R.T, pressure=faces["pressure"].reshape(grid),
         area=faces["area"].reshape(grid),
     )  # fmt: skip

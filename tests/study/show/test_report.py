@@ -14,7 +14,7 @@ import pytest
 from softjaw.study.case.result import CaseResult
 from softjaw.study.flags import Flag
 from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, StudyError
-from softjaw.study.page import box, bullets, details, heading, page, table, text
+from softjaw.study.page import box, bullets, page, table, text
 from softjaw.study.quantities import Axis
 from softjaw.study.ranking import judge
 from softjaw.study.result.layout import Layout
@@ -295,10 +295,10 @@ def test_differences_are_drawn_over_the_ratio_of_the_axes_and_a_page_escapes_eve
     assert ratio.y == pytest.approx([4, 4, 4])
     # Also where a reader's attributes are made of it.
     evil = "</script><script>x</script>'\"&<b>"
-    blocks = [text(evil), text("a", evil), heading(evil), box([evil], evil),
+    blocks = [text(evil), text("a", evil), {"kind": "heading", "text": evil}, box([evil], evil),
               {"kind": "answer", "lines": [(evil, evil, evil)]}, {"kind": "pre", "text": evil}, bullets([evil]),
               table(evil, [evil], [[evil]], texts=(0,)),
-              details(evil, [text(evil)])]  # fmt: skip
+              {"kind": "details", "summary": evil, "blocks": [text(evil)]}]  # fmt: skip
     made = page(evil, evil, [(evil, evil, blocks), ("other", evil, [])])
     assert "<script" not in made
     assert "<b>" not in made

@@ -107,30 +107,31 @@ def test_a_lone_angle_claims_what_its_pads_cover_and_a_wall_moves_bilinearly_bet
 
 
 def test_pads_stand_where_the_file_says_and_arrows_add_up_to_the_friction_of_the_whole(shown):
+    """Files keep faces of patches to 3e-5 of the largest value of their case."""
     view, index = shown
     assert index == (1, 0, 1)
     one, two = view.pads(index)
-    assert one.face[..., 0] == pytest.approx(np.full((5, 5), 0.025))
-    assert two.face[..., 0] == pytest.approx(np.full((5, 5), -0.025))
-    assert np.ptp(one.face.reshape(-1, 3), axis=0) == pytest.approx([0, SIZE[1], SIZE[0]])
+    assert one.face[..., 0] == pytest.approx(np.full((5, 5), 0.025), abs=1e-6)
+    assert two.face[..., 0] == pytest.approx(np.full((5, 5), -0.025), abs=1e-6)
+    assert np.ptp(one.face.reshape(-1, 3), axis=0) == pytest.approx([0, SIZE[1], SIZE[0]], abs=1e-6)
     assert one.back[:, 0] == pytest.approx(np.full(4, 0.025 + SIZE[2] - CLOSING))
     assert one.own(one.back)[:, 2] == pytest.approx(np.full(4, CLOSING - SIZE[2]))
     assert one.sides().shape == (17, 4, 3)
     area = 0.5 * np.linalg.norm(
         np.cross(*np.diff(one.quads()[:, [0, 2, 1, 3]].reshape(-1, 2, 2, 3), axis=2)[:, :, 0].swapaxes(0, 1)), axis=1
     )
-    assert area == pytest.approx(one.area.ravel())
+    assert area == pytest.approx(one.area.ravel(), rel=1e-4)
     # Flat front, slip along x: every force along x, mu left out; a turn about the middle gives no net force.
     pad = view.pads(index)[0]
     places, forces = pad.friction("x")
     assert len(places) == pad.loaded.sum() == 4
     load = 5 * PRESSURE * SIZE[0] * SIZE[1] / 16
-    assert forces == pytest.approx(np.broadcast_to(load * pad.frame[0], (4, 3)))
-    assert pad.friction("y")[1].sum(axis=0) @ pad.frame[1] == pytest.approx(4 * load)
+    assert forces == pytest.approx(np.broadcast_to(load * pad.frame[0], (4, 3)), rel=1e-4, abs=1e-4 * load)
+    assert pad.friction("y")[1].sum(axis=0) @ pad.frame[1] == pytest.approx(4 * load, rel=1e-4)
     places, forces = pad.friction("turn")
-    assert np.abs(forces.sum(axis=0)).max() < 1e-12
+    assert np.abs(forces.sum(axis=0)).max() < 1e-4 * load
     arms = np.linalg.norm(places - pad.origin, axis=1)
-    assert (np.cross(places - pad.origin, forces) @ pad.frame[2]) == pytest.approx(arms * load)
+    assert (np.cross(places - pad.origin, forces) @ pad.frame[2]) == pytest.approx(arms * load, rel=1e-4)
 
 
 @pytest.mark.parametrize("axis", "xyz")

@@ -32,19 +32,19 @@ def test_the_object_has_the_maps_of_each_candidate_and_pads_stand_where_the_pose
     for force, missing in ((1, ()), (5, (0, 5))):  # candidates 0 and 5 have no result at 5 N
         pads = blocks[f"pads, {force} N"]
         assert sorted(set(pads["candidate"])) == [c for c in range(6) if c not in missing]
-        assert pads["pressure"].max() == pytest.approx(PRESSURE * force)
-        assert pads.compute_cell_sizes()["Area"] == pytest.approx(pads["area"], rel=1e-5)
+        assert pads["pressure"].max() == pytest.approx(PRESSURE * force, rel=1e-4)
+        assert pads.compute_cell_sizes()["Area"] == pytest.approx(pads["area"], rel=1e-4)
         for candidate in set(pads["candidate"]):
             chosen = pads["candidate"] == candidate
-            assert pads["area"][chosen].sum() == pytest.approx(2 * SIZE[0] * SIZE[1], rel=1e-5)
+            assert pads["area"][chosen].sum() == pytest.approx(2 * SIZE[0] * SIZE[1], rel=1e-4)
             for finger, side in ((1, 1.0), (2, -1.0)):
                 face = pads.extract_cells(np.flatnonzero(chosen & (pads["finger"] == finger)))
                 assert face.n_cells == np.prod(GRID)
                 station, angle = divmod(int(candidate), 2)
                 away = np.array([1.0 - angle, angle, 0.0])
                 at = side * (0.025, 0.02)[angle] * away + [0, 0, (-0.02, 0.0, 0.02)[station]]
-                assert np.asarray(face.cell_centers().points).mean(axis=0) == pytest.approx(at, abs=1e-7)
-                assert face["normal"] @ away == pytest.approx(np.full(face.n_cells, -side))
+                assert np.asarray(face.cell_centers().points).mean(axis=0) == pytest.approx(at, abs=1e-6)
+                assert face["normal"] @ away == pytest.approx(np.full(face.n_cells, -side), rel=1e-4)
     file = make(tmp_path / "thing.hdf", patches=False)
     assert main(["export", str(file), "--format", "vtk", "-o", str(tmp_path / "body.vtp")]) == 0
     assert "quality, 5 N" in pv.read(tmp_path / "body.vtp").cell_data
