@@ -6,6 +6,7 @@ Maps grow evenly in lightness, so that they can be read without colour. Nothing 
 from __future__ import annotations
 
 import io
+from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
@@ -23,30 +24,9 @@ COLOURS = {
     "indentation": "plasma_r",
     "wall_stress": "inferno_r",
 }
-_STYLE: dict[Any, Any] = {
-    "font.family": "DejaVu Sans",
-    "font.size": 9,
-    "axes.titlesize": 9.5,
-    "axes.titlelocation": "left",
-    "axes.edgecolor": SOFT,
-    "axes.labelcolor": INK,
-    "axes.linewidth": 0.7,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.formatter.limits": (-3, 4),
-    "text.color": INK,
-    "xtick.color": INK,
-    "ytick.color": INK,
-    "lines.linewidth": 1.6,
-    "lines.markersize": 4,
-    "svg.hashsalt": "softjaw",  # the same file gives the same page, byte for byte
-    "svg.fonttype": "path",
-}
-
-
 def style() -> Any:
     """Context in which all pictures of a study are drawn and saved."""
-    return mpl.rc_context(_STYLE)
+    return mpl.rc_context(fname=Path(__file__).with_name("templates") / "pictures.mplstyle")
 
 
 def figure(
