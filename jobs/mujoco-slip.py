@@ -20,6 +20,7 @@ from softjaw.study.export.mjcf import as_mjcf
 from softjaw.study.export.point_contact import cell
 from softjaw.study.export.rigid_body import RigidBody, body_of
 from softjaw.study.export.selection import GripperFrame, RankedGrasp, grasps
+from softjaw.study.grippers import Hand
 from softjaw.study.result.read import open as open_result
 
 # Shares of the largest f_x, f_y and tau_z in a load.
@@ -79,7 +80,7 @@ def rows(file: str, count: int = 5) -> Iterator[list[str]]:
     """Lines of the table: the first ``count`` grasps at every force."""
     ds = open_result(file)
     for force in ds.normal_force.values:
-        for grasp in grasps(ds, GripperFrame(closing="x"), force=float(force), top=count):
+        for grasp in grasps(ds, GripperFrame(Hand(closing="x")), force=float(force), top=count):
             contact = cell(grasp).contacts[0]
             place = grasp.place.rpartition(",")[0]
             axes = [contact.mu_x * contact.F_N, contact.mu_y * contact.F_N, 1e3 * contact.r * contact.F_N]

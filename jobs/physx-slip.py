@@ -18,6 +18,7 @@ from sapien import physx
 from softjaw.study.export.physx import torsional_radius
 from softjaw.study.export.point_contact import RADIUS, PointContact, cell
 from softjaw.study.export.selection import GripperFrame, grasps
+from softjaw.study.grippers import Hand
 from softjaw.study.result.read import open as open_result
 
 LOADS = {"slide": (1, 0), "torque": (0, 1), "slide, torque": (1, 1)}  # shares of mu F_N and of tau_z
@@ -74,7 +75,7 @@ def main() -> None:
     """Print a line for each of the first five grasps at every force."""
     ds, worst = open_result(sys.argv[1]), 0.0
     for force in ds.normal_force.values:
-        for grasp in grasps(ds, GripperFrame(closing="x"), force=float(force), top=5):
+        for grasp in grasps(ds, GripperFrame(Hand(closing="x")), force=float(force), top=5):
             found = ratios(cell(grasp).contacts[0])
             print(grasp.place, {name: tuple(f"{v:.3f}" for v in pair) for name, pair in found.items()}, flush=True)
             for pair, shares in zip(found.values(), LOADS.values(), strict=True):

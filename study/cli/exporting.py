@@ -75,8 +75,8 @@ def gripper_of(options: Namespace, preset: str | None = None) -> GripperFrame:
     name = options.gripper or preset
     hand = gripper_file(name)[1] if name else Hand()
     approaches = tuple(options.approaches or (("x",) if options.form in SIMULATORS else ()))
-    closing = CLOSING.get(options.form, "")
-    return GripperFrame(hand, approaches, closing, in_si("wider_mm", options.wider), options.frame)
+    hand = hand.model_copy(update={"closing": CLOSING.get(options.form, hand.closing)})
+    return GripperFrame(hand, approaches, in_si("wider_mm", options.wider), options.frame)
 
 
 def _written(options: Namespace, texts: list[str]) -> str:

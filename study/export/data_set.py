@@ -94,7 +94,7 @@ def write_data_set(index: Path, out: Path, form: str, gripper: GripperFrame) -> 
     for split, files in listed.items():
         write_file(out / "splits" / f"{split}.txt", "".join(f"{file}\n" for file in files), folders=True)
     about = {"format": form, "grasps": whole, "successful": good, "splits": {k: len(v) for k, v in listed.items()},
-             "gripper": {"name": gripper.hand.frame, "approach_axis": "z", "closing_axis": gripper.along},
+             "gripper": {"name": gripper.hand.frame, "approach_axis": "z", "closing_axis": gripper.hand.closing},
              "units": UNITS_OF, "meaning": MEANING, "states": STATES,
              "object_in_gripper": "holds, does no harm, and this gripper can take it"}
     write_file(out / "data-set.json", json.dumps(about, indent=1))
@@ -197,7 +197,7 @@ def grasp_arrays(ds: xr.Dataset, gripper: GripperFrame) -> Arrays:
             approach, hold = next(iter(holds(ds, case, gripper).items()))
             depth = hold.depth
             success[i] = not (case["flags"] & LOST or hold.unfit) and case["maps"].get("payload", 1.0) > 0
-        transforms[i, :3, :3], transforms[i, :3, 3] = gripper_frame(case, approach, gripper.along, depth)
+        transforms[i, :3, :3], transforms[i, :3, 3] = gripper_frame(case, approach, gripper.hand.closing, depth)
     arrays = {"transforms": transforms, "object_in_gripper": success}
     arrays["force"] = np.array([case["place"]["normal_force"] for case in listed], float)
     arrays["state"] = np.array([STATES.index(case["state"]) for case in listed], np.int64)

@@ -55,7 +55,7 @@ def as_graspgen(grasps: Sequence[RankedGrasp], gripper: GripperFrame, ds: xr.Dat
     file = os.path.relpath(keys["mesh"], folder) if "mesh" in keys else ""
     made = {
         "object": {"file": file, "scale": UNITS[keys.get("unit", "m")].size},
-        "gripper": {"name": gripper.hand.frame, "approach_axis": "z", "closing_axis": gripper.along,
+        "gripper": {"name": gripper.hand.frame, "approach_axis": "z", "closing_axis": gripper.hand.closing,
                     "about": _about(ds, gripper)},
         "grasps": {
             "transforms": [grasp.matrix.tolist() for grasp in grasps],
@@ -86,13 +86,13 @@ def _yaml(name: str, grasps: Sequence[RankedGrasp], gripper: GripperFrame, ds: x
 
 def _about(ds: xr.Dataset, gripper: GripperFrame) -> str:
     """What to know about all grasps of a file."""
-    return "\n".join(
-        [
-            f"Made by softjaw from {ds.attrs['file']}: poses of the gripper in the frame of the object's own file [m].",
-            f"Gripper: {gripper.hand.frame}, approaches along z, closes along {gripper.along} from finger 1 to 2.",
-            "Quality and confidence are relative to the best grasp of this file.",
-        ]
-    )
+    hand = gripper.hand
+    lines = [
+        f"Made by softjaw from {ds.attrs['file']}: poses of the gripper in the frame of the object's own file [m].",
+        f"Gripper: {hand.frame}, approaches along z, closes along {hand.closing} from finger 1 to 2.",
+        "Quality and confidence are relative to the best grasp of this file.",
+    ]
+    return "\n".join(lines)
 
 
 def flow(value: Any) -> str:

@@ -45,20 +45,13 @@ class GripperFrame:
     """The gripper that comes to the grasps: its hand, and how it comes.
 
     ``approach`` are the directions that each grasp is written for; without any it is the one that suits it best.
-    ``closing`` is the axis of a format whose grippers all close along it; ``wider`` [m] is how much the fingers open
-    beyond first touch before the grasp, as far as the stroke allows.
+    ``wider`` [m] is how much the fingers open beyond first touch before the grasp, as far as the stroke allows.
     """
 
     hand: Hand = field(default_factory=Hand)
     approach: tuple[str, ...] = ("minus-x",)
-    closing: str = ""
     wider: float = OPENED_MORE
     object_frame: str = "object"
-
-    @property
-    def along(self) -> str:
-        """The closing axis of the gripper's frame."""
-        return self.closing or self.hand.closing
 
 
 @dataclass(frozen=True)
@@ -194,7 +187,7 @@ def grasps(ds: xr.Dataset, gripper: GripperFrame, **choice: Any) -> list[RankedG
         merit = float(score[i] / best) if best > 0 else 0.0
         for approach, hold in holds(ds, case, gripper).items():
             name = f"grasp_{i}" + (f"_{approach.replace('-', '_')}" if len(gripper.approach) > 1 else "")
-            R, o = gripper_frame(case, approach, gripper.along, hold.depth)
+            R, o = gripper_frame(case, approach, gripper.hand.closing, hold.depth)
             made.append(RankedGrasp(name, place, case, R, o, merit, case["place"]["normal_force"], units, hold))
     return made
 
@@ -210,7 +203,7 @@ def holds(ds: xr.Dataset, case: dict[str, Any], gripper: GripperFrame) -> dict[s
     if gripper.approach:
         return dict.fromkeys(gripper.approach, Hold(*joints, tuple(beyond)))
     try:
-        approach, room = clearest(scene, hand, gripper.along, pad, _middle(case), wide, depth)
+        approach, room = clearest(scene, hand, gripper.hand.closing, pad, _middle(case), wide, depth)
     except (ValueError, OSError) as error:
         text = f"the object cannot be built, so that no approach can be chosen: {error}; name one with --approach"
         raise StudyError(USAGE, text) from error

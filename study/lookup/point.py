@@ -108,11 +108,6 @@ class GraspPoint(GraspNumbers):
         return R.reshape(*self.shape, 2, 3, 3), x.reshape(*self.shape, 2, 3)
 
     @property
-    def safety_factor(self) -> Any:
-        """How many times its weight the object could have; `KeyError` where the scene gives no mass."""
-        return self.value("safety_factor")
-
-    @property
     def flags(self) -> Any:
         """Flags of all cases around the point together (`study.flags.Flag`); 0 where there is no value."""
         flags = np.nan_to_num(self.map.table("flags")[self.corners.index]).astype(int)

@@ -29,7 +29,7 @@ CORNERS = tuple(f"{axis}{k}" for k in (1, 2, 3, 4) for axis in "xyz")
 KINDS = dict.fromkeys((*CENTRE, *CORNERS), "length") | dict.fromkeys(NORMAL, "number")
 KINDS |= {"area": "area", "pressure": "pressure"}
 ALIASES = {f"{stem}_{axis}": f"n{axis}" for stem in ("n", "normal") for axis in "xyz"}
-HEADER = re.compile(r"(?P<name>.*?)\s*(?:_(?P<tail>[^_\s\[\]()]+)|[\[(](?P<boxed>[^\[\]()]*)[\])])?")
+HEADER = re.compile(r"(?P<name>.*?)\s*(?:_(?P<tail>[^_\s\[\]()]+)|[\[(](?P<boxed>[^\[\]()]*)[\])])?", re.DOTALL)
 MINIMAL = "x_mm, y_mm, z_mm, area_mm2, nx, ny, nz, pressure_kpa, or corners x1_mm ... z4_mm with pressure_kpa"
 
 
@@ -88,12 +88,11 @@ def split_header(header: str, pressure_name: str | None = None) -> tuple[str, st
     """
     text = header.strip().lower()
     wanted = (pressure_name or "pressure").strip().lower()
-    name, unit = text, None
-    if match := HEADER.fullmatch(text):
-        name = match["name"]
-        unit = (match["tail"] or match["boxed"] or "").replace(" ", "").replace("^", "").replace("²", "2") or None
-    if text in ALIASES or text in KINDS:
-        name, unit = ALIASES.get(text, text), None
+    match = HEADER.fullmatch(text)
+    assert match  # any text is at least a name
+    name, unit = match["name"], re.sub("[ ^]", "", match["tail"] or match["boxed"] or "").replace("²", "2") or None
+    if text in ALIASES:
+        name, unit = ALIASES[text], None
     if wanted == text:
         return "pressure", unit if unit in FACTORS["pressure"] else None
     if name == "pressure" or wanted == name:

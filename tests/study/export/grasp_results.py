@@ -9,6 +9,7 @@ import numpy as np
 from softjaw.study.case.poses import axis_poses
 from softjaw.study.export.rigid_body import body_of
 from softjaw.study.export.selection import GripperFrame, grasps
+from softjaw.study.grippers import Hand
 from softjaw.study.result.read import open as open_result
 from tests.study.formula_results import grid_axes, make
 
@@ -72,7 +73,7 @@ def opened(path):
 
 @lru_cache
 def all_grasps(path, force):
-    found = grasps(opened(path), GripperFrame(closing="x"), force=force)
+    found = grasps(opened(path), GripperFrame(Hand(closing="x")), force=force)
     return sorted(found, key=lambda grasp: grasp.case["place"]["station"])
 
 

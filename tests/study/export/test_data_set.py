@@ -12,6 +12,7 @@ from softjaw.study.cli import main
 from softjaw.study.export.data_set import FORMS, grasp_arrays
 from softjaw.study.export.selection import GripperFrame
 from softjaw.study.flags import Flag
+from softjaw.study.grippers import Hand
 from softjaw.study.quantities import DONE, WIDE
 from softjaw.study.quantities import SLIPS as SLIPPING
 from softjaw.study.result.index import blank_row, write_index
@@ -57,7 +58,7 @@ def read_shards(out):
 
 def test_arrays_are_those_of_the_file_and_what_the_sampler_rejected_is_unsuccessful_and_says_why(folder):
     ds = opened(folder / "cup.hdf")
-    arrays = grasp_arrays(ds, GripperFrame(closing="x"))
+    arrays = grasp_arrays(ds, GripperFrame(Hand(closing="x")))
     assert {len(values) for values in arrays.values()} == {COUNT}
     success = arrays["object_in_gripper"].reshape(len(STATIONS), -1)
     assert (success.all(axis=1) == (np.arange(len(STATIONS)) != SLIPS)).all()
@@ -72,7 +73,7 @@ def test_arrays_are_those_of_the_file_and_what_the_sampler_rejected_is_unsuccess
     assert arrays["semi_axes"].shape == (COUNT, 2, 3)
     ds = opened(folder / "cup.hdf")
     ds.attrs["rejected"] = np.array([[10, 20, 30, 1, 0, 0, 0, 0, 1, SLIPPING], [0, 0, 5, 0, 1, 0, 0, 0, 1, WIDE]], "f4")
-    arrays = grasp_arrays(ds, GripperFrame(closing="x"))
+    arrays = grasp_arrays(ds, GripperFrame(Hand(closing="x")))
     assert {len(values) for values in arrays.values()} == {COUNT + 2}
     assert arrays["state"].tolist() == [*[DONE] * COUNT, SLIPPING, WIDE]
     assert not arrays["object_in_gripper"][COUNT:].any()

@@ -12,6 +12,7 @@ from softjaw.study.export.mjcf import as_mjcf
 from softjaw.study.export.point_contact import SHARE, carried
 from softjaw.study.export.rigid_body import body_of
 from softjaw.study.export.selection import GripperFrame, grasps
+from softjaw.study.grippers import Hand
 from softjaw.study.result.read import open as open_result
 from softjaw.study.units import GRAVITY
 from tests.study.launching import ROOT
@@ -35,7 +36,7 @@ SHIPPED = {  # scenes, and what makes each a quick one with antipodal grasps
 @lru_cache
 def best(path):
     ds = open_result(path)
-    grasp = grasps(ds, GripperFrame(closing="x"), top=1)[0]
+    grasp = grasps(ds, GripperFrame(Hand(closing="x")), top=1)[0]
     return grasp, body_of(ds, grasp.case)
 
 

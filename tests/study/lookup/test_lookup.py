@@ -80,7 +80,7 @@ def test_one_point_is_the_same_as_an_array_of_points_and_units_are_those_of_peop
     with pytest.raises(ValueError, match="model is 'round'"):
         straight.value("e_n", 0.01, 0.1, 3.0, "round")
     with pytest.raises(KeyError, match="safety_factor"):
-        _ = straight.at(0.01, 0.1, 3).safety_factor
+        _ = straight.at(0.01, 0.1, 3).value("safety_factor")
 
 
 @pytest.mark.parametrize(("place", "word"), [
