@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.ndimage import maximum_filter1d
 
 from softjaw.friction.patch import NEGLIGIBLE
 
@@ -163,9 +164,7 @@ def claims(bend: FloatArray, shape: tuple[int, ...]) -> FloatArray:
     """`bends` ``(3, nodes)`` of this shape of nodes as claims: the largest around along stations and forces."""
     claimed = np.nan_to_num(bend.reshape(3, *shape))
     for axis in (1, 3):
-        wide = np.pad(claimed, [(1, 1) if i == axis else (0, 0) for i in range(4)])
-        beside = [np.take(wide, np.arange(claimed.shape[axis]) + k, axis=axis) for k in range(3)]
-        claimed = np.maximum.reduce(beside)
+        claimed = maximum_filter1d(claimed, 3, axis=axis, mode="constant")
     return CLAIM_FACTOR * claimed.reshape(3, -1)
 
 

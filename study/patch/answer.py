@@ -21,7 +21,7 @@ from softjaw.study.flags import Flag, flags_in, raised
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.patch.faces import ReadPatch
 from softjaw.study.patch.patch_reader import ENDINGS, Reading, checked_file, read_table
-from softjaw.study.quantities import MODELS
+from softjaw.study.quantities import MODELS, map_row
 
 HALF_TURN = np.diag([1.0, -1.0, -1.0])  # about x: how the second of two equal fingers stands
 SURFACES = {  # as a scene names them, and in the text
@@ -35,7 +35,7 @@ SPACE = 3  # dimension of the loads (f_x, f_y, tau_z)
 FRICTION = {"f_x_max": "f_x", "f_y_max": "f_y", "tau_z_max": "tau_z", "tau_pure": "", **{n: n for n in ECCENTRICITIES}}
 UNITS = {
     "area": "m^2", "pressure": "Pa", "S": "N", "F_N": "N", "rho": "m", "origin": "m", "centre_of_pressure": "m",
-    "f_x_max": "N", "f_y_max": "N", "tau_z_max": "N m", "tau_pure": "N m", **dict.fromkeys(ECCENTRICITIES, "m"),
+    **{name: map_row(name).unit for name in FRICTION},
     "volume": "m", "semi_axes": "-, -, m", "E_dir": "rad", "distance": "m", "object_length": "m",
     "contact_length": "m", "misalignment": "rad",
 }  # fmt: skip

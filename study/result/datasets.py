@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from softjaw.study.quantities import MISSING, MODELS, Quantity
+from softjaw.study.table import with_unit
 
 MESSAGE_BYTES = 2000  # bytes of a message: all flags of a case have room
 ROOT = "/study"
@@ -84,8 +85,7 @@ def described(q: Quantity, key: str) -> dict[str, str]:
     """Attributes of the dataset of a quantity, or of one of its models."""
     model = key.rpartition("/")[2] if key != q.key else ""
     label = f"{q.label}, {model}" if model else q.label
-    long_name = f"{label} [{q.unit}]" if q.unit else label
-    attributes = {"units": q.unit, "long_name": long_name, "definition": q.definition}
+    attributes = {"units": q.unit, "long_name": with_unit(label, q.unit), "definition": q.definition}
     if q.by_model and not model:
         attributes["models"] = ", ".join(MODELS)
     if q.meanings:

@@ -143,9 +143,11 @@ class Layout:
         return tuple([i for i in order if self.shape[i] > 1][:2]) or (len(self.shape) - 1,)
 
     @property
-    def counters(self) -> dict[str, int]:
-        """The other dimensions and their lengths: each is a dimension scale 0, 1, 2, ..."""
-        return {**self.lengths, "column": len(self.summed), "closing": len(self.closing)}
+    def counters(self) -> list[Axis]:
+        """The other dimensions: each is a dimension scale 0, 1, 2, ..."""
+        lengths = {**self.lengths, "column": len(self.summed), "closing": len(self.closing)}
+        about = {name: f"number of the {name.removesuffix('_2').replace('_', ' ')}" for name in lengths}
+        return [Axis(name, np.arange(n), "", about[name]) for name, n in lengths.items()]
 
     @cached_property
     def lengths(self) -> dict[str, int]:

@@ -35,6 +35,7 @@ from softjaw.study.result.layout import (
 )
 from softjaw.study.result.provenance import SAMPLING
 from softjaw.study.result.store import open_result
+from softjaw.study.table import with_unit
 from softjaw.study.units import shown_text
 
 HDF5_VERSIONS = ("v108", "v110")  # v110 would mark a file as open for writing, and a killed run could not resume
@@ -136,17 +137,13 @@ def _write_skeleton(file: h5py.File, layout: Layout, header: Header, packed: boo
         group = study.create_group(name)
         for key, value in attributes.items():
             _write_attribute(group, key, value)
-    for name, axis in zip(layout.names, layout.axes, strict=True):
-        scale = study["axes"].create_dataset(name, data=np.asarray(axis.values, "<f8"))
-        long_name = f"{axis.long_name} [{axis.units}]" if axis.units else axis.long_name
-        scale.attrs.update(units=axis.units, long_name=long_name, scene_key=axis.name)
+    kinds = [*((axis, "<f8") for axis in layout.axes), *((axis, "<i4") for axis in layout.counters)]
+    for axis, kind in kinds:
+        scale = study["axes"].create_dataset(axis.name, data=axis.values, dtype=kind)
+        scale.attrs.update(units=axis.units, long_name=with_unit(axis.long_name, axis.units))
         if axis.options:
             _write_attribute(scale, "options", list(axis.options))
-        scale.make_scale(name)
-    for name, length in layout.counters.items():
-        count = study["axes"].create_dataset(name, data=np.arange(length, dtype="<i4"))
-        count.attrs.update(units="", long_name=f"number of the {name.removesuffix('_2').replace('_', ' ')}")
-        count.make_scale(name)
+        scale.make_scale(axis.name)
     for dataset in layout.datasets:
         _create_dataset(file, dataset, packed)
     _link_maps(study, layout)
