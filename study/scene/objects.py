@@ -18,9 +18,6 @@ WALL_KEYS = ("base_wall_mm", "young_modulus_gpa", "wall_poisson_ratio", "yield_s
 
 Span = tuple[float, float]
 Length = Annotated[float, Field(gt=0)]
-Modulus = Annotated[float, Field(gt=0, le=1000)]
-Strength = Annotated[float, Field(gt=0, le=1e5)]
-Ratio = Annotated[float, Field(ge=0, le=0.49)]
 
 
 class Shape(SceneSection):
@@ -28,10 +25,8 @@ class Shape(SceneSection):
 
     SIZE_KEYS: ClassVar[tuple[str, ...]] = ()  # key of the extents, or one key for each of x, y and z
     name: Text = Field("", max_length=100, description="name for titles and tables")
-    mass_g: Annotated[float, Field(gt=0, le=1e6)] | None = Field(None, description="mass, for the force to use")
-    density: Annotated[float, Field(gt=0, le=30_000)] | None = Field(
-        None, description="instead of the mass, of a body that is solid [kg/m^3]"
-    )
+    mass_g: float | None = Field(None, gt=0, le=1e6, description="mass, for the force to use")
+    density: float | None = Field(None, gt=0, le=30_000, description="instead of the mass, of a solid body [kg/m^3]")
 
     @property
     def axis_symmetry(self) -> int:
@@ -69,9 +64,9 @@ class Walled(Shape):
     )
     base_wall_mm: Length | None = Field(None, description="thickness of a flat bottom; that of the wall if left out")
     wall_material: Literal["PET", "PP", "HDPE", "custom"] = Field("PET", description="material of the wall")
-    young_modulus_gpa: Modulus | None = Field(None, description="Young's modulus of the wall instead of the material's")
-    wall_poisson_ratio: Ratio | None = Field(None, description="Poisson's ratio of the wall instead of the material's")
-    yield_strength_mpa: Strength | None = Field(None, description="yield strength instead of the material's")
+    young_modulus_gpa: float | None = Field(None, gt=0, le=1000, description="Young's modulus if not the material's")
+    wall_poisson_ratio: float | None = Field(None, ge=0, le=0.49, description="Poisson's ratio if not the material's")
+    yield_strength_mpa: float | None = Field(None, gt=0, le=1e5, description="yield strength instead of the material's")
     allowed_dent_mm: Length | None = Field(None, description="largest allowed indentation, for the safe force range")
     open_ends: Literal["top", "both", "none"] = Field(
         "top", description="top: open as a cup and a bottle without its cap are; both: a tube"

@@ -22,7 +22,6 @@ Extent = Annotated[float, Field(ge=0, le=500)]
 FingerSide = Annotated[float, Field(ge=1, le=1000)]
 Force = Annotated[float, Field(gt=0, le=1000)]
 Grading = Annotated[float, Field(ge=0.05, le=20)]
-WallSize = Annotated[float, Field(ge=0.2, le=50)]
 MOST_ELEMENTS, LARGEST_ASPECT = 1_000_000, 20.0
 UNCERTAIN = ("object", "gripper", "friction", "candidates", "task")  # sections whose numbers may be
 COARSE, FINE = 0, 1  # meshes of a case: half as many elements in every direction as the scene says, and its own
@@ -278,8 +277,8 @@ class Accuracy(SceneSection):
     contact: Literal["auto", "weighted", "nodal", "blended"] = Field(
         "auto", description="how gaps are collocated; auto is blended for hex8, else weighted"
     )
-    wall_element_mm: WallSize = Field(
-        1.5, description="size of a wall's elements round the object, under the pads; elsewhere up to 4 times as large"
+    wall_element_mm: float = Field(
+        1.5, ge=0.2, le=50, description="size of a wall's elements round it under the pads; up to 4 times elsewhere"
     )
 
     def rules(self) -> Errors:
