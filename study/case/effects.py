@@ -35,7 +35,7 @@ from softjaw.study.quantities import E_N_TARGET, EFFECTS, REASONS
 from softjaw.study.scene import Scene
 from softjaw.study.scene.sections import COARSE
 
-COUPLING = "friction_pressure_coupling"
+COUPLING = "friction_pressure_coupling"  # of which every force has a level of its own; else all have the highest one's
 
 (
     ONLY, FORCED, BELOW, ABOVE, SYMMETRY, NO_WALL, CHEAP, APART, LITTLE, MUCH, UNDECIDED, FAILED, SCREENED,
@@ -167,7 +167,6 @@ STEPS: dict[str, tuple[Step, ...]] = {
     ),
     COUPLING: (Step("none", "tangential", _traction, SMALL_TRACTION, inf),),
 }
-EACH_FORCE = (COUPLING,)  # effects of which every force has a level of its own; else all have that of the highest one
 
 
 def level_named(effect: str, name: str) -> str:
@@ -197,12 +196,12 @@ class EffectChoice:
         self.levels = Levels(*(cheapest[n] if level == "auto" else level for n, level in self._wanted.items()))
         self._chosen: dict[tuple[str, int], Level] = {}
         for name in Levels._fields:
-            if name not in EACH_FORCE:
+            if name != COUPLING:
                 self.level(name, self.count - 1)
 
     def level(self, name: str, k: int) -> Level:
         """Level of one effect with steps at the ``k``-th force."""
-        k = k if name in EACH_FORCE else self.count - 1
+        k = k if name == COUPLING else self.count - 1
         if (name, k) not in self._chosen:
             self._chosen[name, k] = self._choose(name, k)
         return self._chosen[name, k]
@@ -214,7 +213,7 @@ class EffectChoice:
             return Level(level_named(name, steps[0].low), reason=NO_WALL)
         if wanted != "auto":
             # of a force by itself the solved state tells it, see `effects_at`: nothing is solved for it here
-            indicator = nan if name in EACH_FORCE else steps[-1].indicator(self, k)
+            indicator = nan if name == COUPLING else steps[-1].indicator(self, k)
             return Level(level_named(name, wanted), indicator, FORCED)
         # what is stated is the last step's indicator, whichever step was decided last
         return self._at(name, k)._replace(indicator=steps[-1].indicator(self, k))
@@ -226,7 +225,7 @@ class EffectChoice:
             level = decided(name, step, step.indicator(self, k), measured, self.target)
             if level.level == level_named(name, step.low):
                 break
-            if name not in EACH_FORCE:
+            if name != COUPLING:
                 self.levels = self.levels._replace(**{name: step.high})
         return level
 
@@ -236,7 +235,7 @@ class EffectChoice:
         NaN where they are not known. Of effects that all forces share they are those at the force where they are
         largest.
         """
-        forces = [k] if name in EACH_FORCE else range(self.count)
+        forces = [k] if name == COUPLING else range(self.count)
         # what is not known at some force may be the largest
         compared = [self._compared(name, step, i) for i in forces]
         return max(compared, key=lambda c: inf if np.isnan(largest(c)) else largest(c))
@@ -297,11 +296,22 @@ class EffectChoice:
 
         Raises `ConvergenceError, CheckError` if there is no acceptable state.
         """
-        solved = self._solved(k)
-        if solved.coarse is None:
-            return solved
-        pairs = [self._coarse_pair(name, STEPS[name][0], k) for name in self._left_out(k)]
-        return replace(solved, pairs=[*solved.pairs, *filter(None, pairs)])
+        level, note = self.level(COUPLING, k), ""
+        solved: Solved | None = None
+        if level.reason != FORCED and level.level == level_named(COUPLING, "tangential"):
+            coupled = self.levels._replace(friction_pressure_coupling="tangential")
+            try:
+                # a wall whose coarse load path with friction has ended: the fine one takes long to end, too
+                if self.levels.object.endswith("shell") and forces_apart(self.solver.scene):
+                    self.solver.solve(k, COARSE, coupled)
+                solved = self.solver.case(k, coupled, self._share_left_out(k))
+            except (ConvergenceError, CheckError) as error:
+                self._chosen[COUPLING, k] = level._replace(level=level_named(COUPLING, "none"), reason=FAILED)
+                note = LEFT_OUT.format(reason=error)
+        solved = solved or self.solver.case(k, self.levels, self._share_left_out(k))
+        left_out = self._left_out(k) if solved.coarse else []
+        pairs = filter(None, (self._coarse_pair(name, STEPS[name][0], k) for name in left_out))
+        return replace(solved, pairs=[*solved.pairs, *pairs], note=join_notes(note, solved.note))
 
     def _left_out(self, k: int) -> list[str]:
         """Effects whose dearer level was measured and left out."""
@@ -311,21 +321,6 @@ class EffectChoice:
         """What effects that were left out add to the error of the quantity that ``accuracy.target`` is for."""
         field = CHANGE_OF[self.solver.scene.accuracy.target_of]
         return self.skipped_share(k) + sum(abs(getattr(self.level(name, k), field)) for name in self._left_out(k))
-
-    def _solved(self, k: int) -> Solved:
-        """A case without what its effects leave out."""
-        level, coupled = self.level(COUPLING, k), self.levels._replace(friction_pressure_coupling="tangential")
-        if level.reason == FORCED or level.level != level_named(COUPLING, "tangential"):
-            return self.solver.case(k, self.levels, self._share_left_out(k))
-        try:
-            # a wall whose coarse load path with friction has ended: the fine one takes long to end, too
-            if self.levels.object.endswith("shell") and forces_apart(self.solver.scene):
-                self.solver.solve(k, COARSE, coupled)
-            return self.solver.case(k, coupled, self._share_left_out(k))
-        except (ConvergenceError, CheckError) as error:
-            self._chosen[COUPLING, k] = level._replace(level=level_named(COUPLING, "none"), reason=FAILED)
-            solved = self.solver.case(k, self.levels, self._share_left_out(k))
-            return replace(solved, note=join_notes(LEFT_OUT.format(reason=error), solved.note))
 
     def effects_at(self, k: int, contacts: Sequence[PressedContact]) -> dict[str, Level]:
         """Levels of the effects that are chosen at the ``k``-th force, whose contacts are solved."""

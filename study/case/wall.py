@@ -33,14 +33,9 @@ def thin_body(shape: Walled) -> ThinWalled:
     """Wall of an object that has one (``shape.wall`` is not None)."""
     assert shape.wall is not None
     return ThinWalled(
-        outer_surface(shape),
-        shape.wall,
-        material_of(shape),
-        shape.support,
-        shape.open_top,
-        shape.base_wall,
+        outer_surface(shape), shape.wall, material_of(shape), shape.support, shape.open_top, shape.base_wall,
         open_bottom=shape.open_bottom,
-    )
+    )  # fmt: skip
 
 
 def estimated_indentation(

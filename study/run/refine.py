@@ -35,12 +35,12 @@ def refined(scene: Scene, rounds: Rounds) -> Scene:
     rounds = tuple(added for added in rounds if not is_case(added[0]))
     if not rounds:
         return scene
-    where, given = scene.candidates, scene.candidates.station_values_mm
+    where, grown = scene.candidates, dict[str, Any](refine=None)
     if where.poses:
-        grown: dict[str, Any] = {"poses": with_places(where.poses, rounds), "refine": None}
-        return scene.model_copy(update={"candidates": where.model_copy(update=grown)})
-    stations = tuple(sorted({*given, *(s for added in rounds for s in added)}))
-    grown = {"stations": None, "stations_mm": stations, "refine": None}
+        grown |= {"poses": with_places(where.poses, rounds)}
+    else:
+        stations = {*where.station_values_mm, *(s for added in rounds for s in added)}
+        grown |= {"stations": None, "stations_mm": tuple(sorted(stations))}
     return scene.model_copy(update={"candidates": where.model_copy(update=grown)})
 
 
