@@ -165,7 +165,7 @@ def _scores(
     In closed form where the contacts face each other, exactly in any pose elsewhere.
     """
     facing = faces(contacts, settings)
-    scores: dict[str, list[float]] = {"quality": [], "quality_fitted": [], "epsilon": []}
+    rows: list[tuple[float, float, float]] = []
     closed = {m: _closed(contacts, m, settings) for m in MODELS}
     tilt = math.nan  # what the pose makes of the closed form; for all models that of the curved one, which comes first
     for m in MODELS:
@@ -174,7 +174,7 @@ def _scores(
              for fit, c in zip(fits, contacts, strict=True)], contacts, settings)  # fmt: skip
         # a contact that carries nothing in some direction leaves no volume in any pose
         if facing or closed[m].quality == 0:
-            values = closed[m].quality, both, closed[m].epsilon
+            rows.append((closed[m].quality, both, closed[m].epsilon))
         else:
             bodies = [fit[m].body(c.mu) for fit, c in zip(fits, contacts, strict=True)]
             if not any(isinstance(body, Quartic) for body in bodies):
@@ -185,10 +185,9 @@ def _scores(
                 both *= tilt
             ellipsoids = [c.ellipsoids[m] for c in contacts]
             least = _epsilon(contacts, ellipsoids, settings) if settings.epsilon_everywhere else math.nan
-            values = _volume(contacts, ellipsoids, settings), both, least
-        for name, value in zip(("quality", "quality_fitted", "epsilon"), values, strict=True):
-            scores[name].append(value)
-    return {f"maps/{name}": values for name, values in scores.items()}, closed[MODELS[0]]
+            rows.append((_volume(contacts, ellipsoids, settings), both, least))
+    names = ("maps/quality", "maps/quality_fitted", "maps/epsilon")
+    return dict(zip(names, map(list, zip(*rows, strict=True)), strict=True)), closed[MODELS[0]]
 
 
 def quality(contacts: Sequence[Contact], settings: EvaluationSettings) -> float:

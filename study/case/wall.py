@@ -70,9 +70,8 @@ def estimated_indentation(
     load[:, 3:] = load[:, :3]
     q = linear.solve(load.ravel()).reshape(-1, 6)
     indentations = _indentations(linear.shell, q)
-    return float(indentations[pressed].max(initial=0.0)), float(
-        (indentations / mesh.thickness)[pressed].max(initial=0.0)
-    )
+    ratios = indentations / mesh.thickness
+    return float(indentations[pressed].max(initial=0.0)), float(ratios[pressed].max(initial=0.0))
 
 
 def _indentations(shell: Shell, q: FloatArray) -> FloatArray:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any, TextIO
 
 import numpy as np
@@ -121,20 +122,13 @@ class Unbreakable:
         self._stream = stream
 
     def __getattr__(self, name: str) -> Any:
-        """Everything but writing is the stream's own."""
-        return getattr(self._stream, name)
+        """What the stream has; it writes and flushes, or forgets."""
+        act = getattr(self._stream, name)
+        return partial(self._try, act) if name in ("write", "flush") else act
 
-    def write(self, text: str) -> int:
-        """Write, or forget."""
-        return self._try(lambda: self._stream.write(text)) or 0
-
-    def flush(self) -> None:
-        """Flush, or forget."""
-        self._try(self._stream.flush)
-
-    def _try(self, act: Callable[[], Any]) -> Any:
+    def _try(self, act: Callable[..., Any], *text: str) -> Any:
         try:
-            return act()
+            return act(*text)
         except BrokenPipeError:
             # Into nowhere from now on: the interpreter's last flush would complain too.
             nowhere = os.open(os.devnull, os.O_WRONLY)

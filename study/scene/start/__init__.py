@@ -72,10 +72,8 @@ def init(options: Namespace, measure: Callable[[Namespace], Measured]) -> str:
         text = _filled(template, words | mesh)
         text = with_gripper(text, options.gripper) if path == scene and options.gripper else text
         write_file(path, text, folders=True)
-    measured = []
-    if mesh:
-        measured = ["object:  {SIZE} mm along the file's x, y and z, with --unit {UNIT} --axis {AXIS}".format(**mesh)]
-        measured += [f"         {note}" for note in notes]
+    about = "object:  {SIZE} mm along the file's x, y and z, with --unit {UNIT} --axis {AXIS}"
+    measured = [about.format(**mesh), *(f"         {note}" for note in notes)] if mesh else []
     lines = [
         f"written: {scene!s:<{len(str(batch))}}  the scene: what is grasped, where and how hard",
         f"written: {batch}  a Slurm job that resumes after its time limit",
