@@ -66,12 +66,9 @@ def candidates(scene: Scene) -> list[Candidate]:
     notes = {s: middle.remark(s, half) if middle else "" for s in where.station_values}
     places = product(where.station_values, where.angles)
     return [
-        Candidate(
-            station, angle, moved(axis_poses(station, angle, where.roll, middle), where.shift, 0.0),
-            label, notes[station],
-        )
-        for (station, angle), label in zip(places, where.labels, strict=True)
-    ]  # fmt: skip
+        Candidate(s, angle, moved(axis_poses(s, angle, where.roll, middle), where.shift, 0.0), label, notes[s])
+        for (s, angle), label in zip(places, where.labels, strict=True)
+    ]
 
 
 def check_candidates(scene: Scene) -> None:
