@@ -12,7 +12,6 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import shutil
 import tarfile
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
@@ -28,10 +27,10 @@ from softjaw.study.case.poses import explicit_poses, moved
 from softjaw.study.export.cases import MEANING, cases
 from softjaw.study.export.selection import GripperFrame, gripper_frame, holds
 from softjaw.study.flags import LOST
-from softjaw.study.messages import USAGE, StudyError, beside, write_file
+from softjaw.study.messages import OTHER_FILE, USAGE, StudyError, beside, write_file
 from softjaw.study.quantities import BY_KEY, DONE, NO_GRASP, STATES
 from softjaw.study.ranking import judged, task_keys
-from softjaw.study.result.index import read_index, write_arrays
+from softjaw.study.result.index import arrays_file, read_index
 from softjaw.study.result.read import maps_in, open, scene_of
 from softjaw.study.scene.grasps import GraspPose
 from softjaw.study.table import plain
@@ -67,7 +66,7 @@ class ObjectGrasps:
         return self.name + self.mesh.suffix.lower()
 
 
-Writer = Callable[[ObjectGrasps], None]
+Files = dict[str, bytes]  # of one object, by name
 
 
 def write_data_set(index: Path, out: Path, form: str, gripper: GripperFrame) -> str:
@@ -83,9 +82,13 @@ def write_data_set(index: Path, out: Path, form: str, gripper: GripperFrame) -> 
     listed: dict[str, list[str]] = {split: [] for split in SPLITS}
     good = whole = 0
     with ExitStack() as stack:
-        write = FORMS[form](out, stack)
+        shards: dict[str, tarfile.TarFile] = {}
         for grasps in _objects(index, gripper):
-            write(grasps)
+            number, position = divmod(len(listed[grasps.split]), SHARD)
+            if form == "webdataset" and not position:
+                made = stack.enter_context(beside(out / f"{grasps.split}-{number:06d}.tar", folders=True))
+                shards[grasps.split] = stack.enter_context(tarfile.open(made, "w"))
+            _add(FORMS[form](grasps), out, shards.get(grasps.split))
             listed[grasps.split].append(grasps.file)
             good += int(grasps.arrays["object_in_gripper"].sum())
             whole += len(grasps.arrays["object_in_gripper"])
@@ -102,66 +105,51 @@ def write_data_set(index: Path, out: Path, form: str, gripper: GripperFrame) -> 
     return f"written: {out}: {counts}; {good} of {whole} grasps are successful"
 
 
+def _add(files: Files, out: Path, shard: tarfile.TarFile | None) -> None:
+    """Write the files of an object into a folder, or into a shard."""
+    for name, content in files.items():
+        if shard is None:
+            write_file(out / name, content, folders=True)
+            continue
+        entry = tarfile.TarInfo(name)
+        entry.size = len(content)
+        shard.addfile(entry, io.BytesIO(content))
+
+
 # --- formats ----------------------------------------------------------------------------------------------------------
 
 
-def _as_json(grasps: ObjectGrasps) -> str:
+def _as_json(grasps: ObjectGrasps) -> bytes:
     """One object as GraspGen keeps it; what is not known is null."""
     about = {"file": grasps.file, "scale": grasps.scale, "mass": plain(grasps.mass)}
-    return json.dumps({"object": about, "grasps": {name: plain(v) for name, v in grasps.arrays.items()}})
+    arrays = {name: plain(values) for name, values in grasps.arrays.items()}
+    return json.dumps({"object": about, "grasps": arrays}).encode()
 
 
-def _copied(mesh: Path, target: Path) -> None:
-    with beside(target, folders=True) as part:
-        shutil.copyfile(mesh, part)
-
-
-def _graspgen(out: Path, _: ExitStack) -> Writer:
+def _graspgen(grasps: ObjectGrasps) -> Files:
     """``objects/NAME.stl``, and ``grasps/NAME.json`` for each."""
-
-    def write(grasps: ObjectGrasps) -> None:
-        _copied(grasps.mesh, out / "objects" / grasps.file)
-        write_file(out / "grasps" / f"{grasps.name}.json", _as_json(grasps), folders=True)
-
-    return write
+    return {f"objects/{grasps.file}": grasps.mesh.read_bytes(), f"grasps/{grasps.name}.json": _as_json(grasps)}
 
 
-def _acronym(out: Path, _: ExitStack) -> Writer:
+def _acronym(grasps: ObjectGrasps) -> Files:
     """``meshes/NAME.stl``, and ``grasps/NAME_SCALE.h5`` for each, with more qualities beside the simulated one."""
-
-    def write(grasps: ObjectGrasps) -> None:
-        _copied(grasps.mesh, out / "meshes" / grasps.file)
-        arrays = dict(grasps.arrays)
-        made = {"object/file": f"meshes/{grasps.file}", "object/scale": grasps.scale, "object/mass": grasps.mass,
-                "grasps/transforms": arrays.pop("transforms"),
-                "grasps/qualities/flex/object_in_gripper": arrays.pop("object_in_gripper").astype(np.int64)}
-        made |= {f"grasps/qualities/softjaw/{name}": values for name, values in arrays.items()}
-        write_arrays(out / "grasps" / f"{grasps.name}_{grasps.scale!r}.h5", made)
-
-    return write
+    mesh, arrays = f"meshes/{grasps.file}", dict(grasps.arrays)
+    made = {"object/file": mesh, "object/scale": grasps.scale, "object/mass": grasps.mass,
+            "grasps/transforms": arrays.pop("transforms"),
+            "grasps/qualities/flex/object_in_gripper": arrays.pop("object_in_gripper").astype(np.int64)}
+    made |= {f"grasps/qualities/softjaw/{name}": values for name, values in arrays.items()}
+    return {mesh: grasps.mesh.read_bytes(), f"grasps/{grasps.name}_{grasps.scale!r}.h5": arrays_file(made)}
 
 
-def _webdataset(out: Path, stack: ExitStack) -> Writer:
+def _webdataset(grasps: ObjectGrasps) -> Files:
     """``train-000000.tar``, ...: for each object ``NAME.json``, as GraspGen keeps it, and ``NAME.mesh.stl``."""
-    counts, shards = dict.fromkeys(SPLITS, 0), dict[str, tarfile.TarFile]()
-
-    def write(grasps: ObjectGrasps) -> None:
-        number, position = divmod(counts[grasps.split], SHARD)
-        if not position:
-            made = stack.enter_context(beside(out / f"{grasps.split}-{number:06d}.tar", folders=True))
-            shards[grasps.split] = stack.enter_context(tarfile.open(made, "w"))
-        counts[grasps.split] += 1
-        key = grasps.name.replace(".", "_")  # what follows the first dot is the kind of a file
-        parts = {"json": _as_json(grasps).encode(), f"mesh{grasps.mesh.suffix.lower()}": grasps.mesh.read_bytes()}
-        for kind, content in parts.items():
-            entry = tarfile.TarInfo(f"{key}.{kind}")
-            entry.size = len(content)
-            shards[grasps.split].addfile(entry, io.BytesIO(content))
-
-    return write
+    key = grasps.name.replace(".", "_")  # what follows the first dot is the kind of a file
+    return {f"{key}.json": _as_json(grasps), f"{key}.mesh{grasps.mesh.suffix.lower()}": grasps.mesh.read_bytes()}
 
 
-FORMS = {"graspgen": _graspgen, "acronym": _acronym, "webdataset": _webdataset}
+FORMS: dict[str, Callable[[ObjectGrasps], Files]] = {
+    "graspgen": _graspgen, "acronym": _acronym, "webdataset": _webdataset,
+}  # fmt: skip
 
 
 def _objects(index: Path, gripper: GripperFrame) -> Iterator[ObjectGrasps]:
@@ -169,9 +157,10 @@ def _objects(index: Path, gripper: GripperFrame) -> Iterator[ObjectGrasps]:
         path = index.parent / row["file"]
         if row["done"] > 0 and path.exists():
             ds = open(path)
-            unit = task_keys(ds, "object").get("unit", "m")
-            arrays = grasp_arrays(ds, gripper)
-            yield ObjectGrasps(row["object"], index.parent / row["mesh"], UNITS[unit].size, row["mass"], arrays)
+            scale = UNITS[task_keys(ds, "object").get("unit", "m")].size
+            if not (mesh := index.parent / row["mesh"]).is_file():
+                raise StudyError(OTHER_FILE, f"{mesh}: no such file; put the mesh of '{row['object']}' back")
+            yield ObjectGrasps(row["object"], mesh, scale, row["mass"], grasp_arrays(ds, gripper))
 
 
 def grasp_arrays(ds: xr.Dataset, gripper: GripperFrame) -> Arrays:

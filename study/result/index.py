@@ -6,6 +6,7 @@ dataset over ``object``; xarray opens it as `open_index` does.
 
 from __future__ import annotations
 
+import io
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -87,11 +88,13 @@ def write_index(path: Path, rows: Sequence[Row], attributes: Mapping[str, Any]) 
             made.dims[0].attach_scale(names)
 
 
-def write_arrays(path: Path, arrays: Mapping[str, Any]) -> None:
-    """Write an HDF5 file of arrays, numbers and texts by path; an existing one is replaced."""
-    with beside(path, folders=True) as part, h5py.File(part, "w") as file:
+def arrays_file(arrays: Mapping[str, Any]) -> bytes:
+    """An HDF5 file of arrays, numbers and texts by path."""
+    store = io.BytesIO()
+    with h5py.File(store, "w") as file:
         for name, values in arrays.items():
             file[name] = values
+    return store.getvalue()
 
 
 def _about(name: str) -> dict[str, str]:
