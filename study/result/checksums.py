@@ -47,9 +47,8 @@ def broken_rows(file: StoredFile, layout: Layout, path: str, values: Any, rows: 
 
 def stored_sums(file: StoredFile, layout: Layout, path: str) -> NDArray[np.uint32]:
     """Checksums of all rows for the dataset at a path, or of the states."""
-    dataset = file.checked(SUMS, (*layout.shape, len(layout.summed)), np.dtype("<u4"))
-    sums: NDArray[np.uint32] = file.values(dataset, (..., layout.summed.index(path)))
-    return sums.ravel()
+    shape, which = (*layout.shape, len(layout.summed)), (..., layout.summed.index(path))
+    return np.asarray(file.values(SUMS, shape, np.dtype("<u4"), which)).ravel()
 
 
 def broken_states(file: StoredFile, layout: Layout, codes: np.ndarray, under_way: bool) -> np.ndarray:
@@ -62,7 +61,7 @@ def broken_states(file: StoredFile, layout: Layout, codes: np.ndarray, under_way
     wrong = np.array([OF_STATE.get(state, 0) for state in range(256)], np.uint32)[codes] != stored
     if under_way and wrong.any():
         # A kill between checksum and state leaves exactly this: begun, not computed, and the sum of an end.
-        begun = file.values(file.checked(ATTEMPTS, layout.shape, np.dtype("u1"))).ravel() > 0
+        begun = file.values(ATTEMPTS, layout.shape, np.dtype("u1")).ravel() > 0
         ends = [crc for state, crc in OF_STATE.items() if state != MISSING]
         wrong &= ~(begun & (codes == MISSING) & np.isin(stored, ends))
     return np.flatnonzero(wrong)
@@ -77,5 +76,5 @@ def of_header(file: StoredFile, layout: Layout) -> int:
     """Checksum of what is written once, when the file is made: axes, layout, header, scene, definitions."""
     crc = 0
     for name in ("layout", "header", "scene", "definitions", *(f"axes/{name}" for name in layout.names)):
-        crc = zlib.crc32(np.asarray(file.values(file.plain(f"{ROOT}/{name}"))).tobytes(), crc)
+        crc = zlib.crc32(np.asarray(file.values(f"{ROOT}/{name}")).tobytes(), crc)
     return crc

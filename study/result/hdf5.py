@@ -62,15 +62,16 @@ class StoredFile:
 
     def texts(self, path: str) -> list[str]:
         """A list of texts of any length."""
-        with self._damage(path):
-            dataset = self.plain(path)
-            if dataset.ndim != 1 or not h5py.check_string_dtype(dataset.dtype):
-                raise self.damaged(f"{path} is not a list of texts")
-            return [text_of(text) for text in dataset[()].tolist()]
+        if (dataset := self.plain(path)).ndim != 1 or not h5py.check_string_dtype(dataset.dtype):
+            raise self.damaged(f"{path} is not a list of texts")
+        return [text_of(text) for text in self.values(path).tolist()]
 
-    def values(self, dataset: h5py.Dataset, index: Any = ()) -> Any:
-        """Values of a dataset that `plain` or `checked` gave, all or those of an index."""
-        with self._damage(dataset.name or "a dataset"):
+    def values(
+        self, path: str, shape: tuple[int, ...] | None = None, dtype: np.dtype | None = None, index: Any = ()
+    ) -> Any:
+        """Values of a dataset, all or those of an index; with ``shape`` and ``dtype`` those of a `checked` one."""
+        dataset = self.plain(path) if shape is None or dtype is None else self.checked(path, shape, dtype)
+        with self._damage(path):
             return dataset[index]
 
     def _node(self, path: str) -> Any:

@@ -111,7 +111,7 @@ def read_index(path: Path) -> tuple[list[Row], dict[str, Any]]:
     try:
         values: dict[str, list[Any]] = {"object": file.texts("object")}
         for name, (kind, *_) in COLUMNS.items():
-            values[name] = file.texts(name) if kind is str else file.values(file.plain(name)).tolist()
+            values[name] = file.texts(name) if kind is str else file.values(name).tolist()
         if len({len(column) for column in values.values()}) != 1:
             raise file.damaged("columns of different lengths", "run the scene again")
         return [dict(zip(values, row, strict=True)) for row in zip(*values.values(), strict=True)], file.attributes()

@@ -90,11 +90,11 @@ def rewrite(path: Path, layout: Layout, header: Header, *, packed: bool = False)
             left_out = () if old.layout.shape == layout.shape else NOT_COPIED
             known = {d.path for d in old.layout.datasets}
             for dataset in (d for d in layout.datasets if d.path in known and not d.path.startswith(left_out)):
-                values = old.file.values(old.file.plain(dataset.path))
+                values = old.file.values(dataset.path)
                 target = file[dataset.path]
                 target[...] = _spread(values, dataset, stations).astype(target.dtype)  # texts with their encoding
             for name in (SESSION_ROWS, *([] if left_out else [REPORT])):
-                file[name][...] = old.file.values(old.file.plain(name))
+                file[name][...] = old.file.values(name)
 
 
 def _places(old: Layout, new: Layout) -> np.ndarray:

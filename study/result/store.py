@@ -83,10 +83,10 @@ class Result:
         full = self.layout.paths.get(path, f"{ROOT}/{path}")
         path = full.removeprefix(f"{ROOT}/")
         if self._unchecked or full not in self.layout.summed[:-1]:
-            return self.file.values(self._checked(path))
+            return self._values(path)
         # States before values: a row that is marked has all its values.
         rows = np.flatnonzero(self.status != MISSING)
-        values = self.file.values(self._checked(path))
+        values = self._values(path)
         self._refuse(self._still(checksums.broken_rows(self.file, self.layout, full, values, rows), self.status), path)
         return values
 
@@ -94,9 +94,9 @@ class Result:
         """Faces of both fingers at one case: ``pressure (2, faces)``, ``centroid (2, faces, 3)``, ..."""
         names = [c.path.rpartition("/")[2] for c in self.layout.columns if c.key.startswith("patch/")]
         index = tuple(map(int, np.unravel_index(row, self.layout.shape)))
-        faces = {name: self.file.values(self._checked(f"patch/{name}"), index) for name in names}
+        faces = {name: self._values(f"patch/{name}", index) for name in names}
         if not self._unchecked and self.status.flat[row] != MISSING:
-            sums = self.file.values(self._checked("checksums/rows"), index)
+            sums = self._values("checksums/rows", index)
             for name, values in faces.items():
                 if checksums.of_array(values) != sums[self.layout.summed.index(f"{ROOT}/patch/{name}")]:
                     self._refuse(np.array([row]), f"patch/{name}")
@@ -121,7 +121,7 @@ class Result:
     @property
     def codes(self) -> np.ndarray:
         """State of every case as the file has it now, whether it is right or wrong."""
-        return self.file.values(self._checked("status/code"))
+        return self._values("status/code")
 
     @property
     def messages(self) -> np.ndarray:
@@ -152,7 +152,7 @@ class Result:
     @property
     def sessions(self) -> list[dict[str, Any]]:
         """One entry for each time the study was started: start, stop, reason, ranks, versions, ..."""
-        rows = self.file.values(self.file.checked(f"{ROOT}/provenance/sessions", (MOST_SESSIONS,), SESSION))
+        rows = self.file.values(f"{ROOT}/provenance/sessions", (MOST_SESSIONS,), SESSION)
         # A session that lost its start still has its sum: it counts as damage, not as none.
         used = [row for row in rows if row["crc"] or row["start"]]
         if not self._unchecked and any(row["crc"] != checksums.of_session(row) for row in used):
@@ -186,9 +186,8 @@ class Result:
     def _closing(self, name: str) -> np.ndarray:
         """What is filled after all rows, by its name in ``layout.closing``."""
         for patience in (0.02, 0.2, 0.0):  # a run may be writing it just now
-            dataset = self._checked(name) if f"{ROOT}/{name}" in self._known else self._text(name)
-            values = np.asarray(self.file.values(dataset))
-            stored = self.file.values(self._checked("checksums/closing"))[self.layout.closing.index(name)]
+            values = self._values(name) if f"{ROOT}/{name}" in self._known else self._text(name)
+            stored = self._values("checksums/closing")[self.layout.closing.index(name)]
             if self._unchecked or checksums.of_array(values) == stored:
                 return values
             time.sleep(patience)
@@ -198,20 +197,20 @@ class Result:
         cure = "restore it from a copy, or run the scene again, which solves damaged cases anew"
         return self.file.damaged(what, cure)
 
-    def _checked(self, path: str) -> Any:
+    def _values(self, path: str, index: Any = ()) -> np.ndarray:
         expected = self._known.get(f"{ROOT}/{path}")
         if expected is None:
             raise KeyError(f"{path} is not a dataset of this file; it has {', '.join(sorted(self._known))}")
-        return self.file.checked(expected.path, expected.shape, expected.dtype)
+        return np.asarray(self.file.values(expected.path, expected.shape, expected.dtype, index))
 
-    def _text(self, name: str) -> Any:
-        dataset = self.file.plain(f"{ROOT}/{name}")
-        if dataset.shape != () or dataset.dtype.kind != "S":
+    def _text(self, name: str) -> np.ndarray:
+        text = np.asarray(self.file.values(f"{ROOT}/{name}"))
+        if text.shape != () or text.dtype.kind != "S":
             raise self._damaged(f"{ROOT}/{name} is not a text")
-        return dataset
+        return text
 
     def _string(self, name: str) -> str:
-        return text_of(self.file.values(self._text(name)).strip(b"\0 "))
+        return text_of(self._text(name).item().strip(b"\0 "))
 
 
 def _texts(strings: np.ndarray) -> np.ndarray:
