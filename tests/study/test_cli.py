@@ -45,7 +45,8 @@ def scene(tmp_path):
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory):
     path = tmp_path_factory.mktemp("finished") / "done.hdf"
-    assert run_fake(0, path, "--fail", 9)[0] == 6
+    code, output, _ = run_fake(0, path, "--fail", 9)
+    assert (code, "best 9 places" in output) == (6, True)
     return path
 
 

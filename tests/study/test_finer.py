@@ -12,10 +12,11 @@ from softjaw.study.result.skeleton import create
 from softjaw.study.result.store import open_result, torn_rows
 from softjaw.study.result.write import ResultWriter, record
 from softjaw.study.run.plan import make_plan
-from softjaw.study.run.rounds import rivals
+from softjaw.study.run.rounds import next_cases, rivals
 from softjaw.study.scene import load_scene
+from tests.study.formula_results import written
 from tests.study.launching import contents, differing, launch
-from tests.study.scenes import mesh_of, text_of
+from tests.study.scenes import BALL, mesh_of, pose_of, scene_of, text_of
 
 PAD = "[8, 4, 3]\nmax_opening_mm = 85"
 SCENE = text_of(mesh_of("block.stl"), "sampled = 14\n", forces="[2, 5]", elements=PAD) + "[limit_surface]\nsamples = 80"
@@ -74,6 +75,23 @@ def test_a_case_keeps_its_coarse_values_until_finer_ones_replace_them(scene, tmp
         writer.write(number, filled(first.layout, 2.0, 1))
     writer.close()
     assert torn_rows(path, first.layout) == []
+
+
+@pytest.mark.parametrize(("changes", "levels"), [
+    ((), {1}), (("object.mass_g=100",), {0, 1}), (("object.mass_g=100", "load.normal_force_n=[5]"), {0}),
+])  # fmt: skip
+def test_with_a_mass_finer_meshes_go_to_the_force_below_too(tmp_path, changes, levels):
+    made = scene_of(BALL, "accuracy.target=0.01", *changes, where=pose_of(), forces="[2, 5]")
+    made = made.model_copy(update={"candidates": made.candidates.model_copy(update={"sampled": 1})})
+    plan = make_plan(made)
+
+    def case(index):
+        held = 1.0 if index[-1] == plan.layout.shape[-1] - 1 else 0.01
+        values = {"maps/payload": [held] * 3, "maps/payload_error": 0.02, "maps/flags": 0.0, "work/mesh": 0}
+        return CaseResult(values | ({"maps/safety_factor": [10 * held] * 3} if changes else {}))
+
+    with open_result(written(tmp_path / "a.hdf", plan.layout, case, plan.header)) as result:
+        assert {level for *_, level in next_cases(result, made)} == levels
 
 
 @pytest.mark.long

@@ -172,6 +172,8 @@ def test_angles_repeat_with_the_objects_symmetry_and_a_gap_is_bridged_for_round_
     assert same == pytest.approx(one)
     turned, here = (around.at(0.01, np.radians(a), 2).error("e_n") for a in (185, 5))
     assert turned == pytest.approx(here)
+    far = GraspMap(make(tmp_path / "a.hdf", smooth, grid_axes(angles=[*ANGLES[:5], ANGLES[5] + np.pi])))
+    assert far.at(0.01, ANGLES[5], 2).e_n == pytest.approx(smooth(0.01, ANGLES[5], 2.0))  # of the next period
     part = GraspMap(make(tmp_path / "a.hdf", axes=grid_axes(angles=[0, 0.1, 0.2])))
     assert part.at(0.01, 0.15, 2).ok
     assert "angle 90 deg, solved: 0 deg to 11.459 deg" in part.at(0.01, np.pi / 2, 2).reason
