@@ -9,7 +9,7 @@ from softjaw.lsfit.ellipsoid import nearest_solution
 from softjaw.lsfit.form import hessian_tensor
 from softjaw.lsfit.quartic import Quartic
 from softjaw.lsfit.quartic_fit import convex_quartic, normal_equations, round_samples
-from softjaw.lsfit.samples import normalised_samples
+from softjaw.lsfit.samples import normalised_samples, sphere_motions
 from softjaw.lsfit.sos import ball_gram
 
 
@@ -17,6 +17,15 @@ def samples(patch, K=500, rho=2.0, twist=None):
     """Wrenches of evenly spread motions, or of those given, over the load, and the unit motions."""
     twist = fibonacci_twists(K, rho) if twist is None else twist
     return normalised_samples(friction_wrench(patch, twist, 1.0), twist, friction_limits(patch, 1.0).S, rho)
+
+
+SIX = np.array([1, 1, 1, 2, 2, 2])  # units of the components of a motion
+
+
+def six_samples(patch, K):
+    """Wrenches of all six components over the load, and the unit motions."""
+    twist = sphere_motions(K) / SIX
+    return normalised_samples(friction_wrench(patch, twist, 0.5), twist, 0.5 * patch.load.sum(), 2.0)
 
 
 def body_volume(coarse, fine):

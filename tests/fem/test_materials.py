@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from softjaw.fem.materials import Material, material, principal, stress
 from tests.fem import reference
@@ -23,8 +24,7 @@ LAWS = {
     "linear": (material("linear", G, 0.3), lambda F: reference.linear_energy(F, G, 0.3)),
 }
 FINITE = [name for name in LAWS if name != "linear"]
-TURN = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]
-TURN *= np.linalg.det(TURN)
+TURN = Rotation.random(random_state=3).as_matrix()
 
 
 def respond(law: Material, F, tangent=True):

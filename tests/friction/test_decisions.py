@@ -21,10 +21,10 @@ def ulps(values, rng, most=4):
     return values + most * EPS * np.abs(values).max() * rng.uniform(-1, 1, values.shape)
 
 
-def shaken(patch, seed):
+def shaken(patch, seed, far=1.0):
     """The patch turned and moved at random, every number changed by a few ulp; and the rotation."""
     rng = np.random.default_rng(seed)
-    R, t = Rotation.random(random_state=rng).as_matrix(), rng.uniform(-1, 1, 3)
+    R, t = Rotation.random(random_state=rng).as_matrix(), far * rng.uniform(-1, 1, 3)
     corners = None if patch.corners is None else ulps(patch.corners @ R.T + t, rng)
     parts = ulps(patch.centroid @ R.T + t, rng), patch.area, ulps(patch.normal @ R.T, rng), patch.pressure
     return ContactPatch(*parts, corners), R, t
@@ -75,16 +75,6 @@ def prism():
     return replace(mesh_patch(sides), pressure=np.array([9.0, 1.0, 1.0]))
 
 
-def on_a_vertex():
-    """A cap of plane faces, pressed evenly: the line through the centre of pressure runs through a vertex."""
-    return mesh_patch(grid_mesh(4, 4, 1, 1, lambda x, y: -(x**2 + y**2) / 2))
-
-
-def two_floors():
-    """Two plates at equal distances from their common centre of pressure."""
-    return mesh_patch([strip(-1, -1, 1, -1), strip(-1, 1, 1, 1)])
-
-
 # Every patch with the flags that it has, and the faces that are counted as turned away.
 CLEAN, MIXED, WINDING = FrameFlag.CLEAN, FrameFlag.ORIENTATION, FrameFlag.WINDING
 OVERHANG, CENTRES = FrameFlag.OVERHANG, FrameFlag.NO_CORNERS
@@ -94,8 +84,9 @@ KNOWN = {
     "flipped": (flipped, MIXED | OVERHANG, 29),
     "walls at 90 degrees": (trough, CLEAN, 0),
     "sides at 120 degrees": (prism, OVERHANG, 2),
-    "vertex": (on_a_vertex, CLEAN, 0),
-    "two floors": (two_floors, CLEAN, 0),
+    # the line through the centre of pressure runs through a vertex, and lies between plates at equal distances
+    "vertex": (lambda: mesh_patch(grid_mesh(4, 4, 1, 1, lambda x, y: -(x**2 + y**2) / 2)), CLEAN, 0),
+    "two floors": (lambda: mesh_patch([strip(-1, -1, 1, -1), strip(-1, 1, 1, 1)]), CLEAN, 0),
     "cap of half angle 120 degrees": (lambda: cap_polar(1, np.radians(120), 12, 8), OVERHANG | CENTRES, 24),
     "cylinder of centres": (lambda: cylinder_grid(1, 1, 2, 6, 7), CENTRES, 0),
 }

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 from softjaw.friction.foot import ContactFace, foot
 from softjaw.friction.frame import FrameFlag, contact_frame
@@ -113,25 +112,14 @@ def test_a_line_beside_the_face_meets_its_rim_the_nearer_of_two_crossings_counts
     assert np.abs(arm[:2]).max() < 1e-9
 
 
+@pytest.mark.parametrize(("unit", "far"), [(1.0, 1.0), (1.0, 1e3), (1e3, 1.0)])
 @seeded
-def test_the_frame_on_the_whole_face_turns_with_the_patch(seed):
+def test_the_frame_on_the_whole_face_turns_with_the_patch_is_found_far_from_the_origin_and_in_any_unit(unit, far, seed):
     """Corners that differ by rounding are still one corner."""
     patch = bridge(0.37, n=8)
     frame = contact_frame(patch, X, whole_face=True)
-    turned, R, t = shaken(patch, seed)
+    turned, R, t = shaken(replace(patch, centroid=unit * patch.centroid, corners=unit * patch.corners), seed, far)
     found = contact_frame(turned, R @ X, whole_face=True)
     assert found.flag == frame.flag
-    np.testing.assert_allclose(found.axes, frame.axes @ R.T, atol=1e-9)
-    np.testing.assert_allclose(found.origin, R @ frame.origin + t, atol=1e-9)
-
-
-def test_a_face_far_from_the_origin_of_its_coordinates_has_a_frame_too():
-    patch = bridge(0.37)
-    frame = contact_frame(patch, X, whole_face=True)
-    R = Rotation.from_rotvec([0.3, -0.2, 1.1]).as_matrix()
-    far = np.array([900.0, -800.0, 700.0])
-    moved = replace(patch, centroid=patch.centroid @ R.T + far, normal=patch.normal @ R.T)
-    moved = replace(moved, corners=patch.corners @ R.T + far)
-    found = contact_frame(moved, R @ X, whole_face=True)
-    assert found.flag == frame.flag
-    np.testing.assert_allclose(found.origin, R @ frame.origin + far, atol=1e-8)
+    np.testing.assert_allclose(found.axes, frame.axes @ R.T, atol=1e-9 * far)
+    np.testing.assert_allclose(found.origin, unit * R @ frame.origin + t, atol=1e-9 * unit * far)

@@ -180,13 +180,6 @@ def test_another_reference_point_turns_motions_and_wrenches_by_the_adjoint(seed)
     )
 
 
-def slip_matrix(patch):
-    """Rows of all faces' slip ``P (v + omega x r)`` as a matrix that multiplies ``[v, omega]``, ``(3 n, 6)``."""
-    P = np.eye(3) - patch.normal[:, :, None] * patch.normal[:, None, :]
-    turn = np.stack([np.cross(e, patch.centroid) for e in np.eye(3)], axis=2)
-    return np.concatenate([P, P @ turn], axis=2).reshape(-1, 6)
-
-
 @pytest.mark.parametrize(("patch", "rank"), [
     (rect_grid(2, 1, 8, 4), 3), (disc_polar(1, 4, 12), 3), (cylinder_grid(1, 1, 2, 8, 8), 6),
     (cap_polar(1, 1, 6, 12), 6), (wedge(0.6, 1, 2, 4, 8), 5),
@@ -195,7 +188,10 @@ def test_how_many_motions_a_patch_feels(patch, rank):
     """Lifting and tilting rub nowhere on a plane patch; a wedge does not feel its own turn about the ridge; a smoothly
     curved patch feels all. The wrenches span as many dimensions.
     """
-    _, values, right = np.linalg.svd(slip_matrix(patch), full_matrices=True)
+    P = np.eye(3) - patch.normal[:, :, None] * patch.normal[:, None, :]
+    turn = np.stack([np.cross(e, patch.centroid) for e in np.eye(3)], axis=2)
+    # rows of all faces' slip P (v + omega x r), a matrix that multiplies [v, omega]
+    _, values, right = np.linalg.svd(np.concatenate([P, P @ turn], axis=2).reshape(-1, 6), full_matrices=True)
     assert (values > 1e-9 * values[0]).sum() == rank
     unfelt = right[rank:]
     np.testing.assert_allclose(friction_support(patch, unfelt, 1.0) if len(unfelt) else 0.0, 0, atol=1e-12)

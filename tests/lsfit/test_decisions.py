@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from softjaw.friction.wrench import friction_limits, friction_wrench
+from softjaw.friction.wrench import friction_limits
 from softjaw.lsfit import ellipsoid
 from softjaw.lsfit.body import hull_volume
 from softjaw.lsfit.ellipsoid import MAX_REACH_RATIO, Ellipsoid, full_ellipsoid
 from softjaw.lsfit.form import directions, exponents, substitute
 from softjaw.lsfit.quartic import Quartic
 from softjaw.lsfit.quartic_fit import convex_quartic
-from softjaw.lsfit.samples import fit_error, normalised_samples, sample_rank, sphere_motions
+from softjaw.lsfit.samples import fit_error, sample_rank
 from softjaw.lsfit.surface import FitError, FitFlag
 from tests.generators import cylinder_grid, disc_polar, lcg_patch, points_patch
-from tests.oracles import least_squares_quartic, samples, wrenches_alone
+from tests.oracles import least_squares_quartic, samples, six_samples, wrenches_alone
 from tests.scoring.grasps import unit
 from tests.turns import TURNS, shaken
 
@@ -118,17 +118,11 @@ def test_an_axis_that_no_load_reaches_is_zero():
     assert outcomes(lambda rng: three(1.0, shaken(rng, 1e-9), 1e-9, 0.01).rank) == {3: TURNS}
 
 
-def six(K):
-    patch = cylinder_grid(1, np.pi / 3, 2, 12, 12)
-    twist = sphere_motions(K) / [1, 1, 1, 2, 2, 2]
-    return normalised_samples(friction_wrench(patch, twist, 0.5), twist, 0.5 * patch.load.sum(), 2.0)
-
-
 @pytest.mark.parametrize("K", [30, 60, 100])
 def test_a_quartic_of_fewer_samples_than_coefficients_is_one_and_flagged(K):
     """Of all best quartics the nearest to a ball: null directions lie at 1e-16, the others above 1e-8, the margin is
     1e-12. Without a margin its coefficients changed by some per cent."""
-    W, _ = six(K)
+    W, _ = six_samples(cylinder_grid(1, np.pi / 3, 2, 12, 12), K)
     first = least_squares_quartic(W)
     fits = []
 

@@ -26,10 +26,10 @@ def test_there_are_as_many_monomials_as_ways_to_share_the_degree(d, degree, coun
 def test_monomials_are_products_of_powers_with_substitution_and_derivatives(d):
     E, w = exponents(d, 4), RANDOM.normal(size=(7, d))
     np.testing.assert_allclose(monomials(w, E), np.prod(w[:, None] ** E, axis=2), rtol=1e-13)
-    E, w, L = exponents(d, 4), RANDOM.normal(size=(5, d)), RANDOM.normal(size=(d, d))
+    w, L = RANDOM.normal(size=(5, d)), RANDOM.normal(size=(d, d))
     c = RANDOM.normal(size=len(E))
     np.testing.assert_allclose(monomials(w, E) @ substitute(c, E, L), monomials(w @ L.T, E) @ c, rtol=1e-8, atol=1e-10)
-    E, w, step = exponents(d, 4), RANDOM.normal(size=(4, d)), 1e-5
+    w, step = RANDOM.normal(size=(4, d)), 1e-5
     G, c = monomial_gradients(w, d, 4), RANDOM.normal(size=len(E))
     H = np.einsum("ijkl,mk,ml->mij", hessian_tensor(c, d), w, w)
     for i, e in enumerate(step * np.eye(d)):

@@ -3,25 +3,18 @@
 import numpy as np
 import pytest
 
-from softjaw.friction.wrench import friction_support, friction_wrench
+from softjaw.friction.wrench import friction_support
 from softjaw.lsfit.ellipsoid import full_ellipsoid
 from softjaw.lsfit.form import exponents, hessian_tensor, monomials
 from softjaw.lsfit.quartic import Quartic
 from softjaw.lsfit.quartic_fit import convex_quartic
-from softjaw.lsfit.samples import fit_error, normalised_samples, sample_rank, sphere_motions
+from softjaw.lsfit.samples import fit_error, sample_rank, sphere_motions
 from softjaw.lsfit.sos import ball_gram, gram_map
 from softjaw.lsfit.span import span_ellipsoid, span_quartic, span_samples
 from softjaw.lsfit.surface import FitFlag
 from tests.generators import cap_polar, cylinder_grid, heightfield, points_patch, rect_grid
-from tests.oracles import least_curvature, least_squares_quartic, smallest_curvature, wrenches_alone
-
-RHO = 2.0
-SIX = np.array([1, 1, 1, RHO, RHO, RHO])
-
-
-def samples(patch, K):
-    twist = sphere_motions(K) / SIX
-    return normalised_samples(friction_wrench(patch, twist, 0.5), twist, 0.5 * patch.load.sum(), RHO)
+from tests.oracles import SIX, least_curvature, least_squares_quartic, smallest_curvature, wrenches_alone
+from tests.oracles import six_samples as samples
 
 
 @pytest.mark.parametrize(("d", "unknowns"), [(2, 6), (3, 24), (6, 351)])

@@ -12,7 +12,7 @@ from softjaw.lsfit.samples import normalised_samples, sphere_motions
 from softjaw.lsfit.span import FitError, SpanSamples, span_samples, zhou_ellipsoid, zhou_quartic
 from softjaw.lsfit.surface import FitFlag
 from tests.generators import cylinder_grid, disc_polar, lcg_patch, points_patch, rect_grid
-from tests.oracles import least_curvature, samples
+from tests.oracles import least_curvature, samples, six_samples
 from tests.scoring.grasps import unit
 
 DISC = disc_polar(1, 40, 96)
@@ -84,8 +84,7 @@ def test_the_fit_is_free_of_units_and_samples_in_a_plane_give_a_flat_surface(fit
 
 @pytest.mark.parametrize(("patch", "rank"), [(rect_grid(2, 1, 6, 6), 3), (cylinder_grid(1, np.pi / 3, 2, 12, 12), 6)])
 def test_ellipsoids_of_six_components(patch, rank):
-    twist = sphere_motions(128) / [1, 1, 1, 2, 2, 2]
-    W, T = normalised_samples(friction_wrench(patch, twist, 1.0), twist, patch.load.sum(), 2.0)
+    W, T = six_samples(patch, 128)
     surface = zhou_ellipsoid(span_samples(W, T))
     assert surface.rank == rank
     assert np.abs(surface.radius(W) - 1).mean() < 0.02

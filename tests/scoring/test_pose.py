@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
+from scipy.spatial.transform import Rotation
 
 from jobs.graspit import graspit_vertices
 from softjaw.lsfit.ellipsoid import Ellipsoid
@@ -21,18 +22,14 @@ POSES = [(0, 0, (0, 0, 0)), (10, 10, (0, 0, 0)), (30, -20, (0.1, 0.3, 0.2)), (60
          (80, 85, (0, 0.2, 0.1)), (20, 160, (0, 0.2, 0.1)), (90, 0, (0, 0, 0.3)), (0, 180, (0, 0.1, 0))]  # fmt: skip
 
 
-def rotation(rng):
-    Q = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-    return Q * np.linalg.det(Q)
-
-
 def tilted(angle1, angle2, offset=(0, 0, 0), bodies=(A, B), d=1.3):
     """Contacts whose normals are turned away from facing, in degrees."""
     return facing(*bodies, d, np.radians([angle1, angle2]), offset)
 
 
 def anywhere(rng, body1, body2):
-    return [SoftContact(rng.normal(size=3), rotation(rng), body) for body in (body1, body2)]
+    turns = Rotation.random(2, random_state=rng).as_matrix()
+    return [SoftContact(rng.normal(size=3), R, body) for R, body in zip(turns, (body1, body2), strict=True)]
 
 
 def hull_volumes(contacts, object_length, contact_length):
@@ -108,7 +105,7 @@ def test_laws_of_scale_and_motion_and_bodies_known_by_their_support_are_within_t
     rng = np.random.default_rng(7)
     one, two = anywhere(rng, *map(Ellipsoid.of_axes, rng.uniform(0.1, 1, (2, 3))))
     exact = pose_volume(one, two, 1.0, 1.0, relative_error=1e-8)
-    Q, shift = rotation(rng), rng.normal(size=3)
+    Q, shift = Rotation.random(random_state=rng).as_matrix(), rng.normal(size=3)
     moved = [SoftContact(Q @ c.position + shift, c.axes @ Q.T, c.body) for c in (one, two)]
     same = pose_volume(*moved, 1.0, 1.0, relative_error=1e-8), pose_volume(two, one, 1, 1, shift, relative_error=1e-8)
     longer = [SoftContact(1e3 * c.position, c.axes, Ellipsoid.of_axes(c.body.semi_axes * [1, 1, 1e3])) for c in moved]

@@ -21,7 +21,6 @@ import time
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 import pytest
 from scipy.stats import binomtest
@@ -86,19 +85,10 @@ def parts(node: ast.AST) -> Iterator[ast.AST]:
                     yield from parts(child)
 
 
-def segment(lines: list[bytes], node: Any) -> str:
-    first, last = node.lineno - 1, node.end_lineno - 1
-    if first == last:
-        return lines[first][node.col_offset : node.end_col_offset].decode()
-    parts = [lines[first][node.col_offset :], *lines[first + 1 : last], lines[last][: node.end_col_offset]]
-    return b"".join(parts).decode()
-
-
 def mutations(file: Path, root: Path = ROOT) -> list[Mutation]:
-    source, name = file.read_bytes(), str(file.relative_to(root))
-    lines = source.splitlines(keepends=True)
+    source, name = file.read_text(), str(file.relative_to(root))
     return [
-        Mutation(name, place.lineno, place.col_offset, kind, segment(lines, place), new)
+        Mutation(name, place.lineno, place.col_offset, kind, str(ast.get_source_segment(source, place)), new)
         for node in parts(ast.parse(source))
         for kind, place, new in changes(node)
     ]
