@@ -41,3 +41,31 @@ class Curve:
 
     def closing(self, x):
         return float(x[0])
+
+
+class Crossings:
+    """Finds the state under displacement control; under force control the crossing that is nearest to the start.
+
+    One that is not ``close`` [mm] is passed: then it finds the last crossing, as Newton's method may.
+    """
+
+    def __init__(self, problem, close=np.inf):
+        self.problem, self.close, self.at = problem, close, None
+
+    def solve(self, x, tolerance, *limits):
+        control = self.problem.control
+        self.at = np.array([control.closing])
+        if control.force is not None:
+            places = MM * crossings(control.force)
+            nearest = places[[np.abs(places - x[0]).argmin()]]
+            self.at = nearest if abs(nearest - x) < self.close * MM else places[-1:]
+        return self.at, 1
+
+    def is_at(self, x):
+        return x is self.at
+
+    def answer(self, b):
+        return b
+
+    def negative_eigenvalues(self, entries):
+        return 1

@@ -1,10 +1,9 @@
 """Thin-walled cylinders between two fingers, small enough for tests."""
 
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 
-from softjaw.fem.contact.extract import extract
 from softjaw.fem.materials import material
 from softjaw.fem.objects.gap import Pose
 from softjaw.fem.objects.outer_surface import of_revolution
@@ -16,8 +15,7 @@ from softjaw.fem.shell.thin_walled import ThinWalled, grasp, wall_between
 from softjaw.fem.shell.wall_material import WallMaterial, wall_material
 from softjaw.fem.shell.wall_mesh import MeshSize
 from softjaw.fem.shell.wall_problem import WallProblem
-from softjaw.friction.frame import contact_frame, in_frame
-from softjaw.friction.wrench import friction_limits
+from tests.fem import reference
 from tests.fem.reference import dense, placed
 
 SIZE = (0.03, 0.02, 0.02)
@@ -65,9 +63,7 @@ def gap_at(at: Pose):
     return placed(can(), at)
 
 
-def e_n(finger):
-    patch = extract(finger.pad, finger)
-    return friction_limits(in_frame(patch, contact_frame(patch, [1, 0, 0])), 1.0, "pcm").e_n
+e_n = partial(reference.e_n, model="pcm")
 
 
 def stirred(problem: WallProblem, rng: np.random.Generator) -> np.ndarray:

@@ -121,9 +121,9 @@ def facing(a):
     return Pose(np.array([[0.0, 0, -1], [0, 1, 0], [1, 0, 0]]), np.array([a, 0.0, 0.0]))
 
 
-def e_n(state):
+def e_n(state, model="ccm"):
     patch = extract(state.pad, state)
-    return friction_limits(in_frame(patch, contact_frame(patch, np.array([1.0, 0.0, 0.0]))), 1.0, "ccm").e_n
+    return friction_limits(in_frame(patch, contact_frame(patch, np.array([1.0, 0.0, 0.0]))), 1.0, model).e_n
 
 
 def tangent_error(problem, x, d, h):

@@ -18,11 +18,6 @@ def test_b_splines_and_their_derivatives(order):
     assert b_splines(t, x, order) == pytest.approx(expected, rel=1e-12, abs=1e-12 * np.abs(expected).max())
 
 
-def rounded_frustum(n, height, low, high):
-    """Points of a cone's wall as a drawing gives them: rounded to 0.001 mm, here in metres."""
-    return np.column_stack([np.round(np.linspace(0, height, n), 3), np.round(np.linspace(low, high, n), 3)]) / 1000
-
-
 @settings(max_examples=40, deadline=None, derandomize=True)
 @example(18, 134.295, 15.300, 53.740)
 @example(27, 137.462, 23.936, 59.720)
@@ -30,7 +25,7 @@ def rounded_frustum(n, height, low, high):
 @given(st.integers(3, 40), st.floats(20, 200), st.floats(5, 60), st.floats(5, 60))
 def test_every_frustum_rounded_to_a_micrometre_is_one(n, height, low, high):
     """Rounding cuts a long line into runs; where two of them have one direction, a corner was 0 / 0."""
-    points = rounded_frustum(n, height, low, high)
+    points = np.round(np.column_stack([np.linspace(0, height, n), np.linspace(low, high, n)]), 3) / 1000
     e = (points[-1] - points[0]) / np.linalg.norm(points[-1] - points[0])
     z, r = (points[0] + np.linspace(0.2, 0.8, 100)[:, None] * (points[-1] - points[0])).T
     g, normal, hessian = Revolution(points).gap(np.column_stack([r, 0 * r, z]))

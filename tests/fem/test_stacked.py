@@ -26,29 +26,25 @@ def off_the_wall(body, n=400, far=0.003, heights=(0.012, 0.17)):
     return x + normal * rng.uniform(-far, far, n)[:, None]
 
 
+def same(found, expected):
+    for one, other, atol in zip(found, expected, (1e-9, 5e-6, 0.05), strict=True):
+        np.testing.assert_allclose(one, other, atol=atol)
+
+
 def test_circles_make_the_body_of_revolution_ellipses_the_cylinder_and_splines_converge_with_the_fourth_order():
     rigid, stacked = Revolution(np.array(PROFILE)), Stacked(of_sections([Section(z, r) for z, r in PROFILE]))
     x = off_the_wall(rigid)
     for body in (stacked, stacked.near(HERE, np.zeros(3), np.zeros(3))):
-        g, normal, hessian = body.gap(x)
-        expected = rigid.gap(x)
-        np.testing.assert_allclose(g, expected[0], atol=1e-9)
-        np.testing.assert_allclose(normal, expected[1], atol=5e-6)
-        np.testing.assert_allclose(hessian, expected[2], atol=0.05)
+        same(body.gap(x), rigid.gap(x))
     np.testing.assert_allclose(stacked.bounds, rigid.bounds, atol=1e-5)
     assert stacked.outer.round
     a, b = 0.03, 0.024
-    stacked = Stacked(of_sections([Section(z, a, b) for z in (0.0, 0.05, 0.1, 0.15)]))
+    oval = Stacked(of_sections([Section(z, a, b) for z in (0.0, 0.05, 0.1, 0.15)]))
     rng = np.random.default_rng(4)
     theta = rng.uniform(0, 2 * np.pi, 300)
     x = np.column_stack([(a + 0.002) * np.cos(theta), (b + 0.002) * np.sin(theta), rng.uniform(0.02, 0.13, 300)])
-    g, normal, hessian = stacked.gap(x)
-    expected = EllipticCylinder(a, b, 1.0).gap(x)
-    np.testing.assert_allclose(g, expected[0], atol=1e-9)
-    np.testing.assert_allclose(normal, expected[1], atol=5e-6)
-    np.testing.assert_allclose(hessian, expected[2], atol=0.05)
-    assert (stacked.outer.round, stacked.outer.symmetric) == (False, (True, True))
-    stacked = Stacked(of_sections([Section(z, r) for z, r in PROFILE]))
+    same(oval.gap(x), EllipticCylinder(a, b, 1.0).gap(x))
+    assert (oval.outer.round, oval.outer.symmetric) == (False, (True, True))
     low, high = stacked.bounds[:, 2]
     points = np.array([[0.2, 0, 0.06], [0, 0, low - 0.01], [0, 0, high + 0.02], [0, 0, 0.06]])
     g, normal, _ = stacked.gap(points)
@@ -69,8 +65,7 @@ def test_circles_make_the_body_of_revolution_ellipses_the_cylinder_and_splines_c
 
     assert min(worst(24) / worst(48), worst(48) / worst(96)) > 12
     # Ends of the wall that fall on breaks of its outline but for rounding.
-    outer = of_sections([Section(z, r) for z, r in PROFILE])
-    breaks = outer.curve.breaks
+    outer, breaks = stacked.outer, stacked.outer.curve.breaks
     low, *_, high = breaks[(breaks > outer.wall[0]) & (breaks < outer.wall[1])]
     surface = wall_surface(outer, np.nextafter(low, 0.0), np.nextafter(high, 1.0))
     assert np.diff(surface.s).min() > 1e-9

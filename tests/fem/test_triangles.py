@@ -21,12 +21,6 @@ def joined(*meshes):
     return np.array(mesh.vertices), np.array(mesh.faces)
 
 
-def with_point(value):
-    points = np.array(BALL.vertices)
-    points[7] = value
-    return points, np.array(BALL.faces)
-
-
 @pytest.mark.parametrize("mesh", [
     (BALL.vertices, BALL.faces[:0]), (np.full((3, 3), np.nan), [[0, 1, 2]]), (BALL.vertices * 1e3, BALL.faces),
     (BALL.vertices * 1e-3, BALL.faces), (BALL.vertices * 0, BALL.faces),
@@ -38,7 +32,9 @@ def test_only_what_makes_no_object_is_refused(mesh):
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 def test_triangles_without_finite_coordinates_are_left_out(value):
-    points, triangles, notes, *_ = cleaned(*with_point(value))
+    points = np.array(BALL.vertices)
+    points[7] = value
+    points, triangles, notes, *_ = cleaned(points, np.array(BALL.faces))
     assert np.isfinite(points).all()
     assert 310 <= len(triangles) <= 320
     assert notes

@@ -59,7 +59,6 @@ def test_half_a_pad_has_the_loads_of_the_solution_and_faces_tile_the_deformed_fr
     assert np.abs(force[:2]).max() < 1e-10
     assert (patch.pressure >= 0).all()
     # Neighbours share corners, the faces cover the deformed contact face, and each holds its centre.
-    _, pad, pressed, patch = whole
     nx, ny = pad.shape.patch_faces
     corners = patch.corners.reshape(nx, ny, 4, 3)
     assert np.abs(corners[1:, :, 0] - corners[:-1, :, 1]).max() == 0

@@ -14,7 +14,7 @@ from softjaw.fem.objects.shapes import EllipticCylinder, Sphere
 from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.pad.shape import PadShape
 from tests.fem import reference
-from tests.fem.falling_force import MM, Curve, crossings, force
+from tests.fem.falling_force import MM, Crossings, Curve, crossings, force
 
 SIZE, G = (0.050, 0.022, 0.015), 0.040e6
 NEO = material("neo_hookean", G, 0.25)
@@ -107,30 +107,6 @@ class StrainedCurve(Curve):
 
     def symmetric_tangent(self, x):
         return x, int(self.path_tangent(x, None) is not None)
-
-
-class Crossings:
-    """Finds the state under displacement control, and under force control the crossing next to the start."""
-
-    def __init__(self, problem):
-        self.problem, self.at = problem, None
-
-    def solve(self, x, tolerance, *limits):
-        control = self.problem.control
-        self.at = np.array([control.closing])
-        if control.force is not None:
-            roots = MM * crossings(control.force)
-            self.at = roots[[np.abs(roots - x[0]).argmin()]]
-        return self.at, 1
-
-    def is_at(self, x):
-        return x is self.at
-
-    def answer(self, b):
-        return b
-
-    def negative_eigenvalues(self, entries):
-        return 1
 
 
 def following(problem):

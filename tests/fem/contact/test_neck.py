@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from softjaw.fem.objects.shapes import Revolution
 from softjaw.study.case.build import build_object
 from softjaw.study.case.model import approach, press_of
 from softjaw.study.case.poses import axis_poses
@@ -13,26 +12,20 @@ from softjaw.study.scene import parse_scene
 from tests.fem import reference
 
 BOTTLE = Path(__file__).parents[3] / "jobs" / "bottle-rigid.toml"
-FORCES = (1.0, 2.0, 4.0, 7.0, 10.0, 13.0)
-def along_the_neck(stations, forces=FORCES):
-    """Closing displacement [mm], e_n [mm] and Newton iterations ``(stations, forces)``, and what there is to know."""
-    scene = parse_scene(BOTTLE.read_text(), BOTTLE, ["candidates.stations_mm=[160]"])
-    bottle = build_object(scene.object)
-    assert isinstance(bottle, Revolution)
-    rows, known = [], []
-    for station in stations:
-        press = press_of(scene, approach(bottle, axis_poses(1e-3 * station, 0.0, 0.0)[0], scene.gripper), False)
-        states = list(press.load_path(forces))
-        rows.append([(1e3 * s.closing, 1e3 * reference.e_n(s), s.iterations) for s in states])
-        known += [(s.path_dependent, s.instead, s.notes) for s in states]
-        press.destroy()
-    return *np.moveaxis(np.array(rows), 2, 0), known
 
 
 @pytest.mark.long
 def test_a_station_that_moves_by_two_micrometres_changes_nothing():
     """5.43 mm at 4 N with nodal gaps; weighted ones wander to 8.1 mm there, and fail."""
-    closing, e_n, iterations, known = along_the_neck([170.588, 170.59], FORCES[:4])
+    scene = parse_scene(BOTTLE.read_text(), BOTTLE, ["candidates.stations_mm=[160]"])
+    bottle, rows, known = build_object(scene.object), [], []
+    for station in (170.588, 170.59):
+        press = press_of(scene, approach(bottle, axis_poses(1e-3 * station, 0.0, 0.0)[0], scene.gripper), False)
+        states = list(press.load_path((1.0, 2.0, 4.0, 7.0)))
+        rows.append([(1e3 * s.closing, 1e3 * reference.e_n(s), s.iterations) for s in states])
+        known += [(s.path_dependent, s.instead, s.notes) for s in states]
+        press.destroy()
+    closing, e_n, iterations = np.moveaxis(np.array(rows), 2, 0)
     assert known[:4] == known[4:]
     # beyond a fork, which the flag "jumped" tells, one of two equilibria is met that hardly differ
     forked = np.array([jumped for jumped, _, _ in known[:4]])

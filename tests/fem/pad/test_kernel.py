@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from softjaw.fem import materials as kernel
 from softjaw.fem.contact.rigid import RigidProblem
@@ -18,8 +19,7 @@ LAWS = {
     "neo_hookean": material("neo_hookean", G, 0.4),
     "linear": material("linear", G, 0.3),
 }
-TURN = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]
-TURN *= np.linalg.det(TURN)
+TURN = Rotation.random(random_state=3).as_matrix()
 AFFINE = np.array([[1.1, 0.3, -0.1], [0.05, 0.9, 0.2], [0.1, -0.2, 0.7]])
 
 

@@ -17,11 +17,7 @@ def element(request):
     return request.param
 
 
-@pytest.fixture(params=["weighted", "blended", "nodal"])
-def contact(request):
-    return request.param
-
-
+@pytest.mark.parametrize("contact", ["weighted", "blended", "nodal"])
 @pytest.mark.parametrize("symmetry", SYMMETRIES)
 def test_volumes_and_areas_add_up(element, contact, symmetry):
     pad = Pad(PadShape(SIZE, (4, 6, 3), (2.0, 0.5, 3.0), element), FOAM, symmetry, contact)

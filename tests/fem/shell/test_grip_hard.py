@@ -14,7 +14,7 @@ from softjaw.fem.shell.opening import Opening
 from softjaw.fem.shell.thin_walled import grasp
 from softjaw.fem.shell.wall_material import WallMaterial
 from softjaw.fem.shell.wall_mesh import MeshSize, body_mesh
-from tests.fem.falling_force import MM, Curve, crossings
+from tests.fem.falling_force import MM, Crossings, Curve, crossings
 from tests.fem.grips import e_n, grip, pose, thin
 
 ROUGH = MeshSize(0.004, 0.008, 0.016)
@@ -80,19 +80,17 @@ def test_a_wall_that_gives_way_is_flagged_and_a_long_side_that_points_down_gives
             assert (sides[1][:, 1] > 0).all()
 
 
-@pytest.fixture(scope="module")
-def quarter():
-    return grip(thin(), elements=(4, 2, 2), mesh=ROUGH).problem.fingers[0].wall
-
-
 def still(wall):
     none = np.zeros((wall.nodes.max() + 1, 3))
     return none, none.copy()
 
 
-def test_a_part_of_a_wall_is_not_faced_from_beyond_its_edges_nor_a_flat_bottom_but_the_rim_above_it(quarter):
-    assert not quarter.closed
-    assert grip(thin(), elements=(4, 2, 2), mesh=ROUGH, allowed=(False, False)).problem.fingers[0].wall.closed
+def test_a_part_of_a_wall_is_not_faced_from_beyond_its_edges_nor_a_flat_bottom_but_the_rim_above_it():
+    quarter, whole = (
+        grip(thin(), elements=(4, 2, 2), mesh=ROUGH, allowed=(part, part)).problem.fingers[0].wall
+        for part in (True, False)
+    )
+    assert (quarter.closed, whole.closed) == (False, True)
     theta = np.array([-0.02, 0.02, 0.5 * np.pi - 0.02, 0.5 * np.pi + 0.02])
     points = np.column_stack([0.036 * np.cos(theta), 0.036 * np.sin(theta), np.full(4, 0.075)])
     found = face(quarter, points, quarter.places(points), *still(quarter))
@@ -134,24 +132,9 @@ def test_closing_and_e_n_converge_with_order_two_in_the_walls_mesh_and_by_a_perc
     np.testing.assert_allclose(closing_and_e_n((32, 16, 8), 1.0), middle, rtol=0.01)
 
 
-class Jumping:
-    """Under force control finds the last crossing, as Newton's method may, unless it starts close to another."""
-
-    def __init__(self, problem, close=0.05):
-        self.problem, self.close = problem, close
-
-    def solve(self, x, tolerance, *limits):
-        control = self.problem.control
-        if control.force is None:
-            return np.array([control.closing]), 1
-        places = crossings(control.force)
-        near = places[np.abs(places - x[0] / MM) < self.close]
-        return np.array([(near[0] if len(near) else places[-1]) * MM]), 1
-
-
-def stepping(**choices):
+def stepping(close=0.05):
     problem = Curve()
-    return Stepping(problem, Jumping(problem, **choices))
+    return Stepping(problem, Crossings(problem, close))
 
 
 @pytest.mark.parametrize("wanted", [0.3, 1.9, 2.1, 2.4, 2.45, 3.5])
