@@ -15,8 +15,7 @@ from softjaw.lsfit.ellipsoid import Ellipsoid
 from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, SOME_FAILED, USAGE, StudyError
 from softjaw.study.ranking import judge
 from softjaw.study.result.layout import DONE
-from softjaw.study.result.read import dataset, open
-from softjaw.study.result.store import open_result
+from softjaw.study.result.read import open
 from softjaw.study.show.grasps import field
 from softjaw.study.show.stored_surface import StoredSurface
 from tests.generators import cylinder_grid
@@ -59,9 +58,8 @@ def test_the_force_study_is_drawn_with_the_paper_s_normalisation_and_not_where_s
     F = np.array([1.0, 2.0, 4.0, 8.0])
     known = {"S__S": F, "f_y_max__ccm": 0.7 * F, "f_y_max__pcm": 0.8 * F, "f_y_max__pcm_projected": 0.75 * F}
     path = make(tmp_path / "force.hdf", axes=grid_axes([0.0], [0.0], F), **known)
-    with open_result(path) as result:
-        lines = studies.over_force(judge(dataset(result)))
-        e_n = 1e3 * result.read("e_n/ccm")[0, 0]
+    ds = open(path)
+    lines, e_n = studies.over_force(judge(ds)), 1e3 * ds.e_n.sel(model="ccm").values[0, 0]
     _, force = lines["force"]
     assert force["pcm"] == pytest.approx(np.full(4, 0.8))
     assert force["ccm"] == pytest.approx(np.full(4, 0.7))

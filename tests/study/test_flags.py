@@ -1,7 +1,6 @@
 """Flags and units: every bit has a word and a sentence; exact factors, and one choice for what people read."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,8 +12,8 @@ from softjaw.study.quantities import map_row
 from softjaw.study.result.datasets import MESSAGE_BYTES
 from softjaw.study.show.best_grasps import LABEL_WIDTH
 from softjaw.study.units import SHOWN, UNITS, in_si, shown, shown_text, shown_unit
+from tests.study.launching import ROOT
 
-ROOT = Path(__file__).parents[2]
 TABLE = sum(Flag)  # all bits that have a row
 OF_LOWER = {member.name for kind in (FrameFlag, ScoreFlag) for member in kind if member}
 

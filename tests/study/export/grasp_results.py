@@ -1,8 +1,8 @@
 """A result file of five grasps at three forces whose frictions are formulas: nothing is solved."""
 
-import importlib.util
+import runpy
 from functools import lru_cache
-from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -12,8 +12,8 @@ from softjaw.study.export.selection import GripperFrame, grasps
 from softjaw.study.grippers import Hand
 from softjaw.study.result.read import open as open_result
 from tests.study.formula_results import grid_axes, make
+from tests.study.launching import ROOT
 
-ROOT = Path(__file__).parents[3]
 STATIONS = np.linspace(0.0, 0.04, 5)
 ANGLES = np.radians([0.0, 40.0, 90.0, 200.0, 330.0])  # one for each station
 FORCES = np.array([1.0, 4.0, 16.0])
@@ -83,7 +83,4 @@ def body(path):
 
 
 def slipping(simulator):
-    spec = importlib.util.spec_from_file_location(f"{simulator}_slip", ROOT / f"jobs/{simulator}-slip.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return SimpleNamespace(**runpy.run_path(str(ROOT / f"jobs/{simulator}-slip.py")))

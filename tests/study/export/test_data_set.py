@@ -48,14 +48,6 @@ def sets(folder, tmp_path_factory):
     return out
 
 
-def read_shards(out):
-    found = {}
-    for path in sorted(out.glob("*.tar")):
-        with tarfile.open(path) as shard:
-            found |= {entry.name: shard.extractfile(entry).read() for entry in shard}
-    return found
-
-
 def test_arrays_are_those_of_the_file_and_what_the_sampler_rejected_is_unsuccessful_and_says_why(folder):
     ds = opened(folder / "cup.hdf")
     arrays = grasp_arrays(ds, GripperFrame(Hand(closing="x")))
@@ -71,7 +63,6 @@ def test_arrays_are_those_of_the_file_and_what_the_sampler_rejected_is_unsuccess
         assert matrix[:3, 0] == pytest.approx(R[0][:, 2])  # and closes along x, from finger 1
         assert matrix[:3, 3] == pytest.approx(o.mean(axis=0))
     assert arrays["semi_axes"].shape == (COUNT, 2, 3)
-    ds = opened(folder / "cup.hdf")
     ds.attrs["rejected"] = np.array([[10, 20, 30, 1, 0, 0, 0, 0, 1, SLIPPING], [0, 0, 5, 0, 1, 0, 0, 0, 1, WIDE]], "f4")
     arrays = grasp_arrays(ds, GripperFrame(Hand(closing="x")))
     assert {len(values) for values in arrays.values()} == {COUNT + 2}
@@ -102,7 +93,10 @@ def test_graspgen_has_its_fields_and_splits_acronym_its_datasets_and_shards_both
         assert file["grasps/transforms"].shape == (COUNT, 4, 4)
         assert int(file["grasps/qualities/flex/object_in_gripper"][()].sum()) == COUNT - len(FORCES)
         assert file["grasps/qualities/softjaw/payload"].shape == (COUNT,)
-    found = read_shards(sets / "webdataset")
+    found = {}
+    for path in sorted((sets / "webdataset").glob("*.tar")):
+        with tarfile.open(path) as shard:
+            found |= {entry.name: shard.extractfile(entry).read() for entry in shard}
     keys = [name.partition(".")[0] for name in found]
     assert sorted(set(keys)) == ["bowl", "cup", "mug_old", "vase"]
     assert all(first == other for first, other in zip(keys[::2], keys[1::2], strict=True))

@@ -63,6 +63,7 @@ def test_a_contour_gives_what_any_patch_gives(tmp_path, told):
     answer = told(table(tmp_path / "contour.csv", face, True, noise=0.0), tmp_path / "scene.toml", "--distance", 50)
     [found] = answer["patches"]
     assert answer["mu"] == 0.6
+    assert not any("noise" in note for note in answer["notes"])  # it is judged
     assert found["S"] == pytest.approx(S, rel=0.02)
     assert found["friction"]["ccm"]["e_n"] == pytest.approx(e_n, rel=0.02)
     # in the coordinates of the file: the loaded face lies below the undeformed one

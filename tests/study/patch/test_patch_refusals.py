@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from softjaw.study.cli import main
-from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, USAGE
+from softjaw.study.messages import OTHER_FILE, USAGE
 from tests.study.patch.test_patch import EXAMPLE, faceted
 from tests.study.patch_files import centres, cylinder_mesh, vtk
 
@@ -108,15 +108,12 @@ def test_a_grid_that_is_no_patch(tmp_path, refused, name, grid, words, code, key
     assert key in errors
 
 
-@pytest.mark.parametrize(
-    ("words", "code"),
-    [("--mu 0", USAGE), ("--mu x", USAGE), ("--distance -3", USAGE), ("--long-side 1,2", USAGE),
-     ("--long-side 0,0,0", USAGE), ("--long-side 0,0,1", USAGE), ("--unit inch", USAGE), ("--surface sphere", USAGE),
-     ("--object-length 60", USAGE), ("--distance 60 --other b.csv", USAGE), ("-o a.pdf", USAGE),
-     ("-o no/such/folder/a.png", CANNOT_WRITE)],
-)  # fmt: skip
-def test_bad_usage(words, code, capsys):
-    assert main(["patch", str(EXAMPLE), *words.split()]) == code
+@pytest.mark.parametrize("words", [
+    "--mu 0", "--mu x", "--distance -3", "--long-side 1,2", "--long-side 0,0,0", "--long-side 0,0,1", "--unit inch",
+    "--surface sphere", "--object-length 60", "--distance 60 --other b.csv", "-o a.pdf",
+])  # fmt: skip
+def test_bad_usage(words, capsys):
+    assert main(["patch", str(EXAMPLE), *words.split()]) == USAGE
     assert words.split()[0] in capsys.readouterr().err or words.startswith("-o")
 
 

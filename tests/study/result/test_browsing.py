@@ -16,6 +16,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from matplotlib.image import imread
 
 from softjaw.study.result.store import open_result
 from tests.study.launching import ROOT, launch
@@ -64,13 +65,6 @@ def result(tmp_path_factory):
     return path
 
 
-def colours(picture):
-    from matplotlib.image import imread
-
-    rgb = (imread(picture)[..., :3] * 15).round().astype(int).reshape(-1, 3)
-    return len(np.unique(rgb[np.ptp(rgb, axis=1) > 2], axis=0))
-
-
 def test_nexus_checks_find_no_error_silx_opens_at_a_drawn_map_and_xarray_has_coordinates(result, python, tmp_path):
     """nexusformat takes every virtual dataset for a stack of whole ones, so views become plain datasets for it."""
     plain = shutil.copy(result, tmp_path)
@@ -87,7 +81,8 @@ def test_nexus_checks_find_no_error_silx_opens_at_a_drawn_map_and_xarray_has_coo
     assert told["issues"] == {}
     assert told["plots"] > 20
     assert (told["default"], told["view"]) == ("/study/map", "Image")
-    assert colours(tmp_path / "silx.png") > 20
+    rgb = (imread(tmp_path / "silx.png")[..., :3] * 15).round().astype(int).reshape(-1, 3)
+    assert len(np.unique(rgb[np.ptp(rgb, axis=1) > 2], axis=0)) > 20  # colours
     code = (
         "import sys, xarray; d = xarray.open_dataset(sys.argv[1], engine='h5netcdf', group='/study/e_n');"
         "print(float(d.ccm.sel(station=0.01, normal_force=1.9, angle=0, method='nearest')), d.ccm.units)"

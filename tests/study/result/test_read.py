@@ -59,7 +59,6 @@ def test_every_dataset_has_its_numbers_and_cases_without_a_result_a_state_and_a_
             values = result.read(path)
             assert np.array_equal(found.values[done], np.nan_to_num(values)[done] if name == "flags" else values[done],
                                   equal_nan=True), path  # fmt: skip
-    ds = softjaw.open(half)
     status = ds.status.values.ravel()
     assert status.tolist() == [DONE] * 10 + [FAILED] + [MISSING] * (status.size - 11)
     assert ds.status.attrs["flag_meanings"] == STATES

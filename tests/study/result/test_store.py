@@ -102,9 +102,8 @@ def test_viewers_find_a_plot_from_the_root_down_the_map_at_the_largest_force(pat
         assert list(whole.attrs["default_slice"]) == [".", ".", "2"]
         assert entry["e_n/ccm"].attrs["units"] == "m"
         assert entry["patch/normal"].dims[5][0].shape == (3,)
-    layout = small()
     for row in (16, 17):  # the second and third force at station 2, angle 1
-        put(path, layout, row, record(layout, CaseResult({"maps/quality": [row, 0.0, 0.0]})))
+        put(path, layout := small(), row, record(layout, CaseResult({"maps/quality": [row, 0.0, 0.0]})))
     with h5py.File(path) as file:
         shown = file["study/map/quality"][()]
         assert shown[2, 1] == 17.0

@@ -7,7 +7,6 @@ import pytest
 import xarray as xr
 from scipy.spatial.transform import Rotation
 
-from softjaw.study.cli import main
 from softjaw.study.flags import Flag
 from softjaw.study.lookup import GraspMap
 from softjaw.study.quantities import MODELS, quantities
@@ -77,12 +76,6 @@ def test_flags_are_counted_words_or_bits_and_messages_that_differ_in_numbers_are
         (FAILED, 2, "residual 1e-3"), (DONE, 2, Flag.HOLE.sentence), (DONE, 1, "slow"),
     ]  # fmt: skip
     assert kinds[0].cases == [(0,), (2,)]
-
-
-@pytest.mark.parametrize("force", ["-3", "0", "nan", "inf", "ten"])
-def test_a_force_that_is_none_is_bad_usage(force, capsys):
-    assert main(["show", "any.hdf", "--force", force]) == 2
-    assert "--force" in capsys.readouterr().err
 
 
 def rising(masses=None, safety=2, flags=0, **more):

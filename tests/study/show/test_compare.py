@@ -7,14 +7,14 @@ import json
 import numpy as np
 import pytest
 
-import softjaw
-from softjaw.study.cli import main
-from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, RANK, USAGE, StudyError
+import softjaw as sj
+from softjaw.study.messages import OTHER_FILE, USAGE, StudyError
 from softjaw.study.quantities import Axis
 from softjaw.study.result.store import open_result
 from softjaw.study.show.compare import compare, compare_text
 from softjaw.study.table import as_csv, as_json
 from tests.study.formula_results import SCENE, STATIONS, grid_axes, linear, make, without_result
+from tests.study.launching import softjaw
 
 SOFTER = SCENE + "[friction]\nmu = 0.5\n"
 
@@ -33,13 +33,7 @@ def pair(tmp_path_factory):
 
 
 def compared(one, other, **options):
-    return compare(softjaw.open(one), softjaw.open(other), **options)
-
-
-def told(words, monkeypatch):
-    for name in RANK:  # only the first rank of an mpirun speaks
-        monkeypatch.delenv(name, raising=False)
-    return main([str(word) for word in words])
+    return compare(sj.open(one), sj.open(other), **options)
 
 
 def column(table, name):
@@ -56,7 +50,6 @@ def test_common_places_are_found_by_value_and_differences_judged_by_the_errors_o
     assert found.facts["axes"]["normal_force"]["only_a"].tolist() == [1.0, 8.0]
     assert found.facts["settings"] == [{"key": "friction.mu", "a": None, "b": 0.5}]
     # 0.5 % stays within 1 % + 1 %, 10 % does not; a failed case has no difference.
-    found = compared(*pair)
     change, relative = column(found, "difference"), column(found, "relative")
     beyond = [row["beyond_error"] for row in found.rows]
     (failed,) = np.flatnonzero(np.isnan(change))
@@ -76,7 +69,7 @@ def test_common_places_are_found_by_value_and_differences_judged_by_the_errors_o
 
 def test_rounding_is_no_difference_and_errors_of_one_file_alone_are_unknown(pair, tmp_path):
     """Errors of 0 are exceeded by 1e-4 of a value, and not by what another order of operations may change."""
-    one = softjaw.open(pair[0])
+    one = sj.open(pair[0])
     one["e_n_error"][:] = 0.0
     for change, beyond in ((1e-13, False), (1e-4, True)):
         other = one.copy(deep=True)
@@ -125,7 +118,7 @@ def test_maps_that_share_nothing_are_refused(pair, tmp_path, axes, name):
     assert error.value.code == USAGE
 
 
-def test_poses_are_shown_by_label_sweeps_by_word_and_commands_give_the_usual_codes(tmp_path, pair, capsys, monkeypatch):
+def test_poses_are_shown_by_label_sweeps_by_word_and_commands_give_the_usual_codes(tmp_path, pair):
     poses = make(tmp_path / "a.hdf", axes=grid_axes([0, 1], [0], poses=True), labels=("lid", "neck"))
     found = compared(poses, poses)
     assert [row["label"] for row in found.rows[::4]] == ["lid", "neck"]
@@ -139,16 +132,10 @@ def test_poses_are_shown_by_label_sweeps_by_word_and_commands_give_the_usual_cod
     found = compared(swept(["blatz_ko", "linear"]), swept(["blatz_ko", "hyperfoam"]))
     assert {row["material"] for row in found.rows} == {0.0}
     a, b = pair
-    assert told(["compare", a, b, "--top", 2], monkeypatch) == 0
-    assert "2 of 35" in capsys.readouterr().out
-    assert told(["compare", a, b, "--json", "--model", "pcm"], monkeypatch) == 0
-    assert json.loads(capsys.readouterr().out)["quantity"] == "e_n"
-    assert told(["compare", a, b, "--quantity", "beauty"], monkeypatch) == USAGE
-    assert "beauty" in capsys.readouterr().err
-    assert told(["compare", a, tmp_path / "none.hdf"], monkeypatch) == OTHER_FILE
-    assert told(["compare", a], monkeypatch) == USAGE
-    assert told(["export", a], monkeypatch) == USAGE
-    assert told(["export", a, "--csv", "-o", tmp_path / "out.csv"], monkeypatch) == 0
-    assert (tmp_path / "out.csv").read_text().count("\n") == 1 + 4 * 6 * 4
-    assert told(["export", a, "--csv", "-o", tmp_path / "no" / "out.csv"], monkeypatch) == CANNOT_WRITE
-    assert told(["export", tmp_path / "none.hdf", "--json"], monkeypatch) == OTHER_FILE
+    assert "2 of 35" in softjaw(0, "compare", a, b, "--top", 2)[1]
+    assert json.loads(softjaw(0, "compare", a, b, "--json", "--model", "pcm")[1])["quantity"] == "e_n"
+    code, _, errors = softjaw(0, "compare", a, b, "--quantity", "beauty")
+    assert (code, "beauty" in errors) == (USAGE, True)
+    assert softjaw(0, "compare", a, tmp_path / "none.hdf")[0] == OTHER_FILE
+    assert softjaw(0, "compare", a)[0] == softjaw(0, "export", a)[0] == USAGE
+    assert softjaw(0, "export", tmp_path / "none.hdf", "--json")[0] == OTHER_FILE

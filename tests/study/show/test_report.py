@@ -18,8 +18,7 @@ from softjaw.study.page import box, bullets, page, table, text
 from softjaw.study.quantities import Axis
 from softjaw.study.ranking import judge
 from softjaw.study.result.layout import Layout
-from softjaw.study.result.read import dataset
-from softjaw.study.result.store import open_result
+from softjaw.study.result.read import open
 from softjaw.study.show import best_grasps
 from softjaw.study.show.best_grasps import best
 from softjaw.study.show.grasps import at, order
@@ -94,11 +93,6 @@ class Page(HTMLParser):
         return [attributes for tag, attributes in self.found if tag == name]
 
 
-def page_of(path):
-    with open_result(path) as result:
-        return Page(build(dataset(result)))
-
-
 def figures(html):
     return [json.loads(text) for text in re.findall(r'<script type="application/json">(.*?)</script>', html, re.DOTALL)]
 
@@ -162,19 +156,17 @@ def test_texts_of_the_file_are_escaped_in_the_page_and_in_its_figures(ordinary):
 
 def test_the_verdict_and_tables_have_the_numbers_of_the_best_grasps_and_of_the_states(ordinary):
     path, _, page = ordinary
-    with open_result(path) as result:
-        data = judge(dataset(result))
-        first = best(data).rows[0]
-        assert data.attrs["best"] == (2, 1, 1)
-        assert (first["station"], first["angle"]) == (data.station.values[2], data.angle.values[1])
-        sentences, lines = verdict.verdict(data), best_grasps.answer(data, data.attrs["best"])
+    data = judge(open(path))
+    first = best(data).rows[0]
+    assert data.attrs["best"] == (2, 1, 1)
+    assert (first["station"], first["angle"]) == (data.station.values[2], data.angle.values[1])
+    sentences, lines = verdict.verdict(data), best_grasps.answer(data, data.attrs["best"])
     found = [lines[name][0] for name in ("where", "opening", "force")]
     assert found == ["station 20 mm, angle 28.65 deg", "40 mm", "5 N per finger"]
     assert any("10 % more quality" in sentence for sentence in sentences)
     assert [int(n) for n in re.findall(r"\d+", sentences[-1])] == [17, 24, 6, 1]
     assert all(sentence in page.text for sentence in sentences)
-    with open_result(path) as result:
-        ranked, by_force = (block for block in tables.best_grasps(judge(dataset(result))) if block["kind"] == "table")
+    ranked, by_force = (block for block in tables.best_grasps(data) if block["kind"] == "table")
     assert ranked["first"]
     column = [row[ranked["head"].index("f_x_max [N]")] for row in ranked["rows"]]
     assert column[:2] == ["4", "2"]  # 0.8 * 5 N at the peak, half of it beside it
@@ -205,8 +197,7 @@ def test_maps_show_every_case_in_both_models_with_crosses_for_failed_ones(ordina
 def test_values_have_their_error_and_a_chosen_candidate_stands_beside_the_best_one(tmp_path):
     layout = Layout(axes(), 0, has=("two meshes",))
     path = make(tmp_path / "two.hdf", layout, **{"maps/e_n_error": 0.0042, "maps/tau_z_max_error": 0.011})
-    with open_result(path) as result:
-        (folded,) = tables.every_case(judge(dataset(result)))
+    (folded,) = tables.every_case(judge(open(path)))
     block = folded["blocks"][0]
     assert len(block["rows"]) == 24
     assert all("\N{NO-BREAK SPACE}±" in row[block["head"].index("e_n [mm]")] for row in block["rows"])
@@ -215,17 +206,16 @@ def test_values_have_their_error_and_a_chosen_candidate_stands_beside_the_best_o
     def state(index):
         return "it slipped away" if index[:2] == (3, 2) else "done"
 
-    path = make(tmp_path / "f.hdf", Layout(axes(), 24), state)
-    with open_result(path) as result:
-        tables_of = [tables.best_grasps(judge(dataset(result), index)) for index in (None, (3, 0, 1), (3, 2, 1))]
-        plain, chosen, failed = ([b for b in blocks if b["kind"] == "table"] for blocks in tables_of)
-        assert (len(plain), len(chosen), len(failed)) == (2, 3, 3)
-        (row,) = chosen[2]["rows"]
-        cells = dict(zip(chosen[2]["head"], row, strict=True))
-        assert [cells[k] for k in ("name", "station [mm]", "force [N]", "quality")] == ["s09", "30", "5", "1.25"]
-        assert "it slipped away" in failed[2]["rows"][0]
-        with pytest.raises(StudyError, match="--candidate"):
-            build(dataset(result), 12)
+    ds = open(make(tmp_path / "f.hdf", Layout(axes(), 24), state))
+    tables_of = [tables.best_grasps(judge(ds, index)) for index in (None, (3, 0, 1), (3, 2, 1))]
+    plain, chosen, failed = ([b for b in blocks if b["kind"] == "table"] for blocks in tables_of)
+    assert (len(plain), len(chosen), len(failed)) == (2, 3, 3)
+    (row,) = chosen[2]["rows"]
+    cells = dict(zip(chosen[2]["head"], row, strict=True))
+    assert [cells[k] for k in ("name", "station [mm]", "force [N]", "quality")] == ["s09", "30", "5", "1.25"]
+    assert "it slipped away" in failed[2]["rows"][0]
+    with pytest.raises(StudyError, match="--candidate"):
+        build(ds, 12)
 
 
 SMALL = axes(stations=(0.01,), angles=(0.0,), forces=(3.0,))
@@ -242,7 +232,7 @@ TEXTS = (Axis("material", np.array([0.0, 1.0]), "", "gripper.material", ("blatz_
     (Layout(axes((0,), (0,), (1.0,), sweep=TEXTS), 0), {"scene": "a = 1"}, "blatz_ko"),
 ], ids=["one case", "all failed", "nothing done", "no scores", "poses", "sweep of texts"])  # fmt: skip
 def test_odd_files_give_a_page(tmp_path, layout, options, expected):
-    page = page_of(make(tmp_path / "odd.hdf", layout, **options))
+    page = Page(build(open(make(tmp_path / "odd.hdf", layout, **options))))
     assert page.balanced
     assert expected in page.text
 
@@ -252,22 +242,20 @@ def test_odd_files_give_a_page(tmp_path, layout, options, expected):
     (Layout(SMALL, 0), {"maps/payload": [0.25] * 3}, "250 g"),
 ], ids=["bad check", "payload"])  # fmt: skip
 def test_the_verdict_warns_of_what_the_best_case_lacks(tmp_path, layout, values, expected):
-    with open_result(make(tmp_path / "one.hdf", replace(layout, faces=0), **values)) as result:
-        data = judge(dataset(result))
-        lines = [" ".join(line) for line in best_grasps.answer(data, data.attrs["best"]).values()]
-        assert expected in " ".join([*lines, *verdict.verdict(data), *verdict.warnings(data)])
+    data = judge(open(make(tmp_path / "one.hdf", replace(layout, faces=0), **values)))
+    lines = [" ".join(line) for line in best_grasps.answer(data, data.attrs["best"]).values()]
+    assert expected in " ".join([*lines, *verdict.verdict(data), *verdict.warnings(data)])
 
 
 def test_the_verdict_says_why_a_higher_score_is_not_the_best_grasp_and_the_same_file_gives_the_same_page(tmp_path):
-    with open_result(make(tmp_path / "two.hdf", Layout(axes((0, 0.02), (0.0,), (1.0,)), 0))) as result:
-        data = judge(dataset(result))
-        worse, better = sorted(order(data, 0), key=lambda i: at(data, "quality", i))
-        assert Flag.TOO_STRONG.word not in best_grasps.answer(data, data.attrs["best"])["limit"][1]
-        marked = dataset(result)
-        marked["flags"].values[better] = Flag.TOO_STRONG
-        data = judge(marked)
-        assert data.attrs["best"] == worse
-        assert Flag.TOO_STRONG.word in best_grasps.answer(data, worse)["limit"][1]
+    ds = open(make(tmp_path / "two.hdf", Layout(axes((0, 0.02), (0.0,), (1.0,)), 0)))
+    data = judge(ds)
+    worse, better = sorted(order(data, 0), key=lambda i: at(data, "quality", i))
+    assert Flag.TOO_STRONG.word not in best_grasps.answer(data, data.attrs["best"])["limit"][1]
+    ds["flags"].values[better] = Flag.TOO_STRONG
+    data = judge(ds)
+    assert data.attrs["best"] == worse
+    assert Flag.TOO_STRONG.word in best_grasps.answer(data, worse)["limit"][1]
     path = make(tmp_path / "small.hdf", Layout(SMALL, 24))
     one, two = (write_report(path, tmp_path / name) for name in ("one.html", "two.html"))
     assert one.read_bytes() == two.read_bytes()
@@ -285,10 +273,9 @@ def test_differences_are_drawn_over_the_ratio_of_the_axes_and_a_page_escapes_eve
     sweep = (Axis("semi_axis_b", np.array([0.01, 0.025, 0.05]), "m", "object.semi_axis_b_mm"),)
     layout = Layout(axes((0.0,), (0.0,), (1.0, 5.0), sweep=sweep), 0)
     path = make(tmp_path / "sweep.hdf", layout, scene=SWEEP, **{"maps/f_y_overestimate": 0.04})
-    with open_result(path) as result:
-        data = judge(dataset(result)).assign(b_over_a=("semi_axis_b", [0.4, 1.0, 2.0]))
-        data = data.assign(apex_curvature=("semi_axis_b", [250.0, 40.0, 10.0]))
-        found = [block["figure"].data for block in curves.differences(data, data.attrs["best"])]
+    data = judge(open(path)).assign(b_over_a=("semi_axis_b", [0.4, 1.0, 2.0]))
+    data = data.assign(apex_curvature=("semi_axis_b", [250.0, 40.0, 10.0]))
+    found = [block["figure"].data for block in curves.differences(data, data.attrs["best"])]
     (ratio,), (curvature,) = found
     assert ratio.x == pytest.approx([0.5, 1, 2.5])
     assert curvature.x == pytest.approx([10, 40, 250])

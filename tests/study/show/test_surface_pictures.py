@@ -5,27 +5,21 @@ import pytest
 
 from softjaw.lsfit.ellipsoid import Ellipsoid
 from softjaw.lsfit.form import exponents, monomials
-from softjaw.lsfit.quartic import Quartic
 from softjaw.study.quantities import MONOMIALS
 from softjaw.study.ranking import judge
 from softjaw.study.result.layout import Layout
-from softjaw.study.result.read import dataset
-from softjaw.study.result.store import open_result
+from softjaw.study.result.read import open
 from softjaw.study.show.grasps import field
 from softjaw.study.show.report.contact import limit_surfaces
 from softjaw.study.show.stored_surface import circle, shadow_outline, stored_surface
 from softjaw.study.show.view.model import View
-from tests.lsfit.test_form import coefficients
+from tests.lsfit.test_surfaces import squared
 from tests.study.show.test_report import axes, make, patch
 
 MU, RHO = 0.5, 0.02
 S = float((patch()["pressure"] * patch()["area"])[0].sum())
 SEMI = np.array([1.0, 0.9, 0.3])
-
-
-def squared_ellipsoid(semi):
-    """Coefficients of ``(w A w)^2`` with ``A = diag(1 / semi^2)``."""
-    return coefficients(lambda w: ((w / semi) ** 2).sum(axis=1) ** 2, 3)
+BODY = squared(np.diag(SEMI**-2))  # an ellipsoid as a quartic
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +29,7 @@ def file(tmp_path_factory):
     values = {
         "limit_surface/semi_axes": np.broadcast_to(MU * SEMI * scale, (2, 3, 3)),
         "limit_surface/rho": [RHO, RHO],
-        "limit_surface/coefficients": np.broadcast_to(squared_ellipsoid(SEMI), (2, 3, 15)),
+        "limit_surface/coefficients": np.broadcast_to(BODY.coefficients, (2, 3, 15)),
         "fingers/S": [S, S],
         "fingers/f_x_max": np.full((2, 3), MU * S),
         "fingers/tau_z_max": np.full((2, 3), 0.01),
@@ -56,16 +50,15 @@ def test_monomials_are_named_in_the_order_of_the_fits():
 
 @pytest.mark.parametrize(("i", "j"), [(0, 1), (0, 2), (1, 2)])
 def test_shadows_of_ellipsoids_are_ellipses(i, j):
-    for surface in (Ellipsoid.of_axes(SEMI), Quartic.of_coefficients(squared_ellipsoid(SEMI), 3)):
+    for surface in (Ellipsoid.of_axes(SEMI), BODY):
         outline = shadow_outline(surface, i, j, 120)
         assert ((outline / SEMI[[i, j]]) ** 2).sum(axis=1) == pytest.approx(1.0, rel=1e-7)
 
 
 def test_surfaces_and_exact_wrenches_are_rebuilt_from_the_file_and_shown(file):
-    with open_result(file) as result:
-        data = judge(dataset(result))
-        faces = View(data).faces((1, 0, 0))
-        flat, curved = (stored_surface(data, (1, 0, 0), 1, model, faces) for model in ("pcm", "ccm"))
+    data = judge(open(file))
+    faces = View(data).faces((1, 0, 0))
+    flat, curved = (stored_surface(data, (1, 0, 0), 1, model, faces) for model in ("pcm", "ccm"))
     assert flat.unit == pytest.approx(MU * S * np.array([1.0, 1.0, 1e3 * RHO]))
     assert flat.ellipsoid.semi_axes == pytest.approx(SEMI)
     assert flat.chosen.radius(np.eye(3)) == pytest.approx(SEMI)
@@ -75,8 +68,7 @@ def test_surfaces_and_exact_wrenches_are_rebuilt_from_the_file_and_shown(file):
     assert flat.outline(0, 1) == pytest.approx(circle(0, 1, 90)[:, :2], abs=1e-9)
     assert 0 < flat.wrenches(np.array([[0.0, 0.0, 1.0]]))[0, 2] * RHO < 0.01 * np.sqrt(2)
     assert np.abs(curved.outline(0, 1)).max() <= 1 + 1e-12
-    with open_result(file) as result:
-        shown = limit_surfaces(View(judge(dataset(result))), (0, 0, 0))["figure"].data
+    shown = limit_surfaces(View(data), (0, 0, 0))["figure"].data
     outlines = [trace for trace in shown if trace.mode == "lines" and trace.line.dash == "solid"]
     assert len(outlines) == 2 * 3  # CCM and PCM
     reach = MU * S * SEMI * [1, 1, 1e3 * RHO]
@@ -87,13 +79,11 @@ def test_surfaces_and_exact_wrenches_are_rebuilt_from_the_file_and_shown(file):
 
 def test_a_file_without_patches_has_the_surfaces_alone_and_one_without_fits_has_no_figure(tmp_path, file):
     layout = Layout(axes(stations=(0.0,), angles=(0.0,), forces=(1.0,)), 0)
-    with open_result(file) as result:
-        data = judge(dataset(result))
-        names = ("semi_axes", "rho", "coefficients")
-        values = {f"limit_surface/{n}": field(data, f"limit_surface_{n}")[0, 0, 0] for n in names}
-        values |= {f"fingers/{n}": field(data, f"finger_{n}")[0, 0, 0] for n in ("S", "f_x_max")}
-    with open_result(make(tmp_path / "bare.hdf", layout, **values)) as result:
-        shown = limit_surfaces(View(judge(dataset(result))), (0, 0, 0))["figure"].data
-        assert not any(trace.mode == "markers" for trace in shown if trace.type == "scatter")
-    with open_result(make(tmp_path / "none.hdf", layout)) as result:
-        assert limit_surfaces(View(judge(dataset(result))), (0, 0, 0)) is None
+    data = judge(open(file))
+    names = ("semi_axes", "rho", "coefficients")
+    values = {f"limit_surface/{n}": field(data, f"limit_surface_{n}")[0, 0, 0] for n in names}
+    values |= {f"fingers/{n}": field(data, f"finger_{n}")[0, 0, 0] for n in ("S", "f_x_max")}
+    bare = judge(open(make(tmp_path / "bare.hdf", layout, **values)))
+    shown = limit_surfaces(View(bare), (0, 0, 0))["figure"].data
+    assert not any(trace.mode == "markers" for trace in shown if trace.type == "scatter")
+    assert limit_surfaces(View(judge(open(make(tmp_path / "none.hdf", layout)))), (0, 0, 0)) is None

@@ -11,14 +11,10 @@ from tests.study.view_files import FAILED, GRID, PRESSURE, SIZE, make, quality
 RING = 0.14181  # circumference of an ellipse with semi-axes 25 and 20 mm [m]
 
 
-@pytest.fixture(scope="module")
-def blocks(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("vtk")
-    assert main(["export", str(make(folder / "thing.hdf")), "--format", "vtk", "-o", str(folder / "seen.vtm")]) == 0
-    return pv.read(folder / "seen.vtm")
-
-
-def test_the_object_has_the_maps_of_each_candidate_and_pads_stand_where_the_poses_put_them(blocks, tmp_path):
+def test_the_object_has_the_maps_of_each_candidate_and_pads_stand_where_the_poses_put_them(tmp_path):
+    seen = tmp_path / "seen.vtm"
+    assert main(["export", str(make(tmp_path / "thing.hdf")), "--format", "vtk", "-o", str(seen)]) == 0
+    blocks = pv.read(seen)
     body = blocks["object"]
     cell, status = body["candidate"], body["status, 5 N"]
     for candidate, index in enumerate(np.ndindex(3, 2)):
