@@ -13,6 +13,8 @@ import numpy as np
 
 from softjaw.study.cli import main
 from softjaw.study.doctor import launch_environment
+from softjaw.study.quantities import DONE
+from softjaw.study.result.store import open_result
 from tests.study import fake_run
 
 ROOT = Path(__file__).parent.parent.parent
@@ -71,6 +73,16 @@ def wait_for(condition, limit=60.0):
     while not condition():
         assert time.monotonic() < deadline, "it took too long"
         time.sleep(0.02)
+
+
+def states(path):
+    with open_result(path) as result:
+        return result.status.ravel()
+
+
+def done(path):
+    """How many cases are done; of a file that is not made yet none."""
+    return int((states(path) == DONE).sum()) if path.exists() else 0
 
 
 def contents(path):

@@ -12,10 +12,6 @@ from softjaw.study.messages import USAGE
 from tests.study.launching import launch
 
 
-def answering(code, output="", errors=""):
-    return lambda *_, **__: subprocess.CompletedProcess([], code, output, errors)
-
-
 @pytest.mark.ranks
 def test_all_is_well_on_a_machine_that_was_set_up(capsys):
     assert doctor.doctor() == 0, capsys.readouterr().out
@@ -39,7 +35,7 @@ def test_all_is_well_on_a_machine_that_was_set_up(capsys):
     ("pictures", (-6, "", "bad X server connection"), "bad X server", "libosmesa6"),
 ])  # fmt: skip
 def test_a_trouble_comes_with_its_cure(monkeypatch, check, answer, found, cure):
-    monkeypatch.setattr(doctor, "ask", answering(*answer))
+    monkeypatch.setattr(doctor, "ask", lambda *_, **__: subprocess.CompletedProcess([], *answer))
     text, remedy, code = doctor.CHECKS[check]()
     assert found in text
     assert cure in remedy

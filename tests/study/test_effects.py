@@ -1,12 +1,11 @@
 """What indicators measure, which reasons are given, and that no indicator lets `auto` skip an effect wrongly."""
 
-import importlib.util
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from jobs import effects as job
 from softjaw.fem.errors import ConvergenceError
 from softjaw.study.case import effects, model
 from softjaw.study.case.effects import FORCED, LITTLE, MUCH, UNDECIDED, EffectChoice, neglected_traction
@@ -14,12 +13,12 @@ from softjaw.study.case.effects import STIFF_PLATE as STIFF
 from softjaw.study.case.solver import COARSE, Solved
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import REASONS
+from tests.study.launching import ROOT
 from tests.study.scenes import CONE, OVAL, scene_of
 from tests.study.test_pipeline import PLATE, cases, e_n, solved
 from tests.study.test_walls import CUP
 from tests.study.test_walls import solved as on_wall
 
-ROOT = Path(__file__).resolve().parents[2]
 COUPLED = 'effects.friction_pressure_coupling="tangential"'
 
 
@@ -148,15 +147,7 @@ def test_six_components_change_nothing_that_is_mapped():
                 np.testing.assert_allclose(value, six[name], rtol=1e-9)  # of the contact solve
 
 
-@pytest.fixture(scope="module")
-def job():
-    spec = importlib.util.spec_from_file_location("effects_job", ROOT / "jobs" / "effects.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-def judged(job, rows, effect):
+def judged(rows, effect):
     """Whether each case took an effect, and the error where it does not; that no skip is wrong."""
     _, taken, error = job.of_effect(rows, effect)
     assert error[~taken].max(initial=0.0) <= job.WRONG
@@ -164,7 +155,7 @@ def judged(job, rows, effect):
 
 
 @pytest.mark.long
-def test_no_effect_of_rigid_objects_is_skipped_wrongly(job, monkeypatch):
+def test_no_effect_of_rigid_objects_is_skipped_wrongly(monkeypatch):
     """Among the places one where a pad just reaches a waist's middle: there e_n changes most for least."""
     monkeypatch.chdir(ROOT)
     kept = ("bottle", "cylinder 8 x 8 mm", "plane")
@@ -173,18 +164,18 @@ def test_no_effect_of_rigid_objects_is_skipped_wrongly(job, monkeypatch):
     rows = list(job.patch_rows())
     assert max([row[5] for row in rows if row[0] == job.EXACT]) < 1e-6
     for effect, own in (("friction", rows), (job.COUPLING, list(job.friction_rows()))):
-        taken, error = judged(job, own, effect)
+        taken, error = judged(own, effect)
         assert error[taken].max() > job.TARGET  # something to be wrong about
     assert not taken.all()
 
 
 @pytest.mark.long
-def test_no_shell_is_skipped_wrongly(job, monkeypatch):
+def test_no_shell_is_skipped_wrongly(monkeypatch):
     monkeypatch.chdir(ROOT)
     monkeypatch.setattr(job, "WALLS", {name: own for name, own in job.WALLS.items() if name.startswith("cup")})
     rows = list(job.wall_rows())
     for effect in (job.SHELL, job.SHELLS):
-        taken, error = judged(job, rows, effect)
+        taken, error = judged(rows, effect)
         assert error[taken].max() > job.TARGET
         assert not taken.all()
 

@@ -84,9 +84,10 @@ def test_with_a_mass_finer_meshes_go_to_the_force_below_too(tmp_path, changes, l
     made = scene_of(BALL, "accuracy.target=0.01", *changes, where=pose_of(), forces="[2, 5]")
     made = made.model_copy(update={"candidates": made.candidates.model_copy(update={"sampled": 1})})
     plan = make_plan(made)
+    *_, last = range(plan.layout.shape[-1])
 
     def case(index):
-        held = 1.0 if index[-1] == plan.layout.shape[-1] - 1 else 0.01
+        held = 1.0 if index[-1] == last else 0.01  # kg
         values = {"maps/payload": [held] * 3, "maps/payload_error": 0.02, "maps/flags": 0.0, "work/mesh": 0}
         return CaseResult(values | ({"maps/safety_factor": [10 * held] * 3} if changes else {}))
 

@@ -17,7 +17,7 @@ from softjaw.study.messages import CANNOT_WRITE, SOME_FAILED, STOPPED
 from softjaw.study.result.layout import DONE, FAILED, MISSING
 from softjaw.study.result.lock import holder
 from softjaw.study.result.store import open_result, torn_rows
-from tests.study.launching import contents, differing, start, study, wait_for
+from tests.study.launching import contents, differing, done, start, states, study, wait_for
 
 pytestmark = [pytest.mark.long, pytest.mark.ranks]
 VICTIMS = ("one rank", "all ranks", "mpirun")
@@ -26,13 +26,10 @@ OPTIONS = ("--stations", 14, "--retry-failed")  # two kills in one case would ma
 GROWING = ("--stations", 5, "--grow", "--retry-failed")
 
 
-def ranks_of(process):
-    return [int(pid) for pid in Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()]
-
-
 def kill(process, victim, chance):
     """End some of it at once, then see the rest out; whether there was somebody to kill."""
-    ranks = ranks_of(process) if process.poll() is None else []
+    children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
+    ranks = [int(pid) for pid in children.read_text().split()] if process.poll() is None else []
     chosen = {"one rank": chance.sample(ranks, min(1, len(ranks))), "all ranks": ranks, "mpirun": [process.pid]}[victim]
     for pid in chosen if ranks else ():
         os.kill(pid, signal.SIGKILL)
@@ -55,21 +52,14 @@ def done_rows(path):
     return set(np.flatnonzero(codes == DONE).tolist())
 
 
-def count_done(path):
-    if not path.exists():
-        return 0
-    with open_result(path) as result:
-        return int((result.status == DONE).sum())
-
-
 def killed_again_and_again(path, number, chance, options):
     """Kill a study several times, then let it finish; how many kills met it, and rows done when they did."""
     met, progress = 0, [set()]
     for k in range(KILLS):
         process = start(2 + number % 2, path, *options, "--delay", 0.12)  # six seconds of work
         if k or number % 3:  # in the middle of the work, else anywhere from the start on
-            before = count_done(path)
-            wait_for(lambda: process.poll() is not None or count_done(path) > before)  # noqa: B023
+            before = done(path)
+            wait_for(lambda: process.poll() is not None or done(path) > before)  # noqa: B023
             time.sleep(chance.uniform(0.0, 0.3))
         else:
             time.sleep(chance.uniform(0.1, 1.2))
@@ -101,11 +91,6 @@ def test_no_kill_loses_a_result(tmp_path, options, kills):
     assert options is GROWING or kept > 5 * number
 
 
-def states(path):
-    with open_result(path) as result:
-        return result.status.ravel(), result.messages.ravel()
-
-
 def whole(folder, *words):
     assert study(0, folder / "whole.hdf", *words)[0] == 0
     return contents(folder / "whole.hdf")
@@ -120,7 +105,8 @@ def test_one_case_fails_with_its_reason_and_the_others_go_on(tmp_path, how, rank
     path = tmp_path / f"{how}.hdf"
     code, _, errors = study(ranks, path, f"--{how}", 13, *([] if how == "greedy" else ["--limit", 3]))
     assert code == SOME_FAILED, errors
-    codes, messages = states(path)
+    with open_result(path) as result:
+        codes, messages = result.status.ravel(), result.messages.ravel()
     # the case, the force above it, and both for the other candidate of the unit
     assert [row for row, code in enumerate(codes) if code == FAILED] == [13, 14, 16, 17]
     assert (codes[[row for row in range(36) if row not in (13, 14, 16, 17)]] == DONE).all()
@@ -136,7 +122,7 @@ def test_a_single_process_that_hangs_ends_itself_and_gives_the_case_up_the_third
         assert code == 1
         assert "Timeout (0:00:02)!" in errors  # and where it was in Python
     assert study(0, path, "--stuck", 13, "--limit", 1)[0] == SOME_FAILED
-    assert [row for row, code in enumerate(states(path)[0]) if code == FAILED] == [13, 14, 16, 17]
+    assert [row for row, code in enumerate(states(path)) if code == FAILED] == [13, 14, 16, 17]
 
 
 @pytest.mark.parametrize(("how", "ranks"), [("unplug", 0), ("unplug", 3), ("remove", 0), ("remove", 2)])
@@ -147,7 +133,7 @@ def test_a_place_that_gets_lost_ends_the_run_with_one_sentence(tmp_path, how, ra
     assert errors.count("error: ") == 1  # Open MPI adds lines of its own
     assert "Traceback" not in errors
     if how == "unplug":
-        assert (states(path)[0] == DONE).any()
+        assert done(path)
     assert study(2, path)[0] == 0
     assert differing(path, whole(tmp_path)) == []
 
@@ -157,7 +143,7 @@ def test_ranks_leave_in_order_when_mpirun_is_told_to_stop(tmp_path, name):
     """mpirun answers TERM with 1, whatever its ranks say, and kills them after some two seconds: they are quicker."""
     path = tmp_path / "stopped.hdf"
     process = start(2, path, "--hang", 14, "--delay", 0.1)
-    wait_for(lambda: path.exists() and states(path)[0][13] == DONE)
+    wait_for(lambda: path.exists() and states(path)[13] == DONE)
     began = time.monotonic()
     process.send_signal(getattr(signal, name))
     if name == "SIGUSR1":  # a second signal: there is no time after all

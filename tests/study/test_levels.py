@@ -52,7 +52,7 @@ def bits(result):
 def test_a_force_has_the_same_bits_whichever_others_are_asked_for(overrides):
     assert list(whole(overrides)) == [0, 1, 2]
     for wanted in ([2], [1], (2, 0)) if not overrides else ([2], [1]):
-        found = dict(pipeline.solve_unit(unit_of(*overrides), wanted))
+        found = refined(*overrides, wanted=wanted)
         assert list(found) == sorted(wanted)
         for k, result in found.items():
             assert bits(result) == bits(whole(overrides)[k])
@@ -82,7 +82,7 @@ def test_a_failure_at_one_force_leaves_the_others_alone(monkeypatch):
         return at(press, force, coarse)
 
     monkeypatch.setattr(Press, "at", fails)
-    found = dict(pipeline.solve_unit(unit_of()))
+    found = refined()
     assert isinstance(found[1], CaseFailure)
     for k in (0, 2):
         assert bits(found[k]) == bits(expected[k])
@@ -96,7 +96,7 @@ def test_where_the_coarse_path_ends_the_fine_mesh_is_solved_and_its_error_is_unk
         raise ConvergenceError("the force stays below 2 N")
 
     monkeypatch.setattr(Press, "load_path", ends)
-    found = dict(pipeline.solve_unit(unit_of()))
+    found = refined()
     assert bits(found[0]) == bits(expected[0])
     for k in (1, 2):
         assert "maps/e_n_error" not in found[k].values
@@ -137,10 +137,8 @@ def test_a_third_mesh_is_taken_where_the_error_is_not_surely_below_the_target_wi
     # the error that is the target is undecided
     assert {k for k, n in count.items() if n > math.prod(OWN)} == {k for k, error in errors.items() if error >= target}
     assert set(count.values()) <= {math.prod(mesh) for mesh in (OWN, FINER, FINEST)}
-    errors, _, found = split
     k = min(errors, key=errors.__getitem__)
     assert without_count(found[k]) == bits(whole(())[k])
-    errors, target, found = split
     finer = {math.prod(m): refined(f"gripper.elements={list(m)}") for m in (FINER, FINEST)}
     for k in (k for k, error in errors.items() if error >= target):
         values = found[k].values
@@ -196,14 +194,12 @@ def test_a_finer_mesh_without_a_state_loses_nothing(monkeypatch, split):
 
 
 def test_friction_that_acts_back_has_a_third_mesh_too_and_one_mesh_and_two_give_the_same_case():
-    changes = ("effects.friction_pressure_coupling='tangential'", "load.normal_force_n=[2]")
-    two, three = (refined(*changes, *more)[0].values for more in ((), aim(1e-3)))
+    two, three = (refined(*ROUGH, "load.normal_force_n=[2]", *more)[0].values for more in ((), aim(1e-3)))
     assert three["maps/pad_elements"] > math.prod(OWN)
     assert three["maps/e_n_error"] != two["maps/e_n_error"]
     assert three["maps/e_n"][0] == pytest.approx(two["maps/e_n"][0], rel=2 * two["maps/e_n_error"])
     # Each mesh walks its own load path, and no force of the list leaves a trace in another.
-    one, two = (dict(pipeline.solve_unit(unit_of(*ROUGH, *keys))) for keys in
-                (("accuracy.meshes=1", "load.normal_force_n=[2]"), ()))  # fmt: skip
+    one, two = (refined(*ROUGH, *keys) for keys in (("accuracy.meshes=1", "load.normal_force_n=[2]"), ()))
     for key in ("maps/payload", "maps/quality", "maps/e_n", "maps/S", "maps/closing"):
         np.testing.assert_allclose(one[0].values[key], two[1].values[key], rtol=1e-9)  # of the contact solve
 

@@ -50,16 +50,10 @@ def assert_stored(case, path, index):
         assert result.messages[index] == case.notes
 
 
-@pytest.fixture(scope="module")
-def solved(tmp_path_factory):
-    """A scene with two meshes, an image by symmetry, and two forces; its file, and one of its cases."""
+def test_a_case_is_that_of_a_run_bit_for_bit_also_an_image_by_symmetry_and_with_a_kept_solver(tmp_path, monkeypatch):
+    """Of a scene with two meshes, an image by symmetry, and two forces."""
     scene = SMOKE.with_values(**{"accuracy.meshes": 2, "candidates.angles_deg": [0, 180]})
-    path = run(scene, tmp_path_factory.mktemp("solved") / "two.hdf")
-    return scene, path, sj.press(scene, station=0.0, angle=0.0, force=2.0)
-
-
-def test_a_case_is_that_of_a_run_bit_for_bit_also_an_image_by_symmetry_and_with_a_kept_solver(solved, monkeypatch):
-    _, path, case = solved
+    path, case = run(scene, tmp_path / "two.hdf"), sj.press(scene, station=0.0, angle=0.0, force=2.0)
     assert_stored(case, path, (0, 0, 1))
     ds = sj.open(path).isel(station=0, angle=0, normal_force=1)
     assert case.limits["pcm"].e_n == ds.e_n.sel(model="pcm")
@@ -70,7 +64,6 @@ def test_a_case_is_that_of_a_run_bit_for_bit_also_an_image_by_symmetry_and_with_
     for fitted in (True, False):
         mine, its = (one.limit_surface(2, "pcm", fitted).semi_axes for one in (case, point))
         assert mine == pytest.approx(its, rel=1e-12)
-    scene, path, case = solved
     image = sj.press(scene, station=0.0, angle=np.pi, force=1)
     assert image.angle == pytest.approx(np.pi)
     assert_stored(image, path, (0, 1, 0))

@@ -239,6 +239,9 @@ def test_a_load_path_that_ends_names_the_last_good_force_and_what_was_not_tried(
     path = solved(OVAL, "petsc.contact_snes_max_it=2")[0][1]
     assert all(isinstance(result, CaseFailure) for result in path)
     assert numbers_of(path[1].message, "N")[0] == 2
+    # beside the middle a ball has one plane of symmetry, not two
+    with pytest.raises(ValueError, match=r"'quarter' needs 2 plane"):
+        solved(BALL, 'effects.model_size="quarter"', stations="[3]")
 
 
 def numbers_of(text, unit):

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from softjaw.study.doctor import launch_environment
-from softjaw.study.result.layout import DONE, MISSING
+from softjaw.study.result.layout import MISSING
 from softjaw.study.result.store import open_result
 from softjaw.study.run.plan import make_plan
 from softjaw.study.run.shares import shares
-from tests.study.launching import ROOT, begin, contents, differing, launch, softjaw, wait_for
+from tests.study.launching import ROOT, begin, contents, differing, done, launch, softjaw, wait_for
 from tests.study.scenes import BOX, NO_COUPLING, scene_of
 from tests.study.test_walls import CUP
 
@@ -66,11 +66,6 @@ def run(ranks, scene, path, *words):
     return softjaw(ranks, "run", scene, "-o", path, *words)
 
 
-def done(path):
-    with open_result(path) as result:
-        return int((result.status == DONE).sum())
-
-
 def test_two_ranks_divide_the_forces_of_a_candidate():
     """So that what follows compares forces that were solved beside each other with forces that were solved in turn."""
     divided = [own.unit.index for own in shares(make_plan(SCENE).units, np.full(CASES, MISSING), 2)]
@@ -120,7 +115,7 @@ def test_any_number_of_ranks_writes_the_same_bits(tmp_path, scene, alone, ranks)
 def test_a_run_that_is_stopped_or_killed_goes_on_with_other_ranks_to_the_same_bits(tmp_path, scene, alone, how, ranks):
     path = tmp_path / f"{how}.hdf"
     process = begin(0, "-c", SLOWLY, "run", scene, "-o", path)
-    wait_for(lambda: path.exists() and done(path) >= 2)
+    wait_for(lambda: done(path) >= 2)
     process.send_signal(getattr(signal, how))
     process.communicate(timeout=60)
     code, before = process.returncode, done(path)
@@ -129,19 +124,6 @@ def test_a_run_that_is_stopped_or_killed_goes_on_with_other_ranks_to_the_same_bi
     code, _, errors = run(ranks, scene, path)
     assert code == 0, errors
     assert differing(path, contents(alone)) == []
-
-
-NODES = ROOT / "tests" / "two_nodes.sh"
-
-
-def on_two_nodes(ranks, *words):
-    """A command on so many ranks of each node; its output."""
-    done = subprocess.run(
-        [NODES, str(ranks), *map(str, words)], cwd=ROOT, env=launch_environment(), capture_output=True, text=True,
-        timeout=300, check=False,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout
 
 
 @pytest.fixture
@@ -159,7 +141,9 @@ def nodes():
 def test_two_nodes_write_the_file_of_one_process(tmp_path):
     scene = ROOT / "jobs" / "smoke.toml"
     study = ("-m", "softjaw", "run", scene, "-o")
-    on_two_nodes(2, sys.executable, *study, tmp_path / "two.hdf")
+    words = [ROOT / "tests" / "two_nodes.sh", "2", sys.executable, *study, tmp_path / "two.hdf"]  # ranks of each node
+    run = subprocess.run(words, cwd=ROOT, env=launch_environment(), capture_output=True, text=True, timeout=300)
+    assert run.returncode == 0, run.stdout + run.stderr
     assert launch(0, *study, tmp_path / "one.hdf")[0] == 0
     expected = contents(tmp_path / "one.hdf")
     assert len(expected) > 100

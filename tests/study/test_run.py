@@ -4,23 +4,19 @@ import shutil
 import signal
 import time
 
+import h5py
 import numpy as np
 import pytest
 
 from softjaw.study.quantities import DONE, FAILED, MISSING, WIDE
 from softjaw.study.result.store import open_result, torn_rows
-from tests.study.launching import contents, differing, softjaw, start, study, wait_for
+from tests.study.launching import contents, differing, done, softjaw, start, states, study, wait_for
 
 pytestmark = pytest.mark.ranks
 
 
-def states(path):
-    with open_result(path) as result:
-        return result.status.ravel()
-
-
 def begun(path):
-    return path.exists() and 2 <= (states(path) == DONE).sum() < states(path).size
+    return 2 <= done(path) < states(path).size
 
 
 @pytest.fixture(scope="module")
@@ -40,8 +36,7 @@ def test_a_killed_rank_loses_nothing_others_go_on_and_what_is_no_grasp_is_never_
     code, _, _ = study(2, path, "--kill", 20)
     assert code not in (0, 6, 75)
     before = contents(path)
-    done = states(path) == DONE
-    assert 0 < done.sum() < 36
+    assert 0 < done(path) < 36
     code, _, errors = study(0, path)
     assert code == 0, errors
     assert before != uninterrupted
@@ -98,7 +93,7 @@ def test_a_failed_case_has_its_reason_and_stops_nobody_nor_other_forces_that_are
     code, _, errors = study(2, path, "--apart", "--fail", 9, "--raises", 25)
     assert code == 6, errors
     assert [i for i, s in enumerate(states(path)) if s == FAILED] == [9, 25, 28]
-    assert (states(path) == DONE).sum() == 33
+    assert done(path) == 33
 
 
 @pytest.mark.parametrize("name", ["SIGTERM", pytest.param("SIGINT", marks=pytest.mark.long)])
@@ -168,7 +163,6 @@ def test_too_little_space_is_noticed_before_anything_is_solved(tmp_path):
 
 @pytest.mark.parametrize("ranks", [0, pytest.param(2, marks=pytest.mark.long)])
 def test_a_torn_row_is_solved_again(tmp_path, whole, uninterrupted, ranks):
-    import h5py
     path = tmp_path / "torn.hdf"
     shutil.copy(whole, path)
     with h5py.File(path, "r+") as file:

@@ -141,27 +141,13 @@ def test_times_follow_from_costs_and_each_limit_of_many_ranks_is_where_its_close
 
 
 def test_a_case_that_an_earlier_run_left_out_is_missing_once_it_is_asked_for():
-    class Writer:
-        def __init__(self):
-            self.rows, self.forgotten = np.array([DONE, SLIPS, SLIPS, WIDE]), []
-
-        def codes(self):
-            return self.rows.copy()
-
-        def attempts(self):
-            return np.ones(4, int)
-
-        def forget(self, row):
-            self.forgotten.append(row)
-
-        def tidy(self, row):
-            raise AssertionError("nothing is torn")
-
-    writer = Writer()
+    rows, forgotten = np.array([DONE, SLIPS, SLIPS, WIDE]), []
+    # nothing is torn, and so nothing tidied
+    writer = SimpleNamespace(codes=rows.copy, attempts=lambda: np.ones(4, int), forget=forgotten.append)
     wanted = {(0, 1): MISSING, (2,): SLIPS, (3,): WIDE}
     units = [SimpleNamespace(rows=(rows,), state=state, apart=False, reason="") for rows, state in wanted.items()]
     assert settle(writer, units, [], False).tolist() == [DONE, MISSING, SLIPS, WIDE]
-    assert writer.forgotten == [1]
+    assert forgotten == [1]
 
 
 class Run:

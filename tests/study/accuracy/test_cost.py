@@ -1,7 +1,5 @@
 """What accuracy costs: the sweep that tells it, errors and times that its file gives, and the command."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -11,21 +9,11 @@ from softjaw.study.case.candidates import axes
 from softjaw.study.cli import main
 from softjaw.study.messages import DONE
 from softjaw.study.scene import Scene, SceneError, parse_scene
+from tests.study.launching import ROOT
 from tests.study.scenes import BALL, text_of, units_of
 
-JOBS = Path(__file__).parents[3] / "jobs"
 SCENE = text_of(BALL, stations="[-10, -5, 0, 5, 10]", angles="[0, 90]", forces="[1, 2, 3, 4, 5]")
 SCENE += '[effects]\nfriction_pressure_coupling = "none"\nsheet = "rigid"\n'
-SHORT = ["candidates.stations_mm=[0, 10]", "load.normal_force_n=[2]", "gripper.elements=[6, 4, 2]"]
-
-
-@pytest.fixture(scope="module")
-def file(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("cost")
-    (folder / "ball.toml").write_text(SCENE)
-    words = [word for change in SHORT for word in ("--set", change)]
-    assert main(["cost", str(folder / "ball.toml"), "-o", str(folder / "c.hdf"), *words]) == DONE
-    return folder / "c.hdf"
 
 
 def test_a_few_cases_are_solved_on_meshes_of_both_kinds_of_walls_too_without_what_makes_a_study_long():
@@ -42,11 +30,11 @@ def test_a_few_cases_are_solved_on_meshes_of_both_kinds_of_walls_too_without_wha
         (n, kind) for n in scene.sweep["gripper.elements"] for kind in scene.sweep["gripper.element"]
     }
     assert parse_scene(scene.effective_toml()) == scene
-    bottle = Scene.from_file(JOBS / "bottle.toml")
+    bottle = Scene.from_file(ROOT / "jobs" / "bottle.toml")
     assert mesh_sweep(bottle)["accuracy.wall_element_mm"] == pytest.approx([3, 1.5, 1.05])
     assert "gripper.element" in mesh_sweep(bottle.with_values({"effects.object": "rigid"}))
     assert cost_scene(bottle).cases == 4 * 3 * 9
-    scene = Scene.from_file(JOBS / "box-poses.toml", ["accuracy.target=0.01", "candidates.refine=true"])
+    scene = Scene.from_file(ROOT / "jobs" / "box-poses.toml", ["accuracy.target=0.01", "candidates.refine=true"])
     cost = cost_scene(scene)
     assert (cost.accuracy.target, cost.candidates.refine) == (None, None)
     assert 1 < len(cost.candidates.poses) <= 3
@@ -71,7 +59,12 @@ def test_meshes_are_swept_only_where_no_faces_are_stored():
     assert axes(scene)[0].options == ("4 x 2 x 2", "8 x 4 x 2")
 
 
-def test_errors_are_distances_from_the_last_or_smallest_point_and_failed_cases_count_and_leave_the_others(file):
+def test_errors_are_distances_from_the_last_or_smallest_point_and_failed_cases_count_and_leave_the_others(tmp_path):
+    short = ("candidates.stations_mm=[0, 10]", "load.normal_force_n=[2]", "gripper.elements=[6, 4, 2]")
+    scene, file = tmp_path / "ball.toml", tmp_path / "c.hdf"
+    scene.write_text(SCENE)
+    words = [word for change in short for word in ("--set", change)]
+    assert main(["cost", str(scene), "-o", str(file), *words]) == DONE
     ds = softjaw.open(file)
     settings = settings_in(ds)
     assert [(s.values["gripper.elements"], s.values["gripper.element"]) for s in settings] == [
@@ -87,7 +80,7 @@ def test_errors_are_distances_from_the_last_or_smallest_point_and_failed_cases_c
     assert settings[2].seconds == pytest.approx(seconds.mean())
     # of triquadratic elements the finer mesh is nearer to the finest
     assert settings[1].worst["e_n"] > settings[3].worst["e_n"] > 0
-    ds = softjaw.open(file).isel(element=slice(0, 1))
+    ds = ds.isel(element=slice(0, 1))
     ds.elements.attrs |= {"long_name": "accuracy.wall_element_mm", "options": ()}
     text = ds.attrs["scene"].replace('"gripper.elements"', '"accuracy.wall_element_mm"')
     start = text.index('"accuracy.wall_element_mm"')

@@ -38,7 +38,8 @@ def pair(tilt=0.0, strips=65):
 
 
 def test_forces_torque_e_n_and_the_quality_of_facing_ellipsoids_are_those_of_the_closed_form():
-    values, fits = evaluate(pair(), SETTINGS)
+    contacts = pair()
+    values, fits = evaluate(contacts, SETTINGS)
     torque = R**3 * PRESSURE * cylinder_torque(1.0, 1.0, ANGLE, LENGTH / R)
     assert values["maps/S"] == pytest.approx(S, rel=1e-12)
     assert values["maps/F_N"] == pytest.approx(F_N, rel=5e-5)
@@ -51,8 +52,6 @@ def test_forces_torque_e_n_and_the_quality_of_facing_ellipsoids_are_those_of_the
     assert fits[0] is fits[1]  # an image is fitted once
     assert not values["maps/flags"] & (Flag.NOT_ANTIPODAL | Flag.SLIPS | Flag.NO_FIT)
     # 14/9 pi^2 d^2 f_x^2 f_y^2 tau_z per newton of S, d over the arms' length and tau_z over the torques'.
-    contacts = pair()
-    values, _ = evaluate(contacts, SETTINGS)
     for m in range(len(MODELS)):
         f_x, f_y, tau = (values[f"maps/{name}_max"][m] / S for name in ("f_x", "f_y", "tau_z"))
         expected = 14 / 9 * math.pi**2 * (DISTANCE / 0.09) ** 2 * f_x**2 * f_y**2 * tau / 0.05
@@ -138,9 +137,8 @@ def test_every_quantity_with_an_error_gets_one_and_a_weight_between_the_pads_is_
     found = [misses(e, t) for e, t in ((0.01, None), (0.02, None), (0.02, 0.02), (0.021, 0.02), (np.nan, 0.02))]
     assert found == [False, True, False, True, False]
     # Along x both pads carry mu S together.
-    contacts = pair()
-    middle = np.add(contacts[0].origin, [0, 0, DISTANCE / 2])
-    values, _ = evaluate(contacts, replace(SETTINGS, task=Task(middle, (-1.0, 0, 0), mass=0.1)))
+    middle = np.add(fine[0].origin, [0, 0, DISTANCE / 2])
+    values, _ = evaluate(fine, replace(SETTINGS, task=Task(middle, (-1.0, 0, 0), mass=0.1)))
     assert values["maps/payload"][0] * GRAVITY == pytest.approx(2 * MU * S, rel=2e-2)
     assert values["maps/safety_factor"][0] == pytest.approx(values["maps/payload"][0] / 0.1, rel=1e-12)
     assert not values["maps/flags"] & Flag.NOT_BORNE

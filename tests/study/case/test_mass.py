@@ -7,7 +7,7 @@ import pytest
 from softjaw.study.case.build import volume
 from softjaw.study.case.candidates import with_sampled_grasps
 from softjaw.study.messages import StudyError
-from softjaw.study.scene import Scene, SceneError
+from softjaw.study.scene import Scene
 
 
 def scene(density=1000, sweep=None, **shape):
@@ -29,5 +29,3 @@ def test_it_is_density_times_volume_and_what_has_no_volume_or_several_is_refused
         with_sampled_grasps(scene(shape="plane", thickness_mm=30))
     with pytest.raises(StudyError, match="mass_g"):
         with_sampled_grasps(scene(shape="sphere", radius_mm=30, sweep={"object.radius_mm": [20, 30]}))
-    with pytest.raises(SceneError, match="mass_g"):
-        scene(shape="sphere", radius_mm=30, mass_g=5)

@@ -62,19 +62,13 @@ def test_a_mesh_that_was_moved_in_its_file_has_its_grasps_moved_and_states_the_f
     np.testing.assert_allclose(attributes["object_origin"], 1e-3 * SHIFT, atol=1e-6)
 
 
-@pytest.fixture(scope="module")
-def lopsided(tmp_path_factory):
-    """A lopsided ball: before one finger it is the mirror image of what is before the other, in single precision."""
-    path = tmp_path_factory.mktemp("mesh") / "ball.stl"
+def test_the_other_finger_is_the_mirror_image(tmp_path):
+    """Of a lopsided ball in single precision it is x of the object that changes its sign: y of the pad."""
     mesh = trimesh.creation.icosphere(4, 0.03)
     x, y, z = mesh.vertices.T
     mesh.vertices = np.column_stack([x, y * (1 + 4 * y), z * (1 + 3 * z)])
-    mesh.export(path)
-    return scene_of(mesh_of(path, "m"), NO_COUPLING, where=pose_of((0, 0, 4)), forces="[4]", elements="[6, 4, 2]")
-
-
-def test_the_other_finger_is_the_mirror_image(lopsided):
-    """Beyond the mesh's own asymmetry of facets it is x of the object that changes its sign: y of the pad."""
+    mesh.export(path := tmp_path / "ball.stl")
+    lopsided = scene_of(mesh_of(path, "m"), NO_COUPLING, where=pose_of((0, 0, 4)), forces="[4]", elements="[6, 4, 2]")
     poses = candidates(lopsided)[0].poses
     _, other = fingers = [approach(build_object(lopsided.object), pose, lopsided.gripper) for pose in poses]
     assert image_signs(*fingers, lopsided.gripper.pad_size) == (1, -1)

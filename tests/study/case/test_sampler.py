@@ -18,7 +18,7 @@ from softjaw.study.case.sampler import (
 from softjaw.study.case.task import Task
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.quantities import COLLIDES, MISSING, WIDE
-from softjaw.study.scene import SceneError, parse_scene
+from softjaw.study.scene import parse_scene
 from softjaw.study.units import GRAVITY
 from tests.objects.bodies import hollow_bowl, revolved
 from tests.study.scenes import BOX, text_of
@@ -153,8 +153,8 @@ def test_no_pad_is_put_over_a_hole_and_grasps_are_spread_over_the_places_of_an_o
 SLAB = BOX.replace("50, 40", "40, 60")
 
 
-def sampled_scene(opening=50, more=""):
-    text = text_of(SLAB, f"sampled = 3\n{more}", forces="[2, 5]")
+def sampled_scene(opening=50):
+    text = text_of(SLAB, "sampled = 3\n", forces="[2, 5]")
     return with_sampled_grasps(parse_scene(text, overrides=[f"gripper.max_opening_mm={opening}"]))
 
 
@@ -173,13 +173,6 @@ def test_a_scene_without_a_grasp_between_the_pads_is_refused():
         sampled_scene(opening=20)
     assert refused.value.code == USAGE
     assert "max_opening_mm" in str(refused.value)
-
-
-@pytest.mark.parametrize("more", ["angles_deg = [0]", "stations_mm = [20]"])
-def test_a_sampler_excludes_stations(more):
-    with pytest.raises(SceneError) as refused:
-        sampled_scene(more=more)
-    assert any("candidates" in problem for problem in map(str, refused.value.problems))
 
 
 def test_grasps_that_the_hand_does_not_reach_are_left_out_and_it_reaches_a_slab_as_far_as_its_fingers_do():
