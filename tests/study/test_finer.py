@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 import trimesh
 
-from softjaw.study.case.candidates import with_sampled_grasps
 from softjaw.study.case.result import CaseResult
 from softjaw.study.quantities import DONE, LISTED, MISSING
 from softjaw.study.ranking import Place
@@ -13,7 +12,6 @@ from softjaw.study.result.store import open_result, torn_rows
 from softjaw.study.result.write import ResultWriter, record
 from softjaw.study.run.plan import make_plan
 from softjaw.study.run.rounds import next_cases, rivals
-from softjaw.study.scene import load_scene
 from tests.study.formula_results import written
 from tests.study.launching import contents, differing, launch
 from tests.study.scenes import BALL, mesh_of, pose_of, scene_of, text_of
@@ -22,12 +20,11 @@ PAD = "[8, 4, 3]\nmax_opening_mm = 85"
 SCENE = text_of(mesh_of("block.stl"), "sampled = 14\n", forces="[2, 5]", elements=PAD) + "[limit_surface]\nsamples = 80"
 
 
-@pytest.fixture
-def scene(tmp_path):
-    trimesh.creation.box(extents=(40, 60, 260)).subdivide_to_size(40).export(tmp_path / "block.stl")
-    path = tmp_path / "block.toml"
-    path.write_text(SCENE)
-    return path
+def sampled(*changes):
+    """A scene with poses that count as sampled ones."""
+    poses = "".join(pose_of((0, 0, z)) for z in range(4))
+    made = scene_of(BALL, "accuracy.target=0.01", *changes, where=poses, forces="[2, 5]")
+    return made.model_copy(update={"candidates": made.candidates.model_copy(update={"sampled": 4})})
 
 
 def test_rivals_are_those_that_may_be_better_than_the_last_of_the_list_or_than_the_head_of_their_place():
@@ -42,8 +39,8 @@ def test_rivals_are_those_that_may_be_better_than_the_last_of_the_list_or_than_t
     assert rivals([], value, error, [2, 3, 4]) == [3, 2, 4]
 
 
-def test_a_case_keeps_its_coarse_values_until_finer_ones_replace_them(scene, tmp_path):
-    made = with_sampled_grasps(load_scene(scene, ["candidates.sampled=4"]))
+def test_a_case_keeps_its_coarse_values_until_finer_ones_replace_them(tmp_path):
+    made = sampled()
     first, path = make_plan(made), tmp_path / "a.hdf"
     create(path, first.layout, first.header)
     row = (0, 3, 1)
@@ -81,8 +78,7 @@ def test_a_case_keeps_its_coarse_values_until_finer_ones_replace_them(scene, tmp
     ((), {1}), (("object.mass_g=100",), {0, 1}), (("object.mass_g=100", "load.normal_force_n=[5]"), {0}),
 ])  # fmt: skip
 def test_with_a_mass_finer_meshes_go_to_the_force_below_too(tmp_path, changes, levels):
-    made = scene_of(BALL, "accuracy.target=0.01", *changes, where=pose_of(), forces="[2, 5]")
-    made = made.model_copy(update={"candidates": made.candidates.model_copy(update={"sampled": 1})})
+    made = sampled(*changes)
     plan = make_plan(made)
     *_, last = range(plan.layout.shape[-1])
 
@@ -97,7 +93,10 @@ def test_with_a_mass_finer_meshes_go_to_the_force_below_too(tmp_path, changes, l
 
 @pytest.mark.long
 @pytest.mark.ranks
-def test_the_best_of_a_sampled_study_are_solved_well_with_the_same_bits_on_any_ranks(scene):
+def test_the_best_of_a_sampled_study_are_solved_well_with_the_same_bits_on_any_ranks(tmp_path):
+    trimesh.creation.box(extents=(40, 60, 260)).subdivide_to_size(40).export(tmp_path / "block.stl")
+    scene = tmp_path / "block.toml"
+    scene.write_text(SCENE)
     runs = {ranks: scene.with_name(f"{ranks}.hdf") for ranks in (0, 2)}
     for ranks, path in runs.items():
         assert launch(ranks, "-m", "softjaw", "run", scene, "-o", path)[0] == 0
