@@ -29,20 +29,14 @@ def run(scene, path):
     return path
 
 
-def stored(result, key, index):
-    group, name = key.split("/")
-    q = BY_KEY[key]
-    if group == "maps" and q.by_model:
-        return np.array([result.read(f"{name}/{model}")[index] for model in MODELS])
-    return result.read(f"{name}/{name}" if group == "maps" else key)[index]
-
-
 def assert_stored(case, path, index):
     """All values of a case but its work stand in the file, bit for bit, and so do its patches and its message."""
     with open_result(path) as result:
         for key, value in case.result.values.items():
             if not key.startswith("work/"):  # an image costs nothing
-                kept = np.asarray(stored(result, key, index), float)
+                many = key.startswith("maps/") and BY_KEY[key].by_model
+                kept = [result.read(part)[index] for part in ([f"{key}/{m}" for m in MODELS] if many else [key])]
+                kept = np.array(kept if many else kept[0], float)
                 assert np.array_equal(kept, np.asarray(value, float), equal_nan=True), key
         row = np.ravel_multi_index(index, result.layout.shape)
         for name, faces in result.patch(int(row)).items():
