@@ -127,8 +127,7 @@ def contact_length(patch: ContactPatch) -> float:
     """
     faces = patch.loaded
     if faces.corners is not None:
-        points = faces.corners[..., :2].reshape(-1, 2)
-        return float(np.ptp(points, axis=0).max())
+        return float(np.ptp(faces.corners[..., :2].reshape(-1, 2), axis=0).max())
     # the area alone does not say which way a face is longer
     half = 0.5 * np.sqrt(faces.area)[:, None]
     xy = faces.centroid[:, :2]

@@ -184,8 +184,7 @@ def _solve(
     b = np.zeros(len(order))
     b[: 3 * m] = np.repeat([1.0, -1.0, 0.0], m)
     slope = np.repeat([0.0, beta, gamma, lam], [k + f + m, m, m, 1])
-    none_squared = csc_array((len(slope),) * 2)
-    return conic_solution(none_squared, slope, rows[order], b, _cones(m, d, k, side(S)))[:k]
+    return conic_solution(csc_array((len(slope),) * 2), slope, rows[order], b, _cones(m, d, k, side(S)))[:k]
 
 
 def _cones(m: int, d: int, k: int, size: int) -> list:

@@ -359,8 +359,7 @@ class Stepping:
             if np.abs(off).max() > STRAY * self.problem.thickness:
                 return True
         # strain that grows while the force hardly does is a fold of the foam's surface, not a larger contact
-        grown = ahead.strain - here.strain
-        return grown > max(FOLDING, FOLDS * abs(np.log(ahead.force / here.force)))
+        return ahead.strain - here.strain > max(FOLDING, FOLDS * abs(np.log(ahead.force / here.force)))
 
     def _past_limit(self, here: _Place, force: float, work: Work) -> FloatArray:
         """State at ``force`` by displacement control; the force may fall in between, which it does beyond a limit."""

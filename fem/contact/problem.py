@@ -286,8 +286,7 @@ class ContactProblem(ABC):
 
     def shorten(self, x: FloatArray, step: FloatArray) -> float:
         """Factor that keeps the change of closing displacements and the compression of every element within reason."""
-        longest = self.longest_closing
-        factor = min(f.foam.shorten(x[f.unknowns], step[f.unknowns], longest) for f in self.fingers)
+        factor = min(f.foam.shorten(x[f.unknowns], step[f.unknowns], self.longest_closing) for f in self.fingers)
         return factor if self.friction is None else self.friction.damping.shortened(x, step, factor)
 
     # -- friction that acts back --------------------------------------------------------------------------------------

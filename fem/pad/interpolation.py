@@ -62,6 +62,5 @@ def _places(s: FloatArray, line: FloatArray, per_side: int) -> Places:
     ends = line[::step]
     element = np.clip(np.searchsorted(ends, s, side="right") - 1, 0, len(ends) - 2)
     local = (s - ends[element]) / (ends[element + 1] - ends[element])
-    numbers = step * element[:, None] + np.arange(per_side)
     # rounding must not take a point at the rim outside of its element
-    return numbers, along_side(per_side, np.clip(local, 0.0, 1.0))
+    return step * element[:, None] + np.arange(per_side), along_side(per_side, np.clip(local, 0.0, 1.0))

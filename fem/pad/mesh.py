@@ -202,8 +202,7 @@ def face_rule(per_side: int, contact: str) -> tuple[FloatArray, FloatArray]:
     outer = 0.5 if per_side == 2 else 1.0 / (6.0 * a * a)
     weights = np.array([outer, outer]) if per_side == 2 else np.array([outer, 1.0 - 2.0 * outer, outer])
     side = along_side(per_side, points)
-    N = np.einsum("pi,qj->pqij", side, side).reshape(per_side**2, per_side**2)
-    return N, weights
+    return np.einsum("pi,qj->pqij", side, side).reshape(per_side**2, per_side**2), weights
 
 
 def along_side(per_side: int, s: FloatArray) -> FloatArray:

@@ -121,8 +121,7 @@ def elements(
         )
     h = side @ N_G.T  # half thickness at the Gauss points
     volume = 2.0 * h * area
-    mix = _side_mixing()
-    gP = np.einsum("nqba,qas->nqbs", g, mix)
+    gP = np.einsum("nqba,qas->nqbs", g, _side_mixing())
     plane = np.stack([g[..., 0] ** 2, g[..., 1] ** 2, g[..., 0] * g[..., 1]], axis=-1)
     c = g_centre
     twist = np.stack(

@@ -295,8 +295,7 @@ class Grip(LoadPath[WallProblem]):
                 f"the state at {force:.4g} N converged but is wrong: a node of the wall is out of balance "
                 f"by {worst:.3g} N"
             )
-        mesh = problem.model.shell.mesh
-        wall = WallState(mesh, q, load, self._reaction(load), here.snapped, self.opening(q))
+        wall = WallState(problem.model.shell.mesh, q, load, self._reaction(load), here.snapped, self.opening(q))
         first, *others = (replace(pad, wall=wall) for pad in pads)
         return replace(first, other=others[0]) if others else first
 

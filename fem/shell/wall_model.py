@@ -41,8 +41,7 @@ class LinearShell:
     def __init__(self, shell: Shell, fixed: FloatArray) -> None:
         self.shell = shell
         unknown, self.free = free_numbers(fixed)
-        matrix = _matrix(len(self.free), shell.entries(unknown), shell.tangent(np.zeros(shell.size)))
-        self._factors = Factors(matrix)
+        self._factors = Factors(_matrix(len(self.free), shell.entries(unknown), shell.tangent(np.zeros(shell.size))))
 
     def solve(self, load: FloatArray) -> FloatArray:
         """State ``q`` [m] under the load [N], both ``(6 k,)`` or several as the columns of ``(6 k, m)``."""
@@ -171,8 +170,7 @@ def middles(shell: Shell, q: FloatArray) -> tuple[FaceState, FaceState]:
     """Outer and inner face in the middles of the ``n`` elements in the state ``q (6 k,)``."""
     nodes, weights, _, start = shell.loops
     e = np.empty((len(nodes), kernel.STRAINS))
-    x = np.hstack([shell.mesh.X, shell.mesh.D]) + q.reshape(-1, 6)
-    kernel.forms(nodes, weights, x, e)
+    kernel.forms(nodes, weights, np.hstack([shell.mesh.X, shell.mesh.D]) + q.reshape(-1, 6), e)
     e -= start
     membrane, bending = (e[:, first : first + 8].reshape(-1, 4, 2).mean(axis=1) for first in (0, 8))
     outer, inner = (
