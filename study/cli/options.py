@@ -83,14 +83,6 @@ def bound(text: str) -> tuple[str, float]:
     return key, number("a map and a number, such as payload=200")(value)
 
 
-def direction(text: str) -> tuple[float, ...]:
-    """Three numbers with commas between them, not all of them 0."""
-    vector = several(number(), "three numbers, such as 1,0,0", 3, 3)(text)
-    if not any(vector):
-        raise ArgumentTypeError(f"found {text}, expected a direction, such as 1,0,0")
-    return vector
-
-
 def candidate(text: str) -> int:
     """Number of a candidate from its name in a list.
 
@@ -163,7 +155,7 @@ OPTIONS = {
     "deformed": _option("--deformed", action="store_true",
                         help="FILE holds points of the pad's deformed face (CSV with x, y, z), or of a contour (y, z)"),
     "mu": _option("--mu", type=POSITIVE, help="friction coefficient (default 0.8; with --deformed that of the scene)"),
-    "side": _option("--long-side", type=direction, metavar="X,Y,Z",
+    "side": _option("--long-side", type=several(number(), "three numbers, such as 1,0,0", 3, 3), metavar="X,Y,Z",
                     help="the contact frame's x axis, as --long-side=-1,0,0 (default: the patch's longer direction)"),
     "unit": _option("--unit", choices=("m", "cm", "mm"), help="unit of lengths and areas, where the file gives none"),
     "pressure unit": _option("--pressure-unit", choices=("pa", "kpa", "mpa"), help="unit of the pressure, likewise"),

@@ -59,9 +59,8 @@ def _measured(options: Namespace) -> start.Measured:
 def check(options: Namespace) -> str:
     """Find every error of a scene, or say what would be run."""
     if options.folder:
-        text, listed = scene_text(options.folder.check(), options.scene), options.folder.objects
-        names = ", ".join(one.name for one in listed[:5]) + ", ..." * (len(listed) > 5)
-        text += f"\n  objects     {len(listed)}: {names}; the mesh above stands for all of them"
+        text, objects = scene_text(options.folder.check(), options.scene), options.folder.objects
+        text += f"\n  objects     {len(objects)}: {objects[0].name} to {objects[-1].name}; the mesh is one of them"
         return hanging(text, terminal_width())
     scene = with_mass(scene_of(options))
     check_object(scene)
@@ -88,10 +87,10 @@ def objects_text(folder: ObjectFolder, out: Path, ranks: int) -> str:
     objects, planned = folder.objects, []
     some = objects[:: -(-len(objects) // PLANNED)]
     scale, begin = len(objects) / len(some), time.perf_counter()
-    for listed in some:
+    for one in some:
         with suppress(StudyError):
-            scene = with_sampled_grasps(folder.scene(listed))
-            planned.append((make_plan(scene, folder.scene_file, folder.overrides_of(listed)), memory(scene)))
+            scene = with_sampled_grasps(folder.scene(one))
+            planned.append((make_plan(scene, folder.scene_file, folder.overrides_of(one)), memory(scene)))
     preparing = scale * (time.perf_counter() - begin) / ranks
     rows = {"objects": f"{len(objects)}, of which {len(some)} were looked at"}
     if planned:

@@ -27,12 +27,9 @@ def run(options: Namespace) -> int:
         if MPI.COMM_WORLD.rank == 0:
             print(objects.summary(out / "index.hdf", terminal_width()), flush=True)
         return code
-    given = [*options.overrides, *petsc_overrides(options.petsc)]
-    path = target(options)
-    return solve_scene(
-        options.scene_read, path, MPI.COMM_WORLD, scene_file=options.scene, overrides=given,
-        retry_failed=options.retry_failed,
-    )  # fmt: skip
+    about = {"scene_file": options.scene, "overrides": [*options.overrides, *petsc_overrides(options.petsc)]}
+    again = options.retry_failed
+    return solve_scene(options.scene_read, target(options), MPI.COMM_WORLD, **about, retry_failed=again)
 
 
 def cost(options: Namespace) -> int:

@@ -264,7 +264,7 @@ def _force(ds: xr.Dataset, index: Index) -> tuple[str, str]:
         return pressed, "; ".join(filter(None, (ds.attrs["why"], held, "object.mass_g gives the least")))
     wanted, (low, error) = f"{safety:g} times its {shown_text(in_si('mass_g', mass), 'kg', 3)}", force_to_use(ds, index)
     if np.isfinite(low):
-        covers = f"±: mesh, values between solved forces, {100 * MU_ERROR:g} % of mu"
+        covers = f"±: mesh, interpolation, {100 * MU_ERROR:g} % of mu"
         return f"{with_error(low, error)} N per finger", f"the least that holds {wanted} ({covers})"
     weak = not at(ds, "safety_factor", index) >= safety * (1 - TIE)
     return pressed, f"no solved force holds {wanted}" if weak else f"the smallest solved force that holds {wanted}"
@@ -277,11 +277,8 @@ def _held(ds: xr.Dataset, index: Index) -> tuple[str, str]:
     aims = task_keys(ds).get("weight_direction", "worst") != "worst"
     every = "in the direction of its weight" if aims else "pulled in any direction"
     every += f" at {forces(ds)[index[-1]]:g} N" * ("force_low" in ds)
-    covers = "error not known"
-    if "payload_interval" in ds:
-        covers = "±: uncertain inputs, 95 %"
-    elif np.isfinite(at(ds, "payload_error", index)):
-        covers = "±: mesh and method"
+    known = "±: mesh and method" if np.isfinite(at(ds, "payload_error", index)) else "error not known"
+    covers = "±: uncertain inputs, 95 %" if "payload_interval" in ds else known
     return value_text(ds, "payload", index, 3, unit=True), f"{every} ({covers})"
 
 
@@ -307,9 +304,8 @@ def _beyond(ds: xr.Dataset, index: Index) -> str:
     last = (*index[:-1], len(forces(ds)) - 1)
     if last == index:
         return ", the largest solved"
-    lost = flag_words(int(ds["flags"].values[last]) & LOST)
     held = f"it holds {value_text(ds, 'payload', last, 3, unit=True)}" * bool(np.isfinite(at(ds, "payload", last)))
-    more = lost or held
+    more = flag_words(int(ds["flags"].values[last]) & LOST) or held
     return f"; at {forces(ds)[-1]:g} N {more}" if more else ""
 
 

@@ -40,8 +40,7 @@ def compare(one: xr.Dataset, other: xr.Dataset, quantity: str = "e_n", model: st
               "in neither": ~in_a & ~in_b}  # fmt: skip
     names = [q.name for q in TABLE if q.group == "maps" and q.name != "flags" and q.name in one and q.name in other]
     if quantity not in names:
-        text = f"--quantity: found '{quantity}', expected one that both files have: {', '.join(names)}"
-        raise StudyError(USAGE, text)
+        raise StudyError(USAGE, f"--quantity: found '{quantity}', expected one of: {', '.join(names)}")
     units = map_row(quantity).unit
     values = _values(pair, quantity, model)
     *few, station, angle, _ = axes
@@ -145,7 +144,7 @@ def _values(pair: Pair, name: str, model: str) -> dict[str, NDArray[Any]]:
     beyond[~(np.isfinite(change) & np.isfinite(error))] = None
     relative = np.divide(change, size, out=np.full(size.shape, np.nan), where=size > 0)
     columns = {"a": a, "b": b, "difference": change, "relative": relative, "error": error}
-    return {name: values.astype(object) for name, values in columns.items()} | {"beyond_error": beyond}
+    return {**columns, "beyond_error": beyond}
 
 
 def _error(ds: xr.Dataset, name: str, model: str) -> FloatArray | None:
@@ -157,7 +156,7 @@ def _error(ds: xr.Dataset, name: str, model: str) -> FloatArray | None:
 
 def _summary(name: str, values: dict[str, NDArray[Any]]) -> Row:
     """Means, mean and largest relative difference of a map, and how many differences exceed the errors."""
-    a, b, change, relative = (values[k].astype(float) for k in ("a", "b", "difference", "relative"))
+    a, b, change, relative = (values[k] for k in ("a", "b", "difference", "relative"))
     both, judged = np.isfinite(change), [value for value in values["beyond_error"].ravel() if value is not None]
     row: Row = {"quantity": name, "units": map_row(name).unit, "compared": int(both.sum()), "judged": len(judged)}
     row["beyond_error"] = sum(map(bool, judged))

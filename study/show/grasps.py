@@ -12,9 +12,9 @@ import numpy as np
 import xarray as xr
 
 from softjaw.study.flags import OF_FILE, flag_words
-from softjaw.study.quantities import FORCE_RANGE, MAIN, MODELS, NO_GRASP, STATES
+from softjaw.study.quantities import FORCE_RANGE, MAIN, MODELS, STATES
 from softjaw.study.ranking import index_of, ranked
-from softjaw.study.result.layout import DONE, FAILED
+from softjaw.study.result.layout import DONE
 from softjaw.study.result.read import axes_of
 from softjaw.study.result.store import place_text, value_text
 from softjaw.study.show.status import grouped
@@ -138,10 +138,8 @@ def flagged(ds: xr.Dataset, index: Index) -> list[str]:
 def note(ds: xr.Dataset, index: Index, known: int = 0) -> str:
     """Why a case has no result; the checks that a solved one misses, and its flags but for ``known`` ones."""
     state = ds.variables["status"].values[index]
-    if state == FAILED or state in NO_GRASP:
-        return str(ds.variables["message"].values[index])
     if state != DONE:
-        return ""
+        return str(ds.variables["message"].values[index])
     words = flag_words(int(ds["flags"].values[index]) & ~known)
     return ", ".join(text for text in (*flagged(ds, index), words) if text)
 

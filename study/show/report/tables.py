@@ -62,8 +62,7 @@ def every_case(ds: xr.Dataset) -> list[Block]:
     if count == 1:
         return []
     if count > 8000:  # a page with more rows would be heavy
-        summary = f"The {count} cases are too many to be listed here; softjaw export writes all of them."
-        return [text(summary, "note")]
+        return [text(f"The {count} cases are too many to list; softjaw export writes all of them.", "note")]
     cases = case_table(ds, np.ndindex(ds.status.shape), maps=[n for n in choices(ds, SHOWN[0]) if n not in FORCE_RANGE])
     folded = block_of(replace(cases, title=f"All {count} cases (CCM, weaker finger)"))
     return [{"kind": "details", "summary": f"All {count} cases as a table", "blocks": [folded]}]

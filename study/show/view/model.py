@@ -109,16 +109,14 @@ class View:
 
     def _feet(self) -> Iterator[tuple[int, Pose, float]]:
         """Pads of explicit poses at the force that is nearest to the one shown, the best grasp first."""
-        names, seen = ("finger_pose_rotation", "finger_pose_origin", "finger_closing"), set[int]()
-        if not self.ds.attrs["poses"]:
-            return
-        level = self.ds.attrs["level"]
-        for k in sorted(range(len(forces(self.ds))), key=lambda k: abs(k - level)):
-            here = (i for i in order(self.ds, k) if i[:-3] == self.point)
-            for i in (i for i in here if self.candidate(i) not in seen):
-                seen.add(self.candidate(i))
-                for R, x, closing in zip(*(self.ds[name].values[i] for name in names), strict=True):
-                    yield self.candidate(i), Pose(self.placed.rotation.T @ R, self.placed.to_pad(x)), closing
+        first: dict[int, Index] = {}
+        levels = sorted(range(len(forces(self.ds))), key=lambda k: abs(k - self.ds.attrs["level"]))
+        for i in (i for k in levels for i in order(self.ds, k) if self.ds.attrs["poses"] and i[:-3] == self.point):
+            first.setdefault(self.candidate(i), i)
+        for candidate, i in first.items():
+            stored = (self.ds[f"finger_{name}"].values[i] for name in ("pose_rotation", "pose_origin", "closing"))
+            for R, x, closing in zip(*stored, strict=True):
+                yield candidate, Pose(self.placed.rotation.T @ R, self.placed.to_pad(x)), closing
 
     @cached_property
     def wall(self) -> np.ndarray | None:
@@ -211,13 +209,11 @@ def view_of(ds: xr.Dataset, candidate: int | None, where: Place, force: float | 
     if candidate is not None:
         count = int(np.prod(shape[:-1]))
         if not 0 <= candidate < count:
-            text = f"--candidate: found {candidate}, expected 0 to {count - 1}, counted over stations and angles"
-            raise StudyError(USAGE, text)
+            raise StudyError(USAGE, f"--candidate: found {candidate}, expected 0 to {count - 1}")
         best = (*unravelled(candidate, shape[:-1]), k)
     elif where != (None, None):
         if ds.attrs["poses"]:
-            text = "--at: the candidates of this file are poses; choose with --candidate"
-            raise StudyError(USAGE, text)
+            raise StudyError(USAGE, "--at: this file's candidates are poses; choose with --candidate")
         _check_station(ds, where[0])
         best = _nearest(ds, best, where, k)
     return View(ds, best[:-3]), best
@@ -256,5 +252,4 @@ def quantity_of(ds: xr.Dataset, name: str | None) -> str:
     names = maps_of(ds)
     if name is None or name in names:
         return name or str(ds.attrs["score"])
-    text = f"--quantity: found '{name}', expected one of {', '.join(names) or 'none: nothing is solved'}"
-    raise StudyError(USAGE, text)
+    raise StudyError(USAGE, f"--quantity: found '{name}', expected one of: {', '.join(names) or 'none is solved'}")

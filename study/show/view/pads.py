@@ -100,11 +100,8 @@ class Pad:
         some = (slice(step // 2, None, step),) * 2
         loaded = self.loaded[some]
         c, n, load = self.centroid[some][loaded], self.normal[some][loaded], (self.pressure * self.area)[some][loaded]
-        if motion == "turn":
-            v = np.cross(self.frame[2], c - self.origin)
-        else:
-            v = np.broadcast_to(self.frame["xy".index(motion)], c.shape)
-        v = v - np.einsum("ki,ki->k", v, n)[:, None] * n
+        v = np.cross(self.frame[2], c - self.origin) if motion == "turn" else self.frame["xy".index(motion)]
+        v = v - (v * n).sum(axis=1, keepdims=True) * n
         size = np.linalg.norm(v, axis=1, keepdims=True)
         return c, load[:, None] * np.divide(v, size, out=np.zeros_like(v), where=size > 1e-12)
 
