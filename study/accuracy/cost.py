@@ -109,25 +109,24 @@ def settings_in(ds: xr.Dataset) -> list[Setting]:
         values = {axis.long_name: scene.sweep[axis.long_name][j] for axis, j in zip(swept, index, strict=True)}
         keys = {key: key.partition(".")[::2] for key in values}
         given = all(np.array_equal(tables[s].get(name), values[key]) for key, (s, name) in keys.items())
-        known = {name: error[i][np.isfinite(error[i])] for name, error in errors.items()}
-        worst, median = ({n: float(f(e)) if e.size else np.nan for n, e in known.items()} for f in (np.max, np.median))
-        stated = {n: float(np.fmax.reduce(claims[n][i])) if n in claims else np.nan for n in maps}
-        solved = np.isfinite(seconds[i])
-        mean = float(seconds[i][solved].mean()) if solved.any() else np.nan
-        words = {key: _words(value) for key, value in values.items()}
-        settings.append(Setting(words, mean, worst, median, stated, int((~solved).sum()), given, i == last))
+        words = {a.long_name: a.options[j] if a.options else f"{values[a.long_name]:g}"
+                 for a, j in zip(swept, index, strict=True)}  # fmt: skip
+        worst, median = ({n: float(f(_known(e[i]))) for n, e in errors.items()} for f in (np.max, np.median))
+        stated = {n: float(_known(claims[n][i]).max()) if n in claims else np.nan for n in maps}
+        mean, failed = float(_known(seconds[i]).mean()), int(np.isnan(seconds[i]).sum())
+        settings.append(Setting(words, mean, worst, median, stated, failed, given, i == last))
     return settings
+
+
+def _known(values: FloatArray) -> FloatArray:
+    """The finite ones of some values; NaN where there is none."""
+    finite = values[np.isfinite(values)]
+    return finite if finite.size else np.array([np.nan])
 
 
 def _by_point(values: FloatArray, shape: Sequence[int]) -> FloatArray:
     """Values over the cases ``(points, cases)``."""
     return values.reshape(int(np.prod(shape)), -1)
-
-
-def _words(value: Any) -> str:
-    if isinstance(value, str):
-        return value
-    return " x ".join(f"{v:g}" for v in value) if isinstance(value, list | tuple) else f"{value:g}"
 
 
 def percent(error: float) -> str:

@@ -172,9 +172,8 @@ def grasp_arrays(ds: xr.Dataset, gripper: GripperFrame) -> Arrays:
     ds = ds.assign(flags=(ds.status.dims, flags, ds["flags"].attrs))
     status = ds.status.values
     solved = [tuple(map(int, at)) for at in np.argwhere(status == DONE)]
-    refused = [tuple(map(int, at)) for at in np.argwhere(np.isin(status, NO_GRASP))]
     poses = _poses(ds)
-    refused = [at for at in refused if at[-3] < len(poses)]
+    refused = [tuple(map(int, at)) for at in np.argwhere(np.isin(status, NO_GRASP)) if at[-3] < len(poses)]
     listed = list(cases(ds, "ccm", [*solved, *refused]))
     for case, at in zip(listed[len(solved) :], refused, strict=True):
         _placed(case, poses[at[-3]])
