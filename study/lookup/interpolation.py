@@ -21,7 +21,7 @@ from softjaw.friction.patch import NEGLIGIBLE
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
-CLAIM_FACTOR = 1.25  # between estimate and claim: with less, less than 95 % of the errors stay within it
+CLAIM_FACTOR = 1.75  # between estimate and claim: with less, less than 95 % of the errors stay within it
 CLOSING_GAP_RATIO = 1.5  # a gap that closes a circle may be this much wider than the others
 UPPER = np.array(list(np.ndindex(2, 2, 2)))  # which corners of a cell are its upper ones, along each axis
 
