@@ -22,7 +22,7 @@ from softjaw.study.messages import CANNOT_WRITE, DONE, USAGE
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 ROOT = Path(__file__).parents[2]  # where the package softjaw lies
 # folders with loops that numba compiles
-COMPILED = ("fem", "fem/objects", "fem/pad", "fem/shell", "friction", "scoring", "study/case")
+COMPILED = ("fem", "fem/objects", "fem/shell", "friction", "scoring", "study/case")
 PASSING = "softjaw-numba-"  # how temporary folders of compiled loops begin
 LAUNCHED = ("OMPI_", "PMIX_", "PMI_", "PRTE_", "HYDRA_")  # variables by which a rank finds the mpirun above it
 ALLOWED = {"OMPI_MCA_rmaps_base_oversubscribe": "1", "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe"}

@@ -61,10 +61,10 @@ def test_of_two_equally_near_forces_the_lower_is_taken(low, step, seed):
 @given(scores, seeds)
 def test_rounding_is_no_difference_of_two_grasps(values, seed):
     one, other = values[0], moved(values, seed)[0]
-    pair = Sure(np.array([one, other]), np.zeros(2), np.empty((2, 0)))
+    pair = Sure(np.array([one, other]), np.zeros(2), np.zeros((2, 1)))
     assert pair.apart(0, 1) is False
     assert pair.apart(1, 0) is False
-    assert Sure(np.array([1.1, 1.0]), np.full(2, 0.05), np.empty((2, 0))).apart(0, 1) is True
+    assert Sure(np.array([1.1, 1.0]), np.full(2, 0.05), np.zeros((2, 1))).apart(0, 1) is True
 
 
 @tries
