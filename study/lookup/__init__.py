@@ -88,16 +88,15 @@ class GraspMap:
         #: unit and definition of everything that `value` knows
         self.quantities = {name: (unit, ds[name].definition) for name, unit in maps_in(ds).items()}
         self.by_poses = not station.units
-        period, half_turn = (2 * math.pi, False) if self.by_poses else turning(ds, self.index)
-        angles = circle("angle", "rad", angle.values, 0.0 if self.by_poses else period, half_turn)
+        angles = circle("angle", "rad", angle.values, *((0.0, False) if self.by_poses else turning(ds, self.index)))
         stations = plain("candidate" if self.by_poses else "station", station.units, station.values, self.by_poses)
         self.axes: tuple[Nodes, Nodes, Nodes] = (stations, angles, plain("force", "N", force.values))
         self.shape = tuple(len(nodes.x) for nodes in self.axes)
         self.done = self._grid(self.status == DONE)
         self.snapped = self.done & (self._grid(self.read("flags")) & Flag.SNAPPED > 0)
-        self.kind = self._kinds()
         self._tables: dict[tuple[str, str], FloatArray] = {}
         self._bends: dict[tuple[str, str], FloatArray] = {}
+        self.kind = self._kinds()
 
     def at(
         self, station: ArrayLike | None = None, angle: ArrayLike | None = None, force: ArrayLike | None = None, *,
@@ -143,12 +142,10 @@ class GraspMap:
         k, (stations, angles, _) = ds.attrs["level"], (axis.values for axis in self.file_axes[-3:])
         forces, each = ds["normal_force"].values, force is None and "force_low" in ds
         low = ds["force_low"].values.ravel() if each else np.full(self.status[..., 0].size, np.nan)
-        points = []
-        for i in ranked(ds, k, ds.attrs["score"])[:n]:
-            station, angle = np.unravel_index(i, self.status.shape[:-1])
-            use = forces[k] if np.isnan(low[i]) else max(low[i], forces[0])
-            points.append(self.point(int(station) if self.by_poses else stations[station], angles[angle], use))
-        return points
+        first = ranked(ds, k, ds.attrs["score"])[:n]
+        station, angle = np.unravel_index(first, self.status.shape[:-1])
+        use = np.where(np.isnan(low), forces[k], np.maximum(low, forces[0]))[first]
+        return [*map(self.point, station if self.by_poses else stations[station], angles[angle], use)]
 
     def value(
         self, name: str, station: ArrayLike, angle: ArrayLike, force: ArrayLike, model: str = "ccm"
@@ -172,7 +169,9 @@ class GraspMap:
         """
         key = name, model
         if key not in self._tables:
-            grid = self._read(name, checked_model(model))
+            grid = self._grid(self.read(name, checked_model(model)))
+            if "/" in name:  # of the fingers, which a turn may exchange
+                grid = np.where(_like(self.axes[1].swapped[:, None], grid), grid[:, :, :, ::-1], grid)
             grid = np.where(_like(self.done, grid, 0), grid, np.nan)
             self._tables[key] = grid.reshape(-1, *grid.shape[3:])
         return self._tables[key]
@@ -194,7 +193,7 @@ class GraspMap:
         """State of many points, as `GraspPoint.state` has it."""
         used, done, snapped = at.weight > 0, self.done.ravel()[at.index], self.snapped.ravel()[at.index]
         across = (used & snapped).any(axis=1) & (used & ~snapped).any(axis=1)
-        kind = self.kind.ravel()[at.index]
+        kind = self.kind[at.index]
         first = np.take_along_axis(kind, used.argmax(axis=1)[:, None], axis=1)
         jump = (used & (kind != first)).any(axis=1)
         kinds = [~at.inside.all(axis=1), (used & ~done).any(axis=1), across, jump]
@@ -230,21 +229,12 @@ class GraspMap:
             values = np.take(values, nodes.take, axis=axis)
         return values
 
-    def _read(self, name: str, model: str = "ccm") -> FloatArray:
-        """A quantity at the nodes, that of the fingers exchanged where a turn exchanges them."""
-        grid = self._grid(self.read(name, model))
-        if "/" in name:
-            grid = np.where(_like(self.axes[1].swapped[:, None], grid), grid[:, :, :, ::-1], grid)
-        return grid
-
     def _kinds(self) -> np.ndarray:
-        """A number for each kind of contact at the nodes; 0 where a file does not tell."""
-        kinds = np.zeros(self.shape, np.int64)
-        for name, most in KINDS.items() if self.has("fingers/rims") else ():
-            values = contact_kinds(name, self._read(f"fingers/{name}"))
-            for finger in range(values.shape[-1]):
-                kinds = kinds * (most + 1) + values[..., finger]
-        return kinds
+        """A number for each kind of contact at the nodes, flat; 0 where a file does not tell."""
+        names = KINDS if self.has("fingers/rims") else ()
+        kinds = [contact_kinds(name, self.table(f"fingers/{name}")) for name in names]
+        rows = np.column_stack([np.zeros(self.done.size, np.int64), *kinds])
+        return np.unique(rows, axis=0, return_inverse=True)[1].ravel()
 
 
 def _one(si: Any, other: Any, unit: str, name: str, default: Any = None) -> Any:

@@ -18,9 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import maximum_filter1d
 
 from softjaw.friction.patch import NEGLIGIBLE
+from softjaw.study.ranking import FloatArray, IntArray
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 CLAIM_FACTOR = 1.75  # between estimate and claim: with less, less than 95 % of the errors stay within it
 CLOSING_GAP_RATIO = 1.5  # a gap that closes a circle may be this much wider than the others
 UPPER = np.array(list(np.ndindex(2, 2, 2)))  # which corners of a cell are its upper ones, along each axis
@@ -54,10 +53,9 @@ def plain(name: str, units: str, values: ArrayLike, exact: bool = False) -> Node
     """Axis without a period; one single value is a place where the grid can be asked, not beside it."""
     x = np.asarray(values, float)
     order = np.argsort(x)
+    x = x[order]
     if len(x) == 1:
-        x, order = _point(float(x[0])), np.zeros(2, np.int64)
-    else:
-        x = x[order]
+        x, order = _point(float(x[0])), order.repeat(2)
     return Nodes(name, units, x, order, np.zeros(len(x), bool), exact=exact)
 
 
@@ -147,11 +145,10 @@ def bends(table: FloatArray, axes: Sequence[Nodes], side: NDArray[np.bool_]) -> 
         h, slope = np.diff(x), np.diff(f) / np.diff(x)
         half = np.abs(np.diff(slope) / (h[1:] + h[:-1]))
         half[(branch[..., :-2] != branch[..., 1:-1]) | (branch[..., 1:-1] != branch[..., 2:])] = np.nan
-        if not closed:
-            missing = np.full((*half.shape[:-1], 1), np.nan)
-            half = np.concatenate([missing, half, missing], axis=-1)
-        else:
+        if closed:
             h, f = h[1:-1], f[..., 1:-1]
+        else:
+            half = np.pad(half, ((0, 0), (0, 0), (1, 1)), constant_values=np.nan)
         cell = np.fmax(half[..., :-1], half[..., 1:]) * h**2
         cell = np.where(np.isnan(cell), np.abs(np.diff(f)), cell)
         across = np.moveaxis(side, a, -1)

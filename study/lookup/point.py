@@ -60,8 +60,7 @@ class GraspPoint(GraspNumbers):
     @property
     def reason(self) -> Any:
         """Why there is no value, in a sentence; empty where there is one."""
-        texts = [self._reason(i) for i in range(len(self.states))]
-        return texts[0] if not self.shape else np.array(texts, object).reshape(self.shape)
+        return self._shaped(np.array([self._reason(i) for i in range(len(self.states))], object))
 
     def value(self, name: str, model: str = "ccm") -> Any:
         """A quantity of the grasp, in SI units; NaN where there is none."""
@@ -153,7 +152,7 @@ class GraspPoint(GraspNumbers):
         return "\n".join(lines)
 
     def _shaped(self, values: np.ndarray) -> Any:
-        return values.reshape(self.shape) if self.shape else values[0].item()
+        return values.reshape(self.shape) if self.shape else values.tolist()[0]
 
     def _reason(self, i: int) -> str:
         state = int(self.states[i])
@@ -172,7 +171,7 @@ class GraspPoint(GraspNumbers):
             sides = {bool(self.map.snapped.ravel()[n]): self.map.case(c) for c, n in reversed(cases)}
             return f"no value: the wall snaps in between {sides[False]} and {sides[True]}; ask at a case"
         if state == JUMP:
-            kind = self.map.kind.ravel()
+            kind = self.map.kind
             unlike = [cases[0], next(case for case in cases if kind[case[1]] != kind[cases[0][1]])]
             first, other = (f"{self.map.case(c)} ({self._contact(n)})" for c, n in unlike)
             return f"no smooth value: the contact changes between {first} and {other}; take `nearest`, a solved case"
@@ -199,8 +198,7 @@ class GraspPoint(GraspNumbers):
 
     def _cases(self, i: int) -> list[tuple[tuple[int, ...], int]]:
         """Indices of the cases around a point along the file's axes, with their nodes."""
-        cases = []
-        for n in self.corners.index[i][self.corners.weight[i] > 0]:
-            at = np.unravel_index(n, self.map.shape)
-            cases.append((tuple(int(x.take[k]) for x, k in zip(self.map.axes, at, strict=True)), int(n)))
-        return cases
+        nodes = self.corners.index[i][self.corners.weight[i] > 0]
+        places = zip(self.map.axes, np.unravel_index(nodes, self.map.shape), strict=True)
+        cases = zip(*(x.take[k].tolist() for x, k in places), strict=True)
+        return list(zip(cases, nodes.tolist(), strict=True))
