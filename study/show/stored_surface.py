@@ -58,9 +58,7 @@ class StoredSurface:
 def circle(i: int, j: int, count: int) -> np.ndarray:
     """Directions at equal steps in the plane of two of three components, ``(count, 3)``."""
     phi = 2 * np.pi * np.arange(count) / count
-    t = np.zeros((count, 3))
-    t[:, i], t[:, j] = np.cos(phi), np.sin(phi)
-    return t
+    return np.outer(np.cos(phi), np.eye(3)[i]) + np.outer(np.sin(phi), np.eye(3)[j])
 
 
 def sphere(rows: int, columns: int) -> np.ndarray:

@@ -79,14 +79,12 @@ def limit_surfaces(view: View, index: Index) -> Block | None:
     made.update_yaxes(scaleanchor="x", row=1, col=1)
     made.update_layout(legend={"y": -0.25}, margin={"t": 20})
     exact = "Dots: exact wrenches of slip motions. " if any(s.patch for s in known.values()) else ""
-    worst = [at(ds, name, index) for name in ("overclaim", "overclaim_ellipsoid")]
-    mean = [at(ds, name, index) for name in ("fit_error", "fit_error_ellipsoid")]
-    parts = zip(worst, mean, strict=True)
-    fitted, ellipsoid = (f"{number(100 * w, 2)} % (mean error {number(100 * m, 2)} %)" for w, m in parts)
-    off = f"They claim too much by up to (CCM): {fitted} the fitted surface, {ellipsoid} the ellipsoid."
+    off = [[100 * at(ds, f"{name}{kind}", index) for name in ("overclaim", "fit_error")] for kind in ("", "_ellipsoid")]
+    fitted, ellipsoid = (f"{number(worst, 2)} % (mean error {number(mean, 2)} %)" for worst, mean in off)
+    claim = f"They claim too much by up to (CCM): {fitted} the fitted surface, {ellipsoid} the ellipsoid."
     caption = f"{place(ds, index, force=True)}: shadows of the loads that one contact carries without slipping."
     caption += f" Full: the fitted surface; dashed: the ellipsoid from three motions. {exact}"
-    caption += off * bool(np.isfinite([*worst, *mean]).all())
+    caption += claim * bool(np.isfinite(off).all())
     return plot(made, caption, f"Limit surfaces of {' and '.join(known)} over f_x, f_y and tau_z.", 420)
 
 

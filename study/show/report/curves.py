@@ -98,9 +98,7 @@ def _models(ds: xr.Dataset, position: int, index: Index, mu: float | None) -> Bl
 
 def differences(ds: xr.Dataset, index: Index) -> list[Block]:
     """Share of the planar models' claims that the curved contact cannot carry, along a sweep of the object's shape."""
-    position = shape_axis(ds)
-    lines = {} if position is None else overestimates(ds, position, index)
-    if position is None or not lines:
+    if (position := shape_axis(ds)) is None or not (lines := overestimates(ds, position, index)):
         return []
     return [_differences(ds, name, x, lines, index) for name, x in abscissas(ds, position, index).items()]
 

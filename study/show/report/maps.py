@@ -99,8 +99,6 @@ def _maps(ds: xr.Dataset, index: Index, x: int, y: int, over: int, panels: list[
         first = {key: values[k] for key, values in buttons[0]["args"][0].items()}
         made.add_heatmap(coloraxis="coloraxis", hoverongaps=True, row=k // 2 + 1, col=k % 2 + 1, **first)
     _on_cells(made, ds, cuts, x, y)
-    for button in buttons:
-        button["args"].append(list(range(len(cuts))))
     made.update_layout(buttons[0]["args"][1], updatemenus=[{"buttons": buttons, "x": 0, "xanchor": "left", "y": 1,
                        "yanchor": "bottom", "pad": {"b": 28}}], margin={"t": 90}, plot_bgcolor=plots.EMPTY,
                        showlegend=False)  # fmt: skip
@@ -152,8 +150,8 @@ def _button(ds: xr.Dataset, name: str, cuts: Any, x: int, y: int) -> dict[str, A
     low, high = span(np.concatenate([a.ravel() for a in z]))
     rows = [None if not np.isfinite(a).any() else a.tolist() for a in z]
     axis = {"colorscale": plots.colours(name), "cmin": low, "cmax": high, "colorbar": plots.bars(label(title))}
-    return {"label": label(title), "method": "update",
-            "args": [{"z": rows, "hovertemplate": [hover] * len(rows)}, {"coloraxis": axis}]}  # fmt: skip
+    traces = {"z": rows, "hovertemplate": [hover] * len(rows)}
+    return {"label": label(title), "method": "update", "args": [traces, {"coloraxis": axis}, [*range(len(rows))]]}
 
 
 def _notes(ds: xr.Dataset) -> np.ndarray | None:

@@ -29,7 +29,7 @@ its own plane (curved contact model); pcm and pcm_projected are planar models wi
 normal force F_N. NaN: no value; /study/status/code (0 missing, 1 done, 2 failed) and /study/status/message say why.
 Candidates are counted over stations and angles, the angle running fastest. /study/scene has all settings.
 h5web, silx and NeXpy plot the maps; 'softjaw export --format vtk' writes files for ParaView."""
-ASCII = {"\N{MULTIPLICATION SIGN}": "x", "±": "+-"}
+ASCII = str.maketrans({"\N{MULTIPLICATION SIGN}": "x", "±": "+-"})
 
 
 def subtitle(ds: xr.Dataset) -> str:
@@ -93,6 +93,5 @@ def plain_report(ds: xr.Dataset) -> str:
     parts.append(CAVEAT.replace("the scene below", "/study/scene"))
     text = "\n\n".join(part for part in parts if part)
     # h5dump escapes these signs; their names are longer, so they come before the lines are filled
-    for sign, name in ASCII.items():
-        text = text.replace(sign, name)
-    return "\n".join(textwrap.fill(x, WIDTH) if len(x) > WIDTH else x for x in text.splitlines()) + "\n"
+    lines = text.translate(ASCII).splitlines()
+    return "\n".join(textwrap.fill(x, WIDTH) if len(x) > WIDTH else x for x in lines) + "\n"

@@ -42,8 +42,7 @@ def build(ds: xr.Dataset, candidate: int | None = None, place: Place = (None, No
     if candidate is not None or place != (None, None):
         ds = judge(ds, view_of(ds, candidate, place, None)[1])
     # A study without a solved case still gets its page, with states and scene.
-    best = ds.attrs["best"] or (*(0 for _ in ds.status.shape[:-1]), ds.attrs["level"])
-    view = View(ds, best[:-3])
+    view, best = view_of(ds, None, (None, None), None)
     sections: list[Section] = [
         ("answer", "", [the_object(view, best), the_answer(ds)]),
         ("best", "Best grasps", best_grasps(ds)),

@@ -96,15 +96,13 @@ class View:
     @cached_property
     def surface(self) -> Surface:
         """The object's surface; empty with a `note`."""
-        nothing = Surface(np.empty((0, 3)), np.empty((0, 3), int), np.empty(0, int), np.empty(0, int))
-        if self.scene is None:
-            self.note = "the object is not drawn: this version cannot read the scene in the file"
-            return nothing
         try:
+            if self.scene is None:
+                raise ValueError("this version cannot read the scene in the file")
             surface = surface_of(self.scene, axes_of(self.ds), self._feet())
         except (ValueError, OSError) as error:
             self.note = f"the object is not drawn: {error}"
-            return nothing
+            return Surface(np.empty((0, 3)), np.empty((0, 3), int), np.empty(0, int), np.empty(0, int))
         return surface._replace(points=self.placed.to_object(surface.points))
 
     def _feet(self) -> Iterator[tuple[int, Pose, float]]:

@@ -60,9 +60,7 @@ class Pad:
 
     def pressed(self) -> tuple[np.ndarray, np.ndarray]:
         """Corners ``(k, 4, 3)`` [mm] of the loaded faces as they are drawn, and their pressure ``(k,)`` [kPa]."""
-        loaded = self.loaded.ravel()
-        if not loaded.any():
-            return np.empty((0, 4, 3)), np.empty(0)
+        loaded = np.flatnonzero(self.loaded)
         return 1e3 * (self.quads()[loaded] - self.lift * self.approach), 1e-3 * self.pressure.ravel()[loaded]
 
     def rim(self) -> np.ndarray:
@@ -74,8 +72,8 @@ class Pad:
         """Straight sides between the face's border and the back, and the back, as ``(k, 4, 3)``."""
         i, j = (n - 1 for n in self.face.shape[:2])
         b = self.back
-        edges = [(b[k], b[(k + 1) % 4], (i, j, i, j)[k]) for k in range(4)]
-        behind = np.concatenate([p + (q - p) * np.arange(n)[:, None] / n for p, q, n in edges])
+        edges = zip(b, np.roll(b, -1, axis=0), (i, j, i, j), strict=True)
+        behind = np.concatenate([np.linspace(p, q, n, endpoint=False) for p, q, n in edges])
         rim = self.rim()
         walls = np.stack([rim, np.roll(rim, -1, axis=0), np.roll(behind, -1, axis=0), behind], axis=1)
         return np.concatenate([walls, b[None]])
@@ -94,9 +92,7 @@ class Pad:
         the slip ``motion``, along x or y of the contact frame or a turn about its normal. Of dense meshes every
         second, third, ... face is taken.
         """
-        if not self.pressure.size:
-            return np.empty((0, 3)), np.empty((0, 3))
-        step = -(-max(self.pressure.shape) // 14)  # along the longer side of a pad, at most
+        step = -(-max(*self.pressure.shape, 1) // 14)  # along the longer side of a pad, at most
         some = (slice(step // 2, None, step),) * 2
         loaded = self.loaded[some]
         c, n, load = self.centroid[some][loaded], self.normal[some][loaded], (self.pressure * self.area)[some][loaded]

@@ -145,11 +145,12 @@ def surface(plotter: Any, points: np.ndarray, triangles: np.ndarray, values: Any
 
 def faces(plotter: Any, corners: np.ndarray, values: Any = None, **look: Any) -> None:
     """Quadrilaterals ``(k, 4, 3)``, of one colour or in those of ``values (k,)``."""
-    mesh = pv.PolyData.from_regular_faces(corners.reshape(-1, 3), np.arange(4 * len(corners)).reshape(-1, 4))
-    if values is not None:
-        mesh.cell_data["value"] = values
-        look = {"scalars": "value", **look}
-    plotter.add_mesh(mesh, **{"lighting": False, **look})
+    plotter.add_mesh(separate(corners), **{"lighting": False, "scalars": values, **look})
+
+
+def separate(corners: np.ndarray) -> pv.PolyData:
+    """A mesh of quadrilaterals ``(k, 4, 3)`` that share no points."""
+    return pv.PolyData.from_regular_faces(corners.reshape(-1, 3), np.arange(4 * len(corners)).reshape(-1, 4))
 
 
 def block(plotter: Any, pad: Pad) -> None:
@@ -239,8 +240,7 @@ def _pads_file(view: View, force: int) -> pv.PolyData | None:
     pads = [(c, finger, pad) for c, both in cases for finger, pad in enumerate(both, start=1) if pad.pressure.size]
     if not pads:
         return None
-    corners = np.concatenate([pad.quads() for *_, pad in pads])
-    faces = pv.PolyData.from_regular_faces(corners.reshape(-1, 3), np.arange(4 * len(corners)).reshape(-1, 4))
+    faces = separate(np.concatenate([pad.quads() for *_, pad in pads]))
     sizes = [pad.pressure.size for *_, pad in pads]
     faces.cell_data["candidate"] = np.repeat([c for c, *_ in pads], sizes)
     faces.cell_data["finger"] = np.repeat([finger for _, finger, _ in pads], sizes)
