@@ -56,10 +56,9 @@ def best(
 
     Raises `ValueError` for a force outside of the solved ones.
     """
-    errors = values_of(ds, name) if (name := f"{aim(ds)[0]}_error") in ds else None
+    errors = ds.get(f"{aim(ds)[0]}_error")
     known = errors is not None or "e_n_interval" not in ds
-    mesh = ds["work_mesh"].values if "work_mesh" in ds else None
-    error = largest_error(errors, ds, axes_of(ds), ds.label.values, mesh) if known else []
+    error = largest_error(errors, ds, axes_of(ds), ds.label.values, ds.get("work_mesh")) if known else []
     ds = judge(ds, force=force, by=by, top=top, lines=lines)
     k, score, found = ds.attrs["level"], ds.attrs["score"], order(ds, ds.attrs["level"])
     places = distinct(ds, [candidate_of(ds, index) for index in found], rank_values(ds, score, k), k, top)
@@ -116,12 +115,11 @@ def case_table(
     columns += [Column("label", wrap=LABEL_WIDTH, people=named(ds))] if poses else []
     middles = ds["finger_pose_origin"].values.mean(axis=-2) if poses and "finger_pose_origin" in ds else None
     columns += [Column(axis, "m", people=False) for axis in "xyz"] * (middles is not None)
-    quantities = _map_columns(ds, maps)
+    bounds = [Column(name, "N", people=False) for name in FORCE_RANGE if name in ds]
+    quantities = [*_map_columns(ds, maps), *bounds]
     values = {c.name: values_of(ds, c.name) for c in quantities if c.name in ds}
     values[PLANAR_E_N] = values_of(ds, "e_n", MODELS[1])
-    bounds = [name for name in FORCE_RANGE if name in ds]
-    columns += [*quantities, *(Column(name, "N", people=False) for name in bounds)]
-    columns += [Column("safe_forces", "N", "safe forces", programs=False)] * bool(bounds)
+    columns += [*quantities, *[Column("safe_forces", "N", "safe forces", programs=False)] * bool(bounds)]
     columns += [Column("flags", people=False), Column("notes", wrap=NOTES_WIDTH)]
     rows: list[Row] = []
     for place_, index in enumerate(cases, start=1):
@@ -132,7 +130,6 @@ def case_table(
         row |= {"label": str(ds.label.values[index[-3:-1]]), "flags": int(ds["flags"].values[index]) & OF_FILE}
         row |= {} if middles is None else dict(zip("xyz", middles[index].tolist(), strict=True))
         row |= {name: float(found[index]) for name, found in values.items()}
-        row |= {name: float(ds[name].values[index[:-1]]) for name in bounds}
         rows.append(row | {"safe_forces": safe_range(ds, index), "notes": note(ds, index, known)})
     return Table("", columns, rows)
 
@@ -153,11 +150,10 @@ def _map_columns(ds: xr.Dataset, maps: Collection[str]) -> list[Column]:
 
 def safe_range(ds: xr.Dataset, index: Index) -> str:
     """Forces that hold the object and leave its wall undamaged; a plus: the wall bears the largest solved one."""
-    known = {name: float(ds[name].values[index[:-1]]) for name in FORCE_RANGE if name in ds}
-    low, high = (known.get(name, np.nan) for name in FORCE_RANGE)
-    if np.isnan([*known.values()]).all():
+    low, high = (at(ds, name, index) for name in FORCE_RANGE)
+    if np.isnan([low, high]).all():
         return "-"
-    if len(known) > 1 and not low <= high:
+    if all(name in ds for name in FORCE_RANGE) and not low <= high:
         return "none"
     more = "+" * bool(high >= forces(ds)[-1] * (1 - NEGLIGIBLE))
     return "..".join("" if np.isnan(bound) else f"{bound:.3g}" for bound in (low, high)) + more
@@ -248,8 +244,7 @@ def force_to_use(ds: xr.Dataset, index: Index) -> tuple[float, float]:
 
     Friction bears in proportion to mu, so a share by which mu is off moves the force by that share.
     """
-    low = float(ds["force_low"].values[index[:-1]]) if "force_low" in ds else float("nan")
-    error = float(ds["force_low_error"].values[index[:-1]]) if "force_low_error" in ds else 0.0
+    low, error = (at(ds, name, index) for name in ("force_low", "force_low_error"))
     return low, float(np.hypot(np.nan_to_num(error), MU_ERROR * low))
 
 
@@ -284,7 +279,7 @@ def _held(ds: xr.Dataset, index: Index) -> tuple[str, str]:
 
 def _limit(ds: xr.Dataset, index: Index) -> str:
     """Why a grasp holds no more: what lies beyond its force, and better grasps that fail."""
-    k, high = index[-1], float(ds["force_high"].values[index[:-1]]) if "force_high" in ds else np.nan
+    k, high = index[-1], at(ds, "force_high", index)
     if high < forces(ds)[-1] * (1 - NEGLIGIBLE):
         parts = [f"the wall, which bears {high:.3g} N at most"]
     else:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from softjaw.study.case.result import TIE
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.quantities import TABLE, map_row
-from softjaw.study.ranking import falling
+from softjaw.study.ranking import FloatArray, falling
 from softjaw.study.result.layout import DONE
 from softjaw.study.result.read import axes_of, stated_error, values_of
 from softjaw.study.scene.text import changes, value_text
@@ -20,7 +20,6 @@ from softjaw.study.show.overview import listed
 from softjaw.study.table import PAPER, Column, Row, Table, as_text, with_unit, wrapped
 from softjaw.study.units import shown, shown_unit
 
-FloatArray = NDArray[np.float64]
 Pair = tuple[xr.Dataset, xr.Dataset]
 
 
@@ -88,11 +87,9 @@ def compare_text(table: Table, top: int = 10, width: int = PAPER) -> str:
 
 
 def _setting_lines(settings: list[Row], width: int) -> list[str]:
-    if not settings:
-        return ["settings: no difference"]
     rows = [{"key": row["key"], **{f: value_text(row[f]) for f in "ab"}} for row in settings]
     columns = [Column("key", label="setting", wrap=width // 2), Column("a"), Column("b")]
-    return [as_text(Table("", columns, rows), width)]
+    return [as_text(Table("", columns, rows), width) or "settings: no difference"]
 
 
 # --- axes ------------------------------------------------------------------------------------------------------------
@@ -124,12 +121,9 @@ def _matched(one: xr.Dataset, other: xr.Dataset) -> tuple[dict[str, Row], Pair]:
 
 
 def _left_out(name: str, axis: dict[str, Any]) -> list[str]:
-    lines = []
-    for letter in "ab":
-        if len(values := axis[f"only_{letter}"]):
-            text = listed(shown(values, axis["units"]).tolist(), shown_unit(axis["units"]))
-            lines.append(f"{name} only in {letter}, left out: {text}")
-    return lines
+    only = {letter: shown(axis[f"only_{letter}"], axis["units"]).tolist() for letter in "ab"}
+    unit = shown_unit(axis["units"])
+    return [f"{name} only in {letter}, left out: {listed(values, unit)}" for letter, values in only.items() if values]
 
 
 # --- differences -----------------------------------------------------------------------------------------------------

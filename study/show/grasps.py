@@ -53,11 +53,11 @@ def choices(ds: xr.Dataset, first: str, *more: str) -> list[str]:
 
 
 def at(ds: xr.Dataset, name: str, index: Index, model: str = "ccm") -> float:
-    """A map's value at one case, NaN if there is none."""
+    """A map's value at one case, or what is known of its candidate; NaN if there is none."""
     if name not in ds.variables:
         return float("nan")
     found = ds.variables[name]
-    return float(found.values[(*index, MODELS.index(model))] if "model" in found.dims else found.values[index])
+    return float(found.values[(*index, MODELS.index(model)) if "model" in found.dims else index[: found.ndim]])
 
 
 def quantity(ds: xr.Dataset, name: str) -> tuple[str, str, float]:

@@ -54,9 +54,8 @@ def status_text(path: Path, width: int) -> str:
     runner = holder(path)
     cases, seconds = (sum(max(np.nan_to_num(row[key]), 0) for row in rows) for key in ("done", "seconds"))
     lines = [f"{path}: {counts_text(rows)}", f"  {cases:.0f} cases solved, {duration(seconds)} on all ranks"]
-    lines += [f"running now: {runner}"] if runner else []
-    left = index.code_of(rows) == STOPPED and not runner
-    lines += ["run the same command again to resume"] if left else []
+    resume = "run the same command again to resume" * (index.code_of(rows) == STOPPED)
+    lines += filter(None, [f"running now: {runner}" if runner else resume])
     named = [f"{row['object']}: {row['state']}: {row['reason']}" for row in rows if row["reason"]]
     return "\n".join([*lines, *(wrapped(line, width, "  ", "    ") for line in named)])
 

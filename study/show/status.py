@@ -99,8 +99,7 @@ def status_text(result: Any, width: int = PAPER) -> str:
 
 def meshes(result: Any) -> NDArray[np.float64] | None:
     """Finest mesh that each case was tried on; None where a file has it not."""
-    listed = {q.key for q in result.layout.quantities}
-    return result.read("work/mesh") if "work/mesh" in listed else None
+    return result.read("work/mesh") if any(q.key == "work/mesh" for q in result.layout.quantities) else None
 
 
 def waits(result: Any) -> int:
@@ -131,9 +130,7 @@ def aim(cases: Any) -> tuple[str, float]:
     return accuracy.get("target_of", "payload"), accuracy.get("target", math.inf)
 
 
-def largest_error(
-    errors: NDArray[np.float64] | None, cases: Any, axes: Sequence[Any], labels: Any, mesh: Any = None
-) -> list[str]:
+def largest_error(errors: Any, cases: Any, axes: Sequence[Any], labels: Any, mesh: Any = None) -> list[str]:
     """The largest stated error, how many are above a target that the scene names, and how many solved cases have none.
 
     ``errors`` (array over the cases): relative errors; None where a file has none. ``cases`` (Result or
