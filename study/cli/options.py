@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from softjaw.study.messages import MEANING, closest, first_rank
-from softjaw.study.quantities import RANKED_BY
+from softjaw.study.quantities import MODELS, RANKED_BY
 
 MILLION = 10**6
 KINDS = {
@@ -97,7 +97,6 @@ def _option(*names: str, **settings: Any) -> tuple[tuple[str, ...], dict[str, An
     return names, settings
 
 
-MODELS = ("ccm", "pcm", "pcm_projected")
 NORMAL_FORCE = "normal force [N], solved or between two (default: the lowest that holds the object, else the largest)"
 OPTIONS = {
     "scene": _option("scene", metavar="SCENE", help="scene file (TOML)"),
@@ -271,11 +270,9 @@ class Program(Parser):
         width = min(shutil.get_terminal_size().columns, 100) - 2
         lines = [f"usage: {self.prog} COMMAND ...", "", *textwrap.wrap(self.description or "", width)]
         for title, listed in COMMANDS.items():
-            entries = [
-                textwrap.fill(text, width, initial_indent=f"  {name:<12}", subsequent_indent=" " * 14)
-                for name, text, *_ in listed
-            ]
-            lines += ["", f"{title}:", *entries]
+            lines += ["", f"{title}:"]
+            for name, text, *_ in listed:
+                lines.append(textwrap.fill(text, width, initial_indent=f"  {name:<12}", subsequent_indent=" " * 14))
         codes = "; ".join(f"{code} {text}" for code, text in MEANING.items())
         lines += ["", *textwrap.wrap(f"exit codes: {codes}", width, subsequent_indent="  "), "", self.epilog or ""]
         return "\n".join(lines) + "\n"
