@@ -241,12 +241,10 @@ def distinct(ds: xr.Dataset, order: Sequence[int], score: np.ndarray, k: int, to
                 apart = np.einsum("nfi,fij->nfj", pads - x[i], R[i])
                 close = (np.abs(apart) < half).all(axis=(1, 2)) & here & ~rolled
                 near, far = near | close, np.where(close, np.linalg.norm(apart, axis=2).max(axis=1), far)
-        gone = near | images
         near[0] = images[0] = False
-        gone[0] = True
-        found = (rest[mask].tolist() for mask in (near & ~images, images))
-        places.append(Place(int(head), next(found), float(far[near & ~images].max(initial=0.0)), next(found)))
-        rest = rest[~gone]
+        near &= ~images
+        places.append(Place(int(head), rest[near].tolist(), float(far[near].max(initial=0.0)), rest[images].tolist()))
+        rest = rest[1:][~(near | images)[1:]]
     return places
 
 

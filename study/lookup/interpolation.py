@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.ndimage import maximum_filter1d
+from scipy.ndimage import maximum_filter
 
 from softjaw.friction.patch import NEGLIGIBLE
 from softjaw.study.ranking import FloatArray, IntArray
@@ -159,9 +159,7 @@ def bends(table: FloatArray, axes: Sequence[Nodes], side: NDArray[np.bool_]) -> 
 
 def claims(bend: FloatArray, shape: tuple[int, ...]) -> FloatArray:
     """`bends` ``(3, nodes)`` of this shape of nodes as claims: the largest around along stations and forces."""
-    claimed = np.nan_to_num(bend.reshape(3, *shape))
-    for axis in (1, 3):
-        claimed = maximum_filter1d(claimed, 3, axis=axis, mode="constant")
+    claimed = maximum_filter(np.nan_to_num(bend.reshape(3, *shape)), (1, 3, 1, 3), mode="constant")
     return CLAIM_FACTOR * claimed.reshape(3, -1)
 
 
