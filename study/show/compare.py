@@ -43,16 +43,16 @@ def compare(one: xr.Dataset, other: xr.Dataset, quantity: str = "e_n", model: st
     units = map_row(quantity).unit
     values = _values(pair, quantity, model)
     *few, station, angle, _ = axes
-    labels = None if axes[station]["units"] else pair[0].label.values[:, 0]
+    poses = not axes[station]["units"]
     rows: list[Row] = []
     for index in np.ndindex(in_a.shape):
         place: Row = {name: float(axis["common"][i]) for (name, axis), i in zip(axes.items(), index, strict=True)}
-        place |= {} if labels is None else {"label": str(labels[index[-3]])}
+        place["label"] = str(pair[0].label.values[index[-3:-1]])
         rows.append(place | {name: found[index] for name, found in values.items()})
     hidden = [name for name in (*few, station, angle) if len(axes[name]["common"]) < 2]
-    hidden += [] if labels is None else [station, angle]
+    hidden += [station, angle] * poses
     columns = [Column(name, axis["units"], digits=5, people=name not in hidden) for name, axis in axes.items()]
-    columns += [Column("label", wrap=24)] * (labels is not None)
+    columns += [Column("label", wrap=24)] * poses
     judged = any(value is not None for value in values["beyond_error"].ravel())
     columns += [Column("a", units), Column("b", units), Column("difference", units, "b-a"), Column("relative"),
                 Column("error", units, "errors", digits=2, people=judged),

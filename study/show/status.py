@@ -74,8 +74,8 @@ def status_table(result: Any) -> Table:
     rows = []
     for row, index in enumerate(np.ndindex(result.status.shape)):
         where: Row = {axis.name: float(axis.values[i]) for axis, i in zip(axes, index, strict=True)}
-        where |= {"row": row, "state": STATES[int(result.status[index])], "message": str(result.messages[index])}
-        rows.append(where | ({"label": str(result.labels[index[-3:-1]])} if poses else {}))
+        where |= {"row": row, "label": str(result.labels[index[-3:-1]]), "message": str(result.messages[index])}
+        rows.append(where | {"state": STATES[int(result.status[index])]})
     counts = {name.replace(" ", "_"): int(np.sum(result.status == code)) for code, name in enumerate(STATES)}
     facts: Row = {"file": str(result.path), "running": holder(result.path) or None, **counts}
     facts |= {"largest_error": largest_stated_error(result), "waiting": waits(result)}

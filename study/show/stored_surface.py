@@ -121,9 +121,8 @@ def stored_surface(
 
 
 def _patch(ds: xr.Dataset, index: Index, finger: int, faces: dict[str, np.ndarray]) -> ContactPatch | None:
-    origin, axes = field(ds, "finger_frame_origin"), field(ds, "finger_frame_axes")
-    if not faces or origin is None or axes is None:
+    if not faces:
         return None
-    own_faces, R = {name: values[finger] for name, values in faces.items()}, axes[index][finger]
-    centroid = (own_faces["centroid"] - origin[index][finger]) @ R.T
-    return ContactPatch(centroid, own_faces["area"], own_faces["normal"] @ R.T, own_faces["pressure"])
+    origin, R = (ds[f"finger_frame_{name}"].values[index][finger] for name in ("origin", "axes"))
+    x, area, normal, p = (faces[name][finger] for name in ("centroid", "area", "normal", "pressure"))
+    return ContactPatch((x - origin) @ R.T, area, normal @ R.T, p)

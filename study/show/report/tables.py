@@ -130,10 +130,8 @@ def definitions(ds: xr.Dataset) -> list[Block]:
     intro = ds.attrs["definitions"].partition("\n\n")[0]
     rows = [[str(name), v.attrs.get("units", ""), f"{v.attrs['long_name']}. {v.attrs['definition']}"]
             for name, v in ds.data_vars.items() if v.attrs.get("definition")]  # fmt: skip
-    head = ["variable", "unit (SI)", "meaning"]
-    folded = table("What the numbers mean", head, rows, (0, 1), (2,))
-    listed_rows = {"kind": "details", "summary": "All datasets", "blocks": [folded]}
-    return [text(" ".join(intro.split())), listed_rows]
+    folded = table("What the numbers mean", ["variable", "unit (SI)", "meaning"], rows, (0, 1), (2,))
+    return [text(" ".join(intro.split())), {"kind": "details", "summary": "All datasets", "blocks": [folded]}]
 
 
 def scene(ds: xr.Dataset) -> list[Block]:
