@@ -252,19 +252,15 @@ def _sweep_point(axes: Any, where: Mapping[str, Any]) -> tuple[int, ...]:
     """Index along the swept axes."""
     index, left = [], dict(where)
     for axis in axes:
-        key = axis.long_name
-        factor = in_si(key, 1.0)
+        key, factor = axis.long_name, in_si(axis.long_name, 1.0)
         options: list[Any] = [*axis.options] or [v / factor for v in axis.values.tolist()]
         known = f"{key} = {', '.join(map(_text, options))}"
-        if key in left:
-            given = left.pop(key)
-        elif axis.name in left:
-            given = left.pop(axis.name)
-            given = given if isinstance(given, str) else given / factor
-        elif len(options) == 1:
-            given = options[0]
-        else:
+        if key not in left and axis.name in left:
+            value = left.pop(axis.name)
+            left[key] = value if isinstance(value, str) else value / factor
+        if key not in left and len(options) > 1:
             raise ValueError(f"where is missing {key}: give one of {known}")
+        given = left.pop(key, options[0])
         matching = [i for i, option in enumerate(options) if _same(option, given)]
         if not matching:
             raise ValueError(f"where has {key} = {_text(given)}: expected one of {known}; there is no interpolation")
