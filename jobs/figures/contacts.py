@@ -35,7 +35,7 @@ def contact(ds: xr.Dataset) -> tuple[Any, str]:
     view = View(ds, index[:1])
     pad = view.pads(index)[0]
     top = 1e-3 * float(pad.pressure.max())
-    out, along, beside = -pad.approach, pad.rotation[:, 0], pad.rotation[:, 1]
+    out, along, beside = -pad.approach, pad.pose.rotation[:, 0], pad.pose.rotation[:, 1]
 
     def whole(plotter: Any) -> None:
         solids.surface(plotter, 1e3 * view.surface.points, view.surface.triangles, color=NEUTRAL)
@@ -95,7 +95,7 @@ def candidates(ds: xr.Dataset) -> tuple[Any, str]:
     place = f"station {number(1e3 * ds.station.values[0])} mm, {number(forces(ds)[-1])} N"
     axes[0, 1].set_title(f"pressure on its pad: {place}")
     drawing.scale_beside(drawn, mapped, axes[0, 1], "pressure [kPa]")
-    off = 1e3 * float(np.linalg.norm(pad.own(pad.origin)[:2]))
+    off = 1e3 * float(np.linalg.norm(pad.pose.to_pad(pad.origin)[:2]))
     return drawn, f"the contact's origin lies {number(off)} mm from the middle of the pad: pressure is not symmetric"
 
 
@@ -122,12 +122,12 @@ def outline(shape: Any, angle: float) -> tuple[np.ndarray, np.ndarray]:
 
 def _front(axes: Any, pad: Pad, top: float) -> Any:
     """The pad's contact face in its own frame, with the contact frame and the pad's middle."""
-    corners, loaded = 1e3 * pad.own(pad.quads().reshape(-1, 3)).reshape(-1, 4, 3)[..., :2], pad.loaded.ravel()
+    corners, loaded = 1e3 * pad.pose.to_pad(pad.quads().reshape(-1, 3)).reshape(-1, 4, 3)[..., :2], pad.loaded.ravel()
     pale = {"cmap": "Greys", "edgecolor": "#d5dade"}
     drawing.polygons(axes, corners[~loaded], np.zeros((~loaded).sum()), (0, 12), **pale).set_zorder(0)
     pressure, colours = 1e-3 * pad.pressure.ravel()[loaded], pictures.COLOURS["pressure"]
     mapped = drawing.polygons(axes, corners[loaded], pressure, (0.0, top), cmap=colours)
-    origin, frame = 1e3 * pad.own(pad.origin)[:2], pad.frame @ pad.rotation
+    origin, frame = 1e3 * pad.pose.to_pad(pad.origin)[:2], pad.frame @ pad.pose.rotation
     for name, direction in zip("xy", frame[:2], strict=True):
         drawing.arrow(axes, origin, origin + 8 * direction[:2])
         axes.text(*(origin + 10 * direction[:2]), name, ha="center", va="center")

@@ -17,11 +17,10 @@ from softjaw.study.ranking import index_of, ranked
 from softjaw.study.result.layout import DONE
 from softjaw.study.result.read import axes_of
 from softjaw.study.result.store import place_text, value_text
-from softjaw.study.show.status import grouped
+from softjaw.study.show.status import Index, grouped
 from softjaw.study.table import number, with_unit
 from softjaw.study.units import shown, shown_unit
 
-Index = tuple[int, ...]
 # Maps to choose from besides the main ones.
 MORE = ("epsilon", "safety_factor", "F_N", "S", "contact_area", "p_max", "closing", "curvature_loss", "overclaim",
         "overclaim_ellipsoid", "indentation", "wall_stress", "support_force")  # fmt: skip

@@ -55,11 +55,12 @@ def patch(view: View, index: Index) -> Block | None:
 
 def pad_face(pad: Pad, motion: str) -> list[Any]:
     """Traces of one pad in its own frame [mm, kPa]: pressure of the loaded faces, friction, contact frame."""
-    own = 1e3 * pad.own(pad.centroid)
+    own = 1e3 * pad.pose.to_pad(pad.centroid)
     pressure = np.where(pad.loaded, 1e-3 * pad.pressure, np.nan).T
     size = 0.5 * np.ptp(own[..., 1])
-    arrows = 1e3 * pad.own(1e-3 * pad.arrows(motion, size / 4))
-    axes = 1e3 * pad.own(pad.origin) + np.stack([np.zeros((2, 3)), 0.6 * size * (pad.frame @ pad.rotation)[:2]], axis=1)
+    arrows = 1e3 * pad.pose.to_pad(1e-3 * pad.arrows(motion, size / 4))
+    frame = 0.6 * size * (pad.frame @ pad.pose.rotation)[:2]
+    axes = 1e3 * pad.pose.to_pad(pad.origin) + np.stack([np.zeros((2, 3)), frame], axis=1)
     return [plots.heatmap(own[..., 0].mean(axis=1), own[..., 1].mean(axis=0), pressure),
             plots.segments(arrows, FORCE), plots.segments(axes, "white", "xy")]  # fmt: skip
 

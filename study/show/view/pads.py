@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from softjaw.fem.objects.gap import Pose
 from softjaw.friction.patch import NEGLIGIBLE
 from softjaw.study.result.layout import DONE
 from softjaw.study.show.grasps import Index, at
@@ -23,7 +24,7 @@ class Pad:
     ``face (i + 1, j + 1, 3)`` are the corners of the contact faces, ``back (4, 3)`` those of the moved back in the
     order of the face's corners; ``centroid`` and ``normal (i, j, 3)``, ``pressure`` and ``area (i, j)`` belong to the
     faces; they are empty where the file holds no patches. ``frame (3, 3)`` has the contact frame's axes as rows,
-    ``origin (3,)`` is its origin; ``rotation`` and ``position`` place the pad's own frame.
+    ``origin (3,)`` is its origin; ``pose`` places the pad's own frame.
     Contact faces overlap the object between the points where contact holds: pictures draw them by ``lift`` farther out.
     """
 
@@ -31,8 +32,7 @@ class Pad:
     back: np.ndarray
     frame: np.ndarray
     origin: np.ndarray
-    rotation: np.ndarray
-    position: np.ndarray
+    pose: Pose
     lift: float
     centroid: np.ndarray
     normal: np.ndarray
@@ -42,16 +42,12 @@ class Pad:
     @property
     def approach(self) -> np.ndarray:
         """Direction in which the finger closes ``(3,)``."""
-        return self.rotation[:, 2]
+        return self.pose.rotation[:, 2]
 
     @property
     def loaded(self) -> np.ndarray:
         """Faces that carry pressure ``(i, j)``."""
         return self.pressure > NEGLIGIBLE * self.pressure.max(initial=1e-300)
-
-    def own(self, x: np.ndarray) -> np.ndarray:
-        """Points of the object's frame in the pad's frame."""
-        return (x - self.position) @ self.rotation
 
     def quads(self) -> np.ndarray:
         """Corners of the faces, ``(i j, 4, 3)``, in the order of the faces."""
@@ -129,7 +125,7 @@ def pads_of(ds: xr.Dataset, gripper: Any, index: Index, faces: Faces) -> list[Pa
 
 
 def _pad(gripper: Any, faces: Faces, lift: Any, R: Any, o: Any, closing: Any, axes: Any, origin: Any) -> Pad:
-    length, width, thickness = gripper.pad_size
+    pose, (length, width, thickness) = Pose(R, o), gripper.pad_size
     x, y = 0.5 * length * np.array([-1, 1, 1, -1]), 0.5 * width * np.array([-1, -1, 1, 1])
     per_side = 3 if gripper.element == "hex27" else 2
     grid = tuple(per_side * n for n in gripper.elements[:2])
@@ -138,14 +134,10 @@ def _pad(gripper: Any, faces: Faces, lift: Any, R: Any, o: Any, closing: Any, ax
         grid, faces = (0, 0), {name: np.empty(0) for name in ("centroid", "normal", "pressure", "area")}
     else:
         face = corners_of(faces["centroid"].reshape(*grid, 3))
-    placed = {
-        "face": face,
-        "back": np.column_stack([x, y, np.full(4, closing - thickness)]),
-        "origin": origin,
-        "centroid": faces["centroid"].reshape(*grid, 3),
-    }
+    back = np.column_stack([x, y, np.full(4, closing - thickness)])
+    centroid, normal = (faces[name].reshape(*grid, 3) for name in ("centroid", "normal"))
     return Pad(
-        **{name: points @ R.T + o for name, points in placed.items()}, frame=axes @ R.T, rotation=R, position=o,
-        lift=lift, normal=faces["normal"].reshape(*grid, 3) @ R.T, pressure=faces["pressure"].reshape(grid),
-        area=faces["area"].reshape(grid),
+        face=pose.to_object(face), back=pose.to_object(back), frame=axes @ R.T, origin=pose.to_object(origin),
+        pose=pose, lift=lift, centroid=pose.to_object(centroid), normal=normal @ R.T,
+        pressure=faces["pressure"].reshape(grid), area=faces["area"].reshape(grid),
     )  # fmt: skip

@@ -113,7 +113,7 @@ def test_pads_stand_where_the_file_says_and_arrows_add_up_to_the_friction_of_the
     assert two.face[..., 0] == pytest.approx(np.full((5, 5), -0.025), abs=1e-6)
     assert np.ptp(one.face.reshape(-1, 3), axis=0) == pytest.approx([0, SIZE[1], SIZE[0]], abs=1e-6)
     assert one.back[:, 0] == pytest.approx(np.full(4, 0.025 + SIZE[2] - CLOSING))
-    assert one.own(one.back)[:, 2] == pytest.approx(np.full(4, CLOSING - SIZE[2]))
+    assert one.pose.to_pad(one.back)[:, 2] == pytest.approx(np.full(4, CLOSING - SIZE[2]))
     assert one.sides().shape == (17, 4, 3)
     area = 0.5 * np.linalg.norm(
         np.cross(*np.diff(one.quads()[:, [0, 2, 1, 3]].reshape(-1, 2, 2, 3), axis=2)[:, :, 0].swapaxes(0, 1)), axis=1
