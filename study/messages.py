@@ -92,6 +92,11 @@ def shown(value: Any, width: int = 60) -> str:
     return shortened(text, width)
 
 
+def first_of(texts: Sequence[str], most: int, what: str, place: str = "") -> list[str]:
+    """The first texts; where there are more than ``most``, how many more, and of ``what``."""
+    return [*texts[:most], *[f"{place}and {len(texts) - most} more{what}"] * (len(texts) > most)]
+
+
 def closest(word: str, words: Sequence[str]) -> str | None:
     """The word that a mistyped one most likely means.
 

@@ -29,7 +29,7 @@ from softjaw.study.case.build import (
 )
 from softjaw.study.case.fit import doubt, extremes, fit_of, jaws_of
 from softjaw.study.case.poses import axis_poses, explicit_poses, moved, turn_of_pose
-from softjaw.study.messages import USAGE, StudyError
+from softjaw.study.messages import USAGE, StudyError, first_of
 from softjaw.study.quantities import MISSING, REALISATION, Axis
 from softjaw.study.scene import Scene
 from softjaw.study.units import UNITS, in_si, split_unit
@@ -92,8 +92,7 @@ def check_candidates(scene: Scene) -> None:
         remedy = "expected a line of approach that meets it; point_mm is in mm, in the frame of the object's own file"
         found = [f"candidates.poses[{i}].point_mm: found '{label}', where the pads miss the object; {remedy}"
                  for i, label in labels.items()]  # fmt: skip
-        more = [f"and {len(found) - MOST_NAMED} more poses miss it"] if len(found) > MOST_NAMED else []
-        raise StudyError(USAGE, "\n".join([*found[:MOST_NAMED], *more]))
+        raise StudyError(USAGE, "\n".join(first_of(found, MOST_NAMED, " poses miss it")))
 
 
 def turn_between(first: Candidate, second: Candidate, axis_symmetry: int) -> float | None:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.friction.patch import ContactPatch, FloatArray, slivers
-from softjaw.study.messages import USAGE, Problem, StudyError
+from softjaw.study.messages import USAGE, Problem, StudyError, first_of
 
 MOST_PROBLEMS = 10  # reported of one file
 CREDIBLE = {"centroid": (1e3, "m"), "area": (1e4, "m^2"), "pressure": (1e12, "Pa")}  # beyond is no contact on earth
@@ -34,9 +34,7 @@ class ReadPatch:
 def refuse(problems: Sequence[Problem]) -> None:
     """Raise if there are problems, naming the first of them."""
     if problems:
-        lines = [str(p) for p in problems[:MOST_PROBLEMS]]
-        if len(problems) > len(lines):
-            lines.append(f"{problems[0].file}: and {len(problems) - len(lines)} more")
+        lines = first_of([*map(str, problems)], MOST_PROBLEMS, "", f"{problems[0].file}: ")
         raise StudyError(USAGE, "\n".join(lines))
 
 

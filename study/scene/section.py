@@ -16,7 +16,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError, mod
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 
-from softjaw.study.messages import USAGE, Problem, StudyError, closest, printable, shown
+from softjaw.study.messages import USAGE, Problem, StudyError, closest, first_of, printable, shown
 from softjaw.study.units import UNITS, in_si, split_unit
 
 KeyPath = tuple[str | int, ...]
@@ -53,8 +53,7 @@ class SceneError(StudyError, ValueError):
     def __init__(self, problems: Sequence[Problem]) -> None:
         self.problems = list(problems)
         # A file that is no scene at all must not fill the terminal.
-        lines, more = [str(p) for p in self.problems[:MOST_LISTED]], len(self.problems) - MOST_LISTED
-        lines += [f"{problems[0].file}: and {more} more problems"] * (more > 0)
+        lines = first_of([*map(str, self.problems)], MOST_LISTED, " problems", f"{problems[0].file}: ")
         super().__init__(USAGE, "\n".join(lines))
 
     def __reduce__(self) -> tuple[Any, ...]:

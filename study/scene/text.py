@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from softjaw.study.messages import Problem, closest, shown
+from softjaw.study.messages import Problem, closest, first_of, shown
 from softjaw.study.scene.section import SceneError
 
 LARGEST = 1_000_000  # bytes; a scene is a few kB
@@ -118,8 +118,7 @@ def differences(theirs: str, ours: str) -> str:
     if not changed:
         return "the same keys, but another mesh file or another version"
     named = [f"{key} is {value_text(one)} there and {value_text(other)} here" for key, one, other in changed]
-    more = [f"and {len(named) - MOST_NAMED} more keys"] if len(named) > MOST_NAMED else []
-    return "; ".join([*named[:MOST_NAMED], *more])
+    return "; ".join(first_of(named, MOST_NAMED, " keys"))
 
 
 def changes(theirs: str, ours: str) -> list[tuple[str, Any, Any]]:
