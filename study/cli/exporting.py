@@ -5,13 +5,14 @@ from __future__ import annotations
 import sys
 from argparse import Namespace
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from softjaw.study.export.cases import as_csv, as_json
 from softjaw.study.export.data_set import FORMS, write_data_set
 from softjaw.study.export.mjcf import as_mjcf
 from softjaw.study.export.physx import as_usd
-from softjaw.study.export.planners import CLOSING, as_graspgen, as_isaac_grasp, as_moveit
+from softjaw.study.export.planners import CLOSING, as_graspgen, as_yaml
 from softjaw.study.export.rigid_body import body_of
 from softjaw.study.export.sdf import as_sdf, as_stl
 from softjaw.study.export.selection import GripperFrame, chosen, grasps, usable
@@ -23,7 +24,9 @@ from softjaw.study.result.read import open
 from softjaw.study.units import in_si
 
 TABLES = {"csv": as_csv, "json": as_json}
-PLANNERS: dict[str, Callable[..., str]] = {"isaac_grasp": as_isaac_grasp, "graspgen": as_graspgen, "moveit": as_moveit}
+PLANNERS: dict[str, Callable[..., str]] = {
+    "isaac_grasp": partial(as_yaml, "isaac_grasp"), "graspgen": as_graspgen, "moveit": partial(as_yaml, "moveit"),
+}  # fmt: skip
 SIMULATORS = {"mjcf": as_mjcf, "sdf": as_sdf, "physx": as_usd}
 DATA_SETS = ("acronym", "webdataset")  # of folders alone
 

@@ -23,7 +23,7 @@ import numpy as np
 import xarray as xr
 
 from softjaw.fem.objects.gap import Pose
-from softjaw.study.case.poses import explicit_poses, moved
+from softjaw.study.case.poses import explicit_poses, moved, pose_of
 from softjaw.study.export.cases import MEANING, cases
 from softjaw.study.export.selection import GripperFrame, gripper_frame, holds
 from softjaw.study.flags import LOST
@@ -32,7 +32,6 @@ from softjaw.study.quantities import BY_KEY, DONE, NO_GRASP, STATES
 from softjaw.study.ranking import judged, task_keys
 from softjaw.study.result.index import arrays_file, read_index
 from softjaw.study.result.read import maps_in, open, scene_of
-from softjaw.study.scene.grasps import GraspPose
 from softjaw.study.table import plain
 from softjaw.study.units import UNITS
 
@@ -205,8 +204,7 @@ def _placed(case: dict[str, Any], poses: tuple[Pose, Pose]) -> None:
 
 def _offered(like: dict[str, Any], row: np.ndarray) -> dict[str, Any]:
     """A grasp that the sampler offered and rejected, with the keys of another case and nothing known."""
-    values = row.astype(float)
-    pose = GraspPose(point_mm=tuple(values[:3]), approach=tuple(values[3:6]), long_side=tuple(values[6:9]))
+    pose = pose_of(tuple(row[:9].astype(float)))
     fingers = [{name: np.full_like(value, np.nan, dtype=float) for name, value in f.items()} for f in like["fingers"]]
     case = {"place": {"normal_force": np.nan}, "state": STATES[int(row[9])], "flags": 0, "fingers": fingers}
     _placed(case, explicit_poses(pose, Pose(np.eye(3), np.zeros(3))))

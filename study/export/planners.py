@@ -41,11 +41,6 @@ from softjaw.study.units import UNITS
 CLOSING = {"graspgen": "x", "acronym": "x", "webdataset": "x"}
 
 
-def as_isaac_grasp(grasps: Sequence[RankedGrasp], gripper: GripperFrame, ds: xr.Dataset) -> str:
-    """An isaac_grasp file; what it has no field for stands in comments."""
-    return _yaml("grasp.isaac_grasp", grasps, gripper, ds)
-
-
 def as_graspgen(grasps: Sequence[RankedGrasp], gripper: GripperFrame, ds: xr.Dataset, folder: str = ".") -> str:
     """A GraspGen file of all grasps, also of those that do not hold, with everything else that is known beside them.
 
@@ -74,25 +69,20 @@ def as_graspgen(grasps: Sequence[RankedGrasp], gripper: GripperFrame, ds: xr.Dat
     return json.dumps(made, indent=1)
 
 
-def as_moveit(grasps: Sequence[RankedGrasp], gripper: GripperFrame, ds: xr.Dataset) -> str:
-    """A list of moveit_msgs/Grasp under ``grasps``; what a message has no field for stands in comments."""
-    return _yaml("grasp.moveit", grasps, gripper, ds)
-
-
-def _yaml(name: str, grasps: Sequence[RankedGrasp], gripper: GripperFrame, ds: xr.Dataset) -> str:
+def as_yaml(form: str, grasps: Sequence[RankedGrasp], gripper: GripperFrame, ds: xr.Dataset) -> str:
+    """Grasps as ``isaac_grasp`` or ``moveit``; what the format has no field for stands in comments."""
     about = _about(ds, gripper).splitlines()
-    return template(name).render(about=about, grasps=grasps, gripper=gripper, flow=flow, zip=zip, WAY=WAY)
+    return template(f"grasp.{form}").render(about=about, grasps=grasps, gripper=gripper, flow=flow, zip=zip, WAY=WAY)
 
 
 def _about(ds: xr.Dataset, gripper: GripperFrame) -> str:
     """What to know about all grasps of a file."""
     hand = gripper.hand
-    lines = [
-        f"Made by softjaw from {ds.attrs['file']}: poses of the gripper in the frame of the object's own file [m].",
-        f"Gripper: {hand.frame}, approaches along z, closes along {hand.closing} from finger 1 to 2.",
-        "Quality and confidence are relative to the best grasp of this file.",
-    ]
-    return "\n".join(lines)
+    return (
+        f"Made by softjaw from {ds.attrs['file']}: poses of the gripper in the frame of the object's own file [m].\n"
+        f"Gripper: {hand.frame}, approaches along z, closes along {hand.closing} from finger 1 to 2.\n"
+        "Quality and confidence are relative to the best grasp of this file."
+    )
 
 
 def flow(value: Any) -> str:
