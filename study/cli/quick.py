@@ -101,7 +101,7 @@ def objects_text(folder: ObjectFolder, out: Path, ranks: int) -> str:
         need, free = max(needs for _, needs in planned), free_bytes(out / "index.hdf")
         rows |= {
             "cases": f"about {cases:.0f}",
-            "disk": f"about {space / 1e6:.3g} MB in {out}" + f", {free / 1e9:.1f} GB free" * (free >= 0),
+            "disk": f"about {space / 1e6:.3g} MB in {out}, {free / 1e9:.1f} GB free",
             "memory": f"roughly {need / 1e9:.1g} GB on each rank, {need * ranks / 1e9:.2g} GB on {ranks}",
             "time": f"about {duration(START_S + preparing + solving)} on {ranks} rank{'s' * (ranks > 1)}, "
             f"{duration(preparing)} of it for sampling grasps; estimated on a bed of springs",

@@ -288,7 +288,7 @@ def row_of(result: Any) -> Row:
         return row | {"state": index.FAILED if failed.any() and not done.any() else index.NO_GRASP}
     at = ds.attrs["best"]
     k, best = at[-1], int(np.ravel_multi_index(at[:-1], status.shape[:-1]))
-    maps = {name: name for name in ("payload", "opening", "e_n", "quality", "payload_error") if name in ds}
+    maps = [name for name in ("payload", "opening", "e_n", "quality", "payload_error") if name in ds]
     row |= {name: float(values_of(ds, name)[at]) for name in maps}
     row |= {"force": float(ds.normal_force.values[k]), "best": best, "grasps": int(usable[..., k].sum())}
     return row | {"state": index.SOME_FAILED if failed.any() else index.DONE}

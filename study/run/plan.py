@@ -155,13 +155,12 @@ def plan_text(plan: Plan, scene: Any, path: Path, ranks: int) -> str:
     symmetric = f", {shared} candidates are images of others by symmetry" if shared else ""
     shapes = layout.rows * 24 * AROUND * ALONG / 1e6 if "wall" in layout.has else 0.0
     space = f"{layout.nbytes / 1e6:.1f} MB in {path}" + f", {shapes:.1f} MB of it deformed walls" * bool(shapes)
-    free = free_bytes(path)
     rows = {
         "cases": f"{layout.rows} = {' x '.join(map(str, layout.shape))} ({', '.join(layout.names)})",
         "units": f"{len(plan.units)} load paths of {forces} forces{symmetric}",
         "no grasp": _no_grasps(plan),
         "rounds": _rounds(plan, scene),
-        "disk": f"{space}, {free / 1e9:.1f} GB free" if free >= 0 else space,
+        "disk": f"{space}, {free_bytes(path) / 1e9:.1f} GB free",
         "memory": f"roughly {each / 1e9:.1g} GB on each rank, {each * ranks / 1e9:.2g} GB on {ranks}",
         "time": _time(plan, scene, path, ranks),
         "ranks": f"up to {ranks_busy} are busy at least 80 % of the time",
@@ -216,12 +215,9 @@ def _estimated_time(plan: Plan, scene: Any, ranks: int) -> str:
 
 
 def free_bytes(path: Path) -> int:
-    """Free space of the disk on which a file will be made [bytes]; -1 where that is not known."""
+    """Free space of the disk on which a file will be made [bytes]."""
     # The folder of the result is made later: the nearest one that exists tells the disk.
-    for folder in path.absolute().parents:
-        if folder.is_dir():
-            return shutil.disk_usage(folder).free
-    return -1
+    return shutil.disk_usage(next(folder for folder in path.absolute().parents if folder.is_dir())).free
 
 
 def wall_unknowns(scene: Any) -> tuple[int, int]:
