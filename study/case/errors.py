@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from softjaw.study.case.contact import Contact
 from softjaw.study.case.evaluate import LIMITS, EvaluationSettings, overestimates, quality
 from softjaw.study.case.task import payload_alone
-from softjaw.study.quantities import BY_KEY, TABLE, Quantity
+from softjaw.study.quantities import TABLE, Quantity
 
 # The error as a share of what two meshes, and views of the coarser one, are apart (`estimate`); and the floor: a share
 # of the value that falls with the number of elements that bear, less where sums over all faces tell it and more where
@@ -43,8 +43,8 @@ def mesh_errors(
     coarse mesh that differ too, ``floor`` is a share of the value, `WIDER` for some, and ``left_out`` one of every
     value. ``doubt`` is how many times the distances of meshes count.
     """
-    fine_mesh, coarse_mesh = _on_mesh(values, fine), _on_mesh(other, coarse) | _grasp(coarse, settings)
-    viewed = [_sums(view) | _grasp(view, settings) for view in views]
+    fine_mesh, coarse_mesh = _on_mesh(values, fine), _on_mesh(other, coarse) | grasp_values(coarse, settings)
+    viewed = [_sums(view) | grasp_values(view, settings) for view in views]
     compared = [[_all(contacts, settings) for contacts in pair] for pair in pairs]
     errors = {}
     for q in (q for q in TABLE if q.error and q.key in coarse_mesh):
@@ -74,7 +74,7 @@ def coarse_errors(
     ``values`` are the case's own, ``left_out`` the share of the pressure sum that friction which acted back would add.
     """
     solved = _on_mesh(values, contacts)
-    viewed = [_sums(view) | _grasp(view, settings) for view in views]
+    viewed = [_sums(view) | grasp_values(view, settings) for view in views]
     share, errors = COARSE_FLOOR + OF_TRACTION * left_out, {}
     for q in (q for q in TABLE if q.error and q.key in viewed[0]):
         apart = max(distance(solved[q.key], view[q.key], q.error) for view in viewed)
@@ -85,22 +85,6 @@ def coarse_errors(
 def _size(q: Quantity, value: ArrayLike) -> float:
     """What a share of a value is in the unit of its error."""
     return 1.0 if q.error == "relative" else float(np.max(np.abs(value)))
-
-
-def error_of(
-    name: str, fine: Sequence[Contact], coarse: Sequence[Contact], views: Sequence[Sequence[Contact]],
-    settings: EvaluationSettings, pairs: Sequence[tuple[Sequence[Any], Sequence[Any]]] = (), floor: float = 0.0,
-    doubt: float = 1.0,
-) -> float:  # fmt: skip
-    """Error of one quantity, ``e_n``, ``quality`` or ``payload``, as `mesh_errors` has it."""
-    key = f"maps/{name}"
-
-    def value(contacts: Sequence[Contact]) -> ArrayLike:
-        return _sums(contacts)[key] if name == "e_n" else _grasp(contacts, settings)[key]
-
-    kind = BY_KEY[key].error
-    error = doubt * estimate(value(fine), value(coarse), [value(view) for view in views], kind)
-    return error + floor + sum(distance(value(before), value(after), kind) for before, after in pairs)
 
 
 def estimate(fine: ArrayLike, coarse: ArrayLike, views: Sequence[ArrayLike], kind: str) -> float:
@@ -128,7 +112,7 @@ def distance(value: ArrayLike, other: ArrayLike, kind: str) -> float:
 def _all(contacts: Sequence[Any], settings: EvaluationSettings) -> dict[str, Any]:
     """All values that contacts alone tell."""
     closing = np.mean([c.state.closing for c in contacts])
-    return _on_mesh({"maps/closing": closing}, contacts) | _grasp(contacts, settings)
+    return _on_mesh({"maps/closing": closing}, contacts) | grasp_values(contacts, settings)
 
 
 def _on_mesh(values: Mapping[str, Any], contacts: Sequence[Contact]) -> dict[str, Any]:
@@ -139,7 +123,7 @@ def _on_mesh(values: Mapping[str, Any], contacts: Sequence[Contact]) -> dict[str
     return curved | _sums(contacts) | faces
 
 
-def _grasp(contacts: Sequence[Contact], settings: EvaluationSettings) -> dict[str, Any]:
+def grasp_values(contacts: Sequence[Contact], settings: EvaluationSettings) -> dict[str, Any]:
     """Quality of the ellipsoids and payload ``(1,)`` in the curved model."""
     values = {"maps/quality": quality(contacts, settings)}
     values |= payload_alone(contacts, settings.surface.samples, settings.task)

@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from itertools import islice, repeat
 from typing import Any, NamedTuple, TypeVar
 
@@ -21,7 +20,7 @@ from softjaw.fem.objects.gap import Pose
 from softjaw.fem.petsc import Seconds
 from softjaw.study.case.build import build_object, forces_apart, has_wall, pad_elements
 from softjaw.study.case.contact import Contact
-from softjaw.study.case.errors import DOUBTED, edge_floor, error_of
+from softjaw.study.case.errors import DOUBTED, edge_floor, grasp_values, mesh_errors
 from softjaw.study.case.evaluate import settings_of
 from softjaw.study.case.model import approach
 from softjaw.study.case.pressing import OnRigid, OnWall, PressedContact, pressing, refuse_along_axis
@@ -62,11 +61,6 @@ class Solution:
     def views(self) -> list[tuple[Contact, ...]]:
         """Contacts of the same pressures at Gauss points, and at nodes."""
         return list(zip(*(c.views for c in self.contacts), strict=True))
-
-    @cached_property
-    def wall_values(self) -> dict[str, Any]:
-        """What the wall bears, keyed as in ``study.quantities``."""
-        return self.fingers.wall_values(self.states)
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,13 +197,13 @@ class CandidateSolver:
 
     def error(self, solved: Solved) -> float:
         """Relative error of the quantity that ``accuracy.target`` is for; NaN where there is one mesh alone."""
-        fine, coarse, name = solved.fine, solved.coarse, self.scene.accuracy.target_of
+        fine, coarse = solved.fine.contacts, solved.coarse
         if coarse is None:
             return math.nan
         settings = settings_of(self.scene, build_object(self.scene.object))
-        return error_of(
-            name, fine.contacts, coarse.contacts, coarse.views, settings, solved.pairs, solved.floor, solved.doubt
-        )
+        values, apart = grasp_values(fine, settings), (coarse.views, solved.pairs, solved.floor)
+        errors = mesh_errors(fine, coarse.contacts, values, {}, settings, *apart, doubt=solved.doubt)
+        return errors[f"maps/{self.scene.accuracy.target_of}_error"]
 
     def _refined(self, solved: Solved, k: int, levels: Levels, left_out: float) -> Solved:
         """The case as it is where its error is surely below the target, else on further meshes.
