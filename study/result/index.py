@@ -9,6 +9,7 @@ from __future__ import annotations
 import io
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -107,16 +108,13 @@ def _texts(values: Sequence[str]) -> Any:
 
 def read_index(path: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows and attributes of an index."""
-    file: StoredFile = opened(path, "index of objects", _checked)
-    try:
+    with closing(opened(path, "index of objects", _checked)) as file:
         values: dict[str, list[Any]] = {"object": file.texts("object")}
         for name, (kind, *_) in COLUMNS.items():
             values[name] = file.texts(name) if kind is str else file.values(name).tolist()
         if len({len(column) for column in values.values()}) != 1:
             raise file.damaged("columns of different lengths", "run the scene again")
         return [dict(zip(values, row, strict=True)) for row in zip(*values.values(), strict=True)], file.attributes()
-    finally:
-        file.close()
 
 
 def _checked(file: StoredFile) -> StoredFile:

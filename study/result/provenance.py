@@ -63,8 +63,7 @@ def versions(mpi_library: str) -> str:
             known.append(f"{name} {getattr(sys.modules[name], '__version__', '?')}")
     if "petsc4py.PETSc" in sys.modules:
         known.append(f"PETSc {'.'.join(map(str, sys.modules['petsc4py.PETSc'].Sys.getVersion()))}")
-    if "h5py" in sys.modules:
-        known.append(f"HDF5 {sys.modules['h5py'].version.hdf5_version}")
+    known.append(f"HDF5 {sys.modules['h5py'].version.hdf5_version}")
     blas = getattr(getattr(np, "__config__", None), "CONFIG", {}).get("Build Dependencies", {}).get("blas", {})
     threads = os.environ.get("OMP_NUM_THREADS", "all")
     known.append(f"BLAS {blas.get('name', '?')} {blas.get('version', '')} ({threads} threads)")

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import closing, contextmanager
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -62,21 +63,6 @@ class Result:
         # With a wrong header, the sums of the rows would be looked for in the wrong places.
         if not unchecked and str(checksums.of_header(file, self.layout)) != file.attributes(ROOT).get("checksum"):
             raise self._damaged("axes, layout, scene or definitions do not match their checksum")
-
-    def __enter__(self) -> Result:
-        """The file is open; whatever numbers it holds, no warning of numpy is worth printing."""
-        self._quiet: Any = np.errstate(all="ignore")
-        self._quiet.__enter__()
-        return self
-
-    def __exit__(self, *error: Any) -> None:
-        """Close the file."""
-        self._quiet.__exit__(*error)
-        self.close()
-
-    def close(self) -> None:
-        """Close the file."""
-        self.file.close()
 
     def read(self, path: str) -> np.ndarray:
         """A dataset by its path below ``/study`` (``e_n/pcm``), or the key of its quantity (``checks/adhesion``)."""
@@ -246,13 +232,17 @@ def _other_version(path: Path, version: str) -> str:
     return f"{path}: its layout has version {version or 'none'}, expected {VERSION}; take the softjaw that wrote it"
 
 
-def open_result(path: str | Path, unchecked: bool = False) -> Result:
+@contextmanager
+def open_result(path: str | Path, unchecked: bool = False) -> Iterator[Result]:
     """A result file for reading, also while a run is writing it; raise `StudyError` if it is none.
 
     ``unchecked`` reads what is there, whether it matches its checksums or not.
     """
     path = Path(path)
-    return opened(path, "result file", lambda file: Result(path, file, unchecked))
+    result: Result = opened(path, "result file", lambda file: Result(path, file, unchecked))
+    # whatever numbers it holds, no warning of numpy is worth printing
+    with closing(result.file), np.errstate(all="ignore"):
+        yield result
 
 
 def torn_rows(path: Path, layout: Layout) -> list[int]:

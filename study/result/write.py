@@ -81,19 +81,15 @@ class ResultWriter:
         if self._code[self._index(row)] == MISSING:  # not one that has the values of a coarser mesh
             self._sums[(*self._index(row), -1)] = checksums.OF_STATE[MISSING]
 
-    def write(self, row: int, values: Sequence[np.ndarray]) -> None:
-        """Store a solved case; ``values`` as from ``record``."""
-        self._store(row, values, DONE)
-
     def fail(self, row: int, message: str, state: int = FAILED, seconds: float = math.nan) -> None:
         """Store why a case has no result: it failed after ``seconds``, or is one of `study.quantities.NO_GRASP`.
 
         One that has the values of a coarser mesh keeps them, with the message.
         """
         if self._wanted is not None and self._code[self._index(row)] == DONE:
-            self._store(row, self._kept(row, message), DONE)
+            self.write(row, self._kept(row, message))
         else:
-            self._store(row, blank(self.layout, message, seconds), state)
+            self.write(row, blank(self.layout, message, seconds), state)
 
     def _kept(self, row: int, message: str) -> list[np.ndarray]:
         """The stored values of a row, tried on the mesh that is wanted, with one more message."""
@@ -104,7 +100,8 @@ class ResultWriter:
         values[-1] = np.array(text_bytes("; ".join(filter(None, (known, NOT_FINER + message))), MESSAGE_BYTES))
         return values
 
-    def _store(self, row: int, values: Sequence[np.ndarray], state: int) -> None:
+    def write(self, row: int, values: Sequence[np.ndarray], state: int = DONE) -> None:
+        """Store a case; ``values`` as from ``record``."""
         index = self._index(row)
         # A complete case is final, unless a finer mesh is wanted: readers that look on must not see it change.
         if self._code[index] == DONE:

@@ -136,5 +136,5 @@ def test_a_file_that_hdf5_breaks_on_is_refused(tmp_path):
     content = bytearray(path.read_bytes())
     content[1000:3000] = b"\xff" * 2000
     path.write_bytes(content)
-    with pytest.raises(StudyError, match=r"a\.hdf"):
-        open_result(path)
+    with pytest.raises(StudyError, match=r"a\.hdf"), open_result(path):
+        pass

@@ -248,8 +248,8 @@ def test_a_result_that_does_not_fit_is_a_bug_a_full_disk_told_and_only_an_own_fi
 def test_a_file_of_another_kind_is_refused_when_it_is_opened(path, spoil):
     with h5py.File(path, "r+") as file:
         spoil(file)
-    with pytest.raises(StudyError) as caught:
-        open_result(path)
+    with pytest.raises(StudyError) as caught, open_result(path):
+        pass
     assert caught.value.code == OTHER_FILE
 
 
@@ -258,8 +258,8 @@ def test_what_is_no_hdf5_file_is_refused(path, kind):
     path.unlink()
     if kind != "missing":
         path.write_text("" if kind == "empty" else "station,e_n\n1,2\n")
-    with pytest.raises(StudyError) as caught:
-        open_result(path.parent if kind == "folder" else path)
+    with pytest.raises(StudyError) as caught, open_result(path.parent if kind == "folder" else path):
+        pass
     assert caught.value.code == OTHER_FILE
 
 
