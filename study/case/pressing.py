@@ -177,10 +177,8 @@ class OnRigid:
     ) -> None:
         self.scene, self.fingers = scene, fingers
         first, second = poses
-        if turn_of_pose(first, second, scene.object.axis_symmetry) is not None:
-            self.image: tuple[int, int] | None = (1, 1)
-        else:
-            self.image = image_signs(fingers[0], fingers[1], scene.gripper.pad_size)
+        alike = turn_of_pose(first, second, scene.object.axis_symmetry) is not None
+        self.image = (1, 1) if alike else image_signs(fingers[0], fingers[1], scene.gripper.pad_size)
         self.parts = [press_of(scene, finger, coarser, stride) for finger in (fingers[:1] if self.image else fingers)]
         self.fingers_solved, self.planes = 2, min(sum(part.pad.symmetry) for part in self.parts)
 

@@ -115,12 +115,8 @@ def clearance(points: FloatArray, corners: FloatArray) -> float:
     >>> clearance(np.array([[3.0, 0, 0], [0, 5, 4]]), np.array([[[-1.0, -1, -1], [1, 1, 1]]]))
     2.0
     """
-    least = np.inf
-    for low, high in corners:
-        outside = np.maximum(low - points, points - high)
-        distance = np.linalg.norm(np.maximum(outside, 0.0), axis=1) + np.minimum(outside.max(axis=1), 0.0)
-        least = min(least, float(distance.min()))
-    return least
+    outside = np.maximum(corners[:, :1] - points, points - corners[:, 1:])
+    return float((np.linalg.norm(np.maximum(outside, 0.0), axis=-1) + np.minimum(outside.max(axis=-1), 0.0)).min())
 
 
 def clearest(
