@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -93,8 +93,9 @@ class StoredFile:
             raise self.damaged(f"{path}: {why(error)}") from error
 
 
-def opened(path: Path, kind: str, make: Callable[[StoredFile], Any]) -> Any:
-    """What ``make`` makes of a file, which stays open.
+@contextmanager
+def opened(path: Path, kind: str, make: Callable[[StoredFile], Any]) -> Iterator[Any]:
+    """What ``make`` makes of a file, which is open within the ``with``.
 
     `StudyError` if the file cannot be read as a file of this ``kind``, or another program holds it.
     """
@@ -111,15 +112,13 @@ def opened(path: Path, kind: str, make: Callable[[StoredFile], Any]) -> Any:
             text = f"{path}: another program holds it open for writing; close it there"
             raise StudyError(IN_USE, text) from error
         raise StudyError(OTHER_FILE, f"{path}: {_why_not(path, kind, error)}") from error
-    try:
-        return make(file)
-    except BROKEN as error:
-        file.close()
-        text = f"{path}: not a {kind} of softjaw ({why(error)}); choose another file"
-        raise StudyError(OTHER_FILE, text) from error
-    except StudyError:
-        file.close()
-        raise
+    with closing(file):
+        try:
+            made = make(file)
+        except BROKEN as error:
+            text = f"{path}: not a {kind} of softjaw ({why(error)}); choose another file"
+            raise StudyError(OTHER_FILE, text) from error
+        yield made
 
 
 def _why_not(path: Path, kind: str, error: Exception) -> str:

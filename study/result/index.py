@@ -9,7 +9,6 @@ from __future__ import annotations
 import io
 import math
 from collections.abc import Mapping, Sequence
-from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -108,7 +107,7 @@ def _texts(values: Sequence[str]) -> Any:
 
 def read_index(path: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows and attributes of an index."""
-    with closing(opened(path, "index of objects", _checked)) as file:
+    with opened(path, "index of objects", _checked) as file:
         values: dict[str, list[Any]] = {"object": file.texts("object")}
         for name, (kind, *_) in COLUMNS.items():
             values[name] = file.texts(name) if kind is str else file.values(name).tolist()

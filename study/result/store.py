@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -52,9 +52,8 @@ class Result:
         if root.get("program") != PROGRAM:
             raise ValueError("it does not name its program")
         # Before the layout: an older one need not have what is read below.
-        self.version = root.get("layout_version", "")
-        if self.version != str(VERSION):
-            raise StudyError(OTHER_FILE, _other_version(path, self.version))
+        if (version := root.get("layout_version", "")) != str(VERSION):
+            raise StudyError(OTHER_FILE, _other_version(path, version))
         self.layout = layout_of(self._string("layout"))
         self.header = header_of(self._string("header"), self.scene)
         self.axes, self.title, self.digest = self.layout.axes, printable(self.header.title), self.header.digest
@@ -239,9 +238,8 @@ def open_result(path: str | Path, unchecked: bool = False) -> Iterator[Result]:
     ``unchecked`` reads what is there, whether it matches its checksums or not.
     """
     path = Path(path)
-    result: Result = opened(path, "result file", lambda file: Result(path, file, unchecked))
     # whatever numbers it holds, no warning of numpy is worth printing
-    with closing(result.file), np.errstate(all="ignore"):
+    with opened(path, "result file", lambda file: Result(path, file, unchecked)) as result, np.errstate(all="ignore"):
         yield result
 
 

@@ -288,13 +288,10 @@ class Session:
 
 def finish_alone(work: Work, path: Path, plan: Plan, session: int, name: str) -> int:
     """`finish` by a process that has the file for itself; the exit code."""
-    writer = ResultWriter(path, plan.layout, MPI.COMM_SELF, plan.wanted)
-    writer.session = session
-    try:
+    with contextlib.closing(ResultWriter(path, plan.layout, MPI.COMM_SELF, plan.wanted)) as writer:
+        writer.session = session
         finish(work, writer, name)
         return code_of(writer.codes())
-    finally:
-        writer.close()
 
 
 def finish(work: Work, writer: ResultWriter, name: str) -> None:
@@ -333,9 +330,8 @@ def _end_all(comm: Any, claims: Claims, error: StudyError) -> None:
 def _progress(objects: Iterable[Iterable[Any]], codes: np.ndarray, ranks: int) -> Progress:
     weights = np.ones(codes.size)
     for unit in chain.from_iterable(objects):
-        for rows in unit.rows:
-            # A unit costs the same however many candidates it serves, so they share its weight.
-            weights[list(rows)] = unit.cost / max(len(rows) * len(unit.rows), 1) or 1.0
+        # A unit costs the same however many candidates it serves, so they share its weight.
+        weights[np.array(unit.rows)] = unit.cost / np.size(unit.rows) or 1.0
     # Under mpirun every rank's output claims to be a terminal, also when it goes to a file.
     launched = ranks > 1 or any(name.startswith(("OMPI_", "PMIX_", "PMI_")) for name in os.environ)
     return Progress(weights, codes, sys.stdout, live=not launched and sys.stdout.isatty())
