@@ -171,9 +171,7 @@ def usable_symmetry(scene: Scene, finger: Finger, elements: tuple[int, int, int]
     # a coarser mesh for error estimates takes what it can use
     if elements == scene.gripper.elements:
         require_planes(wanted, sum(usable))
-    if wanted == "half" and all(usable):
-        return False, True
-    return usable
+    return (False, True) if wanted == "half" and all(usable) else usable
 
 
 def require_planes(wanted: str, planes: int) -> None:
@@ -198,10 +196,15 @@ def contact_rules(scene: Scene, walled: bool) -> tuple[str, ...]:
     return (chosen,) if chosen == "nodal" else (chosen, "nodal")
 
 
+def pads_of(scene: Scene, symmetry: tuple[bool, bool], coarser: bool) -> list[Pad]:
+    """Pad for a rigid object, and those for where it has no solution."""
+    return [pad_of(scene, symmetry, rule, coarser) for rule in contact_rules(scene, walled=False)]
+
+
 def press_of(scene: Scene, finger: Finger, coarser: bool, stride: int = 1) -> Press:
     """Pad on its object, with friction where the scene wants it to act back."""
     symmetry = usable_symmetry(scene, finger, pad_shape(scene.gripper, coarser).elements)
-    wanted, *others = (pad_of(scene, symmetry, rule, coarser) for rule in contact_rules(scene, walled=False))
+    wanted, *others = pads_of(scene, symmetry, coarser)
     mu = scene.friction.mu if scene.effects.friction_pressure_coupling == "tangential" else None
     return Press(wanted, finger.gap, dict(scene.petsc), others, mu, stride=stride)
 

@@ -17,7 +17,7 @@ from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.fem.objects.gap import NoContactError
 from softjaw.fem.objects.measured_face import cell_of, measured_face
 from softjaw.friction.patch import NEGLIGIBLE, ContactPatch, FloatArray
-from softjaw.study.case.model import contact_rules, pad_of
+from softjaw.study.case.model import pads_of
 from softjaw.study.messages import SOME_FAILED, USAGE, Problem, StudyError
 from softjaw.study.patch.faces import ReadPatch, refuse
 from softjaw.study.patch.patch_reader import Reading, checked_file, refused, si_columns, split_header, table_rows
@@ -38,8 +38,7 @@ def solve_deformed(file: str, unit: str | None, scene: Scene) -> ReadPatch:
         face = measured_face(points, cell_of(scene.gripper.pad_size, scene.gripper.elements))
     except ValueError as error:
         raise StudyError(USAGE, f"{file}: {error}; measure more of the face") from error
-    rules = contact_rules(scene, walled=False)
-    wanted, *others = (pad_of(scene, (False, False), rule, False) for rule in rules)
+    wanted, *others = pads_of(scene, (False, False), coarser=False)
     try:
         measured = MeasuredPress(wanted, others, dict(scene.petsc)).solve(face)
     except NoContactError as error:
