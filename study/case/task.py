@@ -53,17 +53,18 @@ def payload_values(
     found errs on the safe side, with 500 samples by 2 % (median of 40 grasps) to 4 % (one in ten is farther off).
     """
     payloads = [_payload(contacts, [fit[m].wrench for fit in fits], task) for m in MODELS]
-    mass = np.array([f.force for f in payloads]) / GRAVITY
-    values = {"maps/payload": mass.tolist()}
-    if task.mass is not None:
-        values["maps/safety_factor"] = (mass / task.mass).tolist()
-    return values, Flag(0) if payloads[0].borne else Flag.NOT_BORNE
+    return _maps(np.array([f.force for f in payloads]), task), Flag(0) if payloads[0].borne else Flag.NOT_BORNE
 
 
-def payload_alone(contacts: Sequence[Contact], samples: int, task: Task) -> dict[str, float]:
+def payload_alone(contacts: Sequence[Contact], samples: int, task: Task) -> dict[str, Any]:
     """The maps of `payload_values` in the curved model, from so many sampled motions and no fit."""
     wrenches = [sampled_wrenches(c, MODELS[0], samples)[1][:samples] for c in contacts]
-    mass = _payload(contacts, wrenches, task).force / GRAVITY
+    return _maps(_payload(contacts, wrenches, task).force, task)
+
+
+def _maps(force: Any, task: Task) -> dict[str, Any]:
+    """Mass and safety factor by the weight that is held [N]."""
+    mass = force / GRAVITY
     return {"maps/payload": mass} | ({} if task.mass is None else {"maps/safety_factor": mass / task.mass})
 
 
