@@ -164,13 +164,10 @@ def surface_values(contacts: Sequence[Contact], fits: Sequence[Mapping[str, Surf
         sixes = [six_ellipsoid(c.local, c.rho, c.unit_limits["ccm"].S) for c in contacts]
         for name, part in zip(("matrix_6d", "rank_6d", "fit_error_6d"), zip(*sixes, strict=True), strict=True):
             values[f"limit_surface/{name}"] = list(part)
-    return values | {
-        "limit_surface/rho": [b.rho for b in curved],
-        "maps/fit_error": np.max([b.fit_error.Erad for b in curved]),
-        "maps/fit_error_ellipsoid": np.max([b.fit_error_ellipsoid.Erad for b in curved]),
-        "maps/overclaim": np.max([b.overclaim for b in curved]),
-        "maps/overclaim_ellipsoid": np.max([b.overclaim_ellipsoid for b in curved]),
-    }
+    for kind in ("", "_ellipsoid"):
+        values[f"maps/fit_error{kind}"] = np.max([getattr(b, f"fit_error{kind}").Erad for b in curved])
+        values[f"maps/overclaim{kind}"] = np.max([getattr(b, f"overclaim{kind}") for b in curved])
+    return values | {"limit_surface/rho": [b.rho for b in curved]}
 
 
 def six_ellipsoid(patch: ContactPatch, rho: float, S: float) -> tuple[FloatArray, int, FitErrors]:

@@ -147,11 +147,9 @@ class PathSolver:
     def _fail(self, unit: Any, pending: Pending, message: str, seconds: float) -> None:
         """Note what failed, and take it from what is pending: the lowest force, and those above that depend on it."""
         self._begun = []
-        failed = {k: pending[k] for k in ([min(pending)] if unit.apart else pending)}
+        failed = {k: pending.pop(k) for k in ([min(pending)] if unit.apart else [*pending])}
         with self._state.writing():
             fail_from(self._files, failed, message, NOT_TRIED, seconds)
-        for k in failed:
-            del pending[k]
 
     def _count(self, pending: dict[int, list[tuple[int, int]]]) -> None:
         rows = [row for _, row in pending[min(pending)]]

@@ -67,8 +67,7 @@ class Plan:
             return None
         wanted = np.zeros(self.layout.rows, int)
         for unit in self.units:
-            for rows in unit.rows:
-                wanted[list(rows)] = unit.finest or 0
+            wanted[np.array(unit.rows)] = unit.finest or 0
         return wanted
 
     @property
@@ -150,14 +149,13 @@ def plan_text(plan: Plan, scene: Any, path: Path, ranks: int) -> str:
     """Cases, units, disk, memory and time on so many ranks."""
     layout = plan.layout
     each, ranks_busy = memory(scene), sensible_ranks(plan.in_parts([unit.cost for unit in plan.tried]))
-    forces = layout.shape[-1]
     shared = plan.served - len(plan.units)
     symmetric = f", {shared} candidates are images of others by symmetry" if shared else ""
     shapes = layout.rows * 24 * AROUND * ALONG / 1e6 if "wall" in layout.has else 0.0
     space = f"{layout.nbytes / 1e6:.1f} MB in {path}" + f", {shapes:.1f} MB of it deformed walls" * bool(shapes)
     rows = {
         "cases": f"{layout.rows} = {' x '.join(map(str, layout.shape))} ({', '.join(layout.names)})",
-        "units": f"{len(plan.units)} load paths of {forces} forces{symmetric}",
+        "units": f"{len(plan.units)} load paths of {layout.shape[-1]} forces{symmetric}",
         "no grasp": _no_grasps(plan),
         "rounds": _rounds(plan, scene),
         "disk": f"{space}, {free_bytes(path) / 1e9:.1f} GB free",

@@ -21,10 +21,8 @@ def duration(seconds: float) -> str:
     >>> duration(6660.0), duration(75.0), duration(0.2)
     ('1 h 51 min', '1 min 15 s', '0.2 s')
     """
-    if seconds < 10:
-        return f"{seconds:.1f} s"
     if seconds < 60:
-        return f"{seconds:.0f} s"
+        return f"{seconds:.{int(seconds < 10)}f} s"
     minutes, rest = divmod(round(seconds), 60)
     if minutes < 60:
         return f"{minutes} min {rest} s"

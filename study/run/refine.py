@@ -102,8 +102,6 @@ def _cases(result: Any, values: np.ndarray) -> np.ndarray:
 
 def gained(values: FloatArray, before: int) -> float:
     """By which share the poses after the first ``before`` are better than those, in the column where that is most."""
-    if before >= len(values):
-        return 0.0
     old, new = (np.fmax.reduce(part, axis=0, initial=0.0) for part in (values[:before], values[before:]))
     with np.errstate(divide="ignore", invalid="ignore"):
         return max(0.0, float(np.nan_to_num(new / old - 1.0, nan=0.0, posinf=np.inf).max(initial=0.0)))

@@ -72,11 +72,9 @@ def next_poses(result: Any, values: FloatArray, scene: Scene, each: int) -> tupl
     cannot be used. ``scene``: as it was before any round. ``each``: cases of a pose.
     """
     where, rounds = scene.candidates, result.layout.added
-    if where.refine is None:
-        return ()
     given = len(values) - sum(map(len, rounds))
     added = np.moveaxis(result.status.reshape(-1, *result.layout.shape[-3:]), 1, 0)[given:]
-    left = (where.refine - int(np.sum(~np.isin(added, NO_GRASP)))) // each
+    left = ((where.refine or 0) - int(np.sum(~np.isin(added, NO_GRASP)))) // each
     share = rounds[-1][0][0] if rounds else 1.0
     while left > 0 and share >= FINEST_STEP_SHARE:
         if poses := _neighbours(scene, rounds, values, share):
