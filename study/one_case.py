@@ -174,8 +174,7 @@ def solved_case(
     if scene.petsc:
         check_petsc(dict(scene.petsc))
     row = number * len(scene.load.normal_force_n) + k
-    served = ((u, c) for u in units(scene) for c, rows in enumerate(u.rows) if row in rows)
-    unit, c = next(served)
+    unit, c = next((u, c) for u in units(scene) for c, rows in enumerate(u.rows) if row in rows)
     place, what = unit.served[c], f"{unit.served[c].label}, {scene.load.normal_force_n[k]:g} N"
     unit = decided([unit])[0]
     if unit.state:

@@ -166,8 +166,7 @@ class JawsOnSurface:
     @property
     def contacts(self) -> list[Contact]:
         """Both contacts where they lie on the object."""
-        turns = np.eye(3), np.diag([1.0, -1.0, -1.0])
-        frames = [self.axes @ turn for turn in turns]
+        frames = [self.axes @ turn for turn in (np.eye(3), np.diag([1.0, -1.0, -1.0]))]
         return [
             side.contact(Pose(axes, self.point + side.touch * axes[:, 2]))
             for side, axes in zip(self.sides, frames, strict=True)

@@ -191,8 +191,7 @@ class CandidateSolver:
     @property
     def seconds(self) -> Seconds:
         """Where the time of all solves so far has gone."""
-        spent = [part.solver.seconds for fingers in self._pressing.values() for part in fingers.parts]
-        spent.append(self._spent)
+        spent = [self._spent, *(p.solver.seconds for fingers in self._pressing.values() for p in fingers.parts)]
         return Seconds(*(sum(getattr(s, name) for s in spent) for name in ("assembly", "factorisation", "total")))
 
     def error(self, solved: Solved) -> float:

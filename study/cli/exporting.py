@@ -24,9 +24,8 @@ from softjaw.study.result.read import open
 from softjaw.study.units import in_si
 
 TABLES = {"csv": as_csv, "json": as_json}
-PLANNERS: dict[str, Callable[..., str]] = {
-    "isaac_grasp": partial(as_yaml, "isaac_grasp"), "graspgen": as_graspgen, "moveit": partial(as_yaml, "moveit"),
-}  # fmt: skip
+PLANNERS: dict[str, Callable[..., str]] = {form: partial(as_yaml, form) for form in ("isaac_grasp", "moveit")}
+PLANNERS["graspgen"] = as_graspgen
 SIMULATORS = {"mjcf": as_mjcf, "sdf": as_sdf, "physx": as_usd}
 DATA_SETS = ("acronym", "webdataset")  # of folders alone
 

@@ -155,8 +155,7 @@ class Layout:
         parts = {"finger": FINGERS, "model": len(MODELS), "component": 3, "monomial": len(MONOMIALS)}
         parts |= {"session": MOST_SESSIONS, "component_2": 3}
         parts |= {"wrench": 6, "wrench_2": 6} if "six components" in self.has else {}
-        if "wall" in self.has:
-            parts["wall_place"] = AROUND * ALONG
+        parts |= {"wall_place": AROUND * ALONG} if "wall" in self.has else {}
         return {**parts, **({"face": self.faces} if self.faces else {})}
 
     @cached_property

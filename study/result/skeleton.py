@@ -277,8 +277,8 @@ def groups(layout: Layout) -> dict[str, dict[str, Any]]:
     at = [f"{axis.name} {shown_text(axis.values[i], axis.units, 5)}" for axis, i in others]
     title = ", ".join(["grasp map, curved contact model", *at])
     first = {"signal": FIRST[0], "auxiliary_signals": list(FIRST[1:]), "title": title}
-    attributes: dict[str, dict[str, Any]] = {"map": plot | first | {"axes": axes_of(layout, layout.shown)}}
-    del attributes["map"]["default_slice"]
+    shown = {"NX_class": "NXdata", "axes": axes_of(layout, layout.shown)}
+    attributes: dict[str, dict[str, Any]] = {"map": shown | first}
     for q in layout.quantities:
         if q.group != "maps" or q.of:
             continue

@@ -140,8 +140,7 @@ class EllipticCylinderShape(Shape):
 
     def _geometry(self) -> tuple[int, dict[str, Span]]:
         a, b, half = self.semi_axis_a_mm, self.semi_axis_b_mm, self.length_mm / 2
-        symmetry = 0 if self.semi_axis_a_mm == self.semi_axis_b_mm else 2
-        return symmetry, {"x": (-a, a), "y": (-b, b), "z": (-half, half)}
+        return 0 if a == b else 2, {"x": (-a, a), "y": (-b, b), "z": (-half, half)}
 
 
 class BoxShape(Shape):
