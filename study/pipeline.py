@@ -19,7 +19,7 @@ from softjaw.fem.petsc import Seconds
 from softjaw.study.case.build import build_object, forces_apart, own_frame, pad_shape
 from softjaw.study.case.contact import of_fingers, on_faces
 from softjaw.study.case.effects import COUPLING, SCREENED, EffectChoice, settled
-from softjaw.study.case.errors import coarse_errors, mesh_errors
+from softjaw.study.case.errors import coarse_errors
 from softjaw.study.case.evaluate import EvaluationSettings, evaluate, settings_of
 from softjaw.study.case.pressing import state_flags
 from softjaw.study.case.result import CaseFailure, CaseResult
@@ -127,11 +127,7 @@ def _result(
     if contacts[0].state.wall is not None:
         values["maps/flags"] |= wall_flags(scene, contacts[0].state, values)
     if coarse:
-        other = _state_values(coarse)
-        values |= mesh_errors(
-            contacts, coarse.contacts, values, other, settings, coarse.views, solved.pairs,
-            solved.floor, choice.skipped_share(k), solved.doubt,
-        )  # fmt: skip
+        values |= solved.errors(values, _state_values(coarse), settings, choice.skipped_share(k))
         # only where every case has a target: without one the sums at the end say how many cases miss the usual one
         if (target := scene.accuracy.target) is not None and not unit.finest:
             error = values[f"maps/{scene.accuracy.target_of}_error"]

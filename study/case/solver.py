@@ -9,7 +9,7 @@ on each other, or on who asks first. A state, or the failure that stands for it,
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice, repeat
 from typing import Any, NamedTuple, TypeVar
@@ -21,7 +21,7 @@ from softjaw.fem.petsc import Seconds
 from softjaw.study.case.build import build_object, forces_apart, has_wall, pad_elements
 from softjaw.study.case.contact import Contact
 from softjaw.study.case.errors import DOUBTED, edge_floor, grasp_values, mesh_errors
-from softjaw.study.case.evaluate import settings_of
+from softjaw.study.case.evaluate import EvaluationSettings, settings_of
 from softjaw.study.case.model import approach
 from softjaw.study.case.pressing import OnRigid, OnWall, PressedContact, pressing, refuse_along_axis
 from softjaw.study.case.result import surely_below
@@ -84,15 +84,14 @@ class Solved:
         """That on the next coarser mesh, which tells the error."""
         return self.meshes[1] if len(self.meshes) > 1 else None
 
-    @property
-    def floor(self) -> float:
-        """Share of a value that meshes can agree on by luck."""
-        return edge_floor(self.fine.contacts)
-
-    @property
-    def doubt(self) -> float:
-        """How many times distances of meshes count as error."""
-        return DOUBTED if any(contact.coarse for contact in self.fine.contacts) else 1.0
+    def errors(
+        self, values: Mapping[str, Any], other: Mapping[str, Any], settings: EvaluationSettings, left_out: float = 0.0
+    ) -> dict[str, float]:
+        """Errors of the values of a case that has a coarser mesh; see `mesh_errors`."""
+        fine, coarse = self.fine.contacts, self.meshes[1]
+        floor, doubt = edge_floor(fine), DOUBTED if any(contact.coarse for contact in fine) else 1.0
+        solved = fine, coarse.contacts, values, other, settings, coarse.views, self.pairs
+        return mesh_errors(*solved, floor, left_out, doubt)
 
 
 def followed(
@@ -196,12 +195,10 @@ class CandidateSolver:
 
     def error(self, solved: Solved) -> float:
         """Relative error of the quantity that ``accuracy.target`` is for; NaN where there is one mesh alone."""
-        fine, coarse = solved.fine.contacts, solved.coarse
-        if coarse is None:
+        if solved.coarse is None:
             return math.nan
         settings = settings_of(self.scene, build_object(self.scene.object))
-        values, apart = grasp_values(fine, settings), (coarse.views, solved.pairs, solved.floor)
-        errors = mesh_errors(fine, coarse.contacts, values, {}, settings, *apart, doubt=solved.doubt)
+        errors = solved.errors(grasp_values(solved.fine.contacts, settings), {}, settings)
         return errors[f"maps/{self.scene.accuracy.target_of}_error"]
 
     def _refined(self, solved: Solved, k: int, levels: Levels, left_out: float) -> Solved:
