@@ -171,7 +171,7 @@ def row_writes(layout: Layout) -> tuple[float, float, str]:
     """Time that the writes of a case take from its rank, and from the file system [s], and what they are, in words."""
     columns = layout.columns
     # besides its values: begun, checksums, state
-    size, writes = sum(int(np.prod(c.shape)) * c.dtype.itemsize for c in columns), len(columns) + 3
+    size, writes = sum(int(np.prod(c.share)) * c.dtype.itemsize for c in columns), len(columns) + 3
     text = f"{writes} writes of {size / 1e3:.3g} kB together, {1e3 * WRITE_S:g} ms each"
     return WRITE_S * writes, max(writes / WRITES_PER_S, size / BYTES_PER_S), text
 

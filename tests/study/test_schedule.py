@@ -10,7 +10,7 @@ import pytest
 from softjaw.fem.objects.shapes import Sphere
 from softjaw.study.quantities import DONE, MISSING, SLIPS, WIDE
 from softjaw.study.run import estimate
-from softjaw.study.run.estimate import FIRST_FORCE_FACTOR, estimated, heights, scaled, unit_seconds
+from softjaw.study.run.estimate import FIRST_FORCE_FACTOR, estimated, heights, row_writes, scaled, unit_seconds
 from softjaw.study.run.load_path import settle
 from softjaw.study.run.plan import Plan, make_plan
 from softjaw.study.run.progress import Progress
@@ -138,6 +138,11 @@ def test_times_follow_from_costs_and_each_limit_of_many_ranks_is_where_its_close
     assert scaled(seconds, served, 64, 0.1, 0.1) == (pytest.approx(256 * 0.1), "file system")
     assert scaled(seconds, served, 128, 0.0, 0.0) == (pytest.approx(4.0), "longest load path")
     assert scaled(seconds, served, 60, 0.0, 0.0) == (pytest.approx(8.0), "division of load paths")
+
+
+def test_what_a_case_writes_does_not_grow_with_the_study():
+    few, many = (make_plan(scene_of(OVAL, f"load.normal_force_n={forces}")).layout for forces in ([1], [1, 2, 3]))
+    assert row_writes(few) == row_writes(many)
 
 
 def test_a_case_that_an_earlier_run_left_out_is_missing_once_it_is_asked_for():
