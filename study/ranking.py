@@ -144,11 +144,10 @@ class Sure:
 
 def sure(ds: xr.Dataset, name: str, k: int) -> Sure | None:
     """A map (CCM) of all candidates at a force level; None where a file knows no error of it."""
-    if name not in ds:
-        return None
-    values, error, samples = values_of(ds, name)[..., k].ravel(), stated_error(ds, name), ds.get(f"{name}_samples")
+    error, samples = stated_error(ds, name), ds.get(f"{name}_samples")
     if error is None and samples is None:
         return None
+    values = values_of(ds, name)[..., k].ravel()
     of_mesh = np.zeros(values.shape) if error is None else error[..., k].ravel()
     inputs = np.zeros((len(values), 1)) if samples is None else samples.values[..., k, :].reshape(len(values), -1)
     return Sure(values, of_mesh, inputs)
@@ -188,8 +187,6 @@ def ranked(ds: xr.Dataset, k: int, by: str | None = None) -> IntArray:
     name = score_of(ds, by)
     score, flags = rank_values(ds, name, k), judged(ds)[..., k].ravel()
     order, errors = done[ranking(score[done], flags[done])], sure(ds, name, k)
-    if not len(order):
-        return order
     places, group, head = _places(score), np.zeros(len(order), np.int64), 0
     for n, i in enumerate(order):
         first, lost = order[head], flags[[order[head], i]] & LOST > 0

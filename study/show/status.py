@@ -78,8 +78,7 @@ def status_table(result: Any) -> Table:
         rows.append(where | {"state": STATES[int(result.status[index])]})
     counts = {name.replace(" ", "_"): int(np.sum(result.status == code)) for code, name in enumerate(STATES)}
     facts: Row = {"file": str(result.path), "running": holder(result.path) or None, **counts}
-    facts |= {"largest_error": largest_stated_error(result), "waiting": waits(result)}
-    facts["sessions"] = list(result.sessions)
+    facts |= {"largest_error": largest_stated_error(result), "waiting": waits(result), "sessions": result.sessions}
     notes = [reason.text(axes, result.labels) for reason in reasons_in(result)]
     return Table(result.title, columns, rows, notes, facts, "cases")
 
