@@ -219,11 +219,9 @@ def view_of(ds: xr.Dataset, candidate: int | None, where: Place, force: float | 
 
 def _check_station(ds: xr.Dataset, station: float | None) -> None:
     """Refuse a station [m] that lies farther off the map than the map's stations lie apart: it has another unit."""
-    places = np.sort(ds.station.values)
-    if station is None:
-        return
-    if max(places[0] - station, station - places[-1]) > max(np.diff(places), default=0.0) + 1e-9:
-        known = listed((1e3 * places).tolist(), "mm")
+    z = np.sort(ds.station.values)
+    if station is not None and max(z[0] - station, station - z[-1]) > max(np.diff(z), default=0.0) + 1e-9:
+        known = listed((1e3 * z).tolist(), "mm")
         raise StudyError(USAGE, f"--at: found {1e3 * station:.6g} mm, expected a station of this file: {known}")
 
 

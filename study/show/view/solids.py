@@ -244,7 +244,6 @@ def _pads_file(view: View, force: int) -> pv.PolyData | None:
     sizes = [pad.pressure.size for *_, pad in pads]
     faces.cell_data["candidate"] = np.repeat([c for c, *_ in pads], sizes)
     faces.cell_data["finger"] = np.repeat([finger for _, finger, _ in pads], sizes)
-    for name in ("pressure", "area"):
-        faces.cell_data[name] = np.concatenate([getattr(pad, name).ravel() for *_, pad in pads])
-    faces.cell_data["normal"] = np.concatenate([pad.normal.reshape(-1, 3) for *_, pad in pads])
+    for name in ("pressure", "area", "normal"):
+        faces.cell_data[name] = np.concatenate([getattr(p, name).reshape(p.pressure.size, -1) for *_, p in pads])
     return faces
