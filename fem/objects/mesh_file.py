@@ -140,7 +140,8 @@ def _declared(path: Path, kind: str, data: bytes) -> tuple[int, int]:
     numbers = [re.findall(pattern, data, re.MULTILINE) for pattern in DECLARED[kind]]
     if kind == ".obj":
         return len(numbers[0]), len(numbers[1])
-    points, faces = (int(values[0]) if values and values[0][:15].isdigit() else 0 for values in numbers)
+    # fifteen digits are too many already, and what follows them need not be digits
+    points, faces = (int(values[0][:15]) if values and values[0][:15].isdigit() else 0 for values in numbers)
     return points, faces
 
 

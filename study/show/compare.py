@@ -10,7 +10,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from softjaw.study.case.result import TIE
-from softjaw.study.messages import USAGE, StudyError
+from softjaw.study.messages import OTHER_FILE, USAGE, StudyError
 from softjaw.study.quantities import TABLE, map_row
 from softjaw.study.ranking import FloatArray, falling
 from softjaw.study.result.layout import DONE
@@ -34,6 +34,10 @@ def compare(one: xr.Dataset, other: xr.Dataset, quantity: str = "e_n", model: st
     or an unknown quantity.
     """
     axes, pair = _matched(one, other)
+    try:
+        changed = changes(one.scene, other.scene)
+    except ValueError as error:
+        raise StudyError(OTHER_FILE, f"{one.file}, {other.file}: a stored scene cannot be read ({error})") from error
     in_a, in_b = (ds.status.values == DONE for ds in pair)
     states = {"solved in both": in_a & in_b, "only in a": in_a & ~in_b, "only in b": ~in_a & in_b,
               "in neither": ~in_a & ~in_b}  # fmt: skip
@@ -58,7 +62,7 @@ def compare(one: xr.Dataset, other: xr.Dataset, quantity: str = "e_n", model: st
                 Column("error", units, "errors", digits=2, people=judged),
                 Column("beyond_error", "", "exceeds\nerrors", people=judged)]  # fmt: skip
     facts = {"files": {"a": str(one.file), "b": str(other.file)}, "axes": axes,
-             "settings": [{"key": key, "a": a, "b": b} for key, a, b in changes(one.scene, other.scene)],
+             "settings": [{"key": key, "a": a, "b": b} for key, a, b in changed],
              "states": {words: int(cases.sum()) for words, cases in states.items()}, "quantity": quantity,
              "summary": [_summary(name, _values(pair, name, model)) for name in names
                          if map_row(name).rank or name == quantity]}  # fmt: skip

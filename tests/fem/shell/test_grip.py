@@ -50,7 +50,8 @@ def test_quarter_half_and_full_give_the_same(mu):
             assert len(b.fingers) == (1 if allowed[0] else 2)
             for finger in b.fingers:
                 assert finger.closing == pytest.approx(a.fingers[0].closing, rel=1e-7)
-                assert e_n(finger) == pytest.approx(e_n(a.fingers[0]), rel=1e-6)
+                # whether a point at the edge of the contact held on before is decided by rounding, on either mesh
+                assert e_n(finger) == pytest.approx(e_n(a.fingers[0]), rel=1e-4 if mu else 1e-6)
             np.testing.assert_allclose(b.wall.reaction, a.wall.reaction, atol=1e-7)
 
 
