@@ -79,9 +79,11 @@ class Press(LoadPath[RigidProblem]):
 
     def _keeps_laws(self, x: FloatArray) -> bool:
         """Whether an iterate that no solve has ended at keeps all laws of contact to `ALTERNATING`."""
-        residual = self.problem.residual(x)[: self.pad.closing_dof + 1]
         # vinewtonrsls has another residual, which says nothing of pressures at their bounds
-        if self.problem.complementarity or not np.isfinite(residual).all():
+        if self.problem.complementarity:
+            return False
+        residual = self.problem.residual(x)[: self.pad.closing_dof + 1]
+        if not np.isfinite(residual).all():
             return False
         if not (force := self.problem.normal_force(x)) > 0.0:
             return False

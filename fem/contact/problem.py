@@ -7,7 +7,7 @@ per node of the contact face, with ``kappa = E / thickness`` so that all unknown
     R_u     = r_int(u) - int N_a (p n - t) dA                 p = sum N_i p_i, t: friction that acts back, if any
     R_delta = force on the backing plate - F                  (force)
               s (mean closing - its goal), and the difference of both plates' forces   (closing displacement)
-    R_l     = kappa min(A_i l_i, G_i)                         G_i = int N_i g dA   (active set)
+    R_l     = kappa [A_i l_i - max(0, A_i l_i - G_i)]         G_i = int N_i g dA   (active set)
               kappa G_i   with   l_i >= 0                     (complementarity)
 
 All rows are forces [N].  ``A_i = int N_i dA``, all integrals are over the reference area, and ``p`` is the nominal
@@ -251,7 +251,8 @@ class ContactProblem(ABC):
             force = -np.einsum("qa,fqi->fia", f.pad.face_N, (c.load @ f.R).reshape(*f.pad.face_area.shape, 3))
             R[f.unknowns] = inner + gather(f.local_dofs, force, f.pad.size)
             # zero where pressure or gap is and the other is not negative
-            smaller = np.minimum(f.area * x[f.pressures], c.weighted)
+            pressed = f.area * x[f.pressures]
+            smaller = pressed - np.maximum(0.0, pressed - c.weighted)
             # vinewtonrsls keeps the pressures at their bounds itself; it needs the gap alone
             R[f.pressures] = f.kappa * (c.weighted if self.complementarity else smaller)
         self._active_set = np.concatenate([c.active for c in contacts])
