@@ -134,11 +134,7 @@ def changes(theirs: str, ours: str) -> list[tuple[str, Any, Any]]:
 
 def _values(text: str) -> dict[str, Any]:
     """Values by dotted key, without those that change no result."""
-    try:
-        tables = tomllib.loads(text)
-    except RecursionError as error:  # no `SceneError`: whoever asks names the file
-        raise ValueError("nested too deeply") from error
-    values = flat({name: table for name, table in tables.items() if name != "run"})
+    values = flat({name: table for name, table in parse_toml(text, "scene").items() if name != "run"})
     for pose in values.get("candidates.poses", ()):
         # Labels name candidates and change no result.
         pose.pop("label", None)
