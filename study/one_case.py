@@ -12,10 +12,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softjaw.fem.objects.gap import Pose
-from softjaw.friction.patch import ContactPatch
+from softjaw.friction.patch import ContactPatch, FloatArray
 from softjaw.friction.wrench import FrictionLimits
 from softjaw.lsfit.surface import LimitSurface
 from softjaw.study import pipeline
@@ -31,7 +30,6 @@ from softjaw.study.quantities import BY_KEY, MAIN, MODELS, STATES, TABLE, checke
 from softjaw.study.scene import Scene
 from softjaw.study.units import converted, shown_text
 
-FloatArray = NDArray[np.float64]
 READY = 4  # candidates whose matrices are kept for further forces: 10 to 100 MB each
 SAME = {"rel_tol": 1e-9, "abs_tol": 1e-12}  # stations [m], angles [deg] and forces [N] that are the scene's own
 

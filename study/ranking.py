@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from softjaw.fem.objects.gap import IntArray
 from softjaw.friction.patch import FloatArray
 from softjaw.study.case.reach import FREE, clearest, hand_axes, opened, refused
 from softjaw.study.case.result import TIE
@@ -24,7 +24,6 @@ from softjaw.study.quantities import DONE, LEAST_FORCE, LISTED
 from softjaw.study.result.read import at_force, half_width, scene_of, stated_error, values_of
 from softjaw.study.scene.text import scene_table
 
-IntArray = NDArray[np.int64]
 LARGEST = "the largest solved"
 MIN_ROLL_COSINE = math.cos(math.radians(30.0))  # pads rolled by more are another place
 

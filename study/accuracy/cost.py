@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from softjaw.friction.patch import FloatArray
 from softjaw.study import pictures
 from softjaw.study.case.build import has_wall
 from softjaw.study.quantities import BY_KEY
@@ -17,7 +17,6 @@ from softjaw.study.result.read import axes_of, values_of
 from softjaw.study.scene import Scene, parse_scene
 from softjaw.study.table import aligned
 
-FloatArray = NDArray[np.float64]
 FINENESS = (0.5, 0.7, 1.0, 1.4)  # elements per direction over those of the scene
 WALL_SIZES = (2.0, 1.0, 0.7)  # of a wall's elements, over those of the scene
 REPRESENTATIVE = 3  # candidates, and forces, that stand for all

@@ -13,17 +13,14 @@ from functools import cached_property
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 from scipy.spatial import QhullError
 
-from softjaw.fem.objects.gap import Pose
-from softjaw.friction.patch import ContactPatch, NoContactError
+from softjaw.fem.objects.gap import IntArray, Pose
+from softjaw.friction.patch import ContactPatch, FloatArray, NoContactError
 from softjaw.study.case.contact import Contact, angle
 from softjaw.study.case.fit import Jaws, bed_closing
 from softjaw.study.case.task import Task, payload_alone
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 GRID = (25, 11)  # points of a pad's face along length and width
 CRUSHED = 0.25  # strain of the bed at its highest pressure that leaves half of a grasp
 MOTIONS = 50  # slip motions whose wrenches bound what a contact on springs carries

@@ -13,7 +13,6 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softjaw.fem.objects.gap import Pose
 from softjaw.friction.patch import NEGLIGIBLE
@@ -34,7 +33,6 @@ from softjaw.study.quantities import MISSING, REALISATION, Axis
 from softjaw.study.scene import Scene
 from softjaw.study.units import UNITS, in_si, split_unit
 
-FloatArray = NDArray[np.float64]
 MOST_NAMED = 5  # poses that a message names
 
 

@@ -19,7 +19,7 @@ from scipy import ndimage
 from softjaw.fem.objects.gap import Pose
 from softjaw.fem.pad.shape import PadShape
 from softjaw.friction.frame import Frame, contact_frame, contact_length, in_frame
-from softjaw.friction.patch import NEGLIGIBLE, ContactPatch
+from softjaw.friction.patch import NEGLIGIBLE, ContactPatch, FloatArray
 from softjaw.friction.wrench import FrictionLimits, friction_limits, pure_torque
 from softjaw.lsfit.ellipsoid import Ellipsoid, three_motion_ellipsoid
 from softjaw.scoring.contact import SoftContact
@@ -27,7 +27,6 @@ from softjaw.study.case.result import UNDECIDED
 from softjaw.study.flags import Flag, raised
 from softjaw.study.quantities import MODELS, RIMS
 
-FloatArray = NDArray[np.float64]
 X_OF_PAD = np.array([1.0, 0.0, 0.0])  # the contact frame's x axis follows the pad's long side
 ANTIPODAL = np.radians(5.0)  # beyond this misalignment a flag says so
 

@@ -12,8 +12,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from softjaw.friction.patch import FloatArray
 from softjaw.lsfit.quartic import Quartic
 from softjaw.lsfit.surface import LimitSurface
 from softjaw.scoring.closed_form import volume_linf
@@ -30,7 +31,6 @@ from softjaw.study.scene import Scene
 from softjaw.study.scene.sections import LimitSurfaceKeys as Choice
 from softjaw.study.units import in_si
 
-FloatArray = NDArray[np.float64]
 FACING = math.radians(0.5)  # misalignment up to which the closed form is off by less than 1e-4
 EPSILON_GAP = 1e-2  # relative gap between the bounds of epsilon
 LIMITS = (("f_x", "f_x_max"), ("f_y", "f_y_max"), ("tau_z", "tau_z_max"))  # attribute, quantity

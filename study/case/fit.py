@@ -13,13 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from softjaw.fem.objects.gap import IntArray
+from softjaw.friction.patch import FloatArray
 from softjaw.study.quantities import COLLIDES, MISSING, WIDE
 from softjaw.study.scene import Scene
 from softjaw.study.scene.sections import Gripper
 from softjaw.study.units import shown_text
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 DIGITS = 4  # of lengths in messages
 
 

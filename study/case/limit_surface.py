@@ -11,10 +11,9 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softjaw.friction.motion import fibonacci_twists
-from softjaw.friction.patch import ContactPatch
+from softjaw.friction.patch import ContactPatch, FloatArray
 from softjaw.friction.wrench import friction_wrench
 from softjaw.lsfit.ellipsoid import Ellipsoid, axis_aligned_ellipsoid, full_ellipsoid, three_motion_ellipsoid
 from softjaw.lsfit.quartic import Quartic
@@ -26,7 +25,6 @@ from softjaw.study.case.contact import Contact
 from softjaw.study.flags import Flag
 from softjaw.study.scene.sections import LimitSurfaceKeys as Choice
 
-FloatArray = NDArray[np.float64]
 INDEPENDENT = 377  # motions that a fit is judged by and does not see
 SIX_MOTIONS = 2048  # motions that a 6-D ellipsoid is fitted to
 # attributes of a fit that are stored for each friction model

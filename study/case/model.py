@@ -7,7 +7,6 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softjaw.fem.contact.press import Press
 from softjaw.fem.materials import Material, material
@@ -17,14 +16,13 @@ from softjaw.fem.pad.backing_plate import relative_compliance
 from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.pad.shape import BackingPlate, TiltingMount
 from softjaw.fem.petsc import PETSc, unknown_options
-from softjaw.friction.patch import NEGLIGIBLE
+from softjaw.friction.patch import NEGLIGIBLE, FloatArray
 from softjaw.study.case.build import pad_shape
 from softjaw.study.case.fit import extremes
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.scene import Scene
 from softjaw.study.scene.sections import Gripper
 
-FloatArray = NDArray[np.float64]
 MIRRORED = 2e-5  # of the pad's length, to which images agree: files are of single precision, e_n moves by less
 STEPS_BACK = (0.1, 0.4, 1.6)  # of the pad's thickness: where it stands before it is brought to the smooth surface
 ROUNDED_OFF = 2e-5  # so far a smooth surface may lie behind the triangles it is made of where a pad touches first [m]

@@ -7,16 +7,14 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softjaw.fem.objects.gap import Pose
-from softjaw.friction.patch import NEGLIGIBLE
+from softjaw.friction.patch import NEGLIGIBLE, FloatArray
 from softjaw.study.scene.grasps import GraspPose
 
 if TYPE_CHECKING:
     from softjaw.fem.objects.centre_line import CentreLine
 
-FloatArray = NDArray[np.float64]
 STANDOFF = 5.0  # distance of a pad's origin from the point it is aimed at [m]; the press closes it to first touch
 
 

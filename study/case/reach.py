@@ -12,14 +12,13 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from softjaw.friction.patch import FloatArray
 from softjaw.study.case.build import own_frame, surface_triangles
 from softjaw.study.case.result import TIE
 from softjaw.study.grippers import APPROACHES, Hand
 from softjaw.study.units import shown_text
 
-FloatArray = NDArray[np.float64]
 OPENED_MORE = 0.02  # the fingers open beyond first touch before a grasp [m]
 WAY = 0.1  # of approach and retreat [m]
 FREE = 1e-3  # clearance [m] from which a hand and an object are apart, of points that are 2 mm apart

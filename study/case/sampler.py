@@ -14,10 +14,10 @@ from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from softjaw.fem.objects.gap import IntArray
 from softjaw.fem.objects.mesh_object import MeshObject
-from softjaw.friction.patch import NoContactError
+from softjaw.friction.patch import FloatArray, NoContactError
 from softjaw.study.case.bed import JawsOnSurface, Side, grips, held
 from softjaw.study.case.build import build_object, listed_accuracy, own_frame, surface_triangles
 from softjaw.study.case.contact import slips
@@ -30,8 +30,6 @@ from softjaw.study.messages import USAGE, NoGraspError
 from softjaw.study.quantities import COLLIDES, MISSING, SLIPS, STATES, WIDE
 from softjaw.study.scene import Scene
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 SAMPLES = 300  # points of the surface from which grasps are looked for
 TURNS = 4  # rounds of setting a grasp straight; most end after two
 STRAIGHT = math.radians(0.5)  # tilt between two rounds that ends them

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from softjaw.friction.patch import FloatArray
 from softjaw.scoring.contact import PolytopeBody
 from softjaw.scoring.payload import Payload, payload
 from softjaw.study.case.build import centre_of_mass, own_frame
@@ -18,8 +19,6 @@ from softjaw.study.flags import Flag
 from softjaw.study.quantities import MODELS
 from softjaw.study.scene import Scene
 from softjaw.study.units import GRAVITY
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,6 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softjaw.fem.contact.path import Pressed
 from softjaw.fem.errors import CheckError
@@ -15,6 +14,7 @@ from softjaw.fem.shell.element import Shell
 from softjaw.fem.shell.thin_walled import Grasp, ThinWalled, object_factors
 from softjaw.fem.shell.wall_mesh import MeshSize
 from softjaw.fem.shell.wall_model import faces
+from softjaw.friction.patch import FloatArray
 from softjaw.study.case.build import outer_surface
 from softjaw.study.case.geometry import material_of
 from softjaw.study.case.result import UNDECIDED, surely_below
@@ -23,7 +23,6 @@ from softjaw.study.quantities import ALONG, AROUND
 from softjaw.study.scene import Scene
 from softjaw.study.scene.objects import Walled
 
-FloatArray = NDArray[np.float64]
 DENTED_SHARE = 0.2  # of the object's half width between the fingers, beyond which an indentation is told by a flag
 ESTIMATE = MeshSize(0.004, 0.006, 0.012)  # mesh of the estimate that the level is chosen by
 

@@ -14,13 +14,13 @@ import xarray as xr
 from numpy.typing import NDArray
 from trimesh import Trimesh
 
+from softjaw.friction.patch import FloatArray
 from softjaw.study.case.build import build_object, centre_of_mass, own_frame, surface_triangles
 from softjaw.study.messages import OTHER_FILE, StudyError
 from softjaw.study.result.read import axes_of
 from softjaw.study.result.read import scene_of as scene_at
 from softjaw.study.scene import Scene, SceneError
 
-FloatArray = NDArray[np.float64]
 DENSITY = 1000.0  # of an object without `object.mass_g` [kg/m^3], as simulators have it
 
 

@@ -21,9 +21,9 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from softjaw.friction.patch import FloatArray
 from softjaw.study.case.reach import FREE, OPENED_MORE, clearest, hand_axes, opened, refused
 from softjaw.study.export.cases import cases
 from softjaw.study.export.rigid_body import scene_of
@@ -36,7 +36,6 @@ from softjaw.study.result.read import axes_of, maps_in
 from softjaw.study.result.store import place_text
 from softjaw.study.units import shown, shown_text
 
-FloatArray = NDArray[np.float64]
 COMMENT = 100  # characters in a line of a comment
 
 

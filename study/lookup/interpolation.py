@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import maximum_filter
 
-from softjaw.friction.patch import NEGLIGIBLE
-from softjaw.study.ranking import FloatArray, IntArray
+from softjaw.fem.objects.gap import IntArray
+from softjaw.friction.patch import NEGLIGIBLE, FloatArray
 
 CLAIM_FACTOR = 1.75  # between estimate and claim: with less, less than 95 % of the errors stay within it
 CLOSING_GAP_RATIO = 1.5  # a gap that closes a circle may be this much wider than the others

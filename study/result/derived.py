@@ -8,15 +8,15 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from softjaw.friction.patch import FloatArray
 from softjaw.study.case.build import geometry
 from softjaw.study.case.candidates import axes
 from softjaw.study.case.result import UNDECIDED
 from softjaw.study.quantities import FORCE_RANGE, Quantity
 from softjaw.study.scene import Scene
 
-FloatArray = NDArray[np.float64]
 LOW, HIGH = FORCE_RANGE
 LOW_ERROR = f"{LOW}_error"
 

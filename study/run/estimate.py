@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softjaw.friction.patch import FloatArray
 from softjaw.study.case.build import surface_triangles
 from softjaw.study.case.candidates import meshes_cost
 from softjaw.study.case.fit import bed_closing, doubt, heights_over, jaws_of
@@ -28,7 +29,6 @@ from softjaw.study.result.store import open_result
 from softjaw.study.run.progress import duration
 from softjaw.study.run.shares import makespan
 
-FloatArray = NDArray[np.float64]
 FACE_GRID = (13, 7)  # points of a pad's face
 # Measured on cylinders, boxes, bottles and meshes of 64 to 2304 solved elements, CPU time of one core of 2024.
 CASE, ELEMENT = 0.03, 2.5e-4  # seconds of a force: friction, fits and score; contact, for each trilinear element

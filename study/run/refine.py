@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from softjaw.friction.patch import FloatArray
 from softjaw.study.case.poses import pose_of
 from softjaw.study.case.result import UNDECIDED
 from softjaw.study.flags import LOST
@@ -23,7 +24,6 @@ from softjaw.study.result.layout import is_case
 from softjaw.study.scene import Scene
 from softjaw.study.scene.grasps import GraspPose
 
-FloatArray = NDArray[np.float64]
 Rounds = tuple[tuple[Any, ...], ...]  # as `study.result.layout.Layout.rounds`
 Place = tuple[float, ...]  # share of the first step, then point [mm], approach and long side, as a scene gives them
 STEEPER_SLOPE = 1.5  # how much steeper a score may be than its slopes between stations show

@@ -20,8 +20,8 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from softjaw.friction.patch import FloatArray
 from softjaw.study import ranking
 from softjaw.study.case.bed import JawsOnSurface, grips, held
 from softjaw.study.case.build import build_object, own_frame, shapes_of, surface_triangles
@@ -38,7 +38,6 @@ from softjaw.study.run.refine import Place, gained, next_stations, scores_of_pos
 from softjaw.study.scene import Scene
 from softjaw.study.scene.grasps import GraspPose
 
-FloatArray = NDArray[np.float64]
 Case = tuple[int, int, int]  # numbers of the point of a sweep, of the candidate and of the force
 Frame = tuple[FloatArray, FloatArray]  # a point [m]; long side, short side and approach as columns
 FIRST_STEP_SHARE = 0.25  # first step of a shift, of the pad's side

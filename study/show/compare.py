@@ -9,10 +9,11 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from softjaw.friction.patch import FloatArray
 from softjaw.study.case.result import TIE
 from softjaw.study.messages import OTHER_FILE, USAGE, StudyError
 from softjaw.study.quantities import TABLE, map_row
-from softjaw.study.ranking import FloatArray, falling
+from softjaw.study.ranking import falling
 from softjaw.study.result.layout import DONE
 from softjaw.study.result.read import axes_of, stated_error, values_of
 from softjaw.study.scene.text import changes, value_text
