@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from softjaw.friction.patch import FloatArray
@@ -64,5 +65,14 @@ def shifted(index: IntArray, offset: int) -> IntArray:
 
 
 def gather(dofs: IntArray, values: FloatArray, size: int) -> FloatArray:
-    """Sum element values into a vector ``(size,)``; those of fixed unknowns (index -1) fall into a slot that is cut."""
-    return np.asarray(np.bincount(dofs.ravel() + 1, values.ravel(), size + 1)[1:], dtype=float)
+    """Sum element values into a vector ``(size,)``; those of fixed unknowns (index -1) are left out."""
+    out = np.zeros(size)
+    _add(dofs.ravel(), values.ravel(), out)
+    return out
+
+
+@njit(cache=True)
+def _add(dofs, values, out):
+    for k in range(dofs.size):
+        if dofs[k] >= 0:
+            out[dofs[k]] += values[k]

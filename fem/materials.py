@@ -22,28 +22,27 @@ from softjaw.friction.patch import FloatArray
 
 
 @njit(cache=True)
-def transposed_product(M, N):
-    """``M^T N`` of two 3 x 3 matrices, without a call to BLAS."""
-    out = np.empty((3, 3))
+def transposed_product(M, N, out):
+    """Write ``M^T N`` of two 3 x 3 matrices, without a call to BLAS."""
     for i in range(3):
         for j in range(3):
             out[i, j] = M[0, i] * N[0, j] + M[1, i] * N[1, j] + M[2, i] * N[2, j]
-    return out
 
 
 @njit(cache=True)
-def blatz_ko(F, B, J, par, P, A):
+def blatz_ko(F, B, J, par, P, A, work):
     """Foam of Blatz and Ko: ``W = G/2 (tr C^-1 + 2 J - 5)``, ``P = G (J F^-T - F^-T C^-1)``; ``par = [G]``."""
     G = par[0]
-    M = transposed_product(B.T, B.T)  # C^-1
-    D = transposed_product(B, M)
+    M, D, N = work[0], work[1], work[2]
+    transposed_product(B.T, B.T, M)  # C^-1
+    transposed_product(B, M, D)
     for i in range(3):
         for j in range(3):
             P[i, j] = G * (J * B[j, i] - D[i, j])
     # a residual asks for the stress alone, and the tangent costs several times as much
     if A.size == 0:
         return
-    N = transposed_product(B, B)  # b^-1
+    transposed_product(B, B, N)  # b^-1
     for i in range(3):
         for j in range(3):
             for k in range(3):
@@ -55,7 +54,7 @@ def blatz_ko(F, B, J, par, P, A):
 
 
 @njit(cache=True)
-def neo_hookean(F, B, J, par, P, A):
+def neo_hookean(F, B, J, par, P, A, work):
     """Compressible neo-Hookean: ``W = G/2 (tr C - 3 - 2 ln J) + lam/2 (ln J)^2``; ``par = [G, lam]``."""
     G, lam = par[0], par[1]
     log_j = np.log(J)
@@ -73,7 +72,7 @@ def neo_hookean(F, B, J, par, P, A):
 
 
 @njit(cache=True)
-def linear(F, B, J, par, P, A):
+def linear(F, B, J, par, P, A, work):
     """Small-strain isotropic elasticity: ``P = lam tr(e) I + 2 G e``, ``e = sym F - I``; ``par = [G, lam]``."""
     G, lam = par[0], par[1]
     trace = F[0, 0] + F[1, 1] + F[2, 2] - 3.0
@@ -138,7 +137,7 @@ def principal(C):
 
 
 @njit(cache=True)
-def hyperfoam(F, B, J, par, P, A):
+def hyperfoam(F, B, J, par, P, A, work):
     """Storakers' hyperfoam in principal stretches ``l``; ``par = [nu, mu_1, alpha_1, mu_2, alpha_2, ...]``.
 
     ``W = sum 2 mu / alpha^2 [l_1^alpha + l_2^alpha + l_3^alpha - 3 + (J^(-alpha beta) - 1) / beta]`` with
@@ -146,7 +145,9 @@ def hyperfoam(F, B, J, par, P, A):
     """
     beta = par[0] / (1.0 - 2.0 * par[0])
     # rotations keep eigenvectors at right angles also where stretches are nearly equal
-    c, V = principal(transposed_product(F, F))
+    C, FV, S = work[0], work[1], work[2]
+    transposed_product(F, F, C)
+    c, V = principal(C)
     stretch = np.sqrt(c)
     s, ds = np.zeros(3), np.zeros((3, 3))  # second Piola-Kirchhoff S_a and dS_a / dl_b
     for term in range((par.size - 1) // 2):
@@ -158,7 +159,7 @@ def hyperfoam(F, B, J, par, P, A):
             ds[a, a] += 2.0 * mu / alpha * ((alpha - 2.0) * power + 2.0 * volume) / (c[a] * stretch[a])
             for b in range(3):
                 ds[a, b] += 2.0 * mu * beta * volume / (c[a] * stretch[b])
-    FV = transposed_product(F.T, V)
+    transposed_product(F.T, V, FV)
     for i in range(3):
         for j in range(3):
             P[i, j] = FV[i, 0] * s[0] * V[j, 0] + FV[i, 1] * s[1] * V[j, 1] + FV[i, 2] * s[2] * V[j, 2]
@@ -166,7 +167,7 @@ def hyperfoam(F, B, J, par, P, A):
         return
     A[:] = 0.0
     VT = np.ascontiguousarray(V.T)
-    S = transposed_product(VT, VT * s.reshape(3, 1))
+    transposed_product(VT, VT * s.reshape(3, 1), S)
     shear = np.zeros((3, 3))
     for a in range(3):
         for b in range(3):
@@ -195,16 +196,19 @@ def hyperfoam(F, B, J, par, P, A):
 
 
 @njit(cache=True)
-def stress(law, F, B, J, par, P, A):
-    """Write stress and tangent of the law with this number; numbers, not functions, let compiled code be cached."""
+def stress(law, F, B, J, par, P, A, work):
+    """Write stress and tangent of the law with this number; numbers, not functions, let compiled code be cached.
+
+    ``work (3, 3, 3)`` is overwritten: memory that is asked for at every point takes longer than what is done with it.
+    """
     if law == 0:
-        blatz_ko(F, B, J, par, P, A)
+        blatz_ko(F, B, J, par, P, A, work)
     elif law == 1:
-        hyperfoam(F, B, J, par, P, A)
+        hyperfoam(F, B, J, par, P, A, work)
     elif law == 2:
-        neo_hookean(F, B, J, par, P, A)
+        neo_hookean(F, B, J, par, P, A, work)
     else:
-        linear(F, B, J, par, P, A)
+        linear(F, B, J, par, P, A, work)
 
 
 @njit(cache=True)
@@ -235,6 +239,7 @@ def _elements(law, par, u, dN, w, nodes, r, K):
     """Residual and, where ``K`` has entries, tangent of every element; returns the smallest ``det F``."""
     tangent = K.size > 0
     F, B, P, T = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, nodes))
+    work = np.empty((3, 3, 3))
     A = np.empty((3, 3, 3, 3)) if tangent else np.empty((0, 0, 0, 0))
     smallest = np.inf
     for e in range(w.shape[0]):
@@ -245,7 +250,7 @@ def _elements(law, par, u, dN, w, nodes, r, K):
             g = dN[e, q]
             J = _gradient(u[e], g, nodes, F, B)
             smallest = min(smallest, J)
-            stress(law, F, B, J, par, P, A)
+            stress(law, F, B, J, par, P, A, work)
             # the node loop is innermost and contiguous, so that it becomes vector instructions
             dv = w[e, q]
             for i in range(3):
@@ -293,12 +298,13 @@ def strains(law, par, u, dN, directions):
     ``directions (k, 3)``: positive means strongly elliptic (no localisation), infinite that none is given.
     """
     F, B, P, A, C = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3, 3, 3)), np.empty((3, 3))
+    work = np.empty((3, 3, 3))
     smallest, largest, ellipticity = np.inf, 0.0, np.inf
     for e in range(dN.shape[0]):
         for q in range(dN.shape[1]):
             J = _gradient(u[e], dN[e, q], dN.shape[3], F, B)
             smallest = min(smallest, J)
-            C[:] = transposed_product(F, F)
+            transposed_product(F, F, C)
             # no principal stretch is farther from 1 than C is from the identity
             size2 = 0.0
             for i in range(3):
@@ -312,7 +318,7 @@ def strains(law, par, u, dN, directions):
             # one point per element: loss of ellipticity is a warning, and the tensor in many directions is dear
             if q > 0 or len(directions) == 0:
                 continue
-            stress(law, F, B, J, par, P, A)
+            stress(law, F, B, J, par, P, A, work)
             for m in directions:
                 for i in range(3):
                     for k in range(3):

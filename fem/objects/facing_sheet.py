@@ -18,12 +18,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from scipy.ndimage import distance_transform_edt, gaussian_filter, map_coordinates
+from scipy.ndimage import distance_transform_edt, gaussian_filter
 
 from softjaw.fem.objects.gap import Pose
 from softjaw.fem.objects.smooth_triangles import SmoothTriangles
-from softjaw.fem.objects.splines import PADDING, grid_coefficients
-from softjaw.fem.objects.triangle_tree import DEPTH, TriangleTree, first_hit
+from softjaw.fem.objects.splines import between
+from softjaw.fem.objects.triangle_tree import DEPTH, TriangleTree, first_hit, hits
 from softjaw.friction.patch import FloatArray
 
 CONE = np.radians(30.0)
@@ -49,7 +49,7 @@ def _seen(which, normals, sides, directions, spacing, rotation, origin, lower, u
     """
     corners, order, low, high, start, count = nodes
     stack, spot, y = np.empty(DEPTH, np.int64), np.empty(3), np.empty(3)
-    seen = np.zeros(len(which), np.int64)
+    seen, hides = np.zeros(len(which), np.int64), np.zeros(len(directions), np.int64)
     for m in range(len(which)):
         p, normal = corners[which[m]], normals[which[m]]
         longest = 0.0
@@ -81,9 +81,14 @@ def _seen(which, normals, sides, directions, spacing, rotation, origin, lower, u
                     # a line at a smaller sine to a triangle runs along it and does not see it
                     if sign * (normal * directions[k]).sum() > -0.01:
                         continue
+                    # what hid the spot before mostly hides this one, too
+                    if hides[k] != which[m] and 0.0 < hits(spot, -directions[k], corners[hides[k]]) < np.inf:
+                        continue
                     hit = first_hit(spot, -directions[k], 0.0, which[m], True, corners, order, low, high, start, count,
                                     stack)[1]  # fmt: skip
-                    if hit < 0:
+                    if hit >= 0:
+                        hides[k] = hit
+                    else:
                         seen[m] = sign * (2 if k == 0 else 1)
                         break
     return seen
@@ -122,8 +127,7 @@ class FacingSheet:
         part = (slice(None, None, COARSE),) * 3
         known = self.signed(x[part].reshape(-1, 3))[0].reshape(x[part].shape[:3])
         known = _with_shadows(known, COARSE * step, STAIRS / COARSE)
-        places = np.stack(np.meshgrid(*(PADDING + np.arange(n) / COARSE for n in x.shape[:3]), indexing="ij"))
-        g = map_coordinates(grid_coefficients(known), places, prefilter=False)
+        g = between(known, COARSE)
         # contact is decided near the sheet, so no sample is interpolated there
         near = np.abs(g) < 3 * step  # steps from the sheet within which every sample is taken
         g[near] = self.signed(x[near])[0]

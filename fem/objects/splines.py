@@ -98,18 +98,62 @@ def grid_coefficients(samples: FloatArray) -> FloatArray:
     return np.ascontiguousarray(spline_filter(extended, order=3, output=np.float64, mode="mirror"))
 
 
-def _weights(t: FloatArray) -> FloatArray:
-    """Cubic B-spline weights ``(n, 3, 3, 4)`` at ``t (n, 3)`` in [0, 1]: values, first and second derivatives."""
+def between(samples: FloatArray, parts: int) -> FloatArray:
+    """The spline through ``samples`` at their places and at ``parts - 1`` even ones between neighbours."""
+    values = grid_coefficients(samples)
+    for n in samples.shape:
+        # by one axis after the other, which goes to the end each time
+        rows, W = np.zeros((parts * (n - 1) + 1, n + 2 * PADDING)), np.empty((3, 4))
+        for k in range(len(rows)):
+            _weights(k / parts - k // parts, W)
+            rows[k, k // parts + PADDING - 1 : k // parts + PADDING + 3] = W[0]
+        values = np.tensordot(values, rows, (0, 1))
+    return values
+
+
+@njit(cache=True)
+def _weights(t, W):
+    """Cubic B-spline weights ``W (3, 4)`` at ``t`` in [0, 1]: values, first and second derivatives."""
     u = 1.0 - t
-    rows = [
-        [u**3 / 6, (4 - 6 * t**2 + 3 * t**3) / 6, (4 - 6 * u**2 + 3 * u**3) / 6, t**3 / 6],
-        [-(u**2) / 2, t * (3 * t - 4) / 2, -u * (3 * u - 4) / 2, t**2 / 2],
-        [u, 3 * t - 2, 3 * u - 2, t],
-    ]
-    return np.moveaxis(np.array(rows), (2, 3), (0, 1))
+    W[0] = u**3 / 6, (4 - 6 * t**2 + 3 * t**3) / 6, (4 - 6 * u**2 + 3 * u**3) / 6, t**3 / 6
+    W[1] = -(u**2) / 2, t * (3 * t - 4) / 2, -u * (3 * u - 4) / 2, t**2 / 2
+    W[2] = u, 3 * t - 2, 3 * u - 2, t
 
 
-ORDERS = np.eye(3, dtype=int)[:, None] + np.eye(3, dtype=int)  # of the derivatives along each axis in a Hessian
+@njit(cache=True)
+def _evaluate_grid(c, s, g, gradient, hessian):
+    """`evaluate_grid` at ``s (n, 3)`` in steps of the grid from its first sample; derivatives are by these, too."""
+    W, along_z, along_yz, D = np.empty((3, 3, 4)), np.empty((4, 3)), np.empty((4, 3, 3)), np.empty((3, 3, 3))
+    k = np.empty(3, np.int64)
+    for n in range(len(s)):
+        for d in range(3):
+            # a point on the last sample, or off the grid by rounding, belongs to the nearest cell
+            k[d] = min(max(int(np.floor(s[n, d])), 0), c.shape[d] - 2 * PADDING - 2)
+            _weights(s[n, d] - k[d], W[d])
+        # one axis at a time takes far fewer products than 64 weights for each of the ten values
+        first, second, third = k + (PADDING - 1)
+        for i in range(4):
+            for j in range(4):
+                for r in range(3):
+                    along_z[j, r] = 0.0
+                    for m in range(4):
+                        along_z[j, r] += W[2, r, m] * c[first + i, second + j, third + m]
+            for q in range(3):
+                for r in range(3 - q):
+                    along_yz[i, q, r] = 0.0
+                    for j in range(4):
+                        along_yz[i, q, r] += W[1, q, j] * along_z[j, r]
+        for p in range(3):
+            for q in range(3 - p):
+                for r in range(3 - p - q):
+                    D[p, q, r] = 0.0
+                    for i in range(4):
+                        D[p, q, r] += W[0, p, i] * along_yz[i, q, r]
+        g[n] = D[0, 0, 0]
+        gradient[n] = D[1, 0, 0], D[0, 1, 0], D[0, 0, 1]
+        hessian[n, 0] = D[2, 0, 0], D[1, 1, 0], D[1, 0, 1]
+        hessian[n, 1] = D[1, 1, 0], D[0, 2, 0], D[0, 1, 1]
+        hessian[n, 2] = D[1, 0, 1], D[0, 1, 1], D[0, 0, 2]
 
 
 def evaluate_grid(c: FloatArray, lower: FloatArray, step: float, x: FloatArray) -> Gap:
@@ -117,14 +161,7 @@ def evaluate_grid(c: FloatArray, lower: FloatArray, step: float, x: FloatArray) 
 
     ``c`` are padded coefficients, ``lower (3,)`` is the place of the first sample. The points must lie on the grid.
     """
-    n, s = len(x), (x - lower) / step
-    # a point on the last sample, or off the grid by rounding, belongs to the nearest cell
-    k = np.clip(np.floor(s).astype(int), 0, np.array(c.shape) - 2 * PADDING - 2)
-    near = k[:, :, None] + PADDING - 1 + np.arange(4)
-    cells = c[near[:, 0, :, None, None], near[:, 1, None, :, None], near[:, 2, None, None, :]]
-    w = _weights(s - k)
-    # one axis at a time takes far fewer products than 64 weights for each of the ten values
-    z = (cells.reshape(n, 16, 4) @ w[:, 2].swapaxes(1, 2)).reshape(n, 4, 4, 3)
-    D = (w[:, 0] @ (w[:, None, 1] @ z).reshape(n, 4, 9)).reshape(n, 3, 3, 3)
-    gradient, hessian = (D[:, *np.moveaxis(order, -1, 0)] for order in (np.eye(3, dtype=int), ORDERS))
-    return D[:, 0, 0, 0], gradient / step, hessian / step**2
+    n = len(x)
+    g, gradient, hessian = np.empty(n), np.empty((n, 3)), np.empty((n, 3, 3))
+    _evaluate_grid(c, (x - lower) / step, g, gradient, hessian)
+    return g, gradient / step, hessian / step**2

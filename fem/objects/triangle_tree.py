@@ -148,7 +148,7 @@ def closest(x, corners, order, low, high, start, count):
 
 
 @njit(cache=True)
-def _hits(o, d, p):
+def hits(o, d, p):
     """Distance along the ray to the triangle, infinite beside it or in its plane (Moeller and Trumbore)."""
     ux, uy, uz = p[1, 0] - p[0, 0], p[1, 1] - p[0, 1], p[1, 2] - p[0, 2]
     vx, vy, vz = p[2, 0] - p[0, 0], p[2, 1] - p[0, 1], p[2, 2] - p[0, 2]
@@ -194,7 +194,7 @@ def first_hit(o, d, least, skipped, anyone, corners, order, low, high, start, co
             continue
         for k in order[start[node] : start[node] + count[node]]:
             if k != skipped:
-                t = _hits(o, d, corners[k])
+                t = hits(o, d, corners[k])
                 if least < t < best:
                     best, nearest = t, k
                     if anyone:

@@ -112,11 +112,11 @@ class JawsOnSurface:
     def __init__(self, surface: tuple[FloatArray, IntArray], point: FloatArray, axes: FloatArray, jaws: Jaws) -> None:
         self.point, self.axes, self.jaws = point, axes, jaws
         length, width, _ = jaws.pad
-        x, y = (side * ((np.arange(n) + 0.5) / n - 0.5) for side, n in zip((length, width), GRID, strict=True))
+        # with one more even step at both ends
+        wider = [side * ((np.arange(-1, n + 1) + 0.5) / n - 0.5) for side, n in zip((length, width), GRID, strict=True)]
+        x, y = (part[1:-1] for part in wider)
         local = (surface[0] - point) @ axes
         self.local, self.triangles = np.ascontiguousarray(local), surface[1]
-        # with one more even step at both ends
-        wider = (np.pad(part, 1, "reflect", reflect_type="odd") for part in (x, y))
         low, high = height_fields(self.local, self.triangles, *wider)
         if not np.isfinite(low[INNER]).any():
             raise NoContactError("the pad misses the object")

@@ -30,7 +30,7 @@ TURN = Rotation.random(random_state=3).as_matrix()
 def respond(law: Material, F, tangent=True):
     F = np.ascontiguousarray(F, dtype=float)
     P, A = np.zeros((3, 3)), np.full((3, 3, 3, 3) if tangent else (0, 0, 0, 0), np.nan)
-    stress(law.number, F, np.linalg.inv(F), np.linalg.det(F), law.parameters, P, A)
+    stress(law.number, F, np.linalg.inv(F), np.linalg.det(F), law.parameters, P, A, np.empty((3, 3, 3)))
     return P, A
 
 

@@ -49,8 +49,8 @@ def test_patch(pad, name):
     u = pad.nodes @ (AFFINE - np.eye(3)).T
     r, _, det = assembled(pad, law, u)
     f = nodal(pad, r)
-    P, empty = np.empty((3, 3)), np.empty((0, 0, 0, 0))
-    kernel.stress(law.number, AFFINE, np.linalg.inv(AFFINE), np.linalg.det(AFFINE), law.parameters, P, empty)
+    P, empty, work = np.empty((3, 3)), np.empty((0, 0, 0, 0)), np.empty((3, 3, 3))
+    kernel.stress(law.number, AFFINE, np.linalg.inv(AFFINE), np.linalg.det(AFFINE), law.parameters, P, empty, work)
     x, y, z = np.abs(pad.nodes.T)
     tol = 1e-9
     inside = (x < SIZE[0] / 2 - tol) & (y < SIZE[1] / 2 - tol)
