@@ -206,7 +206,9 @@ def _create_dataset(file: h5py.File, dataset: Dataset, packed: bool) -> None:
     fill = None if strings else dataset.fill  # text is filled with zero bytes anyway
     made = file.create_dataset(dataset.path, dataset.shape, dtype, fillvalue=fill, dcpl=plist, **packing)
     for key, value in dataset.attributes.items():
-        _write_attribute(made, key, value)
+        # of fixed length: texts of any length stand elsewhere in the file, 40 kB more in all
+        text = value.encode()
+        made.attrs[key] = np.array(text, h5py.string_dtype("utf-8", len(text))) if packed and text else value
     _attach_scales(made, dataset.scales)
 
 
