@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
@@ -123,20 +124,11 @@ class ContactFace:
         Of several places the one with the least ``abs(s)``, as in `foot`; beside a face that the line misses, the
         point of its rim that is nearest to the line, moved onto the line.
         """
-        offset = self._middle - start
-        along = offset @ N
-        near = np.flatnonzero((offset**2).sum(axis=1) - along**2 <= (1 + NEGLIGIBLE) * self._reach**2)
-        across = _across(N).T
-        q = (self.corners[near] - start) @ across
-        uv = _reference(q)
-        weights = _bilinear(*uv.T)
-        left = np.linalg.norm(np.einsum("nk,nkc->nc", weights, q), axis=1)
-        # Newton may end at the rim of the region it is kept in: only points that are on the line count
-        hit = (np.abs(uv) <= 1 + NEGLIGIBLE).all(axis=1) & (left <= NEGLIGIBLE * self._reach[near])
-        near, weights = near[hit], weights[hit]
+        across = _across(N)
+        near, weights = _on_line(self.corners, self._middle, self._reach, start, N, *across)
         missed = not len(near)
         if missed:
-            near, weights = _beside((self.corners - start) @ across)
+            near, weights = _beside((self.corners - start) @ across.T)
         s = np.einsum("nk,nkc->nc", weights, self.corners[near] - start) @ N
         k = _nearest(s, NEGLIGIBLE * np.ptp(self.corners[near], axis=1).max(axis=1))
         normal = weights[k] @ self.normal[near[k]]
@@ -152,27 +144,48 @@ def _numbered(points: FloatArray, apart: float) -> np.ndarray:
     return number
 
 
-def _bilinear(u: FloatArray, v: FloatArray) -> FloatArray:
-    """Shape functions ``(n, 4)`` of the corners at ``-1 <= u, v <= 1``."""
-    return np.stack([(1 - u) * (1 - v), (1 + u) * (1 - v), (1 + u) * (1 + v), (1 - u) * (1 + v)], axis=-1) / 4
+@njit(cache=True)
+def _on_line(corners, middle, reach, start, N, x, y):  # pragma: no cover - compiled
+    """Faces that the line through ``start`` along ``N`` meets, and the weights ``(n, 4)`` of their corners there.
+
+    ``x, y`` are at right angles to the line: a corner is the complex number of both beside it.
+    """
+    met, weights, q = np.empty(len(corners), np.int64), np.empty((len(corners), 4)), np.empty(4, np.complex128)
+    count = 0
+    for i in range(len(corners)):
+        away = middle[i] - start
+        # most faces are nowhere near
+        if away @ away - (away @ N) ** 2 > (1 + NEGLIGIBLE) * reach[i] ** 2:
+            continue
+        for k in range(4):
+            away = corners[i, k] - start
+            q[k] = complex(away @ x, away @ y)
+        u, v = _reference(q[0], q[1], q[2], q[3])
+        weights[count] = (1 - u) * (1 - v) / 4, (1 + u) * (1 - v) / 4, (1 + u) * (1 + v) / 4, (1 - u) * (1 + v) / 4
+        left = weights[count, 0] * q[0] + weights[count, 1] * q[1] + weights[count, 2] * q[2] + weights[count, 3] * q[3]
+        # Newton may end at the rim of the region it is kept in: only points that are on the line count
+        if max(abs(u), abs(v)) <= 1 + NEGLIGIBLE and abs(left) <= NEGLIGIBLE * reach[i]:
+            met[count] = i
+            count += 1
+    return met[:count], weights[:count]
 
 
-def _reference(q: FloatArray) -> FloatArray:
-    """Coordinates ``u, v`` ``(n, 2)`` of the point 0 in plane quadrilaterals ``(n, 4, 2)``, by Newton's method."""
-    uv = np.zeros((len(q), 2))
+@njit(cache=True)
+def _reference(a, b, c, d):  # pragma: no cover - compiled
+    """Coordinates ``u, v`` of the point 0 in the quadrilateral of four complex numbers, by Newton's method."""
+    u = v = 0.0
     for _ in range(20):  # bilinear faces take three or four
-        u, v = uv.T
-        r = np.einsum("nk,nkc->nc", _bilinear(u, v), q)
-        du = ((q[:, 1] - q[:, 0]) * (1 - v)[:, None] + (q[:, 2] - q[:, 3]) * (1 + v)[:, None]) / 4
-        dv = ((q[:, 3] - q[:, 0]) * (1 - u)[:, None] + (q[:, 2] - q[:, 1]) * (1 + u)[:, None]) / 4
-        det = du[:, 0] * dv[:, 1] - du[:, 1] * dv[:, 0]
+        r = ((1 - u) * ((1 - v) * a + (1 + v) * d) + (1 + u) * ((1 - v) * b + (1 + v) * c)) / 4
+        du, dv = ((b - a) * (1 - v) + (c - d) * (1 + v)) / 4, ((d - a) * (1 - u) + (c - b) * (1 + u)) / 4
+        det, step_u, step_v = (du.conjugate() * dv).imag, (dv.conjugate() * r).imag, (r.conjugate() * du).imag
         # steps are cut at 3 half-widths: a face that the line misses need not converge, only stay outside
-        flat = np.abs(det) <= NEGLIGIBLE * np.linalg.norm(du, axis=1) * np.linalg.norm(dv, axis=1)
-        step = np.stack([r[:, 1] * dv[:, 0] - r[:, 0] * dv[:, 1], r[:, 0] * du[:, 1] - r[:, 1] * du[:, 0]], axis=1)
-        uv = np.clip(uv + np.where(flat[:, None], 3.0, step / np.where(flat, 1.0, det)[:, None]), -3.0, 3.0)
-        if (np.abs(step) <= NEGLIGIBLE * np.abs(det)[:, None]).all():  # Newton squares it: rounding is reached
+        if abs(det) <= NEGLIGIBLE * abs(du) * abs(dv):
+            u, v = min(u + 3.0, 3.0), min(v + 3.0, 3.0)
+        else:
+            u, v = min(max(u + step_u / det, -3.0), 3.0), min(max(v + step_v / det, -3.0), 3.0)
+        if max(abs(step_u), abs(step_v)) <= NEGLIGIBLE * abs(det):  # Newton squares it: rounding is reached
             break
-    return uv
+    return u, v
 
 
 def _beside(q: FloatArray) -> tuple[np.ndarray, FloatArray]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -84,7 +85,7 @@ class ContactPatch:
         """Normal force ``p a`` on each face, ``(n,)`` [N]."""
         return self.pressure * self.area
 
-    @property
+    @cached_property
     def loaded(self) -> ContactPatch:
         """The same patch without the faces that carry no force."""
         return self.only(self.load > 0)  # exactly: no load is what the data say, and no result of a calculation

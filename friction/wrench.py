@@ -260,8 +260,17 @@ def pure_torque(patch: ContactPatch, mu: float, model: str = "ccm") -> float:
     mu = checked_mu(mu)
     arm, normal, load = model_faces(patch, model)
     size = 2.0 ** np.frexp(np.abs(arm).max())[1]  # lengths are divided by a power of two, which rounds nothing
-    arm, radius = arm / size, _radius(patch) / size
-    twist, sums = np.array([[0.0, 0.0, 0.0, 0.0, 0.0, 1.0]]), np.empty((1, 7))
+    least = _least_power(arm / size, normal, load, _radius(patch) / size)
+    if math.isnan(least):
+        raise ArithmeticError("pure torque not found to 1e-9: the faces of the patch differ too much in size")
+    return float(mu * size * least)
+
+
+@njit(cache=True)
+def _least_power(arm, normal, load, radius):  # pragma: no cover - compiled
+    """Least ``H(v_x, v_y, 1)`` of faces as `friction_sums` takes them, to 1e-9 of that about the origin; or NaN."""
+    twist, sums = np.zeros((1, 6)), np.empty((1, 7))
+    twist[0, 5] = 1.0
     # the first ellipse is a circle that must hold the minimiser
     v, P, best, limit = np.zeros(2), np.eye(2) * radius**2, np.inf, 0.0
     for cut in range(2000):
@@ -269,12 +278,12 @@ def pure_torque(patch: ContactPatch, mu: float, model: str = "ccm") -> float:
         friction_sums(arm, normal, load, twist, sums)
         T, g = sums[0, 6], sums[0, :2]
         best, limit = min(best, T), limit if cut else 1e-9 * T
-        width = np.sqrt(max(g @ P @ g, 0.0))
+        width = math.sqrt(max(g @ P @ g, 0.0))
         # the function is convex: nowhere in the ellipse is it below the tangent plane's lowest point
         if T - width >= best - limit:
-            return float(mu * size * best)
+            return best
         v, P = _smaller_ellipse(v, P, g / width, (T - best) / width)
-    raise ArithmeticError(f"pure torque not found to 1e-9 after {cut + 1} cuts: its faces differ too much in size")
+    return math.nan
 
 
 def _radius(patch: ContactPatch) -> float:
@@ -284,7 +293,8 @@ def _radius(patch: ContactPatch) -> float:
     return float(patch.load @ (r * (1 + upright)) / (patch.load @ upright))
 
 
-def _smaller_ellipse(v: FloatArray, P: FloatArray, g: FloatArray, depth: float) -> tuple[FloatArray, FloatArray]:
+@njit(cache=True)
+def _smaller_ellipse(v, P, g, depth):  # pragma: no cover - compiled
     """Least ellipse around the part of ``(x - v)' P^-1 (x - v) <= 1`` where ``g . (x - v) <= -depth`` (g' P g = 1)."""
     Pg = P @ g
     tau, delta, sigma = (1 + 2 * depth) / 3, 4 / 3 * (1 - depth**2), 2 * (1 + 2 * depth) / (3 * (1 + depth))

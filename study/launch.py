@@ -96,16 +96,12 @@ def work(scene: Scene, plan: Any, comm: Any) -> Work:
 
     def with_rounds(rounds: Rounds) -> Work:
         grown_scene = refined(scene, rounds)
-
-        def finalise(writer: Any) -> None:
-            derived.finalise(writer, grown_scene)
-            writer.write_report(plain_report(dataset(writer.result())))
-
         return Work(
             solve_unit=pipeline.solve_unit,
             image=pipeline.image,
-            finalise=finalise,
+            finalise=lambda writer: derived.finalise(writer, grown_scene),
             summary=summary,
+            report=lambda result: plain_report(dataset(result)),
             time_limit=scene.run.time_limit_s,
             memory=scene.run.memory_gb,
             more=lambda result: next_round(result, scene, each),

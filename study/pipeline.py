@@ -16,11 +16,11 @@ import numpy as np
 from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.fem.pad.halving import halved
 from softjaw.fem.petsc import Seconds
-from softjaw.study.case.build import build_object, forces_apart, own_frame, pad_shape
+from softjaw.study.case.build import forces_apart, own_frame, pad_shape
 from softjaw.study.case.contact import of_fingers, on_faces
 from softjaw.study.case.effects import COUPLING, SCREENED, EffectChoice, settled
 from softjaw.study.case.errors import coarse_errors
-from softjaw.study.case.evaluate import EvaluationSettings, evaluate, settings_of
+from softjaw.study.case.evaluate import evaluate
 from softjaw.study.case.pressing import state_flags
 from softjaw.study.case.result import CaseFailure, CaseResult
 from softjaw.study.case.solver import CandidateSolver, Solution, Solved, join_notes
@@ -71,7 +71,7 @@ class UnitSolver:
     """Cases of a unit as a scene solves them, its own or the screened one; states and choices of effects are kept."""
 
     def __init__(self, unit: Any, scene: Scene) -> None:
-        self.unit, self._settings = unit, settings_of(scene, build_object(scene.object))
+        self.unit = unit
         self._solver = CandidateSolver(scene, unit.candidate.poses, finest=unit.finest)
         self._choice: EffectChoice | None = None
 
@@ -85,7 +85,7 @@ class UnitSolver:
                 yield k, outcome
             elif k in wanted:
                 # the first case has the time in which the effects of all were chosen
-                yield k, _result(self._settings, choice, k, outcome, self.unit, start, before)
+                yield k, _result(choice, k, outcome, self.unit, start, before)
                 start, before = time.perf_counter(), self._solver.seconds
 
     def put_away(self) -> None:
@@ -113,11 +113,9 @@ def keep(unit: Any, scene: Scene, solver: UnitSolver, ready: int = 0) -> None:
         del _SOLVERS[next(iter(_SOLVERS))]
 
 
-def _result(
-    settings: EvaluationSettings, choice: EffectChoice, k: int, solved: Solved, unit: Any, begun: float, before: Seconds
-) -> CaseResult:
+def _result(choice: EffectChoice, k: int, solved: Solved, unit: Any, begun: float, before: Seconds) -> CaseResult:
     """Values, checks, work, effects and patches of one case; its clock and the solver's stood at ``begun, before``."""
-    scene, fine, coarse = unit.scene, solved.fine, solved.coarse
+    scene, fine, coarse, settings = unit.scene, solved.fine, solved.coarse, choice.solver.settings
     finest = unit.finest[k] if unit.finest else FINEST
     start, contacts = time.perf_counter(), fine.contacts
     shape = contacts[0].state.pad.shape

@@ -21,8 +21,8 @@ import numpy as np
 from softjaw.fem.contact.problem import SpringBed
 from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.friction.patch import FloatArray, NoContactError
-from softjaw.study.case.build import build_object, forces_apart
-from softjaw.study.case.evaluate import quality, settings_of
+from softjaw.study.case.build import forces_apart
+from softjaw.study.case.evaluate import quality
 from softjaw.study.case.limit_surface import SurfaceFit
 from softjaw.study.case.model import contact_rules, pad_of, plate_compliance
 from softjaw.study.case.pressing import PressedContact, grasp_of
@@ -263,7 +263,7 @@ class EffectChoice:
     def _judged(self, contacts: Sequence[PressedContact]) -> tuple[float, float, float]:
         """e_n of the weaker finger [m], payload [kg] and quality, NaN where that cannot be told."""
         e_n = min(c.limits["ccm"].e_n for c in contacts)
-        settings = settings_of(self.solver.scene, build_object(self.solver.scene.object))
+        settings = self.solver.settings
         try:
             held = payload_alone(contacts, PAYLOAD_MOTIONS, settings.task)["maps/payload"]
             return e_n, held, quality(contacts, settings)

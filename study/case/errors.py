@@ -8,6 +8,7 @@ luck prove nothing.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -43,8 +44,8 @@ def mesh_errors(
     coarse mesh that differ too, ``floor`` is a share of the value, `WIDER` for some, and ``left_out`` one of every
     value. ``doubt`` is how many times the distances of meshes count.
     """
-    fine_mesh, coarse_mesh = _on_mesh(values, fine), _on_mesh(other, coarse) | grasp_values(coarse, settings)
-    viewed = [_sums(view) | grasp_values(view, settings) for view in views]
+    fine_mesh, coarse_mesh = _on_mesh(values, fine), _on_mesh(other, coarse) | grasp_values(tuple(coarse), settings)
+    viewed = [_sums(view) | grasp_values(tuple(view), settings) for view in views]
     compared = [[_all(contacts, settings) for contacts in pair] for pair in pairs]
     errors = {}
     for q in (q for q in TABLE if q.error and q.key in coarse_mesh):
@@ -74,7 +75,7 @@ def coarse_errors(
     ``values`` are the case's own, ``left_out`` the share of the pressure sum that friction which acted back would add.
     """
     solved = _on_mesh(values, contacts)
-    viewed = [_sums(view) | grasp_values(view, settings) for view in views]
+    viewed = [_sums(view) | grasp_values(tuple(view), settings) for view in views]
     share, errors = COARSE_FLOOR + OF_TRACTION * left_out, {}
     for q in (q for q in TABLE if q.error and q.key in viewed[0]):
         apart = max(distance(solved[q.key], view[q.key], q.error) for view in viewed)
@@ -112,7 +113,7 @@ def distance(value: ArrayLike, other: ArrayLike, kind: str) -> float:
 def _all(contacts: Sequence[Any], settings: EvaluationSettings) -> dict[str, Any]:
     """All values that contacts alone tell."""
     closing = np.mean([c.state.closing for c in contacts])
-    return _on_mesh({"maps/closing": closing}, contacts) | grasp_values(contacts, settings)
+    return _on_mesh({"maps/closing": closing}, contacts) | grasp_values(tuple(contacts), settings)
 
 
 def _on_mesh(values: Mapping[str, Any], contacts: Sequence[Contact]) -> dict[str, Any]:
@@ -123,7 +124,8 @@ def _on_mesh(values: Mapping[str, Any], contacts: Sequence[Contact]) -> dict[str
     return curved | _sums(contacts) | faces
 
 
-def grasp_values(contacts: Sequence[Contact], settings: EvaluationSettings) -> dict[str, Any]:
+@lru_cache(maxsize=16)  # of one case: each refinement and each pair of solutions asks for some of them again
+def grasp_values(contacts: tuple[Contact, ...], settings: EvaluationSettings) -> dict[str, Any]:
     """Quality of the ellipsoids and payload ``(1,)`` in the curved model."""
     values = {"maps/quality": quality(contacts, settings)}
     values |= payload_alone(contacts, settings.surface.samples, settings.task)

@@ -39,7 +39,7 @@ PLANAR = {"pcm": "", "pcm_projected": "_pcm_projected"}  # suffixes of the quant
 Fits = Mapping[str, SurfaceFit]  # by friction model
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)  # by identity, so that what was computed with it can be found again
 class EvaluationSettings:
     """What is computed from two contacts.
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import islice, repeat
 from typing import Any, NamedTuple, TypeVar
 
@@ -57,7 +58,7 @@ class Solution:
     states: Sequence[Pressed]
     contacts: Sequence[PressedContact]
 
-    @property
+    @cached_property
     def views(self) -> list[tuple[Contact, ...]]:
         """Contacts of the same pressures at Gauss points, and at nodes."""
         return list(zip(*(c.views for c in self.contacts), strict=True))
@@ -133,6 +134,11 @@ class CandidateSolver:
         self._solutions: dict[tuple[int, int, Levels], Solution] = {}
         self._spent = Seconds()  # by what was put away
 
+    @cached_property
+    def settings(self) -> EvaluationSettings:
+        """What is computed from two contacts."""
+        return settings_of(self.scene, build_object(self.scene.object))
+
     def at_levels(self, levels: Levels) -> Scene:
         """The scene with these levels of its effects."""
         # values that the scene itself could have, so nothing is checked again
@@ -197,8 +203,8 @@ class CandidateSolver:
         """Relative error of the quantity that ``accuracy.target`` is for; NaN where there is one mesh alone."""
         if solved.coarse is None:
             return math.nan
-        settings = settings_of(self.scene, build_object(self.scene.object))
-        errors = solved.errors(grasp_values(solved.fine.contacts, settings), {}, settings)
+        values = grasp_values(tuple(solved.fine.contacts), self.settings)
+        errors = solved.errors(values, {}, self.settings)
         return errors[f"maps/{self.scene.accuracy.target_of}_error"]
 
     def _refined(self, solved: Solved, k: int, levels: Levels, left_out: float) -> Solved:

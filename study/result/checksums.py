@@ -42,13 +42,17 @@ def of_rows(layout: Layout, values: Any, rows: NDArray[Any]) -> NDArray[np.uint3
 
 def broken_rows(file: StoredFile, layout: Layout, path: str, values: Any, rows: NDArray[Any]) -> NDArray[Any]:
     """Those of the ``rows`` whose values in the dataset at a path do not match their checksum."""
-    return rows[of_rows(layout, values, rows) != stored_sums(file, layout, path)[rows]]
+    found = of_rows(layout, values, rows)
+    wrong = found != stored_sums(file, layout, path)[rows]
+    # a run may have stored a row anew since the sums were read
+    return rows[wrong & (found != stored_sums(file, layout, path, anew=True)[rows])] if wrong.any() else rows[wrong]
 
 
-def stored_sums(file: StoredFile, layout: Layout, path: str) -> NDArray[np.uint32]:
-    """Checksums of all rows for the dataset at a path, or of the states."""
-    shape, which = (*layout.shape, len(layout.summed)), (..., layout.summed.index(path))
-    return np.asarray(file.values(SUMS, shape, np.dtype("<u4"), which)).ravel()
+def stored_sums(file: StoredFile, layout: Layout, path: str, *, anew: bool = False) -> NDArray[np.uint32]:
+    """Checksums of all rows for the dataset at a path, or of the states; as they were read first, or ``anew``."""
+    if anew or SUMS not in file.early:
+        file.early[SUMS] = file.values(SUMS, (*layout.shape, len(layout.summed)), np.dtype("<u4"))
+    return np.asarray(file.early[SUMS][..., layout.summed.index(path)]).ravel()
 
 
 def broken_states(file: StoredFile, layout: Layout, codes: np.ndarray, under_way: bool) -> np.ndarray:
@@ -56,7 +60,7 @@ def broken_states(file: StoredFile, layout: Layout, codes: np.ndarray, under_way
 
     Where a run is ``under_way``, or was killed, a row may be stored and not yet marked; nowhere else.
     """
-    stored = stored_sums(file, layout, layout.summed[-1])
+    stored = stored_sums(file, layout, layout.summed[-1], anew=True)
     # A damaged state may be any byte: those that mean nothing get 0 and count as wrong.
     wrong = np.array([OF_STATE.get(state, 0) for state in range(256)], np.uint32)[codes] != stored
     if under_way and wrong.any():

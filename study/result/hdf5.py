@@ -22,6 +22,8 @@ class StoredFile:
 
     def __init__(self, path: Path, file: h5py.File) -> None:
         self.path, self._file, self._bytes = path, file, path.stat().st_size
+        self._nodes: dict[str, Any] = {"": file}
+        self.early: dict[str, Any] = {}  # values of datasets as they were read first
 
     def close(self) -> None:
         """Close the file."""
@@ -75,14 +77,16 @@ class StoredFile:
             return dataset[index]
 
     def _node(self, path: str) -> Any:
-        node: Any = self._file
-        # Link by link: HDF5 by itself would follow soft and external links out of the file.
-        for part in filter(None, path.split("/")):
-            link = node.get(part, getlink=True) if isinstance(node, h5py.Group) else None
+        path = path.rstrip("/")
+        if path not in self._nodes:
+            # Link by link: HDF5 by itself would follow soft and external links out of the file.
+            parent, _, name = path.rpartition("/")
+            group = self._node(parent)
+            link = group.get(name, getlink=True) if isinstance(group, h5py.Group) else None
             if not isinstance(link, h5py.HardLink):
                 raise StudyError(OTHER_FILE, f"{self.path}: {path} is missing or in another file; do not trust it")
-            node = node[part]
-        return node
+            self._nodes[path] = group[name]
+        return self._nodes[path]
 
     @contextmanager
     def _damage(self, path: str) -> Iterator[None]:

@@ -111,8 +111,8 @@ class ResultWriter:
         if not self._attempts[index]:  # a row that is stored is begun: only such a one may be without its mark
             self._attempts[index] = 1
         # Values, sums, state: a kill in between leaves a row that reads as not computed.
-        for dataset, value in zip(self._columns, values, strict=True):
-            dataset[index] = value.astype(dataset.dtype)  # a text with its encoding
+        for dataset, column, value in zip(self._columns, self.layout.columns, values, strict=True):
+            _write_at(dataset.id, index, np.asarray(value, column.dtype))
         self._sums[index] = checksums.of_row(self.layout, values, state)
         self._code[index] = state
 
@@ -189,6 +189,15 @@ class Files:
         """Close on all ranks."""
         for writer in self.writers:
             writer.close()
+
+
+def _write_at(dataset: h5py.h5d.DatasetID, index: tuple[int, ...], values: np.ndarray) -> None:
+    """Write the values of a case into a dataset, as ``dataset[index] = values`` does, in a fifth of the time."""
+    place = dataset.get_space()
+    place.select_hyperslab((*index, *[0] * values.ndim), (*[1] * len(index), *values.shape))
+    # the array's own type knows no encoding of a text, and HDF5 would not convert it
+    kind = dataset.get_type() if values.dtype.kind == "S" else None
+    dataset.write(h5py.h5s.create_simple(values.shape or (1,)), place, np.ascontiguousarray(values), kind)
 
 
 def blank(layout: Layout, message: str = "", seconds: float = math.nan) -> list[np.ndarray]:

@@ -36,7 +36,7 @@ from softjaw.study.run.load_path import sentence, settle
 from softjaw.study.run.object_folder import ObjectFolder, key_of
 from softjaw.study.run.plan import Plan
 from softjaw.study.run.schedule import Claims
-from softjaw.study.run.session import Session, Work, file_of, finish_alone, locked, on_rank0, rounds_in
+from softjaw.study.run.session import Session, Work, file_of, finish_alone, locked, on_rank0, pack, rounds_in
 from softjaw.study.scene import Scene, SceneError
 from softjaw.study.table import Row
 from softjaw.study.units import in_si
@@ -211,13 +211,13 @@ class _ObjectsRun:
 
     def _ending(self, n: int, seconds: float, stopped: bool) -> tuple[int, Row]:
         """The row of an object as its file stands, which is packed if nothing is missing there."""
-        path, (plan, _) = self._out / f"{self._folder.objects[n].name}.hdf", self._mine[n]
+        path, (plan, work) = self._out / f"{self._folder.objects[n].name}.hdf", self._mine[n]
         with open_result(path) as result:
             row = self.rows[n] | row_of(result) | {"preparing": seconds}
         if stopped:  # also where no case is missing, a further round may be
             row |= {"state": index.STOPPED, "reason": ""}
         if row["state"] != index.STOPPED:
-            rewrite(path, plan.layout, plan.header, packed=True)
+            pack(work, path, plan)
         return n, row
 
     def _gathered(self, items: Iterable[Any]) -> list[Any]:

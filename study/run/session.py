@@ -12,7 +12,6 @@ import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import Any, TypeVar
@@ -50,6 +49,7 @@ class Work:
     printed at the end. ``time_limit``: of a single case [s]. ``memory``: as for `study.run.limits.limited_memory`.
     ``more``: ``more(result)`` gives the stations, poses or cases of the next round, from what is stored alone; none at
     the end. ``grown``: ``grown(rounds)`` gives plan and work with what these rounds added; collective.
+    ``report``: ``report(result)`` gives the text that is stored when no round is left.
     """
 
     solve_unit: Callable[[Any, Sequence[int]], Iterable[tuple[int, Any]]]
@@ -60,6 +60,7 @@ class Work:
     memory: float | str = "none"
     more: Callable[[Result], tuple[Any, ...]] = lambda _: ()
     grown: Callable[[Rounds], tuple[Plan, Work]] | None = None
+    report: Callable[[Any], str] | None = None
 
 
 def on_rank0(comm: Any, function: Callable[..., T], *arguments: Any) -> T:
@@ -97,7 +98,7 @@ def run_study(plan: Plan, work: Work, path: Path, comm: Any, *, retry_failed: bo
             on_rank0(comm, rewrite, path, plan.layout, plan.header)
             code = _solve(plan, work, path, comm, retry_failed=False)
         if finished is None and code != STOPPED:
-            on_rank0(comm, partial(rewrite, packed=True), path, plan.layout, plan.header)
+            on_rank0(comm, pack, work, path, plan)
         if comm.rank == 0:
             print_summary(work, path)
     return code
@@ -309,6 +310,14 @@ def finish(work: Work, writer: ResultWriter, name: str) -> None:
         done=int(np.sum(codes == CASE_DONE)),
         failed=failed,
     )
+
+
+def pack(work: Work, path: Path, plan: Plan) -> None:
+    """Write the report of a file to which no further round comes, and pack it; by one process."""
+    if work.report is not None:
+        with contextlib.closing(ResultWriter(path, plan.layout, MPI.COMM_SELF)) as writer:
+            writer.write_report(work.report(writer.result()))
+    rewrite(path, plan.layout, plan.header, packed=True)
 
 
 def print_summary(work: Work, path: Path) -> None:

@@ -74,6 +74,7 @@ class Prepared:
     def __init__(self, changes, payloads=None, lost=()):
         self.scene, self.walled, self.lost = scene_of(PLATE, "accuracy.meshes=2", elements="[4, 4, 2]"), False, lost
         self.forces = tuple(range(1, len(changes) + 1))
+        self.settings = SimpleNamespace(task=None)
         self.changes = changes, payloads or [0.0] * len(changes)
 
     def solve(self, k, mesh, levels):
