@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numba import njit
@@ -110,25 +109,17 @@ class ContactFace:
         length = np.linalg.norm(total, axis=1, keepdims=True)
         return cls(q, (total / np.where(length > 0, length, 1.0))[corner].reshape(q.shape))
 
-    @cached_property
-    def _middle(self) -> FloatArray:
-        return self.corners.mean(axis=1)
-
-    @cached_property
-    def _reach(self) -> FloatArray:
-        return np.linalg.norm(self.corners - self._middle[:, None], axis=2).max(axis=1)
-
     def foot(self, start: FloatArray, N: FloatArray) -> tuple[FloatArray, FloatArray, bool]:
         """Where the line ``start + s N`` meets the face, the normal there, and whether the line misses the face.
 
         Of several places the one with the least ``abs(s)``, as in `foot`; beside a face that the line misses, the
         point of its rim that is nearest to the line, moved onto the line.
         """
-        across = _across(N)
-        near, weights = _on_line(self.corners, self._middle, self._reach, start, N, *across)
+        q = (self.corners - start) @ _across(N).T
+        near, weights = _on_line(q[..., 0] + 1j * q[..., 1])
         missed = not len(near)
         if missed:
-            near, weights = _beside((self.corners - start) @ across.T)
+            near, weights = _beside(q)
         s = np.einsum("nk,nkc->nc", weights, self.corners[near] - start) @ N
         k = _nearest(s, NEGLIGIBLE * np.ptp(self.corners[near], axis=1).max(axis=1))
         normal = weights[k] @ self.normal[near[k]]
@@ -145,27 +136,24 @@ def _numbered(points: FloatArray, apart: float) -> np.ndarray:
 
 
 @njit(cache=True)
-def _on_line(corners, middle, reach, start, N, x, y):  # pragma: no cover - compiled
-    """Faces that the line through ``start`` along ``N`` meets, and the weights ``(n, 4)`` of their corners there.
+def _on_line(q):  # pragma: no cover - compiled
+    """Faces that hold the point 0, and the weights ``(n, 4)`` of their corners there.
 
-    ``x, y`` are at right angles to the line: a corner is the complex number of both beside it.
+    Corners ``q (n, 4)`` are complex numbers in the plane across the line.
     """
-    met, weights, q = np.empty(len(corners), np.int64), np.empty((len(corners), 4)), np.empty(4, np.complex128)
-    count = 0
-    for i in range(len(corners)):
-        away = middle[i] - start
+    met, weights, count = np.empty(len(q), np.int64), np.empty((len(q), 4)), 0
+    for i in range(len(q)):
+        a, b, c, d = q[i, 0], q[i, 1], q[i, 2], q[i, 3]
+        size = abs(a - b) + abs(a - c) + abs(b - d)
         # most faces are nowhere near
-        if away @ away - (away @ N) ** 2 > (1 + NEGLIGIBLE) * reach[i] ** 2:
+        if abs(a + b + c + d) > 4 * size:
             continue
-        for k in range(4):
-            away = corners[i, k] - start
-            q[k] = complex(away @ x, away @ y)
-        u, v = _reference(q[0], q[1], q[2], q[3])
-        weights[count] = (1 - u) * (1 - v) / 4, (1 + u) * (1 - v) / 4, (1 + u) * (1 + v) / 4, (1 - u) * (1 + v) / 4
-        left = weights[count, 0] * q[0] + weights[count, 1] * q[1] + weights[count, 2] * q[2] + weights[count, 3] * q[3]
+        u, v = _reference(a, b, c, d)
+        w = (1 - u) * (1 - v) / 4, (1 + u) * (1 - v) / 4, (1 + u) * (1 + v) / 4, (1 - u) * (1 + v) / 4
+        left = abs(w[0] * a + w[1] * b + w[2] * c + w[3] * d)
         # Newton may end at the rim of the region it is kept in: only points that are on the line count
-        if max(abs(u), abs(v)) <= 1 + NEGLIGIBLE and abs(left) <= NEGLIGIBLE * reach[i]:
-            met[count] = i
+        if max(abs(u), abs(v)) <= 1 + NEGLIGIBLE and left <= NEGLIGIBLE * size:
+            met[count], weights[count] = i, w
             count += 1
     return met[:count], weights[:count]
 
@@ -179,10 +167,9 @@ def _reference(a, b, c, d):  # pragma: no cover - compiled
         du, dv = ((b - a) * (1 - v) + (c - d) * (1 + v)) / 4, ((d - a) * (1 - u) + (c - b) * (1 + u)) / 4
         det, step_u, step_v = (du.conjugate() * dv).imag, (dv.conjugate() * r).imag, (r.conjugate() * du).imag
         # steps are cut at 3 half-widths: a face that the line misses need not converge, only stay outside
-        if abs(det) <= NEGLIGIBLE * abs(du) * abs(dv):
-            u, v = min(u + 3.0, 3.0), min(v + 3.0, 3.0)
-        else:
-            u, v = min(max(u + step_u / det, -3.0), 3.0), min(max(v + step_v / det, -3.0), 3.0)
+        flat = abs(det) <= NEGLIGIBLE * abs(du) * abs(dv)
+        u = min(max(u + (3.0 if flat else step_u / det), -3.0), 3.0)
+        v = min(max(v + (3.0 if flat else step_v / det), -3.0), 3.0)
         if max(abs(step_u), abs(step_v)) <= NEGLIGIBLE * abs(det):  # Newton squares it: rounding is reached
             break
     return u, v

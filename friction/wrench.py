@@ -282,7 +282,10 @@ def _least_power(arm, normal, load, radius):  # pragma: no cover - compiled
         # the function is convex: nowhere in the ellipse is it below the tangent plane's lowest point
         if T - width >= best - limit:
             return best
-        v, P = _smaller_ellipse(v, P, g / width, (T - best) / width)
+        # the least ellipse round the part of this one where g . (x - v) <= -depth
+        Pg, depth = P @ (g / width), (T - best) / width
+        v = v - (1 + 2 * depth) / 3 * Pg
+        P = 4 / 3 * (1 - depth**2) * (P - 2 * (1 + 2 * depth) / (3 * (1 + depth)) * np.outer(Pg, Pg))
     return math.nan
 
 
@@ -291,11 +294,3 @@ def _radius(patch: ContactPatch) -> float:
     r, upright = np.linalg.norm(patch.centroid, axis=1), np.abs(patch.normal[:, 2])
     # farther out every face costs at least its upright share of the distance, more than at the origin
     return float(patch.load @ (r * (1 + upright)) / (patch.load @ upright))
-
-
-@njit(cache=True)
-def _smaller_ellipse(v, P, g, depth):  # pragma: no cover - compiled
-    """Least ellipse around the part of ``(x - v)' P^-1 (x - v) <= 1`` where ``g . (x - v) <= -depth`` (g' P g = 1)."""
-    Pg = P @ g
-    tau, delta, sigma = (1 + 2 * depth) / 3, 4 / 3 * (1 - depth**2), 2 * (1 + 2 * depth) / (3 * (1 + depth))
-    return v - tau * Pg, delta * (P - sigma * np.outer(Pg, Pg))

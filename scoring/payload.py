@@ -82,7 +82,7 @@ def payload(
     V1, V2 = (np.ascontiguousarray(getattr(c.body, "vertices").T) / size for c in contacts)  # noqa: B009
     C[:, :, 0] /= size
     grasp = C, V1, V2, KINDS.index(kind)
-    answer = _along(grasp, _unit(direction)) if direction is not None else _worst(grasp)
+    answer = _along(grasp, np.asarray(direction, float)) if direction is not None else _worst(grasp)
     return Payload(size * answer.force, size * answer.upper, answer.direction, answer.borne)
 
 
@@ -91,7 +91,8 @@ _Grasp = tuple[FloatArray, FloatArray, FloatArray, int]
 
 
 def _along(grasp: _Grasp, d: FloatArray) -> Payload:
-    """Largest load along one direction."""
+    """Largest load along one direction, of any length."""
+    d = d / np.linalg.norm(d)
     # the answer has no part across the load: two more rows
     across = np.linalg.svd(d[None])[2][1:]
     rows = np.zeros((5, 6))
@@ -150,7 +151,7 @@ class _Section:
     def farthest(self, along: FloatArray, basis: FloatArray) -> tuple[float, FloatArray, FloatArray]:
         """Support of the section, the point ``(6,)`` that it touches and its basis; -inf where the section is empty."""
         new = basis.copy()
-        upper, point, missing = _programme(*self.grasp, np.append(along, np.zeros(3)), self.rows, new)
+        upper, point, missing = _programme(*self.grasp, along, self.rows, new)
         return (upper if missing < ROUNDING_FORCE else -np.inf), point, new
 
     def look(self, u: FloatArray, start: FloatArray) -> FloatArray:
@@ -164,30 +165,66 @@ class _Section:
 
     def refine(self) -> float:
         """Distance of the hull's nearest facet, after looking along all that are nearer than the least support."""
-        hull, before = ConvexHull(self.forces, incremental=True), np.empty(0)
-        while True:
-            nearest = int(hull.equations[:, 3].argmax())
-            plane = hull.equations[nearest]
-            # a point that the hull has already ends the search: along its nearest facet both bounds are the same
-            if (
-                len(self.points) == MOST_POINTS
-                or self.upper < ROUNDING_FORCE
-                or -plane[3] >= self.upper * (1.0 - BOUND_GAP)
-                or np.array_equal(plane, before)
-            ):
-                hull.close()
-                return -float(plane[3])
-            before, known = plane, (self.upper, self.u)
-            self.look(plane[:3], self.bases[hull.simplices[nearest, 0]])
-            # a programme that did not fill its rows says nothing of the support
-            if self.upper == -np.inf:
-                self.upper, self.u = known
-            hull.add_points(self.points[-1][None])
+        n, hull = len(self.points), ConvexHull(self.forces)
+        points, bases = np.zeros((MOST_POINTS, 3)), np.zeros((MOST_POINTS, *self.begin.shape))
+        points[:n], bases[:n] = self.points, self.bases
+        corners = hull.simplices.astype(np.int64)  # in no order round their facets
+        inward = np.einsum("fi,fi->f", _planes(points, corners)[:, :3], hull.equations[:, :3]) < 0
+        corners[inward] = corners[inward, ::-1]
+        begun = points, bases, n, corners, hull.equations, self.upper, self.u
+        lower, self.upper, self.u = _refined(*self.grasp, self.rows, *begun)
+        return float(lower)
 
 
-def _unit(v: ArrayLike) -> FloatArray:
-    d = np.asarray(v, dtype=float)
-    return d / np.linalg.norm(d)
+@njit(cache=True)
+def _planes(points, corners):
+    """Outward unit normal and offset ``(m, 4)`` of facets with these corners ``(m, 3)``."""
+    p = points[corners[:, 0]]
+    normal = np.cross(points[corners[:, 1]] - p, points[corners[:, 2]] - p)
+    normal /= np.sqrt((normal**2).sum(axis=1)).reshape(-1, 1)
+    return np.column_stack((normal, -(normal * p).sum(axis=1)))
+
+
+@njit(cache=True)
+def _joined(points, n, corners, planes):
+    """Facets of a hull, their ``corners (m, 3)`` and ``planes (m, 4)``, with the ``n``-th of the points joined to it.
+
+    The facets that see the point give way to those between it and their rim. Where it is beyond a facet by rounding
+    alone that one stays: a facet so thin would have no normal.
+    """
+    keep, rim = np.ones(len(corners), np.bool_), np.zeros((n, n), np.bool_)
+    for f in range(len(corners)):
+        if planes[f, :3] @ points[n] + planes[f, 3] > ROUNDING_FORCE:
+            keep[f] = False
+            for k in range(3):
+                rim[corners[f, k], corners[f, (k + 1) % 3]] = True
+    edges = np.argwhere(rim & ~rim.T)
+    new = np.column_stack((edges, np.full(len(edges), n)))
+    return np.concatenate((corners[keep], new)), np.concatenate((planes[keep], _planes(points, new)))
+
+
+@njit(cache=True)
+def _refined(C, V1, V2, kind, rows, points, bases, count, corners, planes, upper, u):
+    """Distance of the nearest facet, and the least support and its direction, as `_Section.refine` finds them.
+
+    ``count`` of the ``points, bases`` are known; ``corners, planes`` are the facets of their hull.
+    """
+    before = np.zeros(4)
+    while True:
+        nearest = planes[:, 3].argmax()
+        plane = planes[nearest]
+        # a point that the hull has already ends the search: along its nearest facet both bounds are the same
+        known = (plane == before).all() or count == len(points)
+        if known or upper < ROUNDING_FORCE or -plane[3] >= upper * (1.0 - BOUND_GAP):
+            return -plane[3], upper, u
+        before, bases[count] = plane, bases[corners[nearest, 0]]
+        support, point, missing = _programme(C, V1, V2, kind, plane[:3], rows, bases[count])
+        points[count] = point[:3]
+        # a programme that did not fill its rows says nothing of the support
+        if missing < ROUNDING_FORCE and support < upper:
+            upper, u = support, plane[:3]
+        corners, planes = _joined(points, count, corners, planes)
+        count += 1
 
 
 @njit(cache=True)
@@ -218,7 +255,7 @@ def _farthest(C, V1, V2, kind, q):
 
 @njit(cache=True)
 def _programme(C, V1, V2, kind, along, rows, basis):
-    """Largest ``along . x`` over points of W with ``rows . x = off``, by the revised simplex method.
+    """Largest ``along (3,)`` times the force of points x of W with ``rows . x = off``, by the revised simplex method.
 
     ``basis (m, 8)`` is where it begins and ends: points ``(6,)``, then 1 and 0; or 0, a sign and the number of the row,
     from 1, for a column that only fills a row. Returns a proved upper bound, the point reached, and what is filled.
@@ -232,13 +269,15 @@ def _programme(C, V1, V2, kind, along, rows, basis):
             B[int(basis[k, 7]) - 1, k], cost[k] = basis[k, 6], -1e5  # a penalty on torques that no point takes
         else:
             B[: m - 1, k] = rows @ basis[k, :6]
-            B[m - 1, k], cost[k] = 1.0, along @ basis[k, :6]
+            B[m - 1, k], cost[k] = 1.0, along @ basis[k, :3]
     inverse = np.linalg.inv(B)
     x = inverse @ right
     upper, column = np.inf, np.ones(m)
     for _ in range(400):
         y = cost @ inverse
-        point, support = _farthest(C, V1, V2, kind, along - y[: m - 1] @ rows)
+        q = -(y[: m - 1] @ rows)
+        q[:3] += along
+        point, support = _farthest(C, V1, V2, kind, q)
         bound = support + y[: m - 1] @ right[: m - 1]
         upper = min(upper, bound)
         if bound - cost @ x <= 1e-9 * (1.0 + abs(bound)):
@@ -251,7 +290,7 @@ def _programme(C, V1, V2, kind, along, rows, basis):
                 out, most = k, max(x[k], 0.0) / d[k]
         if out < 0:
             break
-        basis[out, :6], basis[out, 6], basis[out, 7], cost[out] = point, 1.0, 0.0, along @ point
+        basis[out, :6], basis[out, 6], basis[out, 7], cost[out] = point, 1.0, 0.0, along @ point[:3]
         inverse[out] /= d[out]
         for k in range(m):
             if k != out:

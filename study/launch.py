@@ -97,15 +97,11 @@ def work(scene: Scene, plan: Any, comm: Any) -> Work:
     def with_rounds(rounds: Rounds) -> Work:
         grown_scene = refined(scene, rounds)
         return Work(
-            solve_unit=pipeline.solve_unit,
-            image=pipeline.image,
-            finalise=lambda writer: derived.finalise(writer, grown_scene),
-            summary=summary,
-            report=lambda result: plain_report(dataset(result)),
-            time_limit=scene.run.time_limit_s,
-            memory=scene.run.memory_gb,
+            pipeline.solve_unit, pipeline.image, lambda writer: derived.finalise(writer, grown_scene), summary,
+            scene.run.time_limit_s, scene.run.memory_gb,
             more=lambda result: next_round(result, scene, each),
             grown=lambda rounds: (on_rank0(comm, make_plan, scene, *about, rounds), with_rounds(rounds)),
-        )
+            report=lambda result: plain_report(dataset(result)),
+        )  # fmt: skip
 
     return with_rounds(())
