@@ -104,7 +104,8 @@ def opened(hand: Hand, gripper: Any, opening: float, wider: float = OPENED_MORE)
 def refused(hand: Hand, gripper: Any, opening: float, force: float) -> list[str]:
     """Why a gripper cannot take a grasp wherever it comes from: its opening [m] or its force [N]."""
     most, (low, high) = opened(hand, gripper, opening)[1], hand.force_n
-    words = [f"wider than the {shown_text(most, 'm')} that it opens"] * (opening > most * (1 + TIE))
+    wide = f"wider than the {shown_text(most, 'm')} that it opens" if most > 0 else "no opening left between its foam"
+    words = [wide] * (opening > most * (1 + TIE))
     return words + [f"a force beyond its {low:g} to {high:g} N"] * (not low <= force <= high)
 
 
