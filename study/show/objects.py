@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -52,8 +53,11 @@ def status_text(path: Path, width: int) -> str:
     """Counts, cases and time, what runs now, and the reasons of objects without a grasp."""
     rows, _ = index.read_index(path)
     runner = holder(path)
-    cases, seconds = (sum(max(np.nan_to_num(row[key]), 0) for row in rows) for key in ("done", "seconds"))
-    lines = [f"{path}: {counts_text(rows)}", f"  {cases:.0f} cases solved, {duration(seconds)} on all ranks"]
+    ended = [row for row in rows if row["state"] != index.STOPPED]
+    # The index does not know how far an object was when a run was killed; its file does.
+    cases = sum(max(row["done"], 0) for row in ended) + sum(done for done, _ in _under_way(path, rows))
+    seconds = duration(sum(np.nan_to_num(row["seconds"]) for row in ended))
+    lines = [f"{path}: {counts_text(rows)}", f"  {cases} cases solved; what is done took {seconds} on all ranks"]
     resume = "run the same command again to resume" * (index.code_of(rows) == STOPPED)
     lines += filter(None, [f"running now: {runner}" if runner else resume])
     named = [f"{row['object']}: {row['state']}: {row['reason']}" for row in rows if row["reason"]]
@@ -69,16 +73,16 @@ def look(path: Path) -> tuple[list[str], int | None]:
     """Counts of the objects and of what is solved now, and the exit code of a run that has ended; for `show.watch`."""
     runner = holder(path)  # asked first: what a run writes before it ends is then read below
     rows, _ = index.read_index(path)
-    under_way = [counts for row in rows if row["state"] == index.STOPPED and (counts := _cases(path, row))]
+    under_way = _under_way(path, rows)
     done, cases = (sum(part) for part in zip(*under_way, strict=True)) if under_way else (0, 0)
     now = f"; {done}/{cases} cases of {len(under_way)} objects that are solved now" if cases else ""
     return [f"{counts_text(rows)}{now}"], None if runner else index.code_of(rows)
 
 
-def _cases(path: Path, row: Row) -> tuple[int, int] | None:
-    """Cases of an object's file that have an end, and all; None where there is no file yet."""
-    try:
-        with open_result(path.parent / row["file"], unchecked=True) as result:
-            return int(np.sum(result.codes != MISSING)), result.codes.size
-    except StudyError:
-        return None
+def _under_way(path: Path, rows: list[Row]) -> list[tuple[int, int]]:
+    """Cases that have an end, and all, of the file of each object that is under way."""
+    found = []
+    for file in (path.parent / row["file"] for row in rows if row["state"] == index.STOPPED):
+        with suppress(StudyError), open_result(file, unchecked=True) as result:
+            found.append((int(np.sum(result.codes != MISSING)), result.codes.size))
+    return found

@@ -1,5 +1,6 @@
 """A folder of objects: which there are, one run over all of them, and what the index says."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -145,6 +146,7 @@ def test_two_ranks_give_the_same_bits(scene, solved):
 def test_a_kill_amid_any_object_loses_nothing_that_is_finished(scene, solved, count):
     out = scene.parent / f"killed{count}"
     assert launch(2, SCRIPT, scene, out, "--kill-after", count, "--delay", 0.01)[0] != SOME_FAILED
+    assert int(re.search(r"(\d+) cases", command(0, "status", out)[1])[1]) >= count - 1  # of one rank alone
     assert launch(2, SCRIPT, scene, out)[0] == SOME_FAILED
     same(out, solved)
 
