@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -148,6 +148,8 @@ def _write_skeleton(file: h5py.File, layout: Layout, header: Header, packed: boo
         _create_dataset(file, dataset, packed)
     _link_maps(study, layout)
     _write_texts(study, layout, header, packed)
+    views = {f"{ROOT}/map/{name}": tuple(layout.names[i] for i in layout.shown) for name in FIRST}
+    _attach_scales(file, {d.path: d.scales for d in layout.datasets} | views | {SESSION_ROWS: ("session",)})
 
 
 def _write_checksums(file: h5py.File, stored: StoredFile, layout: Layout) -> None:
@@ -171,7 +173,6 @@ def _write_texts(study: h5py.Group, layout: Layout, header: Header, packed: bool
     how = {"compression": DEFLATE_LEVEL} if packed else {}
     sessions = study["provenance"].create_dataset("sessions", data=np.zeros(MOST_SESSIONS, SESSION), **how)
     sessions.attrs["long_name"] = "one row for each time the study was started: program, machine, start, end"
-    _attach_scales(sessions, ["session"])
 
 
 def text_bytes(text: str, length: int) -> bytes:
@@ -209,7 +210,6 @@ def _create_dataset(file: h5py.File, dataset: Dataset, packed: bool) -> None:
         # of fixed length: texts of any length stand elsewhere in the file, 40 kB more in all
         text = value.encode()
         made.attrs[key] = np.array(text, h5py.string_dtype("utf-8", len(text))) if packed and text else value
-    _attach_scales(made, dataset.scales)
 
 
 def _chunk(dataset: Dataset) -> tuple[int, ...]:
@@ -234,16 +234,24 @@ def _link_maps(study: h5py.Group, layout: Layout) -> None:
         made = study["map"].create_virtual_dataset(name, view, fillvalue=np.nan)
         made.attrs["interpretation"] = ("spectrum", "image")[len(names) - 1]
         made.attrs.update(described(BY_KEY[f"maps/{name}"], f"maps/{name}/{MODELS[0]}"))
-        _attach_scales(made, names)
 
 
-def _attach_scales(dataset: h5py.Dataset, names: Sequence[str]) -> None:
-    # xarray and NeXus viewers look for the scales beside the data: a second hard link puts them there.
-    for i, name in enumerate(names):
-        scale = dataset.file[f"{ROOT}/axes/{name}"]
-        if name not in dataset.parent:
-            dataset.parent[name] = scale
-        h5py.h5ds.attach_scale(dataset.id, scale.id, i)
+def _attach_scales(file: h5py.File, scales: Mapping[str, Sequence[str]]) -> None:
+    """Attach the scales, named for each dataset, all at once: HDF5 by itself writes their lists anew for each."""
+    users: dict[str, list[Any]] = {}
+    for path, names in scales.items():
+        dataset, references = file[path], np.empty(len(names), object)
+        for i, name in enumerate(names):
+            scale = file[f"{ROOT}/axes/{name}"]
+            # xarray and NeXus viewers look for the scales beside the data: a second hard link puts them there.
+            if name not in dataset.parent:
+                dataset.parent[name] = scale
+            references[i] = np.array([scale.ref], h5py.ref_dtype)
+            users.setdefault(name, []).append((dataset.ref, i))
+        dataset.attrs.create("DIMENSION_LIST", references, dtype=h5py.vlen_dtype(h5py.ref_dtype))
+    for name, listed in users.items():
+        kind = [("dataset", h5py.ref_dtype), ("dimension", "<i4")]
+        file[f"{ROOT}/axes/{name}"].attrs["REFERENCE_LIST"] = np.array(listed, kind)
 
 
 def _write_attribute(node: Any, key: str, value: Any) -> None:
