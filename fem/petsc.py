@@ -232,8 +232,9 @@ class NonlinearSolver:
             # entries of pads are of one size: to scale them, or to look for large ones, takes time and gains no digit
             defaults |= {"pc_type": "cholesky"} if self._condensed else {"mat_mumps_icntl_6": 0}
             defaults["mat_mumps_icntl_8"] = 0
-            if self.problem.size > 2500 or not self._condensed:  # where the analysis of a better ordering pays
-                defaults["mat_mumps_icntl_7"] = 4  # PORD; METIS and SCOTCH are rarely built in
+            if self.problem.size > 200 or not self._condensed:
+                # PORD, which ends the process at a symmetric matrix of few zeros; METIS and SCOTCH are rarely built in
+                defaults["mat_mumps_icntl_7"] = 4
         mine = {PREFIX + key: value for key, value in defaults.items()}
         mine = {key: value for key, value in mine.items() if key not in given} | dict(self.options)
         for key, value in mine.items():
