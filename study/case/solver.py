@@ -90,9 +90,10 @@ class Solved:
     ) -> dict[str, float]:
         """Errors of the values of a case that has a coarser mesh; see `mesh_errors`."""
         fine, coarse = self.fine.contacts, self.meshes[1]
-        floor, doubt = edge_floor(fine), DOUBTED if any(contact.coarse for contact in fine) else 1.0
+        floor = edge_floor(fine) * (DOUBTED if any(contact.coarse for contact in fine) else 1.0)
         solved = fine, coarse.contacts, values, other, settings, coarse.views, self.pairs
-        return mesh_errors(*solved, floor, left_out, doubt)
+        balanced = all(contact.state.points.friction is None for contact in fine)
+        return mesh_errors(*solved, floor, left_out, balanced)
 
 
 def followed(
