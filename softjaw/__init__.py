@@ -11,21 +11,12 @@ from typing import Any
 
 # What type checkers know of these names stands in __init__.pyi.
 _HOMES = {
-    "Scene": "study.scene",
-    "press": "study.solve",
-    "run": "study.solve",
-    "open": "study.result.read",
-    "read_patch": "study.result.read",
-    "GraspMap": "study.lookup",
-    "ContactPatch": "friction.patch",
-    "read_pressure": "study.patch.measures",
-    "friction_limits": "study.patch.measures",
-    "friction_wrench": "study.patch.measures",
-    "fit_ellipsoid": "study.patch.measures",
-    "fit_quartic": "study.patch.measures",
-    "grasp_quality": "study.patch.measures",
-    "StudyError": "study.messages",
-}
+    "Scene": "study.scene", "press": "study.solve", "run": "study.solve", "open": "study.result.read",
+    "read_patch": "study.result.read", "GraspMap": "study.lookup", "ContactPatch": "friction.patch",
+    "read_pressure": "study.patch.measures", "friction_limits": "study.patch.measures",
+    "friction_wrench": "study.patch.measures", "fit_ellipsoid": "study.patch.measures",
+    "fit_quartic": "study.patch.measures", "grasp_quality": "study.patch.measures", "StudyError": "study.messages",
+}  # fmt: skip
 __all__ = sorted(_HOMES)
 
 

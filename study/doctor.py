@@ -185,11 +185,8 @@ def check_disk() -> Finding:
     return f"{free / 1e9:.1f} GB free in {folder}", cure, CANNOT_WRITE if cure else DONE
 
 
-CHECKS: dict[str, Callable[[], Finding]] = {
-    **{name: partial(probed, name) for name in PROBES},
-    "speed": check_speed,
-    "disk": check_disk,
-}
+CHECKS: dict[str, Callable[[], Finding]] = {name: partial(probed, name) for name in PROBES}
+CHECKS |= {"speed": check_speed, "disk": check_disk}
 
 
 def doctor(_options: Namespace | None = None) -> int:

@@ -94,10 +94,7 @@ def raised(flag: IntFlag) -> Flag:
     >>> raised(FrameFlag.HOLE | FrameFlag.ORIENTATION) == Flag.HOLE | Flag.ORIENTATION
     True
     """
-    found = Flag(0)
-    for member in flag:
-        found |= Flag[str(member.name)]
-    return found
+    return Flag(sum(Flag[str(member.name)] for member in flag))
 
 
 def flags_in(value: int) -> list[Flag]:

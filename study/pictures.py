@@ -17,13 +17,11 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 INK, SOFT = "#1d2429", "#6b747b"
 COLOURS = {
-    "payload": "viridis",
-    "quality": "viridis",
-    "e_n": "cividis",
-    "pressure": "magma_r",
-    "indentation": "plasma_r",
+    "payload": "viridis", "quality": "viridis", "e_n": "cividis", "pressure": "magma_r", "indentation": "plasma_r",
     "wall_stress": "inferno_r",
-}
+}  # fmt: skip
+
+
 def style() -> Any:
     """Context in which all pictures of a study are drawn and saved."""
     return mpl.rc_context(fname=Path(__file__).with_name("templates") / "pictures.mplstyle")

@@ -146,13 +146,12 @@ def bends(table: FloatArray, axes: Sequence[Nodes], side: NDArray[np.bool_]) -> 
         half = np.abs(np.diff(slope) / (h[1:] + h[:-1]))
         half[(branch[..., :-2] != branch[..., 1:-1]) | (branch[..., 1:-1] != branch[..., 2:])] = np.nan
         if closed:
-            h, f = h[1:-1], f[..., 1:-1]
+            h, f, branch = h[1:-1], f[..., 1:-1], branch[..., 1:-1]
         else:
             half = np.pad(half, ((0, 0), (0, 0), (1, 1)), constant_values=np.nan)
         cell = np.fmax(half[..., :-1], half[..., 1:]) * h**2
         cell = np.where(np.isnan(cell), np.abs(np.diff(f)), cell)
-        across = np.moveaxis(side, a, -1)
-        cell[across[..., :-1] != across[..., 1:]] = 0.0
+        cell[branch[..., :-1] != branch[..., 1:]] = 0.0
         np.moveaxis(bent[a], a, -1)[..., :-1] = cell
     return bent.reshape(3, -1)
 

@@ -197,13 +197,9 @@ def grasp_record(
 def as_record(patches: Sequence[EvaluatedPatch], grasp: dict[str, Any] | None) -> dict[str, Any]:
     """Everything as plain numbers, lists and texts, in SI units; what is not there is None."""
     return {
-        "mu": patches[0].contact.mu,
-        "patches": [_patch_record(patch) for patch in patches],
-        "grasp": grasp,
-        "notes": _notes(patches, grasp),
-        "units": UNITS,
-        "definitions": DEFINITIONS,
-    }
+        "mu": patches[0].contact.mu, "patches": [_patch_record(patch) for patch in patches], "grasp": grasp,
+        "notes": _notes(patches, grasp), "units": UNITS, "definitions": DEFINITIONS,
+    }  # fmt: skip
 
 
 def _patch_record(evaluated: EvaluatedPatch) -> dict[str, Any]:

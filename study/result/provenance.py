@@ -73,15 +73,7 @@ def versions(mpi_library: str) -> str:
 def session(ranks: int, hosts: int, mpi_library: str) -> dict[str, Any]:
     """One row of the provenance, as a run begins."""
     return {
-        "start": timestamp(),
-        "reason": "running",
-        "ranks": ranks,
-        "hosts": hosts,
-        "host": platform.node(),
-        "program": program(),
-        "git": git_state(Path(__file__).parents[3]),
-        "versions": versions(mpi_library),
-        "cpu": cpu(),
-        "command": shlex.join(sys.argv),
-        "petsc_options": os.environ.get("PETSC_OPTIONS", ""),
-    }
+        "start": timestamp(), "reason": "running", "ranks": ranks, "hosts": hosts, "host": platform.node(),
+        "program": program(), "git": git_state(Path(__file__).parents[3]), "versions": versions(mpi_library),
+        "cpu": cpu(), "command": shlex.join(sys.argv), "petsc_options": os.environ.get("PETSC_OPTIONS", ""),
+    }  # fmt: skip

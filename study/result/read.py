@@ -127,8 +127,7 @@ def dataset(result: Result) -> xr.Dataset:
     variables = {q.variable: _variable(result, q) for q in listed}
     for q in layout.derived:
         variables[q.name] = xr.Variable(q.dims, result.derived(q.name), _about(q))
-    for name in ("attempts", "message"):
-        values = result.messages if name == "message" else result.read(f"status/{name}")
+    for name, values in (("attempts", result.read("status/attempts")), ("message", result.messages)):
         variables[name] = xr.Variable(layout.names, values, _about(BY_KEY[f"status/{name}"]))
     status = result.status  # last: rows that a run began anew meanwhile are missing now
     for variable in variables.values():

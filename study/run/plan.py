@@ -89,16 +89,10 @@ def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = (), r
     units: Sequence[Any] = decided(grasps.units(scene))
     if scene.candidates.sampled and forces_apart(scene):
         units = [_with_meshes(unit, scene, rounds) for unit in units]
-    header = Header(
-        digest=digest,
-        scene=text,
-        title=getattr(scene.object, "name", None) or Path(scene_file).stem,
-        scene_file=scene_file,
-        overrides=tuple(overrides),
-        petsc_options=" ".join(f"-{key} {value}" for key, value in scene.petsc.items()),
-        labels=tuple(candidate.label for candidate in grasps.candidates(scene)),
-        about=_about(scene),
-    )
+    title = getattr(scene.object, "name", None) or Path(scene_file).stem
+    petsc_options = " ".join(f"-{key} {value}" for key, value in scene.petsc.items())
+    labels = tuple(candidate.label for candidate in grasps.candidates(scene))
+    header = Header(digest, text, title, scene_file, tuple(overrides), petsc_options, labels, _about(scene))
     layout = Layout(axes, faces, tuple(derived(scene)), has(scene), rounds)
     return Plan(layout, header, tuple(units))
 

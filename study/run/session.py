@@ -298,18 +298,14 @@ def finish_alone(work: Work, path: Path, plan: Plan, session: int, name: str) ->
 def finish(work: Work, writer: ResultWriter, name: str) -> None:
     """Fill the derived datasets if nothing is missing, and write how this session ended; by one rank."""
     codes = writer.codes()
-    missing, failed = int(np.sum(codes == MISSING)), int(np.sum(codes == FAILED))
+    missing, done, failed = (int(np.sum(codes == state)) for state in (MISSING, CASE_DONE, FAILED))
     # Derived values of half a study would look like those of a whole one.
     if work.finalise is not None and not missing:
         work.finalise(writer)
-    writer.update_session(
-        stop=provenance.timestamp(),
-        reason=f"stopped by {name or 'another rank'}" if missing else "complete",
-        # Once more: libraries that were loaded for the solves are known only now.
-        versions=provenance.versions(MPI.Get_library_version()),
-        done=int(np.sum(codes == CASE_DONE)),
-        failed=failed,
-    )
+    reason = f"stopped by {name or 'another rank'}" if missing else "complete"
+    # Once more: libraries that were loaded for the solves are known only now.
+    versions = provenance.versions(MPI.Get_library_version())
+    writer.update_session(stop=provenance.timestamp(), reason=reason, versions=versions, done=done, failed=failed)
 
 
 def pack(work: Work, path: Path, plan: Plan) -> None:
