@@ -191,9 +191,8 @@ def _axes(N: FloatArray, x_hint: ArrayLike) -> FloatArray:
     hint = np.asarray(x_hint, float)
     x = hint - (hint @ N) * N
     if np.linalg.norm(x) <= CANCEL * np.linalg.norm(hint):
-        raise ValueError(
-            f"x_hint {hint.tolist()} is parallel to the contact normal {N.tolist()}: give another direction"
-        )
+        text = f"x_hint {hint.tolist()} is parallel to the contact normal {N.tolist()}: give another direction"
+        raise ValueError(text)
     x = x / np.linalg.norm(x)
     return np.stack([x, np.cross(N, x), N])
 

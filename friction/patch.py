@@ -76,9 +76,8 @@ class ContactPatch:
             array.flags.writeable = False
             object.__setattr__(self, name, array)
         if not self.load.any():
-            raise NoContactError(
-                f"the {n} faces of the patch carry zero normal force: press further, or leave this patch out"
-            )
+            text = f"the {n} faces of the patch carry zero normal force: press further, or leave this patch out"
+            raise NoContactError(text)
 
     @property
     def load(self) -> FloatArray:
@@ -107,9 +106,8 @@ def _finite(name: str, value: ArrayLike, shape: tuple[int, ...]) -> FloatArray:
         )
     if not np.isfinite(array).all():
         index = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
-        raise ValueError(
-            f"{name}{list(index)} is {array[index]}: every value must be finite; repair or drop face {index[0]}"
-        )
+        text = f"{name}{list(index)} is {array[index]}: every value must be finite; repair or drop face {index[0]}"
+        raise ValueError(text)
     return array
 
 

@@ -198,9 +198,8 @@ def _six(twist: ArrayLike) -> FloatArray:
         raise ValueError(f"twist has shape {t.shape}, expected (m, 3) [v_x, v_y, omega_z] or (m, 6) [v, omega]")
     if not np.isfinite(t).all():
         k = int(np.argmin(np.isfinite(t).all(axis=1)))
-        raise ValueError(
-            f"twist[{k}] is {t[k].tolist()}: write a translation as omega = 0, not as a far centre of rotation"
-        )
+        text = f"twist[{k}] is {t[k].tolist()}: write a translation as omega = 0, not as a far centre of rotation"
+        raise ValueError(text)
     if t.shape[1] == 6:
         return np.ascontiguousarray(t)
     six = np.zeros((len(t), 6))

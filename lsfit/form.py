@@ -151,9 +151,8 @@ def sphere_rule(dimension: int, n: int) -> tuple[FloatArray, FloatArray]:
     # slices of a sphere weigh (1 - z^2)^((d - 3) / 2), for which these rules are made
     z, weight = roots_gegenbauer(n, (dimension - 2) / 2)
     u, inner = sphere_rule(dimension - 1, n)
-    points = np.concatenate(
-        [np.sqrt(1 - z**2)[:, None, None] * u, np.broadcast_to(z[:, None, None], (n, len(u), 1))], axis=2
-    )
+    heights = np.broadcast_to(z[:, None, None], (n, len(u), 1))
+    points = np.concatenate([np.sqrt(1 - z**2)[:, None, None] * u, heights], axis=2)
     return points.reshape(-1, dimension), (weight[:, None] * inner).ravel()
 
 

@@ -201,9 +201,8 @@ def refuse_runaway(surface: Quartic | Ellipsoid, Y: FloatArray) -> None:
     # the median, as single bad samples may lie anywhere
     median = float(np.median(radii(surface, Y)))
     if median > 2:
-        raise FitError(
-            f"the surface lies {median:.3g} times as far out as half of the {len(Y)} samples: give more of them"
-        )
+        text = f"the surface lies {median:.3g} times as far out as half of the {len(Y)} samples: give more of them"
+        raise FitError(text)
 
 
 def refuse_endless(P: float, u: FloatArray, Y: FloatArray, degree: int) -> None:

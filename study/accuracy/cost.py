@@ -28,8 +28,7 @@ LOOKS = (("#12436d", "o"), ("#c05a00", "s"), ("#2a8c82", "^"), ("#801650", "D"))
 def cost_scene(scene: Scene) -> Scene:
     """The scene whose results tell the cost: a few of its cases, with its own sweep or one over meshes."""
     plain: dict[str, Any] = dict.fromkeys(("accuracy.target", "candidates.refine"))
-    plain |= {"uncertainty.spread": {}, "run.patches": "none"}
-    plain |= {"load.normal_force_n": _few(scene.load.normal_force_n)}
+    plain |= {"uncertainty.spread": {}, "run.patches": "none", "load.normal_force_n": _few(scene.load.normal_force_n)}
     few = scene.with_values(plain | _few_candidates(scene))
     return Scene.of_tables({**few.effective(), "sweep": dict(scene.sweep) or mesh_sweep(scene)})
 

@@ -66,9 +66,7 @@ def own_frame(shape: Any) -> Pose:
 
 def centre_of_volume(obj: Any) -> NDArray[np.float64]:
     """Centroid ``(3,)`` [m] of the body that an object's surface encloses, as if it were full."""
-    if hasattr(obj, "centroid"):
-        return np.asarray(obj.centroid[0])
-    return solid_centroid(*obj.surface())
+    return np.asarray(obj.centroid[0]) if hasattr(obj, "centroid") else solid_centroid(*obj.surface())
 
 
 def centroid_and_bounds(shape: Any) -> dict[str, NDArray[np.float64]]:
@@ -162,19 +160,17 @@ def check_object(scene: Scene) -> None:
     for inputs in scene.realisations[1:]:
         scene.with_values(inputs)  # a sample that cannot be, such as a friction coefficient below 0
     for shape in shapes_of(scene):
-        keys = {"revolution": "object.profile_mm", "sections": "object.sections", "mesh": "object.mesh"}
-        key = keys.get(shape.shape)
+        key = {"revolution": "object.profile_mm", "sections": "object.sections", "mesh": "object.mesh"}.get(shape.shape)
         if key is None:
             return
         try:
             build_object(shape)
             # An outline may be a good solid and still no wall.
-            if shape.wall is not None:
-                outer_surface(shape)
+            surface = None if shape.wall is None else outer_surface(shape)
         except ValueError as error:
             raise StudyError(USAGE, f"{key}: {error}") from error
-        if shape.wall is not None:
-            geometry().check_wall(shape, outer_surface(shape))
+        if surface is not None:
+            geometry().check_wall(shape, surface)
         if shape.shape == "mesh":
             _check_stations(scene, shape)
 

@@ -51,11 +51,9 @@ SMALL_TRACTION = E_N_TARGET / 0.5
 # wanted, too, which a rigid wall has not and e_n does not tell.
 STIFF_WALL, SMALL_INDENTATION = 0.02, 0.6
 SURFACES = {
-    "three_motions": "ellipsoid from three motions",
-    "axis_aligned": "fitted ellipsoid",
-    "full": "fitted ellipsoid",
+    "three_motions": "ellipsoid from three motions", "axis_aligned": "fitted ellipsoid", "full": "fitted ellipsoid",
     "quartic": "convex quartic",
-}
+}  # fmt: skip
 # Part of the largest change on the coarse mesh that is doubted: the fine one shifts where a change passes through zero.
 DOUBT = 0.3
 # What may be raised where a contact is smaller than a coarse element: that says nothing, and harms no case.
@@ -144,10 +142,9 @@ def settled(scene: Scene, solution: Solution, fits: Sequence[Mapping[str, Surfac
     wrench, surface = scene.effects.wrench, scene.limit_surface.model
     dropped = max(dropped_share(fit.wrench, fit.rho) for fit in curved)
     error = float(np.max([fit.fit_error.Erad for fit in curved]))
+    reason = SYMMETRY if scene.effects.model_size == "auto" else FORCED
     return {
-        "model_size": Level(
-            MODEL_SIZES[solution.fingers.planes], reason=SYMMETRY if scene.effects.model_size == "auto" else FORCED
-        ),
+        "model_size": Level(MODEL_SIZES[solution.fingers.planes], reason=reason),
         # one where a plane of symmetry lies between two that press on one wall
         "fingers": Level("one", reason=SYMMETRY) if solution.fingers.fingers_solved == 1 else Level("two"),
         "friction": Level("ccm", 1.0 - F_N / S, CHEAP),

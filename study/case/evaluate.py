@@ -109,30 +109,23 @@ def evaluate(
 def _friction_values(contacts: Sequence[Contact]) -> dict[str, Any]:
     """Friction limits of each contact, and of the weaker one."""
     # axes: finger, friction model
-    limits = {
-        name: np.array([[getattr(c.limits[m], name) for m in MODELS] for c in contacts])
-        for name in ("f_x", "f_y", "tau_z", *ECCENTRICITIES)
-    }
+    names = "f_x", "f_y", "tau_z", *ECCENTRICITIES
+    limits = {name: np.array([[getattr(c.limits[m], name) for m in MODELS] for c in contacts]) for name in names}
     S, F_N = (np.array([getattr(c.limits["ccm"], name) for c in contacts]) for name in ("S", "F_N"))
     tau_pure = [c.tau_pure for c in contacts]
     values = {
-        "maps/tau_pure": min(tau_pure),
-        "maps/S": S.mean(),
-        "maps/F_N": F_N.mean(),
+        "maps/tau_pure": min(tau_pure), "maps/S": S.mean(), "maps/F_N": F_N.mean(),
         "maps/contact_area": np.mean([c.area for c in contacts]),
         "maps/p_max": max(c.largest_pressure for c in contacts),
         "maps/contact_distance": float(np.linalg.norm(contacts[1].origin - contacts[0].origin)),
-        "maps/curvature_loss": 1.0 - F_N.sum() / S.sum(),
-        "maps/misalignment": max(angles(*contacts)),
-        "fingers/tau_pure": tau_pure,
-        "fingers/S": S,
-        "fingers/F_N": F_N,
+        "maps/curvature_loss": 1.0 - F_N.sum() / S.sum(), "maps/misalignment": max(angles(*contacts)),
+        "fingers/tau_pure": tau_pure, "fingers/S": S, "fingers/F_N": F_N,
         "fingers/frame_origin": [c.frame.origin for c in contacts],
         "fingers/frame_axes": [c.frame.axes for c in contacts],
         "fingers/frame_flag": [int(c.frame.flag) for c in contacts],
         "fingers/pose_rotation": np.array([c.pose.rotation for c in contacts]),
         "fingers/pose_origin": np.array([c.pose.origin for c in contacts]),
-    }
+    }  # fmt: skip
     for name in ("semi_axes", "rank"):
         values[f"limit_surface/{name}"] = [[getattr(c.ellipsoids[m], name) for m in MODELS] for c in contacts]
     # a grasp carries what its weaker finger carries

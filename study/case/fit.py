@@ -125,9 +125,8 @@ def jaws_of(scene: Scene) -> Jaws:
     """The gripper of a scene at the force in the middle of its load path."""
     gripper, forces = scene.gripper, scene.load.normal_force
     opening = math.inf if gripper.max_opening is None else gripper.max_opening
-    return Jaws(
-        gripper.pad_size, stiffness(gripper), scene.friction.mu, forces[len(forces) // 2], opening, gripper.finger_size
-    )
+    middle = forces[len(forces) // 2]
+    return Jaws(gripper.pad_size, stiffness(gripper), scene.friction.mu, middle, opening, gripper.finger_size)
 
 
 def doubt(points: FloatArray) -> float:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -51,17 +52,15 @@ def boxes(hand: Hand, along: str, pad: FloatArray, opening: float, depth: float)
     width, thickness = (pad[1], FINGER_THICKNESS) if hand.finger_mm is None else np.array(hand.finger_mm) / 1e3
     tip, root = depth + pad[0] / 2, depth - pad[0] / 2
     bare = opening / 2 + pad[2]
+    foam = opening / 2, bare, pad[1], root
+    finger = bare, bare + thickness, max(width, pad[1]), min(0.0, root)
     made = []
-    for low, high, wide, start in (
-        (opening / 2, bare, pad[1], root),
-        (bare, bare + thickness, max(width, pad[1]), min(0.0, root)),
-    ):
-        for sign in (-1.0, 1.0):
-            box = np.zeros((2, 3))
-            box[:, closing] = sorted((sign * low, sign * high))
-            box[:, across] = -wide / 2, wide / 2
-            box[:, 2] = start - WAY, tip
-            made.append(box)
+    for (low, high, wide, start), sign in product((foam, finger), (-1.0, 1.0)):
+        box = np.zeros((2, 3))
+        box[:, closing] = sorted((sign * low, sign * high))
+        box[:, across] = -wide / 2, wide / 2
+        box[:, 2] = start - WAY, tip
+        made.append(box)
     if hand.palm_mm is not None:
         palm = np.array(hand.palm_mm) / 1e3
         palm[:, :2] = palm[:, :2] if along == hand.closing else palm[:, 1::-1]

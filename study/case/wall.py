@@ -111,9 +111,8 @@ def _places(grasp: Grasp, shell: Shell, q: FloatArray) -> FloatArray:
     The angles begin at finger 1, so that images of a grasp are stored alike but for their turn.
     """
     mesh = shell.mesh
-    theta, s = np.meshgrid(
-        2 * np.pi * np.arange(AROUND) / AROUND, np.linspace(mesh.s[0], mesh.s[-1], ALONG), indexing="ij"
-    )
+    angles = 2 * np.pi * np.arange(AROUND) / AROUND
+    theta, s = np.meshgrid(angles, np.linspace(mesh.s[0], mesh.s[-1], ALONG), indexing="ij")
     # to the side that is meshed
     x, y = np.cos(theta), np.sin(theta)
     side = np.stack([np.where((x < 0) & grasp.mirrors[0], -1.0, 1.0), np.where((y < 0) & grasp.mirrors[1], -1.0, 1.0)])

@@ -46,13 +46,10 @@ def cases(
     for index in np.ndindex(status.shape) if which is None else which:
         yield {
             "place": {axis.name: float(axis.values[i]) for axis, i in zip(axes, index, strict=True)},
-            "label": str(labels[index[-3:-1]]),
-            "state": STATES[status[index]],
-            "message": str(messages[index]),
-            "flags": int(flags[index]),
-            "maps": {name: values[index] for name, values in maps.items()},
+            "label": str(labels[index[-3:-1]]), "state": STATES[status[index]], "message": str(messages[index]),
+            "flags": int(flags[index]), "maps": {name: values[index] for name, values in maps.items()},
             "fingers": [{name: values[index][f] for name, (values, *_) in fingers.items()} for f in range(FINGERS)],
-        }
+        }  # fmt: skip
 
 
 def _fingers(ds: xr.Dataset, model: str) -> dict[str, tuple[np.ndarray, str | tuple[str, ...], tuple[str, ...]]]:

@@ -13,7 +13,7 @@ import hashlib
 import io
 import json
 import tarfile
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -146,9 +146,7 @@ def _webdataset(grasps: ObjectGrasps) -> Files:
     return {f"{key}.json": _as_json(grasps), f"{key}.mesh{grasps.mesh.suffix.lower()}": grasps.mesh.read_bytes()}
 
 
-FORMS: dict[str, Callable[[ObjectGrasps], Files]] = {
-    "graspgen": _graspgen, "acronym": _acronym, "webdataset": _webdataset,
-}  # fmt: skip
+FORMS = {"graspgen": _graspgen, "acronym": _acronym, "webdataset": _webdataset}
 
 
 def _objects(index: Path, gripper: GripperFrame) -> Iterator[ObjectGrasps]:

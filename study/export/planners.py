@@ -55,10 +55,8 @@ def as_graspgen(grasps: Sequence[RankedGrasp], gripper: GripperFrame, ds: xr.Dat
         "grasps": {
             "transforms": [grasp.matrix.tolist() for grasp in grasps],
             "object_in_gripper": [not grasp.reasons for grasp in grasps],
-            "qualities": [grasp.merit for grasp in grasps],
-            "forces": [grasp.force for grasp in grasps],
-            "widths": [plain(grasp.maps["opening"]) for grasp in grasps],
-            "names": [grasp.name for grasp in grasps],
+            "qualities": [grasp.merit for grasp in grasps], "forces": [grasp.force for grasp in grasps],
+            "widths": [plain(grasp.maps["opening"]) for grasp in grasps], "names": [grasp.name for grasp in grasps],
             "warnings": [[*grasp.warnings, *grasp.hold.unfit] for grasp in grasps],
         },
         "softjaw": {

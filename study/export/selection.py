@@ -31,7 +31,7 @@ from softjaw.study.flags import LOST, flag_words, flags_in
 from softjaw.study.grippers import Hand
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.quantities import FORCE_RANGE, LEAST_FORCE, MAIN
-from softjaw.study.ranking import at_level, judged, ranked, score_of
+from softjaw.study.ranking import at_level, index_of, judged, ranked, score_of
 from softjaw.study.result.read import axes_of, maps_in
 from softjaw.study.result.store import place_text
 from softjaw.study.units import shown, shown_text
@@ -163,8 +163,7 @@ def chosen(
     if unknown := [name for name in least if name not in units]:
         raise StudyError(USAGE, f"--min: found '{unknown[0]}', expected one of {', '.join(units)}")
     at = at.assign(flags=(at.status.dims, judged(at), at["flags"].attrs))
-    shape, order = at.status.shape[:-1], ranked(at, k, by)
-    which = [(*(int(i) for i in np.unravel_index(c, shape)), k) for c in order]
+    which = [index_of(at, int(c), k) for c in ranked(at, k, by)]
     bounds = {name: value / shown(1.0, units[name]) for name, value in least.items()}
     # NaN is not at least anything, so a grasp without the value is left out.
     found = [

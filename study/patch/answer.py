@@ -25,11 +25,9 @@ from softjaw.study.quantities import MODELS, map_row
 
 HALF_TURN = np.diag([1.0, -1.0, -1.0])  # about x: how the second of two equal fingers stands
 SURFACES = {  # as a scene names them, and in the text
-    "three_motions": "ellipsoid, three motions",
-    "axis_aligned": "ellipsoid, axis-aligned",
-    "full": "ellipsoid, full",
+    "three_motions": "ellipsoid, three motions", "axis_aligned": "ellipsoid, axis-aligned", "full": "ellipsoid, full",
     "quartic": "convex quartic",
-}
+}  # fmt: skip
 FITTED_ON = 500  # motions; a fit is judged on others
 SPACE = 3  # dimension of the loads (f_x, f_y, tau_z)
 FRICTION = {"f_x_max": "f_x", "f_y_max": "f_y", "tau_z_max": "tau_z", "tau_pure": "", **{n: n for n in ECCENTRICITIES}}

@@ -190,9 +190,8 @@ def _groups_free() -> Iterator[float]:
         _, controllers, path = line.split(":", 2)
         if controllers in ("", "memory"):
             root = CGROUPS / controllers
-            names = (
-                ("memory.limit_in_bytes", "memory.usage_in_bytes") if controllers else ("memory.max", "memory.current")
-            )
+            version_1 = "memory.limit_in_bytes", "memory.usage_in_bytes"
+            names = version_1 if controllers else ("memory.max", "memory.current")
             group = root / path.strip().lstrip("/")
             # A limit may be set on any group above; the tightest one counts.
             for folder in (group, *(f for f in group.parents if f.is_relative_to(root))):

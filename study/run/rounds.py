@@ -95,16 +95,15 @@ def _neighbours(scene: Scene, rounds: Any, values: FloatArray, share: float) -> 
         return grip.peak * held(grip.contacts, task)
 
     known = [_frame(pose, placed) for pose in with_places(scene.candidates.poses, rounds)]
+
+    def unknown(frame: Frame) -> bool:
+        return not any(apart(frame, other, jaws.pad) < SAME_POSE_STEPS * share for other in known)
+
     poses: list[tuple[float, Place]] = []
     for best in best_places(values):
         # payload on a bed of springs, below which it is none [kg]
         reference = max(promise(JawsOnSurface(surface, *known[best], jaws)), 1e-9)
-        frames = (
-            frame
-            for frame in _moved(known[best], share, jaws.pad)
-            if not any(apart(frame, other, jaws.pad) < SAME_POSE_STEPS * share for other in known)
-        )
-        for grip in grips(surface, frames, jaws, lids):
+        for grip in grips(surface, filter(unknown, _moved(known[best], share, jaws.pad)), jaws, lids):
             # In the middle between both contacts, where the next tilt turns about.
             known.append((grip.middle, grip.axes))
             place = in_file(grip.middle, grip.axes[:, 2], grip.axes[:, 0], placed)

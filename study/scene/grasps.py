@@ -56,10 +56,9 @@ class Candidates(SceneSection):
         None, ge=2, le=10_000, description="number of stations, spread evenly from the first to the last of stations_mm"
     )
     stations_mm: Annotated[tuple[float, ...], Field(min_length=1, max_length=10_000), RISING] | None = Field(
-        None,
-        description="stations along the object's axis; with `stations` the first and the last",
+        None, description="stations along the object's axis; with `stations` the first and the last",
         examples=[[25, 50, 75]],
-    )
+    )  # fmt: skip
     angles_deg: Annotated[tuple[Angle, ...], Field(min_length=1, max_length=3600), RISING] = Field(
         (0.0, 90.0), description="angles about the axis", examples=[[0, 90]]
     )
@@ -72,10 +71,9 @@ class Candidates(SceneSection):
         None, ge=1, le=1000, description="looks for so many distinct grasps itself: places that face each other"
     )
     refine: Annotated[Annotated[int, Field(ge=1, le=100_000)] | None, BeforeValidator(_budget)] = Field(
-        None,
-        description=f"most cases that are solved beside the scene's own, around the best; true is {BUDGET}",
+        None, description=f"most cases that are solved beside the scene's own, around the best; true is {BUDGET}",
         examples=[BUDGET],
-    )
+    )  # fmt: skip
 
     @property
     def station_values_mm(self) -> tuple[float, ...]:

@@ -153,10 +153,8 @@ class Scene(SceneSection):
             yield f"friction.mu = {mu:g} is large: foam on plastic has about 0.8, and the paper's highest is 2"
         strain = force / (g.pad_length * g.pad_width) / g.shear_modulus
         if strain > 2:
-            area = f"{g.pad_length_mm * g.pad_width_mm:g} mm^2"
-            yield (
-                f"load.normal_force_n = {force:g} N on {area}: {strain:.2g} times the shear modulus may not converge"
-            )
+            load = f"{force:g} N on {g.pad_length_mm * g.pad_width_mm:g} mm^2"
+            yield f"load.normal_force_n = {load}: {strain:.2g} times the shear modulus may not converge"
         walled = getattr(self.object, "wall", None) is not None
         if self.accuracy.target is not None and walled and self.effects.object != "rigid":
             yield "accuracy.target refines cases on rigid objects alone: on a simulated wall there are two meshes"

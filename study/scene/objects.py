@@ -180,11 +180,9 @@ class RevolutionShape(Walled):
     SIZE_KEYS = ("profile_mm",)
     shape: Literal["revolution"]
     profile_mm: tuple[Point, ...] = Field(
-        min_length=4,
-        max_length=2000,
-        description="outline as points [z, radius] with rising z",
+        min_length=4, max_length=2000, description="outline as points [z, radius] with rising z",
         examples=[[[0, 30], [50, 30], [80, 20], [100, 20]]],
-    )
+    )  # fmt: skip
 
     def _geometry(self) -> tuple[int, dict[str, Span]]:
         radius = max(r for _, r in self.profile_mm)

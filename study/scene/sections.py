@@ -61,10 +61,9 @@ class Gripper(SceneSection):
         None, gt=0, le=1000, description="largest distance of the pads' faces; wider grasps are not solved"
     )
     finger_size_mm: tuple[FingerSide, FingerSide] | None = Field(
-        None,
-        description="length and width of what carries a pad, left out where it is the pad's own",
+        None, description="length and width of what carries a pad, left out where it is the pad's own",
         examples=[[60, 25]],
-    )
+    )  # fmt: skip
     sheet_thickness_mm: float = Field(2.0, ge=0.05, le=100, description="thickness of the backing plate")
     sheet_modulus_gpa: float = Field(200.0, ge=1e-3, le=2000, description="Young's modulus of the plate; steel: 200")
     sheet_support_mm: tuple[Extent, Extent] = Field((20.0, 10.0), description="the plate's held middle, length first")
@@ -312,10 +311,9 @@ class Uncertainty(SceneSection):
 
     samples: int = Field(20, ge=8, le=1000, description="how often the study is solved again")
     spread: dict[str, Annotated[float, Field(gt=0)]] = Field(
-        default_factory=dict,
-        description="half-widths of 95 % intervals by dotted key, in the key's unit",
+        default_factory=dict, description="half-widths of 95 % intervals by dotted key, in the key's unit",
         examples=[{"friction.mu": 0.08}],
-    )
+    )  # fmt: skip
 
     def inputs(self, means: Mapping[str, float]) -> list[dict[str, float]]:
         """Samples of independent normal inputs about their means, by key.
@@ -349,8 +347,7 @@ class Run(SceneSection):
     patches: Literal["all", "none"] = Field("all", description="whether the pressure on every face is kept")
     time_limit_s: float = Field(600.0, ge=0.1, le=1e6, description="time after which a case fails; the others continue")
     memory_gb: Annotated[float, Field(ge=0.1, le=1e5)] | Literal["auto", "none"] = Field(
-        "auto",
-        description="memory that the cases of a rank may take; auto is the rank's share of what is free",
+        "auto", description="memory that the cases of a rank may take; auto is the rank's share of what is free"
     )
 
 

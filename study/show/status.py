@@ -56,14 +56,11 @@ class Reason(NamedTuple):
 
 def status(options: Namespace) -> str:
     """Say what a result file or a folder of objects holds so far, as text, JSON or CSV."""
+    form, width = options.form, terminal_width()
     if index := index_path(options.file):
-        if options.form is None:
-            return objects.status_text(index, terminal_width())
-        return rendered(objects.index_table(index), options.form)
+        return rendered(objects.index_table(index), form) if form else objects.status_text(index, width)
     with open_result(options.file) as result:
-        if options.form is None:
-            return status_text(result, terminal_width())
-        return rendered(status_table(result), options.form)
+        return rendered(status_table(result), form) if form else status_text(result, width)
 
 
 def status_table(result: Any) -> Table:

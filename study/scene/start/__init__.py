@@ -63,9 +63,8 @@ def init(options: Namespace, measure: Callable[[Namespace], Measured]) -> str:
     scene, batch = (base.with_name(base.name + ending) for ending in (".toml", ".sbatch"))
     existing = [str(path) for path in (scene, batch) if path.exists()]
     if existing and not options.force:
-        raise StudyError(
-            CANNOT_WRITE, f"{' and '.join(existing)}: exists already; choose another name with -o, or add --force"
-        )
+        text = f"{' and '.join(existing)}: exists already; choose another name with -o, or add --force"
+        raise StudyError(CANNOT_WRITE, text)
     words = {"NAME": base.name, "SOFTJAW": _program()}
     mesh, notes = _about_mesh(options, scene, measure) if options.kind == "mesh" else ({}, ())
     for path, template in ((scene, f"{options.kind}.toml"), (batch, "run.sbatch")):
@@ -131,12 +130,10 @@ def _about_mesh(options: Namespace, scene: Path, measure: Callable) -> tuple[dic
     axis, extents, stations, notes = measure(options)
     file = os.path.relpath(Path(options.mesh).absolute(), scene.absolute().parent)
     return {
-        "MESH": json.dumps(file, ensure_ascii=False),
-        "UNIT": options.unit,
-        "AXIS": axis,
+        "MESH": json.dumps(file, ensure_ascii=False), "UNIT": options.unit, "AXIS": axis,
         "SIZE": " x ".join(f"{extents[i - 'xyz'.index(axis) - 1]:.4g}" for i in range(3)),
         "STATIONS": _stations(extents, stations),
-    }, notes
+    }, notes  # fmt: skip
 
 
 def _stations(extents: Sequence[float], stations: Sequence[float]) -> str:

@@ -79,15 +79,12 @@ def payload(
         "words": {key: view.summary(i, quantity) for key, i in every.items()},
         "notes": {key: label(said) for key, i in every.items() if (said := stated(ds, i))},
         "quantities": [_choice(view, name) for name in choices(ds, quantity)],
-        "points": _packed(1e3 * surface.points, "<f4"),
-        "triangles": _packed(surface.triangles, "<i4"),
-        "owner": _packed(surface.owner, "<i4"),
-        "grid": [AROUND, ALONG],
+        "points": _packed(1e3 * surface.points, "<f4"), "triangles": _packed(surface.triangles, "<i4"),
+        "owner": _packed(surface.owner, "<i4"), "grid": [AROUND, ALONG],
         "around": "" if wall is None else _packed(np.nan_to_num(wall[:, 0], nan=-1e9), "<f4"),
         "along": "" if wall is None else _packed(np.nan_to_num(wall[:, 1]), "<f4"),
-        "colours": [NEUTRAL, OPEN, CROSSED],
-        "cases": kept,
-    }
+        "colours": [NEUTRAL, OPEN, CROSSED], "cases": kept,
+    }  # fmt: skip
     return content, left_out
 
 
