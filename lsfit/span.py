@@ -188,12 +188,8 @@ def _solve(
 
 
 def _cones(m: int, d: int, k: int, size: int) -> list:
-    return [
-        clarabel.NonnegativeConeT(3 * m),
-        *[clarabel.SecondOrderConeT(d + 1)] * m,
-        clarabel.SecondOrderConeT(k + 1),
-        clarabel.PSDTriangleConeT(size),
-    ]
+    of_slip, of_length = [clarabel.SecondOrderConeT(d + 1)] * m, clarabel.SecondOrderConeT(k + 1)
+    return [clarabel.NonnegativeConeT(3 * m), *of_slip, of_length, clarabel.PSDTriangleConeT(size)]
 
 
 def refuse_runaway(surface: Quartic | Ellipsoid, Y: FloatArray) -> None:

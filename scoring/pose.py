@@ -59,9 +59,8 @@ def pose_volume(
     or to the finest division, which leaves some 3e-4 for bodies that are neither: theirs is at least half of what
     extrapolation adds to the volume of a hull. The L1 volume, NaN unless it is asked for, takes a third of the time.
     """
-    (C1, body1), (C2, body2) = (
-        _evened(c.wrench_map(object_length, contact_length, centre_of_mass), c.body) for c in (contact1, contact2)
-    )
+    lengths = object_length, contact_length, centre_of_mass
+    (C1, body1), (C2, body2) = (_evened(c.wrench_map(*lengths), c.body) for c in (contact1, contact2))
     spans = _spans(C1, body1, C2, body2)
     if spans is None:
         return PoseVolume(0.0, 0.0, 0.0)

@@ -43,11 +43,7 @@ class Score:
 
 
 def score(
-    contact1: Iterable[float],
-    contact2: Iterable[float],
-    distance: float,
-    object_length: float,
-    contact_length: float,
+    contact1: Iterable[float], contact2: Iterable[float], distance: float, object_length: float, contact_length: float
 ) -> Score:
     """Score of two soft contacts that face each other, about a centre of mass halfway between them.
 

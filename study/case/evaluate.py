@@ -69,18 +69,15 @@ def lengths(scene: Scene, obj: Any) -> tuple[FloatArray, float]:
     arms_by, torques_by = scene.score.object_length_mm, scene.score.contact_length_mm
     longest = float(extents.max()) if isinstance(arms_by, str) else in_si("arms_mm", arms_by)
     torques = {"pad": scene.gripper.pad_length, "object": longest}
-    return (
-        extents if arms_by == "per_axis" else np.full(3, longest),
-        torques[torques_by] if isinstance(torques_by, str) else in_si("torques_mm", torques_by),
-    )
+    arms = extents if arms_by == "per_axis" else np.full(3, longest)
+    return arms, torques[torques_by] if isinstance(torques_by, str) else in_si("torques_mm", torques_by)
 
 
 def settings_of(scene: Scene, obj: Any) -> EvaluationSettings:
     """What a scene asks for."""
     return EvaluationSettings(
         *lengths(scene, obj), task_of(scene, obj), scene.limit_surface,
-        epsilon_everywhere=scene.score.epsilon == "everywhere",
-        six=scene.effects.wrench == "6-D",
+        epsilon_everywhere=scene.score.epsilon == "everywhere", six=scene.effects.wrench == "6-D",
     )  # fmt: skip
 
 

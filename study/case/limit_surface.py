@@ -153,11 +153,10 @@ def _fit_error(surface: LimitSurface, W: FloatArray, T: FloatArray) -> FitErrors
 
 def surface_values(contacts: Sequence[Contact], fits: Sequence[Mapping[str, SurfaceFit]], six: bool) -> dict[str, Any]:
     """What is stored of both fingers' surfaces, keyed as in ``study.quantities``."""
-    values: dict[str, Any] = {
-        f"limit_surface/{name}": [[getattr(fit, name) for fit in finger.values()] for finger in fits]
-        for name in PER_MODEL
-    }
     curved = [finger["ccm"] for finger in fits]
+    values: dict[str, Any] = {"limit_surface/rho": [fit.rho for fit in curved]}
+    for name in PER_MODEL:
+        values[f"limit_surface/{name}"] = [[getattr(fit, name) for fit in finger.values()] for finger in fits]
     if six:
         sixes = [six_ellipsoid(c.local, c.rho, c.unit_limits["ccm"].S) for c in contacts]
         for name, part in zip(("matrix_6d", "rank_6d", "fit_error_6d"), zip(*sixes, strict=True), strict=True):
@@ -165,7 +164,7 @@ def surface_values(contacts: Sequence[Contact], fits: Sequence[Mapping[str, Surf
     for kind in ("", "_ellipsoid"):
         values[f"maps/fit_error{kind}"] = np.max([getattr(b, f"fit_error{kind}").Erad for b in curved])
         values[f"maps/overclaim{kind}"] = np.max([getattr(b, f"overclaim{kind}") for b in curved])
-    return values | {"limit_surface/rho": [b.rho for b in curved]}
+    return values
 
 
 def six_ellipsoid(patch: ContactPatch, rho: float, S: float) -> tuple[FloatArray, int, FitErrors]:

@@ -65,17 +65,15 @@ def _fingers(ds: xr.Dataset, model: str) -> dict[str, tuple[np.ndarray, str | tu
     limits = (("f_x_max", "N"), ("f_y_max", "N"), ("tau_z_max", "N m"))
     fitted = (("coefficients", MONOMIALS), ("matrix", SQUARE), ("certificate", ()))
     return {
-        "pose_origin": (o, "m", XYZ),
-        "pose_rotation": (R, "", NINE),
+        "pose_origin": (o, "m", XYZ), "pose_rotation": (R, "", NINE),
         "frame_origin": (np.einsum("...ij,...j->...i", R, ds.finger_frame_origin.values) + o, "m", XYZ),
         "frame_axes": (ds.finger_frame_axes.values @ np.swapaxes(R, -1, -2), "", NINE),
         **{name: (of_model[f"finger_{name}"].values, force, ()) for name, force in limits},
-        "S": (S, "N", ()),
-        "F_N": (ds.finger_F_N.values, "N", ()),
+        "S": (S, "N", ()), "F_N": (ds.finger_F_N.values, "N", ()),
         "semi_axes": (of_model.limit_surface_semi_axes.values * S[..., None], FORCES, WRENCH),
         "unit": (unit, FORCES, WRENCH),
         **{name: (of_model[f"limit_surface_{name}"].values, "", parts) for name, parts in fitted},
-    }
+    }  # fmt: skip
 
 
 def as_json(ds: xr.Dataset, model: str = "ccm", listed: Iterable[dict[str, Any]] | None = None) -> str:

@@ -49,8 +49,7 @@ def read_vtk(path: Path, reading: Reading) -> ReadPatch:
     centroid, area, normal = corner_geometry(corners)
     given = (np.asarray(array) for key, array in grid.cell_data.items() if key.lower() in ("normals", "normal"))
     normal = next((array.astype(float) for array in given if array.shape == normal.shape), normal)
-    place = "cell {}".format
-    return checked(str(path), place, centroid, area, normal, pressure, corners, notes, reading.flip_normals)
+    return checked(str(path), "cell {}".format, centroid, area, normal, pressure, corners, notes, reading.flip_normals)
 
 
 def _grid(path: Path) -> Any:

@@ -113,8 +113,7 @@ def opened(path: Path, kind: str, make: Callable[[StoredFile], Any]) -> Iterator
     except BROKEN as error:
         # h5py has no class for this: only the text tells a lock from damage.
         if "unable to lock file" in str(error):
-            text = f"{path}: another program holds it open for writing; close it there"
-            raise StudyError(IN_USE, text) from error
+            raise StudyError(IN_USE, f"{path}: another program holds it open for writing; close it there") from error
         raise StudyError(OTHER_FILE, f"{path}: {_why_not(path, kind, error)}") from error
     with closing(file):
         try:

@@ -27,8 +27,7 @@ class Lock:
 
     def __init__(self, result: Path, owner: str) -> None:
         self.path, self.result, self.owner = result.with_name(result.name + ".lock"), result, owner
-        self.warning = ""
-        self._fd = -1
+        self.warning, self._fd = "", -1
 
     def take_first(self) -> None:
         """On rank 0: raise `StudyError` if a rank of another run is alive."""

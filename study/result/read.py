@@ -160,10 +160,8 @@ def _scene_at(text: str, point: tuple[int, ...]) -> Scene:
 
 def axes_of(ds: xr.Dataset) -> tuple[Axis, ...]:
     """The axes of the cases: swept keys, station, angle and normal force."""
-    return tuple(
-        Axis(str(name), ds[name].values, ds[name].units, ds[name].long_name, ds[name].attrs.get("options", ()))
-        for name in ds.status.dims
-    )
+    axes = ((str(name), ds[name]) for name in ds.status.dims)
+    return tuple(Axis(name, x.values, x.units, x.long_name, x.attrs.get("options", ())) for name, x in axes)
 
 
 def values_of(ds: xr.Dataset, name: str, model: str = "ccm") -> np.ndarray:

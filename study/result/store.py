@@ -249,10 +249,8 @@ def torn_rows(path: Path, layout: Layout) -> list[int]:
     with open_result(path, unchecked=True) as result:
         codes = result.codes.ravel()
         marked = np.flatnonzero(codes != MISSING)
-        torn = [
-            checksums.broken_rows(result.file, layout, c.path, result.read(c.path.removeprefix(f"{ROOT}/")), marked)
-            for c in layout.columns
-        ]
+        columns = ((c.path, result.read(c.path.removeprefix(f"{ROOT}/"))) for c in layout.columns)
+        torn = [checksums.broken_rows(result.file, layout, path, values, marked) for path, values in columns]
         # The caller holds the lock, so no run is under way.
         states = checksums.broken_states(result.file, layout, codes, under_way=False)
     # What is not marked is solved anyway.

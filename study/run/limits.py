@@ -46,10 +46,8 @@ class Stopper:
     """
 
     def __init__(self, on_stop: Callable[[], None], limit: float = math.inf, last_resort: float | None = None) -> None:
-        self.name = ""
-        self.limit = limit
+        self.name, self.limit, self._solving = "", limit, False
         self._on_stop, self._last_resort = on_stop, last_resort
-        self._solving = False
         self._before: dict[signal.Signals, Any] = {}
         self._leave = self._case_ends = math.inf
 

@@ -116,10 +116,8 @@ def _names(meshes: Sequence[str]) -> list[str]:
     names = [path.stem for path in paths]
     for longer in (lambda p: f"{p.parent.name}-{p.stem}", lambda p: f"{p.parent.name}-{p.stem}-{p.suffix[1:]}"):
         seen = Counter(name.lower() for name in names)
-        names = [
-            longer(path) if seen[name.lower()] > 1 or name.lower() == INDEX else name
-            for name, path in zip(names, paths, strict=True)
-        ]
+        clashes = [seen[name.lower()] > 1 or name.lower() == INDEX for name in names]
+        names = [longer(path) if clash else name for clash, path, name in zip(clashes, paths, names, strict=True)]
     seen = Counter()
     for i, name in enumerate(names):
         seen[name.lower()] += 1

@@ -173,10 +173,8 @@ def _place_in(data: Any, entry: ErrorDetails, tables: Tables) -> tuple[KeyPath, 
         loc = ("object", "shape") if kind.startswith("union_tag") else ("object", *loc[2:])
     path: list[str | int] = []
     for part in loc:
-        inside = (
-            part in value if isinstance(value, Mapping)
-            else isinstance(part, int) and isinstance(value, list | tuple) and part < len(value)
-        )  # fmt: skip
+        member = isinstance(part, int) and isinstance(value, list | tuple) and part < len(value)
+        inside = part in value if isinstance(value, Mapping) else member
         if inside or part in known or part == "shape":
             path.append(part)
             value = value[part] if inside else None

@@ -68,11 +68,8 @@ def parse_toml(text: str, file: str) -> dict[str, Any]:
 def toml_text(data: Mapping[str, Any]) -> str:
     """TOML text of the tables of a scene, those within a table on a line; None is left out."""
     plain = [_line(key, value) for key, value in data.items() if not isinstance(value, Mapping)]
-    tables = [
-        f"\n[{_key(key)}]\n{''.join(_line(*pair) for pair in value.items())}"
-        for key, value in data.items()
-        if isinstance(value, Mapping) and value
-    ]
+    sections = [(_key(key), value) for key, value in data.items() if isinstance(value, Mapping) and value]
+    tables = [f"\n[{name}]\n{''.join(_line(*pair) for pair in table.items())}" for name, table in sections]
     return "".join([*plain, *tables])
 
 

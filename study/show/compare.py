@@ -142,8 +142,7 @@ def _values(pair: Pair, name: str, model: str) -> dict[str, NDArray[Any]]:
     beyond = (np.abs(change) > error + TIE * size).astype(object)
     beyond[~(np.isfinite(change) & np.isfinite(error))] = None
     relative = np.divide(change, size, out=np.full(size.shape, np.nan), where=size > 0)
-    columns = {"a": a, "b": b, "difference": change, "relative": relative, "error": error}
-    return {**columns, "beyond_error": beyond}
+    return {"a": a, "b": b, "difference": change, "relative": relative, "error": error, "beyond_error": beyond}
 
 
 def _error(ds: xr.Dataset, name: str, model: str) -> FloatArray | None:
