@@ -24,8 +24,8 @@ from softjaw.study.units import GRAVITY
 # of the value that falls with the number of elements that bear, less where sums over all faces tell it and more where
 # single ones do, and `DOUBTED` times as large where the mesh is coarse for the contact. Measured on random scenes with
 # a reference of half the element size (docs/accuracy.md): there the floor tells more than the distances do.
-OF_MESHES, DOUBTED, EDGE, POWER = 0.16, 2.5, 0.13, 0.5
-WIDER = {"f_x_max": 0.5, "f_y_max": 0.5, "opening_loaded": 0.1, "closing": 1.1, "contact_area": 5.0, "p_max": 20.0}
+OF_MESHES, DOUBTED, EDGE, POWER = 0.16, 2.5, 0.27, 0.75
+WIDER = {"f_x_max": 0.5, "f_y_max": 0.5, "opening_loaded": 0.1, "contact_area": 4.5, "p_max": 21.0}
 BALANCED = {"f_x_max": 0.17, "f_y_max": 0.17}  # instead, where pressures alone balance the force
 OF_PAIRS = {"p_max": 2.0}  # of what pairs differ by: peaks that an effect makes at an edge grow as elements shrink
 OF_FRICTION = 0.1  # of the friction: a payload is what arms and couples leave of it, and its floor no less than theirs
