@@ -28,7 +28,10 @@ OF_MESHES, DOUBTED, EDGE, POWER = 0.16, 2.5, 0.27, 0.75
 WIDER = {"f_x_max": 0.5, "f_y_max": 0.5, "opening_loaded": 0.1, "contact_area": 4.5, "p_max": 21.0}
 BALANCED = {"f_x_max": 0.17, "f_y_max": 0.17}  # instead, where pressures alone balance the force
 OF_PAIRS = {"p_max": 2.0}  # of what pairs differ by: peaks that an effect makes at an edge grow as elements shrink
-OF_FRICTION = 0.1  # of the friction: a payload is what arms and couples leave of it, and its floor no less than theirs
+# A payload is what arms and couples leave of the friction: its floor is no less than this share of the friction's, and
+# it is in doubt more than in proportion where meshes and views disagree.
+OF_FRICTION, DISAGREEING = 0.1, 2.0
+PAYLOADS = ("payload", "safety_factor")
 # The same of the coarse mesh alone, without friction that acts back, beside the distance to the farther view: of the
 # traction that is left out, and of the value. On 209 cases of seven meshes they cover at least 97 % of the errors of
 # the payload against the scene's mesh, and are some 7 times too large in the median.
@@ -55,7 +58,8 @@ def mesh_errors(
     for q in (q for q in TABLE if q.error and q.key in coarse_mesh):
         seen = [view[q.key] for view in viewed if q.key in view]
         value, size = fine_mesh[q.key], _size(q, fine_mesh[q.key])
-        error = estimate(value, coarse_mesh[q.key], seen, q.error) + floor * wider.get(q.name, 1.0) * size
+        more = DISAGREEING if q.name in PAYLOADS else 0.0
+        error = estimate(value, coarse_mesh[q.key], seen, q.error, more) + floor * wider.get(q.name, 1.0) * size
         if q.error == "relative" and not np.all(coarse_mesh[q.key]):
             error = max(error, 1.0)  # a payload of which the coarse mesh has nothing
         apart = [distance(low[q.key], high[q.key], q.error, value) for low, high in compared if q.key in low]
@@ -67,7 +71,7 @@ def _of_friction(values: Mapping[str, Any]) -> dict[str, float]:
     """How many times its floor is that of a payload: more where it is little of what friction carries."""
     weight = GRAVITY * float(values["maps/payload"][0])
     held = max(1.0, OF_FRICTION * sum(values["maps/f_x_max"]) / weight) if weight > 0 else 1.0
-    return {"payload": held, "safety_factor": held}
+    return dict.fromkeys(PAYLOADS, held)
 
 
 def edge_floor(contacts: Sequence[Contact]) -> float:
@@ -101,14 +105,17 @@ def _size(q: Quantity, value: ArrayLike) -> float:
     return 1.0 if q.error == "relative" else float(np.max(np.abs(value)))
 
 
-def estimate(fine: ArrayLike, coarse: ArrayLike, views: Sequence[ArrayLike], kind: str) -> float:
+def estimate(
+    fine: ArrayLike, coarse: ArrayLike, views: Sequence[ArrayLike], kind: str, disagreeing: float = 0.0
+) -> float:
     """Error of a number on the finer mesh: a share of its distances to the coarser one.
 
     The difference of two meshes alone passes through zero where the contact's edge lies alike on both; those to the
-    ``views`` of the coarse contact do not, so the farthest of all counts as well.
+    ``views`` of the coarse contact do not, so the farthest of all counts as well. ``disagreeing`` is how much more all
+    count where one is a whole value away.
     """
     farthest = max(distance(fine, other, kind) for other in (coarse, *views))
-    return OF_MESHES * (distance(fine, coarse, kind) + farthest)
+    return OF_MESHES * (distance(fine, coarse, kind) + farthest) * (1.0 + disagreeing * min(farthest, 1.0))
 
 
 def distance(value: ArrayLike, other: ArrayLike, kind: str, of: ArrayLike | None = None) -> float:
