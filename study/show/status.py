@@ -144,7 +144,9 @@ def largest_error(errors: Any, cases: Any, axes: Sequence[Any], labels: Any, mes
         return [f"errors: none of {solved} solved cases has one"]
     worst = tuple(map(int, np.unravel_index(int(np.nanargmax(known)), status.shape)))
     name, target = aim(cases)
-    parts = [f"{name} errors up to {100 * known[worst]:.2g} %"]
+    # where next to nothing is held the error may be many times what is
+    most = f"up to {100 * known[worst]:.2g} %" if known[worst] < 1 else "above 100 %"
+    parts = [f"{name} errors {most}"]
     if above := int(np.count_nonzero(misses(known, target))):
         parts.append(f"{above} of {count} above {100 * target:g} %")
     if count < solved:
