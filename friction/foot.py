@@ -136,7 +136,7 @@ def _numbered(points: FloatArray, apart: float) -> np.ndarray:
 
 
 @njit(cache=True)
-def _on_line(q):  # pragma: no cover - compiled
+def _on_line(q):
     """Faces that hold the point 0, and the weights ``(n, 4)`` of their corners there.
 
     Corners ``q (n, 4)`` are complex numbers in the plane across the line.
@@ -159,7 +159,7 @@ def _on_line(q):  # pragma: no cover - compiled
 
 
 @njit(cache=True)
-def _reference(a, b, c, d):  # pragma: no cover - compiled
+def _reference(a, b, c, d):
     """Coordinates ``u, v`` of the point 0 in the quadrilateral of four complex numbers, by Newton's method."""
     u = v = 0.0
     for _ in range(20):  # bilinear faces take three or four

@@ -215,7 +215,7 @@ REST = 32 * 2.0**-52
 # Reordering of sums lets the loop fill the vector registers. Not among the flags: nnan and ninf, which would allow the
 # compiler to drop the test for a face at rest.
 @njit(cache=True, fastmath={"reassoc", "contract", "arcp", "nsz"})
-def friction_sums(arm, normal, load, twist, out):  # pragma: no cover - compiled
+def friction_sums(arm, normal, load, twist, out):
     """Wrench and dissipation of unit friction for each motion.
 
     A face slides with ``c = n x v`` turned by a right angle in its plane, so ``|P v| = |c|`` and ``P v = c x n``: both
@@ -266,7 +266,7 @@ def pure_torque(patch: ContactPatch, mu: float, model: str = "ccm") -> float:
 
 
 @njit(cache=True)
-def _least_power(arm, normal, load, radius):  # pragma: no cover - compiled
+def _least_power(arm, normal, load, radius):
     """Least ``H(v_x, v_y, 1)`` of faces as `friction_sums` takes them, to 1e-9 of that about the origin; or NaN."""
     twist, sums = np.zeros((1, 6)), np.empty((1, 7))
     twist[0, 5] = 1.0

@@ -81,11 +81,11 @@ def _seen(which, normals, sides, directions, spacing, rotation, origin, lower, u
                     # a line at a smaller sine to a triangle runs along it and does not see it
                     if sign * (normal * directions[k]).sum() > -0.01:
                         continue
+                    back = -directions[k]
                     # what hid the spot before mostly hides this one, too
-                    if hides[k] != which[m] and 0.0 < hits(spot, -directions[k], corners[hides[k]]) < np.inf:
+                    if hides[k] != which[m] and 0.0 < hits(spot, back, corners[hides[k]]) < np.inf:
                         continue
-                    hit = first_hit(spot, -directions[k], 0.0, which[m], True, corners, order, low, high, start, count,
-                                    stack)[1]  # fmt: skip
+                    hit = first_hit(spot, back, 0.0, which[m], True, corners, order, low, high, start, count, stack)[1]
                     if hit >= 0:
                         hides[k] = hit
                     else:
