@@ -103,6 +103,7 @@ class LimitSurface(ABC):
 
     def mapped(self, A: FloatArray, flag: FitFlag = FitFlag.CLEAN) -> Self:
         """Image of the body under ``w -> A w``, with another flag added."""
+        # every surface is a dataclass, which its common base does not say
         return replace(self, B=A @ self.B, flag=self.flag | flag)  # type: ignore[type-var]
 
     def radius(self, u: ArrayLike) -> FloatArray:

@@ -106,7 +106,10 @@ def _check_line(line: FloatArray) -> None:
         z = line[1 + line[1:-1, 1].argmin(), 0]
         raise ValueError(f"the profile's curve swings to the axis near z = {z:g} m; add points there to hold it off")
     a, d = line[:-1], np.diff(line, axis=0)
-    cross = lambda u, v: u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]  # noqa: E731
+
+    def cross(u: FloatArray, v: FloatArray) -> FloatArray:
+        return u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
+
     e, touch = d / np.linalg.norm(d, axis=1)[:, None], NEGLIGIBLE * np.ptp(line, axis=0).max()
     start = cross(e[:, None], a[None] - a[:, None])  # distances of all ends from all pieces' lines
     end = cross(e[:, None], line[None, 1:] - a[:, None])

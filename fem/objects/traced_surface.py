@@ -71,7 +71,10 @@ def _smooth_surface(
     # carried on over the lids, so that they have the shape of the last section
     q = continued(s + start, R / a(s)[:, None], wavelength, (0.0, float(curve.breaks[-1])))
     shape = _shape(q, AROUND)
-    section = lambda theta, s, z, z_s: shape.at(theta, s)[:, :3, :2].transpose(1, 0, 2)  # noqa: E731
+
+    def section(theta: FloatArray, s: FloatArray, _z: FloatArray, _z_s: FloatArray) -> FloatArray:
+        return shape.at(theta, s)[:, :3, :2].transpose(1, 0, 2)
+
     return OuterSurface(curve, (start, stop), flat, section, wall.centre, symmetric, is_round), wavelength
 
 
