@@ -83,7 +83,7 @@ def _seen(which, normals, sides, directions, spacing, rotation, origin, lower, u
                         continue
                     back = -directions[k]
                     # what hid the spot before mostly hides this one, too
-                    if hides[k] != which[m] and 0.0 < hits(spot, back, corners[hides[k]]) < np.inf:
+                    if hides[k] != which[m] and 0.0 < hits(spot, back, corners, hides[k]) < np.inf:
                         continue
                     hit = first_hit(spot, back, 0.0, which[m], True, corners, order, low, high, start, count, stack)[1]
                     if hit >= 0:

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from numba import njit
 
-from softjaw.fem.objects.gap import IntArray, edges_of
+from softjaw.fem.objects.gap import IntArray
 from softjaw.friction.patch import NEGLIGIBLE, FloatArray
 
 LEAF = 4  # triangles in the smallest boxes
@@ -22,107 +22,119 @@ DEPTH = 128  # of the stack; a tree of 500 000 triangles is 18 deep
 
 
 @njit(cache=True)
-def _built(centres, lower, upper):
+def _built(corners):
     """Order of the triangles, and nodes: box, first triangle (leaf) or first child, number of triangles (0: inner)."""
-    m = len(centres)
-    order = np.arange(m)
+    m = len(corners)
+    order, along = np.arange(m), np.empty(m)
     most = max(4 * (m // LEAF + 1), 8)
-    low, high = np.empty((most, 3)), np.empty((most, 3))
+    low, high = np.full((most, 3), np.inf), np.full((most, 3), -np.inf)
     start, count = np.zeros(most, np.int64), np.zeros(most, np.int64)
     start[0], count[0], used, node = 0, m, 1, 0
     while node < used:
         a, n = start[node], count[node]
-        for d in range(3):
-            low[node, d], high[node, d] = np.inf, -np.inf
-        c_low, c_high = np.full(3, np.inf), np.full(3, -np.inf)
-        for i in order[a : a + n]:
-            for d in range(3):
-                low[node, d], high[node, d] = min(low[node, d], lower[i, d]), max(high[node, d], upper[i, d])
-                c_low[d], c_high[d] = min(c_low[d], centres[i, d]), max(c_high[d], centres[i, d])
         if n > LEAF:
             members = order[a : a + n].copy()
-            along = centres[members, np.argmax(c_high - c_low)]
-            # a stable sort keeps equal centres in order, so the tree is the same everywhere
-            order[a : a + n] = members[np.argsort(along, kind="mergesort")]
+            widest, axis = -1.0, 0
+            for d in range(3):
+                least, largest = np.inf, -np.inf
+                for k in members:
+                    centre = corners[k, 0, d] + corners[k, 1, d] + corners[k, 2, d]
+                    least, largest = min(least, centre), max(largest, centre)
+                if largest - least > widest:
+                    widest, axis = largest - least, d
+            for k in range(n):
+                i = members[k]
+                along[k] = corners[i, 0, axis] + corners[i, 1, axis] + corners[i, 2, axis]
+            order[a : a + n] = members[np.argpartition(along[:n], n // 2)]
             start[used], count[used] = a, n // 2
             start[used + 1], count[used + 1] = a + n // 2, n - n // 2
             start[node], count[node] = used, 0
             used += 2
         node += 1
+    for node in range(used - 1, -1, -1):  # children come after their parents
+        first = start[node]
+        for d in range(3):
+            for k in range(first, first + count[node]):
+                for c in range(3):
+                    z = corners[order[k], c, d]
+                    low[node, d], high[node, d] = min(low[node, d], z), max(high[node, d], z)
+            if not count[node]:
+                low[node, d] = min(low[first, d], low[first + 1, d])
+                high[node, d] = max(high[first, d], high[first + 1, d])
     return order, low[:used], high[:used], start[:used], count[:used]
 
 
+# Below numbers are passed one by one: in such short functions a view of an array takes as long as the rest.
 @njit(cache=True)
-def _to_box(x, low, high):
-    """Squared distance of a point to a box."""
-    d2 = 0.0
-    for d in range(3):
-        out = max(low[d] - x[d], 0.0, x[d] - high[d])
-        d2 += out * out
-    return d2
-
-
-@njit(cache=True)
-def _on_segment(x, a, b, foot):
-    """Put the closest point of the segment into ``foot``; squared distance and the place on the segment in [0, 1]."""
-    along, length2 = 0.0, 0.0
-    for d in range(3):
-        along += (x[d] - a[d]) * (b[d] - a[d])
-        length2 += (b[d] - a[d]) ** 2
-    t = min(max(along / length2, 0.0), 1.0) if length2 > 0.0 else 0.0
-    d2 = 0.0
-    for d in range(3):
-        foot[d] = a[d] + t * (b[d] - a[d])
-        d2 += (x[d] - foot[d]) ** 2
-    return d2, t
+def _to_box(x0, x1, x2, low, high, n):
+    """Squared distance of a point to the ``n``-th box."""
+    d0 = max(low[n, 0] - x0, 0.0, x0 - high[n, 0])
+    d1 = max(low[n, 1] - x1, 0.0, x1 - high[n, 1])
+    d2 = max(low[n, 2] - x2, 0.0, x2 - high[n, 2])
+    return d0 * d0 + d1 * d1 + d2 * d2
 
 
 @njit(cache=True)
-def _on_triangle(x, p, most, foot, other):
-    """Put the closest point of the triangle ``p (3, 3)`` into ``foot``; squared distance and feature.
+def _on_segment(wx, wy, wz, dx, dy, dz):
+    """Squared distance of a point at ``w`` from the start of a segment ``d``, and the closest place on it in [0, 1]."""
+    length2 = dx * dx + dy * dy + dz * dz
+    t = min(max((wx * dx + wy * dy + wz * dz) / length2, 0.0), 1.0) if length2 > 0.0 else 0.0
+    return (wx - t * dx) ** 2 + (wy - t * dy) ** 2 + (wz - t * dz) ** 2, t
+
+
+@njit(cache=True)
+def _on_triangle(x0, x1, x2, corners, m, most):
+    """Squared distance of a point to the ``m``-th triangle, the feature that is closest, and the way there.
 
     Features: 0 the face, 1 to 3 the edges from corner 0, 1, 2 to the next one, 4 to 6 the corners. Infinite where the
-    triangle's plane is farther away than ``most``, squared.
+    triangle is farther away than ``most``, squared.
     """
-    ux, uy, uz = p[1, 0] - p[0, 0], p[1, 1] - p[0, 1], p[1, 2] - p[0, 2]
-    vx, vy, vz = p[2, 0] - p[0, 0], p[2, 1] - p[0, 1], p[2, 2] - p[0, 2]
-    wx, wy, wz = x[0] - p[0, 0], x[1] - p[0, 1], x[2] - p[0, 2]
+    ax, ay, az = corners[m, 0, 0], corners[m, 0, 1], corners[m, 0, 2]
+    ux, uy, uz = corners[m, 1, 0] - ax, corners[m, 1, 1] - ay, corners[m, 1, 2] - az
+    vx, vy, vz = corners[m, 2, 0] - ax, corners[m, 2, 1] - ay, corners[m, 2, 2] - az
+    wx, wy, wz = x0 - ax, x1 - ay, x2 - az
     nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
     area2 = nx * nx + ny * ny + nz * nz
-    size2 = max(ux * ux + uy * uy + uz * uz, vx * vx + vy * vy + vz * vz)
+    sx, sy, sz = vx - ux, vy - uy, vz - uz
+    uu, vv = ux * ux + uy * uy + uz * uz, vx * vx + vy * vy + vz * vz
     # squared area over the fourth power of the size, below which a triangle is taken as its three edges
-    if area2 > 1e-20 * size2 * size2:
+    if area2 > 1e-20 * max(uu, vv) ** 2:
         h = (wx * nx + wy * ny + wz * nz) / area2
         # by more than rounding, which decides between triangles that are as near as each other
         if h * h * area2 > 1.000001 * most:
-            return np.inf, 0
+            return np.inf, 0, 0.0, 0.0, 0.0
         c = ((uy * wz - uz * wy) * nx + (uz * wx - ux * wz) * ny + (ux * wy - uy * wx) * nz) / area2
         b = ((wy * vz - wz * vy) * nx + (wz * vx - wx * vz) * ny + (wx * vy - wy * vx) * nz) / area2
-        if b > 0.0 and c > 0.0 and b + c < 1.0:
-            foot[0], foot[1], foot[2] = x[0] - h * nx, x[1] - h * ny, x[2] - h * nz
-            return h * h * area2, 0
-    best, feature = np.inf, 0
-    for k in range(3):
-        d2, t = _on_segment(x, p[k], p[(k + 1) % 3], other)
-        if d2 < best:
-            best = d2
-            feature = 4 + k if t == 0.0 else (4 + (k + 1) % 3 if t == 1.0 else 1 + k)
-            foot[:] = other
-    return best, feature
+        a = 1.0 - b - c
+        if b > 0.0 and c > 0.0 and a > 0.0:
+            return h * h * area2, 0, h * nx, h * ny, h * nz
+        # in the plane it is at least as far off as from the line of any side that it is beyond
+        beside = max(min(b, 0.0) ** 2 / vv, min(c, 0.0) ** 2 / uu, min(a, 0.0) ** 2 / (sx * sx + sy * sy + sz * sz))
+        if (h * h + beside) * area2 > 1.000001 * most:
+            return np.inf, 0, 0.0, 0.0, 0.0
+    best, t = _on_segment(wx, wy, wz, ux, uy, uz)
+    feature, fx, fy, fz = 4 if t == 0.0 else 5 if t == 1.0 else 1, wx - t * ux, wy - t * uy, wz - t * uz
+    d2, t = _on_segment(wx - ux, wy - uy, wz - uz, sx, sy, sz)
+    if d2 < best:
+        best, feature = d2, 5 if t == 0.0 else 6 if t == 1.0 else 2
+        fx, fy, fz = wx - ux - t * sx, wy - uy - t * sy, wz - uz - t * sz
+    d2, t = _on_segment(wx, wy, wz, vx, vy, vz)
+    if d2 < best:
+        best, feature = d2, 4 if t == 0.0 else 6 if t == 1.0 else 3
+        fx, fy, fz = wx - t * vx, wy - t * vy, wz - t * vz
+    return best, feature, fx, fy, fz
 
 
 @njit(cache=True)
 def closest(x, corners, order, low, high, start, count):
-    """Closest points ``(n, 3)`` of the triangles ``corners (m, 3, 3)``, and the triangle and feature of each."""
+    """Ways ``(n, 3)`` from the closest points of the triangles ``corners (m, 3, 3)``; triangle and feature of each."""
     n = len(x)
-    feet, triangle, feature = np.empty((n, 3)), np.zeros(n, np.int64), np.zeros(n, np.int64)
-    foot, other, stack, bound = np.empty(3), np.empty(3), np.empty(DEPTH, np.int64), np.empty(DEPTH)
+    away, triangle, feature = np.empty((n, 3)), np.zeros(n, np.int64), np.zeros(n, np.int64)
+    stack, bound, nearest = np.empty(DEPTH, np.int64), np.empty(DEPTH), 0
     for i in range(n):
-        best = np.inf
-        if i > 0:  # points come in runs: the triangle of the one before is a good first guess
-            best, feature[i] = _on_triangle(x[i], corners[triangle[i - 1]], np.inf, foot, other)
-            triangle[i] = triangle[i - 1]
-            feet[i] = foot
+        x0, x1, x2 = x[i, 0], x[i, 1], x[i, 2]
+        # points come in runs: the triangle of the one before is a good first guess
+        best, kind, w0, w1, w2 = _on_triangle(x0, x1, x2, corners, nearest, np.inf)
         top, stack[0], bound[0] = 1, 0, 0.0
         while top > 0:
             top -= 1
@@ -131,32 +143,33 @@ def closest(x, corners, order, low, high, start, count):
             if bound[top] >= best:
                 continue
             if count[node]:
-                for k in order[start[node] : start[node] + count[node]]:
-                    d2, kind = _on_triangle(x[i], corners[k], best, foot, other)
+                for j in range(start[node], start[node] + count[node]):
+                    d2, other, v0, v1, v2 = _on_triangle(x0, x1, x2, corners, order[j], best)
                     if d2 < best:
-                        best, triangle[i], feature[i] = d2, k, kind
-                        feet[i] = foot
+                        best, kind, nearest, w0, w1, w2 = d2, other, order[j], v0, v1, v2
                 continue
             first, second = start[node], start[node] + 1
-            d_one, d_two = _to_box(x[i], low[first], high[first]), _to_box(x[i], low[second], high[second])
+            d_one, d_two = _to_box(x0, x1, x2, low, high, first), _to_box(x0, x1, x2, low, high, second)
             # the nearer box comes to lie on top: what it yields often spares the other
             if d_one < d_two:
                 first, second, d_one, d_two = second, first, d_two, d_one
             stack[top], bound[top], stack[top + 1], bound[top + 1] = first, d_one, second, d_two
             top += 2
-    return feet, triangle, feature
+        away[i, 0], away[i, 1], away[i, 2], triangle[i], feature[i] = w0, w1, w2, nearest, kind
+    return away, triangle, feature
 
 
 @njit(cache=True)
-def hits(o, d, p):
-    """Distance along the ray to the triangle, infinite beside it or in its plane (Moeller and Trumbore)."""
-    ux, uy, uz = p[1, 0] - p[0, 0], p[1, 1] - p[0, 1], p[1, 2] - p[0, 2]
-    vx, vy, vz = p[2, 0] - p[0, 0], p[2, 1] - p[0, 1], p[2, 2] - p[0, 2]
+def hits(o, d, corners, m):
+    """Distance along the ray to the ``m``-th triangle, infinite beside it or in its plane (Moeller and Trumbore)."""
+    ax, ay, az = corners[m, 0, 0], corners[m, 0, 1], corners[m, 0, 2]
+    ux, uy, uz = corners[m, 1, 0] - ax, corners[m, 1, 1] - ay, corners[m, 1, 2] - az
+    vx, vy, vz = corners[m, 2, 0] - ax, corners[m, 2, 1] - ay, corners[m, 2, 2] - az
     qx, qy, qz = d[1] * vz - d[2] * vy, d[2] * vx - d[0] * vz, d[0] * vy - d[1] * vx
     det = ux * qx + uy * qy + uz * qz
     if det == 0.0:
         return np.inf
-    wx, wy, wz = o[0] - p[0, 0], o[1] - p[0, 1], o[2] - p[0, 2]
+    wx, wy, wz = o[0] - ax, o[1] - ay, o[2] - az
     b = (wx * qx + wy * qy + wz * qz) / det
     if b < -NEGLIGIBLE or b > 1.0 + NEGLIGIBLE:
         return np.inf
@@ -192,9 +205,10 @@ def first_hit(o, d, least, skipped, anyone, corners, order, low, high, start, co
             stack[top], stack[top + 1] = start[node], start[node] + 1
             top += 2
             continue
-        for k in order[start[node] : start[node] + count[node]]:
+        for j in range(start[node], start[node] + count[node]):
+            k = order[j]
             if k != skipped:
-                t = hits(o, d, corners[k])
+                t = hits(o, d, corners, k)
                 if least < t < best:
                     best, nearest = t, k
                     if anyone:
@@ -213,36 +227,53 @@ def _along(x, d, least, skipped, nodes):
     return distance, hit
 
 
-def corner_angles(corners: FloatArray) -> FloatArray:
-    """Angles ``(m, 3)`` of triangles ``(m, 3, 3)`` at their corners [rad]."""
-    along = np.roll(corners, -1, axis=1) - corners
-    along /= np.maximum(np.linalg.norm(along, axis=2), 1e-300)[:, :, None]
-    # rounding can push the cosine beyond 1
-    return np.asarray(np.arccos(np.clip(-np.einsum("mkd,mkd->mk", along, np.roll(along, 1, axis=1)), -1.0, 1.0)))
+@njit(cache=True)
+def _round_points(triangles, points):
+    """Triangles round each of so many ``points``: where they start ``(points + 1,)`` in a list ``(3 m,)``."""
+    start, members = np.zeros(points + 2, np.int64), np.empty(triangles.size, np.int64)
+    for k in triangles.ravel():
+        start[k + 2] += 1
+    start = np.cumsum(start)
+    for k in range(triangles.size):
+        corner = triangles[k // 3, k % 3]
+        members[start[corner + 1]] = k // 3
+        start[corner + 1] += 1
+    return start[:-1], members
 
 
-def pseudo_normals(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, np.ndarray]:
-    """Outward vectors ``(m, 7, 3)`` of face, edges and corners, and which lie on a border ``(m, 7)``."""
-    corners = points[triangles]
-    along = np.roll(corners, -1, axis=1) - corners
-    normal = np.cross(along[:, 0], -along[:, 2])
-    size = np.linalg.norm(normal, axis=1)
-    normal /= np.where(size > 0, size, 1.0)[:, None]  # a triangle without area has no say
-    angle = corner_angles(corners)
-    at_corner = np.stack([
-        np.bincount(triangles.ravel(), (angle * normal[:, d : d + 1]).ravel(), len(points)) for d in range(3)
-    ], axis=1)  # fmt: skip
-    edges = np.sort(edges_of(triangles), axis=1)
-    key, edge, times = np.unique(edges[:, 0] * len(points) + edges[:, 1], return_inverse=True, return_counts=True)
-    edge = edge.ravel()
-    at_edge = np.stack([np.bincount(edge, np.repeat(normal[:, d], 3), len(key)) for d in range(3)], axis=1)
-    border = np.zeros(len(points), dtype=bool)
-    border[edges[times[edge] == 1]] = True
-    vectors = np.concatenate([normal[:, None], at_edge[edge].reshape(-1, 3, 3), at_corner[triangles]], axis=1)
-    on_border = np.concatenate(
-        [np.zeros((len(triangles), 1), bool), (times[edge] == 1).reshape(-1, 3), border[triangles]], axis=1
-    )
-    return vectors, on_border
+@njit(cache=True)
+def _pseudo_normals(which, feature, corners, triangles, normals, start, members):
+    """Outward vectors ``(n, 3)`` of features of triangles, see `_on_triangle`, and which lie on a border ``(n,)``."""
+    vectors, border = np.zeros((len(which), 3)), np.zeros(len(which), np.bool_)
+    for i in range(len(which)):
+        t, f = which[i], feature[i]
+        if f == 0:
+            vectors[i] = normals[t]
+            continue
+        point = triangles[t, (f - 1) % 3]
+        for m in members[start[point] : start[point + 1]]:
+            k = 0 if triangles[m, 0] == point else 1 if triangles[m, 1] == point else 2
+            weight = 1.0
+            if f > 3:
+                uu = vv = uv = 0.0
+                for d in range(3):
+                    u = corners[m, (k + 1) % 3, d] - corners[m, k, d]
+                    v = corners[m, (k + 2) % 3, d] - corners[m, k, d]
+                    uu, vv, uv = uu + u * u, vv + v * v, uv + u * v
+                # rounding can push the cosine beyond 1
+                weight = np.arccos(min(max(uv / max(np.sqrt(uu * vv), 1e-300), -1.0), 1.0))
+            elif triangles[t, f % 3] not in triangles[m]:
+                continue
+            vectors[i] += weight * normals[m]
+        # the feature ends on a border where one of its edges belongs to a single triangle
+        for m in members[start[point] : start[point + 1]]:
+            for end in triangles[m]:
+                if end != point and (f > 3 or end == triangles[t, f % 3]):
+                    times = 0
+                    for other in members[start[point] : start[point + 1]]:
+                        times += end in triangles[other]
+                    border[i] |= times == 1
+    return vectors, border
 
 
 @dataclass(frozen=True, eq=False)
@@ -264,16 +295,19 @@ class TriangleTree:
     def nodes(self) -> tuple[np.ndarray, ...]:
         """Corners ``(m, 3, 3)`` and tree, as the compiled functions take them."""
         corners = np.ascontiguousarray(self.points[self.triangles])
-        return corners, *_built(corners.mean(axis=1), corners.min(axis=1), corners.max(axis=1))
-
-    @property
-    def face_normals(self) -> FloatArray:
-        """Unit normals ``(m, 3)``; zero for a triangle without area."""
-        return np.ascontiguousarray(self._vectors[0][:, 0])
+        return corners, *_built(corners)
 
     @cached_property
-    def _vectors(self) -> tuple[FloatArray, np.ndarray]:
-        return pseudo_normals(self.points, self.triangles)
+    def face_normals(self) -> FloatArray:
+        """Unit normals ``(m, 3)``; zero for a triangle without area."""
+        a, b, c = self.nodes[0].transpose(1, 0, 2)
+        area = np.cross(b - a, c - a)
+        size = np.linalg.norm(area, axis=1)
+        return np.ascontiguousarray(area / np.where(size > 0, size, 1.0)[:, None])
+
+    @cached_property
+    def _round_points(self) -> tuple[np.ndarray, np.ndarray]:
+        return _round_points(np.ascontiguousarray(self.triangles), len(self.points))
 
     def along(self, x: FloatArray, direction: FloatArray) -> FloatArray:
         """Distances ``(n,)`` [m] from points ``(n, 3)`` to the first triangle in a direction; infinite without one."""
@@ -292,13 +326,13 @@ class TriangleTree:
     def signed(self, x: FloatArray) -> tuple[FloatArray, FloatArray, np.ndarray]:
         """Signed distance ``(n,)`` [m], its unit gradient ``(n, 3)``, and whether the border is closest ``(n,)``."""
         x = np.ascontiguousarray(x, dtype=float)
-        feet, triangle, feature = closest(x, *self.nodes)
-        vectors, border = self._vectors
-        away, vector = x - feet, vectors[triangle, feature]
+        away, triangle, feature = closest(x, *self.nodes)
+        about = self.nodes[0], np.ascontiguousarray(self.triangles), self.face_normals, *self._round_points
+        vector, border = _pseudo_normals(triangle, feature, *about)
         length = np.linalg.norm(away, axis=1)
         sign = np.where(np.einsum("nd,nd->n", away, vector) < 0, -1.0, 1.0)
         # on the surface itself the direction to the foot is rounding
         on = length <= 1e-9 * np.ptp(self.points)
         normal = np.where(on[:, None], vector, sign[:, None] * away)
         normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
-        return sign * length, normal, border[triangle, feature]
+        return sign * length, normal, border
