@@ -38,44 +38,58 @@ def height_fields(points, triangles, x, y):
     low, high = np.full((m, n), np.inf), np.full((m, n), -np.inf)
     dx, dy = x[1] - x[0], y[1] - y[0]
     for t in range(len(triangles)):
-        a, b, c = points[triangles[t, 0]], points[triangles[t, 1]], points[triangles[t, 2]]
-        left, right = min(a[0], b[0], c[0]), max(a[0], b[0], c[0])
-        near, far = min(a[1], b[1], c[1]), max(a[1], b[1], c[1])
+        p, q, r = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        ax, bx, cx, ay, by, cy = points[p, 0], points[q, 0], points[r, 0], points[p, 1], points[q, 1], points[r, 1]
+        left, right, near, far = min(ax, bx, cx), max(ax, bx, cx), min(ay, by, cy), max(ay, by, cy)
         if right < x[0] or left > x[-1] or far < y[0] or near > y[-1]:
             continue
-        area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+        area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
         if area == 0.0:  # seen from its edge: its neighbours have the line
             continue
         first, last = max(0, math.ceil((left - x[0]) / dx)), min(m - 1, math.floor((right - x[0]) / dx))
         start, stop = max(0, math.ceil((near - y[0]) / dy)), min(n - 1, math.floor((far - y[0]) / dy))
         for i in range(first, last + 1):
             for j in range(start, stop + 1):
-                u = ((b[0] - x[i]) * (c[1] - y[j]) - (b[1] - y[j]) * (c[0] - x[i])) / area
-                v = ((c[0] - x[i]) * (a[1] - y[j]) - (c[1] - y[j]) * (a[0] - x[i])) / area
+                u = ((bx - x[i]) * (cy - y[j]) - (by - y[j]) * (cx - x[i])) / area
+                v = ((cx - x[i]) * (ay - y[j]) - (cy - y[j]) * (ax - x[i])) / area
                 w = 1.0 - u - v
                 if u >= -1e-12 and v >= -1e-12 and w >= -1e-12:
-                    z = u * a[2] + v * b[2] + w * c[2]
+                    z = u * points[p, 2] + v * points[q, 2] + w * points[r, 2]
                     low[i, j], high[i, j] = min(low[i, j], z), max(high[i, j], z)
     return low, high
+
+
+@njit(cache=True)
+def on_springs(height, dx, dy, springs):
+    """First touch, and there heights ``(m, n)``, pressures ``(m, n)`` and slopes ``(m, n, 2)`` of a bed of springs.
+
+    ``springs`` have a stiffness, a force and a length; they stand ``dx`` and ``dy`` apart.
+    """
+    (m, n), (stiffness, force, length), touch = height.shape, springs, height.min()
+    h, slope = height - touch, np.empty((*height.shape, 2))
+    depth = bed_closing(h.ravel(), force / (stiffness * dx * dy))
+    pressure = stiffness * np.maximum(depth - h, 0.0)
+    filled = np.where(np.isfinite(h), h, length)
+    for i in range(m):
+        for j in range(n):
+            a, b, c, d = max(i - 1, 0), min(i + 1, m - 1), max(j - 1, 0), min(j + 1, n - 1)
+            slope[i, j, 0] = (filled[b, j] - filled[a, j]) / ((b - a) * dx)
+            slope[i, j, 1] = (filled[i, d] - filled[i, c]) / ((d - c) * dy)
+            # a cell whose neighbour misses the object, or lies far behind it, is at a silhouette: its slope says
+            # nothing; one that is steeper than this is the object's flank
+            if np.abs(slope[i, j]).max() > 3.0:
+                slope[i, j] = 0.0
+    return touch, h, pressure, slope
 
 
 class Side:
     """What one pad meets: closing at which each cell of its face touches ``height (m, n)`` [m], normals, pressures."""
 
     def __init__(self, height: FloatArray, x: FloatArray, y: FloatArray, jaws: Jaws) -> None:
-        self.jaws = jaws
-        self.touch = float(np.min(height))
-        self.height = height - self.touch
-        self.x, self.y = np.repeat(x[:, None], len(y), axis=1), np.repeat(y[None], len(x), axis=0)
-        self.cell = (x[1] - x[0]) * (y[1] - y[0])
-        depth = bed_closing(self.height, jaws.force / (jaws.stiffness * self.cell))
-        self.pressure = jaws.stiffness * np.maximum(depth - self.height, 0.0)
-        filled = np.where(np.isfinite(self.height), self.height, jaws.pad[2])
-        self.slope = np.stack(np.gradient(filled, x[1] - x[0], y[1] - y[0]), axis=-1)
-        # a cell whose neighbour misses the object, or lies far behind it, is at a silhouette: its slope says nothing
-        # slope of a height field that still counts as touched: further out it is the object's flank
-        edge = np.abs(self.slope).max(axis=-1) > 3.0
-        self.slope[edge] = 0.0
+        self.jaws, (self.x, self.y) = jaws, np.meshgrid(x, y, indexing="ij")
+        steps = x[1] - x[0], y[1] - y[0]
+        self.cell, springs = steps[0] * steps[1], np.array([jaws.stiffness, jaws.force, jaws.pad[2]])
+        self.touch, self.height, self.pressure, self.slope = on_springs(np.ascontiguousarray(height), *steps, springs)
 
     @cached_property
     def centre(self) -> FloatArray:
