@@ -11,6 +11,7 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Mapping, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -136,13 +137,13 @@ def _write_skeleton(file: h5py.File, layout: Layout, header: Header, packed: boo
     for name, attributes in groups(layout).items():
         group = study.create_group(name)
         for key, value in attributes.items():
-            _write_attribute(group, key, value)
+            _write_attribute(group.id, key, value)
     kinds = [*((axis, "<f8") for axis in layout.axes), *((axis, "<i4") for axis in layout.counters)]
     for axis, kind in kinds:
         scale = study["axes"].create_dataset(axis.name, data=axis.values, dtype=kind)
         scale.attrs.update(units=axis.units, long_name=with_unit(axis.long_name, axis.units))
         if axis.options:
-            _write_attribute(scale, "options", list(axis.options))
+            _write_attribute(scale.id, "options", list(axis.options))
         scale.make_scale(axis.name)
     for dataset in layout.datasets:
         _create_dataset(file, dataset, packed)
@@ -195,21 +196,27 @@ def report_bytes(text: str) -> np.ndarray:
 
 
 def _create_dataset(file: h5py.File, dataset: Dataset, packed: bool) -> None:
-    plist, packing = h5py.h5p.create(h5py.h5p.DATASET_CREATE), {}
+    plist = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+    plist.set_obj_track_times(False)
     if packed:
-        packing = {"chunks": _chunk(dataset), "shuffle": True, "compression": DEFLATE_LEVEL}
+        plist.set_chunk(_chunk(dataset))
+        plist.set_shuffle()
+        plist.set_deflate(DEFLATE_LEVEL)
     else:  # contiguous and allocated at once: only so can ranks write independently of each other
         plist.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
     # Filled now: a case that is never written reads as not computed, not as what the disk held.
     plist.set_fill_time(h5py.h5d.FILL_TIME_ALLOC)
     strings = dataset.dtype.kind == "S"
     dtype = h5py.string_dtype("utf-8", dataset.dtype.itemsize) if strings else dataset.dtype
-    fill = None if strings else dataset.fill  # text is filled with zero bytes anyway
-    made = file.create_dataset(dataset.path, dataset.shape, dtype, fillvalue=fill, dcpl=plist, **packing)
+    if not strings:  # text is filled with zero bytes anyway
+        plist.set_fill_value(np.array(dataset.fill))
+    kind, space = h5py.h5t.py_create(dtype, logical=True), h5py.h5s.create_simple(dataset.shape)
+    made = h5py.h5d.create(file.id, dataset.path.encode(), kind, space, plist)
     for key, value in dataset.attributes.items():
         # of fixed length: texts of any length stand elsewhere in the file, 40 kB more in all
         text = value.encode()
-        made.attrs[key] = np.array(text, h5py.string_dtype("utf-8", len(text))) if packed and text else value
+        fixed = np.array(text, h5py.string_dtype("utf-8", len(text))) if packed and text else value
+        _write_attribute(made, key, fixed)
 
 
 def _chunk(dataset: Dataset) -> tuple[int, ...]:
@@ -238,27 +245,29 @@ def _link_maps(study: h5py.Group, layout: Layout) -> None:
 
 def _attach_scales(file: h5py.File, scales: Mapping[str, Sequence[str]]) -> None:
     """Attach the scales, named for each dataset, all at once: HDF5 by itself writes their lists anew for each."""
-    users: dict[str, list[Any]] = {}
+    axes = {name: file[f"{ROOT}/axes/{name}"] for name in dict.fromkeys(chain.from_iterable(scales.values()))}
+    of_axis = {name: np.array([axis.ref], h5py.ref_dtype) for name, axis in axes.items()}
+    users: dict[str, list[Any]] = {name: [] for name in axes}
     for path, names in scales.items():
-        dataset, references = file[path], np.empty(len(names), object)
+        dataset, parent = h5py.h5d.open(file.id, path.encode()), file[path.rpartition("/")[0]]
+        references = np.empty(len(names), h5py.vlen_dtype(h5py.ref_dtype))
         for i, name in enumerate(names):
-            scale = file[f"{ROOT}/axes/{name}"]
             # xarray and NeXus viewers look for the scales beside the data: a second hard link puts them there.
-            if name not in dataset.parent:
-                dataset.parent[name] = scale
-            references[i] = np.array([scale.ref], h5py.ref_dtype)
-            users.setdefault(name, []).append((dataset.ref, i))
-        dataset.attrs.create("DIMENSION_LIST", references, dtype=h5py.vlen_dtype(h5py.ref_dtype))
+            if name not in parent:
+                parent[name] = axes[name]
+            references[i] = of_axis[name]
+            users[name].append((h5py.h5r.create(file.id, path.encode(), h5py.h5r.OBJECT), i))
+        _write_attribute(dataset, "DIMENSION_LIST", references)
     for name, listed in users.items():
         kind = [("dataset", h5py.ref_dtype), ("dimension", "<i4")]
-        file[f"{ROOT}/axes/{name}"].attrs["REFERENCE_LIST"] = np.array(listed, kind)
+        _write_attribute(axes[name].id, "REFERENCE_LIST", np.array(listed, kind))
 
 
 def _write_attribute(node: Any, key: str, value: Any) -> None:
-    if isinstance(value, list):
-        node.attrs.create(key, np.array(value, object), dtype=TEXT)
-    else:
-        node.attrs[key] = value
+    """Make an attribute of a text, a list of texts or an array, in a fifth of the time that h5py itself takes."""
+    values = value if isinstance(value, np.ndarray) else np.array(value, TEXT)
+    kind, space = h5py.h5t.py_create(values.dtype, logical=True), h5py.h5s.create_simple(values.shape)
+    h5py.h5a.create(node, key.encode(), kind, space).write(values, h5py.h5t.py_create(values.dtype))
 
 
 def view_slice(layout: Layout) -> list[str]:

@@ -45,7 +45,7 @@ class ResultWriter:
         shared = {} if comm is None else {"driver": "mpio", "comm": comm}
         self._file = h5py.File(path, "r+", libver=HDF5_VERSIONS, **shared)
         # Opened once: finding an object by its path takes longer than a small write.
-        self._columns = [self._file[c.path] for c in layout.columns]
+        self._columns = [h5py.h5d.open(self._file.id, c.path.encode()) for c in layout.columns]
         self._code, self._attempts = (self._file[f"{ROOT}/status/{name}"] for name in ("code", "attempts"))
         self._sums, self._closing_sums = self._file[SUMS], self._file[CLOSING_SUMS]
         self._sessions = self._file[f"{ROOT}/provenance/sessions"]
@@ -94,7 +94,7 @@ class ResultWriter:
     def _kept(self, row: int, message: str) -> list[np.ndarray]:
         """The stored values of a row, tried on the mesh that is wanted, with one more message."""
         assert self._wanted is not None
-        values = [np.asarray(dataset[self._index(row)]) for dataset in self._columns]
+        values = [np.asarray(h5py.Dataset(column)[self._index(row)]) for column in self._columns]
         values[[c.key for c in self.layout.columns].index(MESH)] = self._wanted[row]
         known = text_of(bytes(values[-1].item()))
         values[-1] = np.array(text_bytes("; ".join(filter(None, (known, NOT_FINER + message))), MESSAGE_BYTES))
@@ -112,7 +112,7 @@ class ResultWriter:
             self._attempts[index] = 1
         # Values, sums, state: a kill in between leaves a row that reads as not computed.
         for dataset, column, value in zip(self._columns, self.layout.columns, values, strict=True):
-            _write_at(dataset.id, index, np.asarray(value, column.dtype))
+            _write_at(dataset, index, np.asarray(value, column.dtype))
         self._sums[index] = checksums.of_row(self.layout, values, state)
         self._code[index] = state
 
