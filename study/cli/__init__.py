@@ -25,6 +25,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # Before numpy is imported: its libraries read the number of threads only once.
     pin_threads()
     keep_compiled_loops()
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # the search for some is a tenth of a start
     words = list(sys.argv[1:] if arguments is None else arguments)
     # What follows "--" belongs to PETSc, whose options argparse would take for its own.
     cut = words.index("--") if "--" in words else len(words)
