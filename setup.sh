@@ -159,6 +159,8 @@ if [ -n "$(find $venv/lib/python3*/site-packages -maxdepth 1 -iname h5py)" ]; th
     $venv/bin/python -m pip uninstall --quiet --yes h5py
 fi
 venv_works || fail "the packages are installed but do not import; '$venv/bin/softjaw doctor' says what is wrong"
+# where PYTHONDONTWRITEBYTECODE is set, as in many containers, each start would compile them anew: half a second
+$venv/bin/python -m compileall -q fem friction lsfit scoring softjaw study
 say "compiling the loops of the solver by a small run (half a minute; what is compiled is kept)"
 made=$(mktemp -d)
 $venv/bin/softjaw run jobs/smoke.toml -o "$made/smoke.hdf" > /dev/null || say "the run failed; '$venv/bin/softjaw doctor' says what is wrong"
