@@ -132,11 +132,9 @@ def _result(choice: EffectChoice, k: int, solved: Solved, unit: Any, begun: floa
             values["maps/flags"] |= Flag.COARSE * bool(misses(error, target))
     effects = choice.effects_at(k, contacts) | settled(choice.solver.scene, fine, fits)
     if finest == COARSE:
-        left_out = 0.0
         if scene.effects.friction_pressure_coupling == "auto":
             effects[COUPLING] = effects[COUPLING]._replace(reason=SCREENED)
-            left_out = effects[COUPLING].indicator
-        values |= coarse_errors(contacts, values, fine.views, settings, left_out)
+        values |= coarse_errors(contacts, values, fine.views, settings)
         values["maps/flags"] &= ~Flag.COARSE  # its errors say so
     values |= _work(choice.solver, solved, start, begun, before)
     if scene.accuracy.target is not None:

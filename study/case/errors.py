@@ -18,60 +18,48 @@ from softjaw.study.case.contact import Contact
 from softjaw.study.case.evaluate import LIMITS, EvaluationSettings, overestimates, quality
 from softjaw.study.case.task import payload_alone
 from softjaw.study.quantities import TABLE, Quantity
-from softjaw.study.units import GRAVITY
 
-# The error as a share of what two meshes, and views of the coarser one, are apart (`estimate`); and the floor: a share
-# of the value that falls with the number of elements that bear, less where sums over all faces tell it and more where
-# single ones do, and `DOUBTED` times as large where the mesh is coarse for the contact. Measured on random scenes with
-# a reference of half the element size (docs/accuracy.md): there the floor tells more than the distances do.
-OF_MESHES, DOUBTED, EDGE, POWER = 0.16, 2.5, 0.27, 0.75
-WIDER = {"f_x_max": 0.5, "f_y_max": 0.5, "opening_loaded": 0.1, "contact_area": 4.5, "p_max": 21.0}
-BALANCED = {"f_x_max": 0.17, "f_y_max": 0.17}  # instead, where pressures alone balance the force
-OF_PAIRS = {"p_max": 2.0}  # of what pairs differ by: peaks that an effect makes at an edge grow as elements shrink
-# A payload is what arms and couples leave of the friction: its floor is no less than this share of the friction's, and
-# it is in doubt more than in proportion where meshes and views disagree.
-OF_FRICTION, DISAGREEING = 0.1, 2.0
-PAYLOADS = ("payload", "safety_factor")
-# The same of the coarse mesh alone, without friction that acts back, beside the distance to the farther view: of the
-# traction that is left out, and of the value. On 209 cases of seven meshes they cover at least 97 % of the errors of
-# the payload against the scene's mesh, and are some 7 times too large in the median.
-OF_TRACTION, COARSE_FLOOR = 0.2, 0.02
+# The error as a share of how far the coarser mesh, or a view of it, is away at most (`estimate`); the floor: a share
+# of the value that falls with the number of elements that bear, `DOUBTED` times as large where the mesh is coarse for
+# the contact. Fitted to random scenes with a reference of half the element size (docs/accuracy.md): there the floor
+# tells more than the distances do.
+OF_FARTHEST, DOUBTED, EDGE, POWER = 0.3, 2.0, 0.27, 0.75
+# How many times the floor: shares that a model or the curvature takes off are small differences of large numbers, sums
+# over all faces tell less of single ones.
+WIDER = dict.fromkeys((q.name for q in TABLE if q.error == "absolute"), 10.0) | {
+    "f_x_max": 0.4, "f_y_max": 0.4, "opening_loaded": 0.1, "contact_area": 4.5, "p_max": 19.0, "wall_stress": 4.5,
+    "wall_strain": 4.5,
+}  # fmt: skip
+OF_PAIRS = {"p_max": 3.0}  # of what pairs differ by: peaks that an effect makes at an edge grow as elements shrink
+PAYLOADS = ("payload", "safety_factor")  # what arms and couples leave of the friction: little of it moves all of them
 
 
 def mesh_errors(
     fine: Sequence[Contact], coarse: Sequence[Contact], values: Mapping[str, Any], other: Mapping[str, Any],
     settings: EvaluationSettings, views: Sequence[Sequence[Contact]] = (),
     pairs: Sequence[tuple[Sequence[Any], Sequence[Any]]] = (), floor: float = 0.0, left_out: float = 0.0,
-    balanced: bool = False,
 ) -> dict[str, float]:  # fmt: skip
     """Errors of all quantities that have one, from the contacts on the mesh and on a coarser one.
 
     ``values`` are those of the fine mesh, ``other`` what the coarser one says beside its contacts; keyed alike.
     ``views`` are the coarse contacts with their pressures at Gauss points and at nodes, ``pairs`` are contacts on the
     coarse mesh that differ too, ``floor`` is a share of the value, `WIDER` for some, and ``left_out`` one of every
-    value. ``balanced`` says that pressures alone balance the force.
+    value.
     """
     fine_mesh, coarse_mesh = _on_mesh(values, fine), _on_mesh(other, coarse) | grasp_values(tuple(coarse), settings)
     viewed = [_sums(view) | grasp_values(tuple(view), settings) for view in views]
     compared = [[_all(contacts, settings) for contacts in pair] for pair in pairs]
-    wider, errors = WIDER | _of_friction(fine_mesh) | (BALANCED if balanced else {}), {}
+    errors = {}
     for q in (q for q in TABLE if q.error and q.key in coarse_mesh):
         seen = [view[q.key] for view in viewed if q.key in view]
         value, size = fine_mesh[q.key], _size(q, fine_mesh[q.key])
-        more = DISAGREEING if q.name in PAYLOADS else 0.0
-        error = estimate(value, coarse_mesh[q.key], seen, q.error, more) + floor * wider.get(q.name, 1.0) * size
+        error = estimate(value, coarse_mesh[q.key], seen, q.error, q.name in PAYLOADS)
+        error += floor * WIDER.get(q.name, 1.0) * size
         if q.error == "relative" and not np.all(coarse_mesh[q.key]):
             error = max(error, 1.0)  # a payload of which the coarse mesh has nothing
         apart = [distance(low[q.key], high[q.key], q.error, value) for low, high in compared if q.key in low]
         errors[q.of_error.key] = error + OF_PAIRS.get(q.name, 1.0) * sum(apart) + left_out * size
     return errors
-
-
-def _of_friction(values: Mapping[str, Any]) -> dict[str, float]:
-    """How many times its floor is that of a payload: more where it is little of what friction carries."""
-    weight = GRAVITY * float(values["maps/payload"][0])
-    held = max(1.0, OF_FRICTION * sum(values["maps/f_x_max"]) / weight) if weight > 0 else 1.0
-    return dict.fromkeys(PAYLOADS, held)
 
 
 def edge_floor(contacts: Sequence[Contact]) -> float:
@@ -85,18 +73,20 @@ def edge_floor(contacts: Sequence[Contact]) -> float:
 
 def coarse_errors(
     contacts: Sequence[Contact], values: Mapping[str, Any], views: Sequence[Sequence[Contact]],
-    settings: EvaluationSettings, left_out: float,
+    settings: EvaluationSettings,
 ) -> dict[str, float]:  # fmt: skip
     """Errors of quantities of a case that is solved on the coarse mesh alone, from the two ``views`` of its contacts.
 
-    ``values`` are the case's own, ``left_out`` the share of the pressure sum that friction which acted back would add.
+    All count in doubt: the distance to the farther view, and the floor. ``values`` are the case's own.
     """
     solved = _on_mesh(values, contacts)
     viewed = [_sums(view) | grasp_values(tuple(view), settings) for view in views]
-    share, errors = COARSE_FLOOR + OF_TRACTION * left_out, {}
+    floor, errors = edge_floor(contacts), {}
     for q in (q for q in TABLE if q.error and q.key in viewed[0]):
         apart = max(distance(solved[q.key], view[q.key], q.error) for view in viewed)
-        errors[q.of_error.key] = apart + share * _size(q, solved[q.key])
+        # friction that is left out here may move any of them as much
+        share = floor * max(WIDER.get(q.name, 1.0), 1.0)
+        errors[q.of_error.key] = DOUBTED * (apart + share * _size(q, solved[q.key]))
     return errors
 
 
@@ -106,16 +96,16 @@ def _size(q: Quantity, value: ArrayLike) -> float:
 
 
 def estimate(
-    fine: ArrayLike, coarse: ArrayLike, views: Sequence[ArrayLike], kind: str, disagreeing: float = 0.0
+    fine: ArrayLike, coarse: ArrayLike, views: Sequence[ArrayLike], kind: str, remainder: bool = False
 ) -> float:
-    """Error of a number on the finer mesh: a share of its distances to the coarser one.
+    """Error of a number on the finer mesh: a share of the farthest of the coarser one and of its ``views``.
 
     The difference of two meshes alone passes through zero where the contact's edge lies alike on both; those to the
-    ``views`` of the coarse contact do not, so the farthest of all counts as well. ``disagreeing`` is how much more all
-    count where one is a whole value away.
+    views of the coarse contact do not. A ``remainder`` of larger numbers is in doubt more than in proportion, twice
+    as much where one is a whole value away.
     """
     farthest = max(distance(fine, other, kind) for other in (coarse, *views))
-    return OF_MESHES * (distance(fine, coarse, kind) + farthest) * (1.0 + disagreeing * min(farthest, 1.0))
+    return OF_FARTHEST * farthest * (1.0 + remainder * min(farthest, 1.0))
 
 
 def distance(value: ArrayLike, other: ArrayLike, kind: str, of: ArrayLike | None = None) -> float:

@@ -92,8 +92,7 @@ class Solved:
         fine, coarse = self.fine.contacts, self.meshes[1]
         floor = edge_floor(fine) * (DOUBTED if any(contact.coarse for contact in fine) else 1.0)
         solved = fine, coarse.contacts, values, other, settings, coarse.views, self.pairs
-        balanced = all(contact.state.points.friction is None for contact in fine)
-        return mesh_errors(*solved, floor, left_out, balanced)
+        return mesh_errors(*solved, floor, left_out)
 
 
 def followed(
