@@ -65,8 +65,8 @@ class GraspMap:
     -----
     The error of a value is that of a straight line through a curve with the largest second derivative that the cases
     around show, with those beside them along stations and forces, added up over the three axes and times 1.75: a claim,
-    with the errors that the cases around state themselves (``accuracy.meshes = 2``; in between as the values are),
-    below which at least 95 % of the true errors of the main maps stay where that was measured.
+    below which at least 95 % of the true errors of the main maps stay where that was measured. Errors that the cases
+    around state themselves (``accuracy.meshes = 2``; in between as the values are) are added in squares.
     Along an axis of two values there is no second derivative, and half of their difference stands in. What is
     narrower than the spacing of the candidates stays unseen.
 

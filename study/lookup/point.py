@@ -75,7 +75,9 @@ class GraspPoint(GraspNumbers):
         errors, values = (of(name, model, self.corners) for of in (self.map.errors, self.map.interpolated))
         q = BY_KEY.get(f"maps/{name}")
         if q is not None and q.error and self.map.has(q.of_error.name):
-            errors = errors + q.error_in_unit(self.map.interpolated(q.of_error.name, "ccm", self.corners), values)
+            cases = q.error_in_unit(self.map.interpolated(q.of_error.name, "ccm", self.corners), values)
+            # one does not know of the other, and each by itself holds in 95 % of the cases
+            errors = np.hypot(errors, cases)
         return self._shaped(np.where((self.states == INSIDE) & np.isfinite(values), errors, np.nan))
 
     def fingers(self, name: str, model: str = "ccm") -> FloatArray:
