@@ -56,7 +56,7 @@ class Pattern:
 def pairs(rows: IntArray, columns: IntArray) -> tuple[IntArray, IntArray]:
     """Rows and columns ``(entries,)`` of element matrices, from two index arrays that broadcast against each other."""
     first, second = np.broadcast_arrays(rows, columns)
-    return first.ravel().astype(np.int32), second.ravel().astype(np.int32)
+    return first.ravel().astype(np.int32, copy=False), second.ravel().astype(np.int32, copy=False)
 
 
 def shifted(index: IntArray, offset: int) -> IntArray:

@@ -3,16 +3,48 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import copy
+from dataclasses import dataclass
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from softjaw.fem.assembly import Pattern, gather, pairs
+from softjaw.fem.assembly import IntArray, Pattern, gather, pairs
 from softjaw.fem.contact.problem import ContactProblem, Control, Evaluated, Finger, Gap
 from softjaw.fem.pad.mesh import Pad
 from softjaw.friction.patch import FloatArray
 
 NO_DIRECTIONS = np.empty((0, 3))
+
+
+@dataclass(frozen=True, eq=False)
+class _Entries:
+    """Pattern of the tangent, place in it of every entry, and where each kind of them ends."""
+
+    pattern: Pattern
+    slots: IntArray
+    ends: IntArray
+
+    @classmethod
+    def of(cls, finger: Finger) -> _Entries:
+        face, pressure, size = finger.local_dofs, finger.pressure_dofs, finger.pad.size
+        # the diagonal of closing and pressures: an idle node has nothing else in its row
+        diagonal = np.arange(finger.closing_dof, size, dtype=np.int32)
+        parts = (
+            (finger.foam.rows, finger.foam.columns),
+            pairs(face[:, :, :, None, None], face[:, None, None, :, :]),
+            pairs(face[:, None, :, :], pressure[:, :, None, None]),
+            pairs(pressure[:, :, None, None], face[:, None, :, :]),
+            (diagonal, diagonal),
+        )
+        rows, columns = (np.concatenate(index) for index in zip(*parts, strict=True))
+        pattern = Pattern(size, rows, columns)
+        return cls(pattern, pattern.slots(rows, columns), np.cumsum([len(part[0]) for part in parts]))
+
+
+# of the pads in use: all candidates of a scene share a few
+_ENTRIES: WeakKeyDictionary[Pad, _Entries] = WeakKeyDictionary()
 
 
 class RigidProblem(ContactProblem):
@@ -36,22 +68,13 @@ class RigidProblem(ContactProblem):
 
     def _build_pattern(self) -> None:
         """Work arrays, so that nothing large is allocated in an iteration, and the place of every entry."""
-        face, pressure = self.finger.local_dofs, self.finger.pressure_dofs
-        # the diagonal of closing and pressures: an idle node has nothing else in its row
-        diagonal = np.arange(self.closing_dof, self.size, dtype=np.int32)
-        parts = (
-            (self.foam.rows, self.foam.columns),
-            pairs(face[:, :, :, None, None], face[:, None, None, :, :]),
-            pairs(face[:, None, :, :], pressure[:, :, None, None]),
-            pairs(pressure[:, :, None, None], face[:, None, :, :]),
-            (diagonal, diagonal),
-        )
-        rows, columns = (np.concatenate(index) for index in zip(*parts, strict=True))
-        self.pattern = Pattern(self.size, rows, columns)
-        self._slots = self.pattern.slots(rows, columns)
-        self._ends = np.cumsum([len(part[0]) for part in parts])
+        if self.pad not in _ENTRIES:
+            _ENTRIES[self.pad] = _Entries.of(self.finger)
+        entries = _ENTRIES[self.pad]
+        self.pattern, self._slots, self._ends = copy(entries.pattern), entries.slots, entries.ends
+        self.pattern.values = np.zeros_like(entries.pattern.values)
         self._closing_entries = np.flatnonzero(self.foam.columns == self.closing_dof)
-        self._values = np.zeros(rows.size)
+        self._values = np.zeros(self._slots.size)
 
     def _parts(self) -> list[FloatArray]:
         """Views of the values: elements, face stiffness, force by pressure, gap by displacement, diagonal."""
