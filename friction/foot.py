@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from softjaw.friction.patch import NEGLIGIBLE, ContactPatch, FloatArray, slivers
 
+ASLANT = np.array([0.48, 0.64, 0.6])  # a direction in which points of a grid that faces an axis are all apart
 UNLOADED = 0.01  # weight of a face's own normal, in mean loads of all faces: the object's counts where there is load
 
 
@@ -97,15 +97,14 @@ class ContactFace:
         q = patch.corners
         assert q is not None
         # the diagonals give the area vector of a warped face too, whichever way it is split
-        plane_normal = np.cross(q[:, 2] - q[:, 0], q[:, 3] - q[:, 1])
+        plane_normal = patch.area_vectors[0]
         length = np.linalg.norm(plane_normal, axis=1)
-        plane_normal = plane_normal * (~slivers(q) / np.where(length > 0, length, 1.0))[:, None]
+        plane_normal = plane_normal * (~slivers(*patch.area_vectors) / np.where(length > 0, length, 1.0))[:, None]
         plane_normal *= np.sign(patch.load @ (plane_normal * patch.normal).sum(axis=1))
         share = patch.load[:, None] * patch.normal + UNLOADED * patch.load.mean() * plane_normal
         # corners no farther apart than this share of a usual face's size are one
         corner = _numbered(q.reshape(-1, 3), 1e-6 * np.median(np.ptp(q, axis=1).max(axis=1)))
-        weight = np.repeat(share, 4, axis=0)
-        total = np.column_stack([np.bincount(corner, weight[:, k]) for k in range(3)])
+        total = np.column_stack([np.bincount(corner, np.repeat(share, 4, axis=0)[:, k]) for k in range(3)])
         length = np.linalg.norm(total, axis=1, keepdims=True)
         return cls(q, (total / np.where(length > 0, length, 1.0))[corner].reshape(q.shape))
 
@@ -115,38 +114,51 @@ class ContactFace:
         Of several places the one with the least ``abs(s)``, as in `foot`; beside a face that the line misses, the
         point of its rim that is nearest to the line, moved onto the line.
         """
-        q = (self.corners - start) @ _across(N).T
-        near, weights = _on_line(q[..., 0] + 1j * q[..., 1])
+        across = _across(N)
+        near, weights = _on_line(self.corners, start, across)
         missed = not len(near)
         if missed:
-            near, weights = _beside(q)
+            near, weights = _beside((self.corners - start) @ across.T)
         s = np.einsum("nk,nkc->nc", weights, self.corners[near] - start) @ N
         k = _nearest(s, NEGLIGIBLE * np.ptp(self.corners[near], axis=1).max(axis=1))
         normal = weights[k] @ self.normal[near[k]]
         return start + s[k] * N, normal / np.linalg.norm(normal), missed
 
 
-def _numbered(points: FloatArray, apart: float) -> np.ndarray:
+@njit(cache=True)
+def _numbered(points, apart):
     """Numbers ``(n,)`` that are the same for points ``(n, 3)`` no more than ``apart`` from each other."""
-    number = np.arange(len(points))
-    # a balanced tree takes long to build where many coordinates are equal, as in a grid
-    pairs = cKDTree(points, balanced_tree=False).query_pairs(apart, output_type="ndarray")
-    np.minimum.at(number, pairs.max(axis=1), pairs.min(axis=1))
+    along, number = points @ ASLANT, np.arange(len(points))
+    order = np.argsort(along)
+    for i, a in enumerate(order):
+        for b in order[i + 1 :]:
+            if along[b] - along[a] > 1.001 * apart:  # the rest is for rounding
+                break
+            if ((points[a] - points[b]) ** 2).sum() <= apart**2:
+                number[max(a, b)] = min(number[max(a, b)], a, b)
     return number
 
 
 @njit(cache=True)
-def _on_line(q):
-    """Faces that hold the point 0, and the weights ``(n, 4)`` of their corners there.
+def _on_line(corners, start, across):
+    """Faces ``(n, 4, 3)`` that a line runs through, and the weights ``(n, 4)`` of their corners there.
 
-    Corners ``q (n, 4)`` are complex numbers in the plane across the line.
+    Corners are complex numbers along both directions ``across (2, 3)`` of the line.
     """
-    met, weights, count = np.empty(len(q), np.int64), np.empty((len(q), 4)), 0
-    for i in range(len(q)):
-        a, b, c, d = q[i, 0], q[i, 1], q[i, 2], q[i, 3]
-        size = abs(a - b) + abs(a - c) + abs(b - d)
-        # most faces are nowhere near
-        if abs(a + b + c + d) > 4 * size:
+    met, weights, count = np.empty(len(corners), np.int64), np.empty((len(corners), 4)), 0
+    turn, q = across[0] + 1j * across[1], np.empty(4, np.complex128)
+    for i in range(len(corners)):
+        for k in range(4):
+            x = corners[i, k]
+            q[k] = (x[0] - start[0]) * turn[0] + (x[1] - start[1]) * turn[1] + (x[2] - start[2]) * turn[2]
+        a, b, c, d = q[0], q[1], q[2], q[3]
+        # most faces are nowhere near, which components tell without a root
+        x, y, z, middle = a - b, a - c, b - d, a + b + c + d
+        most = abs(x.real) + abs(x.imag) + abs(y.real) + abs(y.imag) + abs(z.real) + abs(z.imag)
+        if max(abs(middle.real), abs(middle.imag)) > 4 * most:
+            continue
+        size = abs(x) + abs(y) + abs(z)
+        if abs(middle) > 4 * size:
             continue
         u, v = _reference(a, b, c, d)
         w = (1 - u) * (1 - v) / 4, (1 + u) * (1 - v) / 4, (1 + u) * (1 + v) / 4, (1 - u) * (1 + v) / 4

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
 from softjaw.friction.foot import ContactFace, foot
-from softjaw.friction.patch import CANCEL, NEGLIGIBLE, ContactPatch, FloatArray, NoContactError, area_vectors, slivers
+from softjaw.friction.patch import CANCEL, NEGLIGIBLE, ContactPatch, FloatArray, NoContactError, cross, slivers
 
 MAX_ITERATIONS = 100
 STILL = 1e-12  # change of the unit normal at which the iteration ends
@@ -194,7 +194,7 @@ def _axes(N: FloatArray, x_hint: ArrayLike) -> FloatArray:
         text = f"x_hint {hint.tolist()} is parallel to the contact normal {N.tolist()}: give another direction"
         raise ValueError(text)
     x = x / np.linalg.norm(x)
-    return np.stack([x, np.cross(N, x), N])
+    return np.stack([x, cross(N, x), N])
 
 
 ANGLE = 1e-6  # of a cosine: files in single precision know their directions to some 1e-7
@@ -213,7 +213,7 @@ def wound(faces: ContactPatch) -> NDArray[np.int8]:
     """
     if faces.corners is None:
         return np.zeros(len(faces.area), dtype=np.int8)
-    twice_area, error = area_vectors(faces.corners)
+    twice_area, error = faces.area_vectors
     along = np.einsum("ij,ij->i", twice_area, faces.normal)
     margin = np.maximum(error, ANGLE * np.linalg.norm(twice_area, axis=1))
     return (np.sign(along) * (np.abs(along) > margin)).astype(np.int8)
@@ -223,7 +223,7 @@ def firm(faces: ContactPatch) -> NDArray[np.bool_]:
     """Which faces are no slivers ``(n,)``: all without corners, and all where every one is a sliver."""
     if faces.corners is None:
         return np.ones(len(faces.area), dtype=bool)
-    plane = ~slivers(faces.corners)
+    plane = ~slivers(*faces.area_vectors)
     return plane | ~plane.any()
 
 

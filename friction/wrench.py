@@ -22,6 +22,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numba import njit
@@ -155,6 +156,7 @@ def _largest_force(patch: ContactPatch) -> float:
     return largest
 
 
+@lru_cache(maxsize=8)  # each limit asks for those of its patch some times
 def model_faces(patch: ContactPatch, model: str) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Arms ``(3, n)``, unit normals ``(3, n)`` and loads ``(n,)`` of the loaded faces, as the model sees them.
 

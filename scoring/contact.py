@@ -178,7 +178,9 @@ class SoftContact:
         """
         arm = (self.position - np.asarray(centre_of_mass, float)) / object_length
         x, y, N = self.axes
-        C, forces = np.zeros((6, 4)), np.array([N, x, y])
-        C[:3, :3], C[3:, :3] = forces.T, np.cross(arm, forces).T
+        C = np.zeros((6, 4))
+        C[:3, :3] = F = np.array([N, x, y]).T
+        # the arm times these; numpy's cross takes longer than all the rest
+        C[3:, :3] = arm[1] * F[2] - arm[2] * F[1], arm[2] * F[0] - arm[0] * F[2], arm[0] * F[1] - arm[1] * F[0]
         C[3:, 3] = N / contact_length
         return C

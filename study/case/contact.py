@@ -6,6 +6,7 @@ the patch may come from a file.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
@@ -19,7 +20,7 @@ from scipy import ndimage
 from softjaw.fem.objects.gap import Pose
 from softjaw.fem.pad.shape import PadShape
 from softjaw.friction.frame import Frame, contact_frame, contact_length, in_frame
-from softjaw.friction.patch import NEGLIGIBLE, ContactPatch, FloatArray
+from softjaw.friction.patch import NEGLIGIBLE, ContactPatch, FloatArray, cross
 from softjaw.friction.wrench import FrictionLimits, friction_limits, pure_torque
 from softjaw.lsfit.ellipsoid import Ellipsoid, three_motion_ellipsoid
 from softjaw.scoring.contact import SoftContact
@@ -114,7 +115,7 @@ class Contact:
         """Force and torque ``(6,)`` of the pressure on the object, about its frame's origin [N, N m]."""
         force = self.patch.load[:, None] * self.patch.normal @ self.pose.rotation.T
         arm = self.pose.to_object(self.patch.centroid)
-        return np.concatenate([force.sum(axis=0), np.cross(arm, force).sum(axis=0)])
+        return np.concatenate([force.sum(axis=0), cross(arm, force).sum(axis=0)])
 
     @property
     def loaded(self) -> NDArray[np.bool_]:
@@ -145,7 +146,8 @@ class Contact:
 
 def angle(u: FloatArray, v: FloatArray) -> float:
     """Angle between two vectors [rad]; an arc cosine near 1 would know 8 digits."""
-    return float(np.arctan2(np.linalg.norm(np.cross(u, v)), u @ v))
+    n = cross(u, v)
+    return math.atan2(math.sqrt(n @ n), u @ v)
 
 
 def angles(first: Contact, second: Contact) -> tuple[float, float]:

@@ -16,7 +16,7 @@ from softjaw.fem.shell.grip import Grip
 from softjaw.fem.shell.thin_walled import Grasp, grasp, wall_between
 from softjaw.fem.shell.wall_mesh import MeshSize
 from softjaw.fem.shell.wall_problem import WallProblem
-from softjaw.friction.patch import ContactPatch
+from softjaw.friction.patch import ContactPatch, cross
 from softjaw.friction.wrench import FrictionLimits
 from softjaw.study.case.build import pad_shape
 from softjaw.study.case.contact import Contact
@@ -73,8 +73,7 @@ class PressedContact(Contact):
         keeps = np.array([not mirrored for mirrored in pad.symmetry], float)
         friction = points.friction * self._signs
         force = friction.sum(axis=(0, 1)) / pad.share * [*keeps, 1.0]
-        arm = points.position * self._signs - self.frame.origin
-        torque = np.cross(arm, friction).sum(axis=(0, 1)) / pad.share
+        torque = cross(points.position * self._signs - self.frame.origin, friction).sum(axis=(0, 1)) / pad.share
         torque = torque * [keeps[1], keeps[0], keeps.prod()]
         return np.array([*(self.frame.axes[:2] @ force), self.frame.axes[2] @ torque])
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from softjaw.friction.patch import ContactPatch, FloatArray, slivers
+from softjaw.friction.patch import ContactPatch, FloatArray, area_vectors, slivers
 from softjaw.study.messages import USAGE, Problem, StudyError, first_of
 
 MOST_PROBLEMS = 10  # reported of one file
@@ -68,7 +68,7 @@ def checked(
     _check_range({key: value for key, value in given.items() if value is not None}, wrong)
     refuse(problems)
     # corners on one line give an area of rounding, which is none either
-    flat = area == 0 if corners is None else (area == 0) | slivers(corners)
+    flat = area == 0 if corners is None else (area == 0) | slivers(*area_vectors(corners))
     loaded = (pressure > 0) & ~flat
     if not loaded.any() or (pressure * area).sum() <= LEAST_LOAD:
         problems.append(Problem(file, None, "pressure", f"{len(loaded)} faces and no load on any",
