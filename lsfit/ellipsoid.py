@@ -158,8 +158,7 @@ def _quadratic_form(Y: FloatArray) -> tuple[FloatArray, FitFlag]:
     lowest = np.linalg.eigvalsh(A)[0]
     if lowest >= floor:
         return A, flag if lowest > floor + 1e-9 else flag | FitFlag.BOUNDED
-    a = least_in_cone(N, b, triangle, floor)
-    return (place @ a).reshape(r, r), flag | FitFlag.BOUNDED
+    return (place @ least_in_cone(N, b, triangle, floor)).reshape(r, r), flag | FitFlag.BOUNDED
 
 
 def nearest_solution(N: FloatArray, b: FloatArray, start: FloatArray) -> tuple[FloatArray, FitFlag]:

@@ -137,8 +137,7 @@ def _angles(G: FloatArray, T: FloatArray, span: FloatArray) -> FloatArray:
     if span.shape[1] < len(span):
         across = T - T @ span @ span.T
         # no normal of a flat body points against the gradient
-        ahead = np.maximum(((T - across) * u).sum(axis=1, keepdims=True), 0.0)
-        u = _unit(across + ahead * u)
+        u = _unit(across + np.maximum(((T - across) * u).sum(axis=1, keepdims=True), 0.0) * u)
     # The half-angle form keeps its digits where the arc cosine of a number near one loses them; it is a right angle for
     # a motion against the gradient, which has no part along a normal.
     return 2 * np.arctan2(np.linalg.norm(u - T, axis=1), np.linalg.norm(u + T, axis=1))

@@ -346,5 +346,4 @@ def _outlook(moments: FloatArray, A0: FloatArray, planes: FloatArray) -> tuple[F
     # through the mean of the moments, so that wrenches they mix up fall on either side
     split -= (split @ mean) * total
     split /= np.abs(split).max()
-    both: FloatArray = np.vstack([axes, -axes])
-    return both, planes, split
+    return np.vstack([axes, -axes]), planes, split

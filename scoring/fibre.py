@@ -186,8 +186,7 @@ class HullFibre:
             points, triangles = hull_mesh(inner_points(self.body, 20 * 4**level))
             a, b, c = (points[triangles[:, i]] for i in range(3))
             det = np.einsum("mi,mi->m", a, np.cross(b, c))
-            normals = np.column_stack([-det, np.cross(b - a, c - a)]) / 6
-            self.meshes[level] = points, triangles, normals
+            self.meshes[level] = points, triangles, np.column_stack([-det, np.cross(b - a, c - a)]) / 6
         return self.meshes[level]
 
     def measures(self, level: int) -> tuple[float, float]:

@@ -97,83 +97,48 @@ def _along(grasp: _Grasp, d: FloatArray) -> Payload:
     across = np.linalg.svd(d[None])[2][1:]
     rows = np.zeros((5, 6))
     rows[:3, 3:], rows[3:, :3] = np.eye(3), across
-    section = _Section(grasp, rows)
-    most, point, basis = section.farthest(-d, section.begin)
-    least = -section.farthest(d, basis)[0]  # from which load on: 0 or less where none is needed
-    if most < -ROUNDING_FORCE or least > ROUNDING_FORCE:
+    basis = _begin(grasp, rows)
+    most, point, missing = _programme(*grasp, -d, rows, basis)
+    other, _, also = _programme(*grasp, d, rows, basis)  # a load of more than -other is needed: none where that is < 0
+    if max(missing, also) >= ROUNDING_FORCE or min(most, other) < -ROUNDING_FORCE:
         return Payload(0.0, 0.0, d, False)
     return Payload(max(float(-d @ point[:3]), 0.0), max(most, 0.0), d, True)
 
 
 def _worst(grasp: _Grasp) -> Payload:
     """Largest load in every direction, and one in which a larger one is lost."""
-    search = _Section(grasp, np.hstack([np.zeros((3, 3)), np.eye(3)]))
-    begin = search.begin
-    for u in np.vstack([np.eye(3), -np.eye(3)]):
-        begin = search.look(u, begin)
-        if search.upper < -ROUNDING_FORCE:
-            return Payload(0.0, 0.0, -search.u, False)
+    rows = np.hstack([np.zeros((3, 3)), np.eye(3)])
+    points, bases = np.zeros((MOST_POINTS, 3)), np.zeros((MOST_POINTS, 4, 8))
+    axes = np.vstack([np.eye(3), -np.eye(3)])
+    search = *grasp, rows, points, bases
+    upper, u = _looked(*search, axes, _begin(grasp, rows), 0, -np.inf, np.inf, axes[0])
+    if upper < -ROUNDING_FORCE:
+        return Payload(0.0, 0.0, -u, False)
     # a set that is flat has no hull, and no ball round 0
-    thin = np.linalg.svd(search.forces - search.forces.mean(axis=0))[2][-1]
-    for u in (thin, -thin):
-        search.look(u, begin)
-    flat = np.linalg.svd(search.forces - search.forces.mean(axis=0))[1][-1] <= ROUNDING_FORCE
-    lower = 0.0 if flat or search.upper <= ROUNDING_FORCE else search.refine()
-    force = min(lower, search.upper) if lower > ROUNDING_FORCE else 0.0
-    return Payload(force, max(search.upper, 0.0), -search.u, search.upper >= -ROUNDING_FORCE)
-
-
-class _Section:
-    """Points of W without a part along ``rows (m, 6)``: those that directions have found, and the least support.
-
-    ``upper`` is that support, along ``u``; ``begin (m + 1, 8)``: basis that fulfils the rows with the least that no
-    point takes.
-    """
-
-    def __init__(self, grasp: _Grasp, rows: FloatArray) -> None:
-        self.grasp, self.rows, m = grasp, rows, len(rows) + 1
-        self.begin = np.zeros((m, 8))
-        # every row but the last, which counts the points, begins with a column of its own
-        self.begin[:, 7] = np.arange(1, m + 1)
-        first, _ = _farthest(*grasp, np.ones(6))
-        self.begin[-1, :6], self.begin[-1, 6:] = first, (1.0, 0.0)
-        off = TORQUE_OFFSET * np.sqrt(np.arange(2.0, m + 1)) - rows @ first
-        self.begin[:-1, 6] = np.where(off < 0, -1.0, 1.0)
-        self.points: list[FloatArray] = []
-        self.bases: list[FloatArray] = []
-        self.upper, self.u = np.inf, np.zeros(3)
-
-    @property
-    def forces(self) -> FloatArray:
-        """Forces ``(n, 3)`` of the points."""
-        return np.array(self.points)
-
-    def farthest(self, along: FloatArray, basis: FloatArray) -> tuple[float, FloatArray, FloatArray]:
-        """Support of the section, the point ``(6,)`` that it touches and its basis; -inf where the section is empty."""
-        new = basis.copy()
-        upper, point, missing = _programme(*self.grasp, along, self.rows, new)
-        return (upper if missing < ROUNDING_FORCE else -np.inf), point, new
-
-    def look(self, u: FloatArray, start: FloatArray) -> FloatArray:
-        """Add the point that is farthest in a direction; the basis it was found with."""
-        support, point, basis = self.farthest(u, start)
-        self.points.append(point[:3])
-        self.bases.append(basis)
-        if support < self.upper:
-            self.upper, self.u = support, u
-        return basis
-
-    def refine(self) -> float:
-        """Distance of the hull's nearest facet, after looking along all that are nearer than the least support."""
-        n, hull = len(self.points), ConvexHull(self.forces)
-        points, bases = np.zeros((MOST_POINTS, 3)), np.zeros((MOST_POINTS, *self.begin.shape))
-        points[:n], bases[:n] = self.points, self.bases
+    thin = np.linalg.svd(points[:6] - points[:6].mean(axis=0), full_matrices=False)[2][-1]
+    upper, u = _looked(*search, np.stack([thin, -thin]), bases[5], 6, -np.inf, upper, u)
+    extent = np.linalg.svd(points[:8] - points[:8].mean(axis=0), compute_uv=False)
+    lower = 0.0
+    if extent[-1] > ROUNDING_FORCE and upper > ROUNDING_FORCE:
+        hull = ConvexHull(points[:8])
         corners = hull.simplices.astype(np.int64)  # in no order round their facets
         inward = np.einsum("fi,fi->f", _planes(points, corners)[:, :3], hull.equations[:, :3]) < 0
         corners[inward] = corners[inward, ::-1]
-        begun = points, bases, n, corners, hull.equations, self.upper, self.u
-        lower, self.upper, self.u = _refined(*self.grasp, self.rows, *begun)
-        return float(lower)
+        lower, upper, u = _refined(*search, 8, corners, hull.equations, upper, u)
+    force = min(lower, upper) if lower > ROUNDING_FORCE else 0.0
+    return Payload(force, max(upper, 0.0), -u, upper >= -ROUNDING_FORCE)
+
+
+def _begin(grasp: _Grasp, rows: FloatArray) -> FloatArray:
+    """Basis ``(m + 1, 8)`` of `_programme` that fulfils ``rows (m, 6)`` with the least that no point of W takes."""
+    m, point = len(rows) + 1, np.empty(6)
+    _farthest(*grasp, np.ones(6), point)
+    basis = np.zeros((m, 8))
+    # every row but the last, which counts the points, begins with a column of its own
+    basis[:, 7] = np.arange(1, m + 1)
+    basis[-1, :6], basis[-1, 6:] = point, (1.0, 0.0)
+    basis[:-1, 6] = np.where(TORQUE_OFFSET * np.sqrt(np.arange(2.0, m + 1)) < rows @ point, -1.0, 1.0)
+    return basis
 
 
 @njit(cache=True)
@@ -204,33 +169,58 @@ def _joined(points, n, corners, planes):
 
 
 @njit(cache=True)
-def _refined(C, V1, V2, kind, rows, points, bases, count, corners, planes, upper, u):
-    """Distance of the nearest facet, and the least support and its direction, as `_Section.refine` finds them.
+def _looked(C, V1, V2, kind, rows, points, bases, directions, basis, n, empty, upper, u):
+    """Fill in ``points`` and ``bases`` from the ``n``-th on, which are farthest in directions, without a part in rows.
 
-    ``count`` of the ``points, bases`` are known; ``corners, planes`` are the facets of their hull.
+    Each programme begins where the one before ended, the first at ``basis``. Returns the least support and its
+    direction, so far ``upper, u``; ``empty`` is that of a programme that did not fill its rows.
+    """
+    for k in range(len(directions)):
+        bases[n] = basis
+        support, point, missing = _programme(C, V1, V2, kind, directions[k], rows, bases[n])
+        points[n], basis, n = point[:3], bases[n], n + 1
+        support = support if missing < ROUNDING_FORCE else empty
+        if support < upper:
+            upper, u = support, directions[k]
+        if upper < -ROUNDING_FORCE:
+            break
+    return upper, u
+
+
+@njit(cache=True)
+def _refined(C, V1, V2, kind, rows, points, bases, n, corners, planes, upper, u):
+    """Distance of the hull's nearest facet, after a look along all that are nearer than the least support, and that.
+
+    ``n`` points are known; ``corners, planes`` are the facets of their hull.
     """
     before = np.zeros(4)
     while True:
         nearest = planes[:, 3].argmax()
         plane = planes[nearest]
         # a point that the hull has already ends the search: along its nearest facet both bounds are the same
-        known = (plane == before).all() or count == len(points)
+        known = (plane == before).all() or n == len(points)
         if known or upper < ROUNDING_FORCE or -plane[3] >= upper * (1.0 - BOUND_GAP):
             return -plane[3], upper, u
-        before, bases[count] = plane, bases[corners[nearest, 0]]
-        support, point, missing = _programme(C, V1, V2, kind, plane[:3], rows, bases[count])
-        points[count] = point[:3]
         # a programme that did not fill its rows says nothing of the support
-        if missing < ROUNDING_FORCE and support < upper:
-            upper, u = support, plane[:3]
-        corners, planes = _joined(points, count, corners, planes)
-        count += 1
+        before, basis, along = plane, bases[corners[nearest, 0]], plane[:3].copy().reshape(1, 3)
+        upper, u = _looked(C, V1, V2, kind, rows, points, bases, along, basis, n, np.inf, upper, u)
+        corners, planes = _joined(points, n, corners, planes)
+        n += 1
 
 
 @njit(cache=True)
-def _touching(C, V, q, out):
-    """Support of ``P + B`` along ``q (6,)``; its point goes into ``out (6,)``."""
-    t = C.T @ q
+def _times(A, x, out):
+    """``out = A x``; BLAS takes longer to call than these few products take."""
+    for i in range(A.shape[0]):
+        out[i] = 0.0
+        for k in range(A.shape[1]):
+            out[i] += A[i, k] * x[k]
+
+
+@njit(cache=True)
+def _touching(C, V, q, t, out):
+    """Support of ``P + B`` along ``q (6,)``; its point goes into ``out (6,)``, and ``t (4,)`` is room."""
+    _times(C.T, q, t)
     best, at = -np.inf, 0
     for k in range(V.shape[1]):
         h = V[0, k] * t[1] + V[1, k] * t[2] + V[2, k] * t[3]
@@ -242,15 +232,17 @@ def _touching(C, V, q, out):
 
 
 @njit(cache=True)
-def _farthest(C, V1, V2, kind, q):
-    """Point ``(6,)`` of W that is farthest along ``q``, and how far."""
-    w1, w2 = np.empty(6), np.empty(6)
-    h1, h2 = _touching(C[0], V1, q, w1), _touching(C[1], V2, q, w2)
+def _farthest(C, V1, V2, kind, q, point):
+    """How far W goes along ``q``; the farthest ``point (6,)`` is filled in."""
+    w1, w2, t = np.empty(6), np.empty(6), np.empty(4)
+    h1, h2 = _touching(C[0], V1, q, t, w1), _touching(C[1], V2, q, t, w2)
+    a, b = 1.0, 1.0
     if kind == 0:
-        return (2.0 * w1, 2.0 * h1) if h1 >= h2 else (2.0 * w2, 2.0 * h2)
-    if kind == 1:
-        return w1 * (h1 > 0.0) + w2 * (h2 > 0.0), max(h1, 0.0) + max(h2, 0.0)
-    return w1 + w2, h1 + h2
+        a, b = (2.0, 0.0) if h1 >= h2 else (0.0, 2.0)
+    elif kind == 1:
+        a, b = 1.0 * (h1 > 0.0), 1.0 * (h2 > 0.0)
+    point[:] = a * w1 + b * w2
+    return a * h1 + b * h2
 
 
 @njit(cache=True)
@@ -268,22 +260,23 @@ def _programme(C, V1, V2, kind, along, rows, basis):
         if basis[k, 7] > 0:
             B[int(basis[k, 7]) - 1, k], cost[k] = basis[k, 6], -1e5  # a penalty on torques that no point takes
         else:
-            B[: m - 1, k] = rows @ basis[k, :6]
+            _times(rows, basis[k, :6], B[: m - 1, k])
             B[m - 1, k], cost[k] = 1.0, along @ basis[k, :3]
     inverse = np.linalg.inv(B)
-    x = inverse @ right
+    x, y, d, q, point = np.empty(m), np.empty(m), np.empty(m), np.empty(6), np.empty(6)
     upper, column = np.inf, np.ones(m)
+    _times(inverse, right, x)
     for _ in range(400):
-        y = cost @ inverse
-        q = -(y[: m - 1] @ rows)
+        _times(inverse.T, cost, y)
+        _times(rows.T, y, q)
+        q[:] = -q
         q[:3] += along
-        point, support = _farthest(C, V1, V2, kind, q)
-        bound = support + y[: m - 1] @ right[: m - 1]
+        bound = _farthest(C, V1, V2, kind, q, point) + y[: m - 1] @ right[: m - 1]
         upper = min(upper, bound)
         if bound - cost @ x <= 1e-9 * (1.0 + abs(bound)):
             break
-        column[: m - 1] = rows @ point
-        d = inverse @ column
+        _times(rows, point, column)
+        _times(inverse, column, d)
         out, most = -1, np.inf
         for k in range(m):
             if d[k] > 1e-11 and max(x[k], 0.0) < most * d[k]:
@@ -295,7 +288,7 @@ def _programme(C, V1, V2, kind, along, rows, basis):
         for k in range(m):
             if k != out:
                 inverse[k] -= d[k] * inverse[out]
-        x = inverse @ right
+        _times(inverse, right, x)
     point, missing = np.zeros(6), 0.0
     for k in range(m):
         point += x[k] * basis[k, :6]

@@ -149,8 +149,7 @@ def mixed_area(sides1: FloatArray, sides2: FloatArray) -> float:
     # a side is its normal turned by a quarter; in order of angle sides close the polygon
     corners = np.cumsum(np.column_stack([-n[:, 1], n[:, 0]]), axis=0)
     # The corner after the last side before the angle is the farthest point in that direction.
-    corner = corners[np.searchsorted(first[order], second) - 1]
-    return 0.5 * float((corner * sides2).sum())
+    return 0.5 * float((corners[np.searchsorted(first[order], second) - 1] * sides2).sum())
 
 
 def joint_pairs(normals1: FloatArray, normals2: FloatArray, direction: FloatArray) -> float:

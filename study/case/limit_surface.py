@@ -86,7 +86,7 @@ def fit_surfaces(
     fits.
     """
     rho, limits = contact.rho, contact.unit_limits[model]
-    twist, wrench = sampled_wrenches(contact, model, samples)
+    twist, wrench = sampled_wrenches(contact, model, fit_motions(samples))
     W, T = normalised_samples(wrench, twist, limits.S, rho)
     f_x, f_y, tau_z = limits.per_unit_force
     ellipsoid = three_motion_ellipsoid(f_x, f_y, tau_z / rho, 1.0)
@@ -102,14 +102,14 @@ def fit_surfaces(
     return surfaces
 
 
-def sampled_wrenches(contact: Contact, model: str, samples: int) -> tuple[FloatArray, FloatArray]:
-    """Motions ``(m, 3)`` of a contact and their wrenches ``(m, 6)`` for mu = 1; the first ``samples`` are fitted to."""
-    twist = _motions(samples) / [1.0, 1.0, contact.rho]
+def sampled_wrenches(contact: Contact, model: str, motions: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Motions ``(m, 3)`` of a contact, given for one of length 1, and their wrenches ``(m, 6)`` for mu = 1."""
+    twist = motions / [1.0, 1.0, contact.rho]
     return twist, friction_wrench(contact.local, twist, 1.0, model)
 
 
 @lru_cache(maxsize=8)
-def _motions(fitted_to: int) -> FloatArray:
+def fit_motions(fitted_to: int) -> FloatArray:
     """Motions of the fit and those, evenly spread too, that it is judged by, for a contact of length 1."""
     # As many motions as the fit has would be the same ones, and it would judge itself.
     judging = INDEPENDENT + (fitted_to == INDEPENDENT)

@@ -14,7 +14,7 @@ from softjaw.scoring.contact import PolytopeBody
 from softjaw.scoring.payload import Payload, payload
 from softjaw.study.case.build import centre_of_mass, own_frame
 from softjaw.study.case.contact import Contact
-from softjaw.study.case.limit_surface import SurfaceFit, sampled_wrenches
+from softjaw.study.case.limit_surface import SurfaceFit, fit_motions, sampled_wrenches
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import MODELS
 from softjaw.study.scene import Scene
@@ -51,14 +51,17 @@ def payload_values(
     The friction of a finger is the hull of the sampled wrenches, which lies inside the exact limit surface: what is
     found errs on the safe side, with 500 samples by 2 % (median of 40 grasps) to 4 % (one in ten is farther off).
     """
-    payloads = [_payload(contacts, [fit[m].wrench for fit in fits], task) for m in MODELS]
+    pressure = [c.pressure_wrench for c in contacts]
+    payloads = [_payload(contacts, [fit[m].wrench for fit in fits], pressure, task) for m in MODELS]
     return _maps(np.array([f.force for f in payloads]), task), Flag(0) if payloads[0].borne else Flag.NOT_BORNE
 
 
 def payload_alone(contacts: Sequence[Contact], samples: int, task: Task) -> dict[str, Any]:
     """The maps of `payload_values` in the curved model, from so many sampled motions and no fit."""
-    wrenches = [sampled_wrenches(c, MODELS[0], samples)[1][:samples] for c in contacts]
-    return _maps(_payload(contacts, wrenches, task).force, task)
+    motions, of_patch = fit_motions(samples)[:samples], {c.local: c for c in contacts}  # one for both where alike
+    wrench = {local: sampled_wrenches(c, MODELS[0], motions)[1] for local, c in of_patch.items()}
+    pressure = [c.pressure_wrench for c in contacts]
+    return _maps(_payload(contacts, [wrench[c.local] for c in contacts], pressure, task).force, task)
 
 
 def _maps(force: Any, task: Task) -> dict[str, Any]:
@@ -67,8 +70,10 @@ def _maps(force: Any, task: Task) -> dict[str, Any]:
     return {"maps/payload": mass} | ({} if task.mass is None else {"maps/safety_factor": mass / task.mass})
 
 
-def _payload(contacts: Sequence[Contact], wrenches: Sequence[FloatArray], task: Task) -> Payload:
+def _payload(
+    contacts: Sequence[Contact], wrenches: Sequence[FloatArray], pressure: Sequence[FloatArray], task: Task
+) -> Payload:
     # a motion the other way gives the opposite wrench, which costs no further sample
     both = [np.vstack([wrench, -wrench])[:, [0, 1, 5]] for wrench in wrenches]
     soft = [c.soft(PolytopeBody(c.mu * wrench)) for c, wrench in zip(contacts, both, strict=True)]
-    return payload(soft, [c.pressure_wrench for c in contacts], task.centre_of_mass, task.direction, task.kind)
+    return payload(soft, pressure, task.centre_of_mass, task.direction, task.kind)
