@@ -203,8 +203,7 @@ class CandidateSolver:
         """Relative error of the quantity that ``accuracy.target`` is for; NaN where there is one mesh alone."""
         if solved.coarse is None:
             return math.nan
-        values = grasp_values(tuple(solved.fine.contacts), self.settings)
-        errors = solved.errors(values, {}, self.settings)
+        errors = solved.errors(grasp_values(tuple(solved.fine.contacts), self.settings), {}, self.settings)
         return errors[f"maps/{self.scene.accuracy.target_of}_error"]
 
     def _refined(self, solved: Solved, k: int, levels: Levels, left_out: float) -> Solved:

@@ -67,8 +67,7 @@ def estimated_indentation(
         load[:, :3] += (part * depth / depth.sum())[:, None] * pose.rotation[:, 2]
         pressed |= depth > 0
     load[:, 3:] = load[:, :3]
-    q = linear.solve(load.ravel()).reshape(-1, 6)
-    indentations = _indentations(linear.shell, q)
+    indentations = _indentations(linear.shell, linear.solve(load.ravel()).reshape(-1, 6))
     ratios = indentations / mesh.thickness
     return float(indentations[pressed].max(initial=0.0)), float(ratios[pressed].max(initial=0.0))
 

@@ -118,8 +118,7 @@ def crossing_error(forces: ArrayLike, values: ArrayLike, limit: float, stated: A
 
 def _from_nothing(forces: ArrayLike, values: ArrayLike) -> tuple[FloatArray, FloatArray]:
     """Forces and values with those at no force before them."""
-    y = np.asarray(values, float)
-    return np.append(0.0, np.asarray(forces, float)), np.insert(y, 0, 0.0, axis=-1)
+    return np.append(0.0, np.asarray(forces, float)), np.insert(np.asarray(values, float), 0, 0.0, axis=-1)
 
 
 def first_crossing(forces: ArrayLike, values: ArrayLike, limit: float) -> FloatArray:
