@@ -91,6 +91,7 @@ def _dense_factors() -> None:
 take_buffers(_dense_factors)
 # without the log PETSc keeps no times of its own
 PETSc.Log.begin()
+LIBRARY = ctypes.CDLL(PETSc.__file__)  # for what petsc4py does not reach
 REASONS = {value: name for name, value in vars(PETSc.SNES.ConvergedReason).items() if isinstance(value, int)}
 OUT_OF_MEMORY = (-5, -7, -13)  # INFOG(1) of MUMPS
 WITHIN, FAST = 1e5, 0.05  # see NonlinearSolver
@@ -423,11 +424,11 @@ def _set_values(matrix: PETSc.Mat, values: FloatArray) -> None:
     petsc4py goes through ``MatSetValues``, which looks for the place of every single one.
     """
     # the array of a sequential AIJ matrix is the values in the order of its rows, as in `Pattern`
-    lib, stored = ctypes.CDLL(PETSc.__file__), ctypes.POINTER(ctypes.c_double)()
+    stored = ctypes.POINTER(ctypes.c_double)()
     handle = ctypes.c_void_p(matrix.handle)
-    lib.MatSeqAIJGetArray(handle, ctypes.byref(stored))
+    LIBRARY.MatSeqAIJGetArray(handle, ctypes.byref(stored))
     np.ctypeslib.as_array(stored, values.shape)[:] = values
-    lib.MatSeqAIJRestoreArray(handle, ctypes.byref(stored))
+    LIBRARY.MatSeqAIJRestoreArray(handle, ctypes.byref(stored))
     matrix.assemble()
 
 
@@ -484,7 +485,6 @@ def unknown_options(options: dict[str, Any]) -> list[str]:
 
     petsc4py has no binding for ``PetscOptionsUsed``, so it is called in the library that petsc4py has loaded.
     """
-    asked = ctypes.CDLL(PETSc.__file__).PetscOptionsUsed
     judged = {name: value for name, value in options.items() if not PRINTING.search(name)}
     # x = 1 of a few unknowns is enough for PETSc to read every option; PORD ends the process at a matrix without zeros
     diagonal = np.arange(30, dtype=np.int32)
@@ -501,7 +501,7 @@ def unknown_options(options: dict[str, Any]) -> list[str]:
         solver._snes.solve(None, solver._x)  # MUMPS reads its options here
         for name in judged:
             used = ctypes.c_int(0)
-            asked(None, name.encode(), ctypes.byref(used))
+            LIBRARY.PetscOptionsUsed(None, name.encode(), ctypes.byref(used))
             if not used.value:
                 unknown.append(name)
     solver.destroy()
