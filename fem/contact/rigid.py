@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from copy import copy
-from dataclasses import dataclass
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -18,33 +17,25 @@ from softjaw.friction.patch import FloatArray
 NO_DIRECTIONS = np.empty((0, 3))
 
 
-@dataclass(frozen=True, eq=False)
-class _Entries:
+# Of the pads in use, for all candidates of a scene share a few: `_entries`.
+_ENTRIES: WeakKeyDictionary[Pad, tuple[Pattern, IntArray, IntArray]] = WeakKeyDictionary()
+
+
+def _entries(finger: Finger) -> tuple[Pattern, IntArray, IntArray]:
     """Pattern of the tangent, place in it of every entry, and where each kind of them ends."""
-
-    pattern: Pattern
-    slots: IntArray
-    ends: IntArray
-
-    @classmethod
-    def of(cls, finger: Finger) -> _Entries:
-        face, pressure, size = finger.local_dofs, finger.pressure_dofs, finger.pad.size
-        # the diagonal of closing and pressures: an idle node has nothing else in its row
-        diagonal = np.arange(finger.closing_dof, size, dtype=np.int32)
-        parts = (
-            (finger.foam.rows, finger.foam.columns),
-            pairs(face[:, :, :, None, None], face[:, None, None, :, :]),
-            pairs(face[:, None, :, :], pressure[:, :, None, None]),
-            pairs(pressure[:, :, None, None], face[:, None, :, :]),
-            (diagonal, diagonal),
-        )
-        rows, columns = (np.concatenate(index) for index in zip(*parts, strict=True))
-        pattern = Pattern(size, rows, columns)
-        return cls(pattern, pattern.slots(rows, columns), np.cumsum([len(part[0]) for part in parts]))
-
-
-# of the pads in use: all candidates of a scene share a few
-_ENTRIES: WeakKeyDictionary[Pad, _Entries] = WeakKeyDictionary()
+    face, pressure = finger.local_dofs, finger.pressure_dofs
+    # the diagonal of closing and pressures: an idle node has nothing else in its row
+    diagonal = np.arange(finger.closing_dof, finger.pad.size, dtype=np.int32)
+    parts = (
+        (finger.foam.rows, finger.foam.columns),
+        pairs(face[:, :, :, None, None], face[:, None, None, :, :]),
+        pairs(face[:, None, :, :], pressure[:, :, None, None]),
+        pairs(pressure[:, :, None, None], face[:, None, :, :]),
+        (diagonal, diagonal),
+    )
+    rows, columns = (np.concatenate(index) for index in zip(*parts, strict=True))
+    pattern = Pattern(finger.pad.size, rows, columns)
+    return pattern, pattern.slots(rows, columns), np.cumsum([len(part[0]) for part in parts])
 
 
 class RigidProblem(ContactProblem):
@@ -69,10 +60,10 @@ class RigidProblem(ContactProblem):
     def _build_pattern(self) -> None:
         """Work arrays, so that nothing large is allocated in an iteration, and the place of every entry."""
         if self.pad not in _ENTRIES:
-            _ENTRIES[self.pad] = _Entries.of(self.finger)
-        entries = _ENTRIES[self.pad]
-        self.pattern, self._slots, self._ends = copy(entries.pattern), entries.slots, entries.ends
-        self.pattern.values = np.zeros_like(entries.pattern.values)
+            _ENTRIES[self.pad] = _entries(self.finger)
+        pattern, self._slots, self._ends = _ENTRIES[self.pad]
+        self.pattern = copy(pattern)
+        self.pattern.values = np.zeros_like(pattern.values)
         self._closing_entries = np.flatnonzero(self.foam.columns == self.closing_dof)
         self._values = np.zeros(self._slots.size)
 
