@@ -10,7 +10,7 @@ import json
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -167,8 +167,7 @@ class Layout:
     @cached_property
     def datasets(self) -> tuple[Dataset, ...]:
         """All datasets of the study but axes, texts and sessions."""
-        states = (d for d in of_cases(self) if d.path in (CODE, ATTEMPTS))
-        return (*self.columns, *states, *others(self))
+        return (*self.columns, *(d for d in of_cases(self) if d.path in (CODE, ATTEMPTS)), *others(self))
 
     @property
     def nbytes(self) -> int:
@@ -187,6 +186,9 @@ def is_case(added: Any) -> bool:
     return isinstance(added, tuple) and len(added) == 3
 
 
+_adapter = lru_cache(TypeAdapter)  # making one takes longer than reading by it
+
+
 def as_json(value: Any) -> str:
     """Records with arrays as JSON."""
     return json.dumps(value, default=np.ndarray.tolist)
@@ -194,7 +196,7 @@ def as_json(value: Any) -> str:
 
 def layout_of(text: str) -> Layout:
     """The layout of an existing file; ``ValueError`` if it makes no sense."""
-    layout = TypeAdapter(Layout).validate_json(text)
+    layout = _adapter(Layout).validate_json(text)
     axes = tuple(replace(axis, values=np.asarray(axis.values, float)) for axis in layout.axes)
     if len(axes) < 3 or not all(axis.values.ndim == 1 and np.isfinite(axis.values).all() for axis in axes):
         raise ValueError("its axes are not those of a study")
@@ -204,4 +206,4 @@ def layout_of(text: str) -> Layout:
 
 def header_of(text: str, scene: str) -> Header:
     """The header of an existing file; ``ValueError`` if it makes no sense."""
-    return TypeAdapter(Header).validate_python({**json.loads(text), "scene": scene})
+    return _adapter(Header).validate_python({**json.loads(text), "scene": scene})
