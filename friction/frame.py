@@ -159,8 +159,7 @@ def _on_faces(faces: ContactPatch, cop: FloatArray, N: FloatArray) -> tuple[Floa
         if key in visited or iterations == MAX_ITERATIONS:
             # without a cycle in sight after all passes, every face that was met counts
             start = visited.index(key) if key in visited else 0
-            union = sorted(set().union(*visited[start:]))
-            N = _direction(faces.normal[union].mean(axis=0))
+            N = _direction(faces.normal[sorted(set().union(*visited[start:]))].mean(axis=0))
             origin, met, missed = foot(faces, cop, N)
             flag |= FrameFlag.CYCLE
             break
@@ -237,7 +236,6 @@ def opposing(faces: ContactPatch, turned: NDArray[np.bool_]) -> bool:
     tree, count = cKDTree(faces.centroid), min(5, len(turned))
     # all faces as far away as the last neighbour count, or which one does would hang on rounding
     reach = tree.query(faces.centroid[turned], k=[count])[0][:, 0] * (1 + 1e-6)
-    near = tree.query_ball_point(faces.centroid[turned], reach)
-    pairs = zip(faces.normal[turned], near, strict=True)
+    pairs = zip(faces.normal[turned], tree.query_ball_point(faces.centroid[turned], reach), strict=True)
     # cosine between the normals of neighbours: a real overhang turns by less from face to face
     return any((faces.normal[some] @ n).min() < -0.5 - ANGLE for n, some in pairs)

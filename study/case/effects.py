@@ -106,8 +106,7 @@ def neglected_traction(state: Any, mu: float) -> float:
     column of foam is that is sheared by ``d``. A slope shows here too: there the whole pad moves along the surface.
     """
     pad, points = state.pad, state.points
-    start = np.einsum("qa,fai->fqi", pad.face_N, pad.nodes[pad.face_nodes])
-    moved = points.position - start
+    moved = points.position - np.einsum("qa,fai->fqi", pad.face_N, pad.nodes[pad.face_nodes])
     along = moved - np.einsum("fqi,fqi->fq", moved, points.normal)[..., None] * points.normal
     stick = pad.modulus_per_thickness * pad.face_area * np.linalg.norm(along, axis=-1)
     # A point that is pulled has no pressure that friction could act on.

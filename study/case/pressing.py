@@ -127,8 +127,7 @@ class PressedContact(Contact):
         loaded = self.loaded.reshape(n, k, m, k)
         widths = [np.count_nonzero(loaded.any(axes)) for axes in ((1, 2, 3), (0, 1, 3))]
         # a single line of nodes loads the elements on both sides of it
-        shared = self.state.pad.contact == "nodal"
-        few = self.on_few_elements or min(widths) - shared < 2
+        few = self.on_few_elements or min(widths) - (self.state.pad.contact == "nodal") < 2
         normals = self.patch.normal.reshape(n * k, m * k, 3)
         # a blade thinner than an element is met on its flanks alone, or not on them, as the faces happen to lie
         pairs = zip(_neighbours(normals), _neighbours(loaded.reshape(n * k, m * k)), strict=True)

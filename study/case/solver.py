@@ -187,8 +187,7 @@ class CandidateSolver:
             solved, unknown = Solved([fine, coarse]), NO_PATH_ERROR
             if levels.friction_pressure_coupling != "none":
                 # what the steps of its load path leave: the difference to steps of twice the length
-                pair = coarse.contacts, self.solve(k, LONG_STEPS, levels).contacts
-                solved = replace(solved, pairs=[pair])
+                solved = replace(solved, pairs=[(coarse.contacts, self.solve(k, LONG_STEPS, levels).contacts)])
         except (ConvergenceError, CheckError) as failure:
             solved = replace(solved, note=unknown.format(reason=failure))
         return self._refined(solved, k, levels, left_out) if isinstance(fine.fingers, OnRigid) else solved

@@ -131,8 +131,7 @@ def first_crossing(forces: ArrayLike, values: ArrayLike, limit: float) -> FloatA
     """
     x, y = _from_nothing(forces, values)
     # Nothing beyond the first gap is used: the true crossing may lie inside it.
-    known = np.cumprod(np.isfinite(y), axis=-1).astype(bool)
-    above = known & (y >= limit * (1.0 - UNDECIDED))
+    above = np.cumprod(np.isfinite(y), axis=-1).astype(bool) & (y >= limit * (1.0 - UNDECIDED))
     k = np.maximum(above.argmax(axis=-1), 1)[..., None]
     low, high = np.take_along_axis(y, k - 1, -1)[..., 0], np.take_along_axis(y, k, -1)[..., 0]
     # Equal neighbours would divide by 0; the clip then gives an end of their interval.

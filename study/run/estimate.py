@@ -130,8 +130,7 @@ def unit_seconds(plan: Any, seconds: np.ndarray) -> list[float]:
     known = np.isfinite(times)
     if not costs[known].sum():
         return []
-    rate = times[known].sum() / costs[known].sum()
-    return np.where(known, times, rate * costs).tolist()
+    return np.where(known, times, times[known].sum() / costs[known].sum() * costs).tolist()
 
 
 def measured_seconds(layout: Layout, path: Path) -> Any:

@@ -199,8 +199,7 @@ def _groups_free() -> Iterator[float]:
 
 
 def _file_pages(group: Path) -> float:
-    words = [line.split() for line in _lines(group / "memory.stat")]
-    counts = {name: float(value) for name, value in words}
+    counts = {name: float(value) for name, value in map(str.split, _lines(group / "memory.stat"))}
     # Version 1 counts pages of groups below under total_ only.
     return sum(counts.get(f"total_{name}", counts.get(name, 0.0)) for name in ("inactive_file", "active_file"))
 

@@ -129,6 +129,5 @@ class Unbreakable:
             return act(*text)
         except BrokenPipeError:
             # Into nowhere from now on: the interpreter's last flush would complain too.
-            nowhere = os.open(os.devnull, os.O_WRONLY)
-            os.dup2(nowhere, self._stream.fileno())
+            os.dup2(os.open(os.devnull, os.O_WRONLY), self._stream.fileno())
             return None

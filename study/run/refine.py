@@ -69,8 +69,7 @@ def chances(stations: FloatArray, score: FloatArray, sound: NDArray[np.bool_], f
     best = np.where(sound, score, -np.inf).max(axis=(1, 2))[:, None, None, :]
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.nan_to_num(np.where(best > 0, most / best - 1, 0.0), nan=0.0)
-    slopes = np.maximum(share.max(axis=(0, 2, 3)), 0.0)
-    return np.where(h >= 2 * finest * (1 - UNDECIDED), slopes, 0.0)
+    return np.where(h >= 2 * finest * (1 - UNDECIDED), np.maximum(share.max(axis=(0, 2, 3)), 0.0), 0.0)
 
 
 def chances_in(result: Any) -> FloatArray:

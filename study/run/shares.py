@@ -26,8 +26,7 @@ class Share:
     @property
     def cost(self) -> float:
         """Work, in the measure of the unit's own; along one load path all forces up to the last one cost."""
-        count = len(self.unit.rows[0])
-        return self.unit.cost * (len(self.forces) / count if self.unit.apart else 1.0)
+        return self.unit.cost * (len(self.forces) / len(self.unit.rows[0]) if self.unit.apart else 1.0)
 
     def divided(self, parts: int) -> list[Share]:
         """The same forces in at most so many shares, of which none has more than one force more than another."""
