@@ -219,8 +219,8 @@ def joined(patch: ContactPatch, along: FloatArray, across: FloatArray) -> dict[s
     """
 
     def summed(values: FloatArray) -> FloatArray:
-        grid = values.reshape(along.shape[1], across.shape[1], -1)
-        return np.einsum("ai,bj,ijc->abc", along, across, grid).reshape(-1, *values.shape[1:])
+        lines = (along @ values.reshape(along.shape[1], -1)).reshape(len(along), across.shape[1], -1)
+        return (across @ lines).reshape(-1, *values.shape[1:])
 
     def mean(values: FloatArray) -> FloatArray:
         by_load, by_area = summed(forces[:, None] * values), summed(patch.area[:, None] * values)
