@@ -306,7 +306,7 @@ class TriangleTree:
         return np.ascontiguousarray(area / np.where(size > 0, size, 1.0)[:, None])
 
     @cached_property
-    def _round_points(self) -> tuple[np.ndarray, np.ndarray]:
+    def _at_points(self) -> tuple[np.ndarray, np.ndarray]:
         return _round_points(np.ascontiguousarray(self.triangles), len(self.points))
 
     def along(self, x: FloatArray, direction: FloatArray) -> FloatArray:
@@ -327,7 +327,7 @@ class TriangleTree:
         """Signed distance ``(n,)`` [m], its unit gradient ``(n, 3)``, and whether the border is closest ``(n,)``."""
         x = np.ascontiguousarray(x, dtype=float)
         away, triangle, feature = closest(x, *self.nodes)
-        about = self.nodes[0], np.ascontiguousarray(self.triangles), self.face_normals, *self._round_points
+        about = self.nodes[0], np.ascontiguousarray(self.triangles), self.face_normals, *self._at_points
         vector, border = _pseudo_normals(triangle, feature, *about)
         length = np.linalg.norm(away, axis=1)
         sign = np.where(np.einsum("nd,nd->n", away, vector) < 0, -1.0, 1.0)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from softjaw.fem.objects.gap import Pose, grid_triangles
+from softjaw.fem.objects.gap import Pose, edges_of, grid_triangles
 from softjaw.fem.objects.mesh_holes import border_loops, filling
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.fem.objects.smooth_triangles import smooth_triangles
@@ -187,6 +187,12 @@ def test_the_tree_finds_what_all_triangles_give_and_the_edges_of_a_coarse_cylind
     alone = [TriangleTree(x, triangle[None]) for triangle in triangles]
     assert np.abs(g) == pytest.approx(np.min([np.abs(one.signed(points)[0]) for one in alone], axis=0), abs=1e-15)
     assert not border.any()
+    torn = np.delete(triangles, rng.integers(0, len(triangles), 9), axis=0)
+    edges, times = np.unique(np.sort(edges_of(torn), axis=1), axis=0, return_counts=True)
+    g, _, border = TriangleTree(x, torn).signed(points)
+    rim = np.abs(TriangleTree(x, edges[times == 1][:, [0, 1, 1]]).signed(points)[0])
+    assert border.any()
+    assert (border == (rim <= np.abs(g) + 1e-15)).all()
     stack = np.empty(128, np.int64)
     for o, d in zip(points[:100], rng.normal(size=(100, 3)), strict=True):
         t, hit = first_hit(o, d, 0.0, -1, False, *tree.nodes, stack)
