@@ -2,8 +2,9 @@
 
 Every law is one function ``law(F, B, J, par, P, A)``: from the deformation gradient ``F``, its inverse ``B`` and its
 determinant ``J`` it writes the first Piola-Kirchhoff stress ``P = dW/dF`` [Pa] and, where ``A`` has entries, the
-tangent ``A[i, J, k, L] = dP[i, J] / dF[k, L]`` [Pa].  A new material is one more such function, a line in ``stress``
-and one in ``LAWS``. The loops stand beside the laws because numba's cache looks at the file of a function alone.
+tangent ``A[i, J, k, L] = dP[i, J] / dF[k, L]`` [Pa] for ``k >= i``; the rest is symmetric.  A new material is one more
+such function, a line in ``stress`` and one in ``LAWS``. The loops stand beside the laws because numba's cache looks at
+the file of a function alone.
 
 Element arrays keep the node index last and contiguous, so that the innermost loop over the nodes of an element becomes
 vector instructions; local unknowns are therefore ordered component first, ``(3, nodes)``.
@@ -29,28 +30,29 @@ def transposed_product(M, N, out):
             out[i, j] = M[0, i] * N[0, j] + M[1, i] * N[1, j] + M[2, i] * N[2, j]
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def blatz_ko(F, B, J, par, P, A, work):
     """Foam of Blatz and Ko: ``W = G/2 (tr C^-1 + 2 J - 5)``, ``P = G (J F^-T - F^-T C^-1)``; ``par = [G]``."""
     G = par[0]
-    M, D, N = work[0], work[1], work[2]
-    transposed_product(B.T, B.T, M)  # C^-1
-    transposed_product(B, M, D)
+    M, D = work[0], work[1]
+    for i in range(3):
+        for j in range(i + 1):
+            M[i, j] = B[i, 0] * B[j, 0] + B[i, 1] * B[j, 1] + B[i, 2] * B[j, 2]  # C^-1
+            M[j, i] = M[i, j]
     for i in range(3):
         for j in range(3):
+            D[i, j] = B[0, i] * M[0, j] + B[1, i] * M[1, j] + B[2, i] * M[2, j]
             P[i, j] = G * (J * B[j, i] - D[i, j])
     # a residual asks for the stress alone, and the tangent costs several times as much
     if A.size == 0:
         return
-    transposed_product(B, B, N)  # b^-1
     for i in range(3):
-        for j in range(3):
-            for k in range(3):
+        for k in range(i, 3):
+            n = G * (B[0, i] * B[0, k] + B[1, i] * B[1, k] + B[2, i] * B[2, k])  # b^-1
+            for j in range(3):
+                a, b, c = G * J * B[j, i], G * (D[k, j] - J * B[j, k]), G * B[j, k]
                 for m in range(3):
-                    A[i, j, k, m] = G * (
-                        J * (B[m, k] * B[j, i] - B[j, k] * B[m, i])
-                        + B[m, i] * D[k, j] + N[i, k] * M[m, j] + B[j, k] * D[i, m]
-                    )  # fmt: skip
+                    A[i, j, k, m] = a * B[m, k] + b * B[m, i] + n * M[m, j] + c * D[i, m]
 
 
 @njit(cache=True)
@@ -65,7 +67,7 @@ def neo_hookean(F, B, J, par, P, A, work):
         return
     for i in range(3):
         for j in range(3):
-            for k in range(3):
+            for k in range(i, 3):
                 for m in range(3):
                     A[i, j, k, m] = lam * B[j, i] * B[m, k] + (G - lam * log_j) * B[j, k] * B[m, i]
             A[i, j, i, j] += G
@@ -88,22 +90,6 @@ def linear(F, B, J, par, P, A, work):
             A[i, i, j, j] += lam
             A[i, j, i, j] += G
             A[i, j, j, i] += G
-
-
-@njit(cache=True)
-def inverted(M, out):
-    """Write the inverse of a 3 x 3 matrix; returns its determinant, and nothing is divided where that is 0."""
-    for i in range(3):
-        a, b = (i + 1) % 3, (i + 2) % 3
-        for j in range(3):
-            c, d = (j + 1) % 3, (j + 2) % 3
-            out[j, i] = M[a, c] * M[b, d] - M[a, d] * M[b, c]
-    det = M[0, 0] * out[0, 0] + M[0, 1] * out[1, 0] + M[0, 2] * out[2, 0]
-    if det != 0.0:
-        for i in range(3):
-            for j in range(3):
-                out[i, j] /= det
-    return det
 
 
 @njit(cache=True)
@@ -187,7 +173,7 @@ def hyperfoam(F, B, J, par, P, A, work):
             for i in range(3):
                 for j in range(3):
                     x, y = FV[i, a] * V[j, a], FV[i, a] * V[j, b]
-                    for k in range(3):
+                    for k in range(i, 3):
                         for m in range(3):
                             A[i, j, k, m] += x * X[k, m] + y * Y[k, m]
     for i in range(3):
@@ -195,7 +181,7 @@ def hyperfoam(F, B, J, par, P, A, work):
         A[i, :, i, :] += S
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def stress(law, F, B, J, par, P, A, work):
     """Write stress and tangent of the law with this number; numbers, not functions, let compiled code be cached.
 
@@ -211,16 +197,25 @@ def stress(law, F, B, J, par, P, A, work):
         linear(F, B, J, par, P, A, work)
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _gradient(u, dN, nodes, F, B):
-    """Deformation gradient and its inverse at one point; returns ``det F``."""
-    for i in range(3):
-        for j in range(3):
-            value = 1.0 if i == j else 0.0
-            for a in range(nodes):
-                value += u[i, a] * dN[j, a]
-            F[i, j] = value
-    return inverted(F, B)
+    """Deformation gradient and its inverse, without the division where it has none; returns ``det F``."""
+    f00 = f11 = f22 = 1.0
+    f01 = f02 = f10 = f12 = f20 = f21 = 0.0
+    for a in range(nodes):
+        x, y, z, d0, d1, d2 = u[0, a], u[1, a], u[2, a], dN[0, a], dN[1, a], dN[2, a]
+        f00, f01, f02 = f00 + x * d0, f01 + x * d1, f02 + x * d2
+        f10, f11, f12 = f10 + y * d0, f11 + y * d1, f12 + y * d2
+        f20, f21, f22 = f20 + z * d0, f21 + z * d1, f22 + z * d2
+    F[0, 0], F[0, 1], F[0, 2], F[1, 0], F[1, 1], F[1, 2] = f00, f01, f02, f10, f11, f12
+    F[2, 0], F[2, 1], F[2, 2] = f20, f21, f22
+    b00, b10, b20 = f11 * f22 - f12 * f21, f12 * f20 - f10 * f22, f10 * f21 - f11 * f20
+    det = f00 * b00 + f01 * b10 + f02 * b20
+    s = 1.0 / det if det != 0.0 else 1.0
+    B[0, 0], B[1, 0], B[2, 0] = b00 * s, b10 * s, b20 * s
+    B[0, 1], B[1, 1], B[2, 1] = (f02 * f21 - f01 * f22) * s, (f00 * f22 - f02 * f20) * s, (f01 * f20 - f00 * f21) * s
+    B[0, 2], B[1, 2], B[2, 2] = (f01 * f12 - f02 * f11) * s, (f02 * f10 - f00 * f12) * s, (f00 * f11 - f01 * f10) * s
+    return det
 
 
 @njit(cache=True)
@@ -321,11 +316,12 @@ def strains(law, par, u, dN, directions):
             stress(law, F, B, J, par, P, A, work)
             for m in directions:
                 for i in range(3):
-                    for k in range(3):
+                    for k in range(i, 3):
                         C[i, k] = 0.0
                         for j in range(3):
                             for n in range(3):
                                 C[i, k] += A[i, j, k, n] * m[j] * m[n]
+                        C[k, i] = C[i, k]
                 # only where the smallest so far, taken off the diagonal, leaves no positive definite matrix
                 a, b, c = C[0, 0] - ellipticity, C[1, 1] - ellipticity, C[2, 2] - ellipticity
                 minor = a * b - C[0, 1] ** 2

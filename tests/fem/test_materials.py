@@ -31,6 +31,8 @@ def respond(law: Material, F, tangent=True):
     F = np.ascontiguousarray(F, dtype=float)
     P, A = np.zeros((3, 3)), np.full((3, 3, 3, 3) if tangent else (0, 0, 0, 0), np.nan)
     stress(law.number, F, np.linalg.inv(F), np.linalg.det(F), law.parameters, P, A, np.empty((3, 3, 3)))
+    for i, k in ((1, 0), (2, 0), (2, 1)) if tangent else ():
+        A[i, :, k] = A[k, :, i].T
     return P, A
 
 
