@@ -134,8 +134,7 @@ def full_ellipsoid(W: ArrayLike) -> Ellipsoid:
     determine ``A``, it is the ellipsoid nearest to their principal axes; where they would make it endless, the best one
     that reaches at most `MAX_REACH_RATIO` times as far as they do.
     """
-    W = np.asarray(W, float)[pressed(W)]
-    B, Y, flag = principal_frame(W)
+    B, Y, flag = principal_frame(np.asarray(W, float)[pressed(W)])
     A, more = _quadratic_form(Y)
     # A = L L' makes the body |L' y| <= 1, the image of the ball under the inverse of L'
     return Ellipsoid(B @ np.linalg.inv(np.linalg.cholesky(A)).T, flag | more)

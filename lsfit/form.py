@@ -199,8 +199,7 @@ def round_frame(value: Callable[[FloatArray], FloatArray], dimension: int, degre
     L = np.eye(dimension)
     # one pass does for bodies that are nearly round, long ones take several; 0.3 is round enough for the rules
     for _ in range(40):
-        r = value(u @ L.T) ** (-1 / degree)
-        Y = u * r[:, None]
+        Y = u * (value(u @ L.T) ** (-1 / degree))[:, None]
         # the second moments of a unit sphere are 1 / d: times d they are the identity
         C = np.linalg.cholesky(dimension * (Y.T @ Y) / len(u))
         if abs(C - np.eye(dimension)).max() < 0.3:

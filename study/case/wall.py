@@ -117,7 +117,6 @@ def _places(grasp: Grasp, shell: Shell, q: FloatArray) -> FloatArray:
     side = np.stack([np.where((x < 0) & grasp.mirrors[0], -1.0, 1.0), np.where((y < 0) & grasp.mirrors[1], -1.0, 1.0)])
     angle = np.arctan2(side[1] * y, side[0] * x).ravel()
     nodes, N = mesh.locate(angle, s.ravel())
-    moved = np.einsum("na,nai->ni", N, (q[:, :3] + q[:, 3:])[nodes])
-    place = mesh.surface.jets(angle, s.ravel())[:, 0] + moved
+    place = mesh.surface.jets(angle, s.ravel())[:, 0] + np.einsum("na,nai->ni", N, (q[:, :3] + q[:, 3:])[nodes])
     place[:, :2] *= side.reshape(2, -1).T
     return place @ about_z(-grasp.angle)
