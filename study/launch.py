@@ -1,7 +1,4 @@
-"""A study from its scene to its finished file: plan, how cases are solved, what is written and said at the end.
-
-What reads the file afterwards is imported then, by the rank that reads: xarray loads as long as a case is solved.
-"""
+"""A study from its scene to its finished file: plan, how cases are solved, what is written and said at the end."""
 
 from __future__ import annotations
 
@@ -16,12 +13,16 @@ from softjaw.study.case.build import told
 from softjaw.study.case.candidates import with_sampled_grasps
 from softjaw.study.case.model import check_petsc
 from softjaw.study.result import derived
-from softjaw.study.result.store import Result
+from softjaw.study.result.read import dataset
 from softjaw.study.run.object_folder import ObjectFolder
+from softjaw.study.run.objects import run_objects
 from softjaw.study.run.plan import make_plan
 from softjaw.study.run.refine import Rounds, added_cases, refined
+from softjaw.study.run.rounds import next_round
 from softjaw.study.run.session import Work, on_rank0, run_study
 from softjaw.study.scene import Scene
+from softjaw.study.show.best_grasps import summary
+from softjaw.study.show.report.verdict import plain_report
 
 
 def solve_scene(
@@ -67,7 +68,6 @@ def solve_objects(folder: ObjectFolder, out: Path, comm: Any, *, retry_failed: b
     Returns as for `solve_scene`; 0 also where an object has no grasp. Raises `StudyError` on every rank:
     what is wrong for all objects alike, or ``out`` cannot be used.
     """
-    from softjaw.study.run.objects import run_objects
 
     def study(scene: Scene, overrides: tuple[str, ...]) -> tuple[Any, Work]:
         scene = with_sampled_grasps(scene)
@@ -97,30 +97,11 @@ def work(scene: Scene, plan: Any, comm: Any) -> Work:
     def with_rounds(rounds: Rounds) -> Work:
         grown_scene = refined(scene, rounds)
         return Work(
-            pipeline.solve_unit, pipeline.image, lambda writer: derived.finalise(writer, grown_scene), _summary,
+            pipeline.solve_unit, pipeline.image, lambda writer: derived.finalise(writer, grown_scene), summary,
             scene.run.time_limit_s, scene.run.memory_gb,
-            more=lambda result: _next_round(result, scene, each),
+            more=lambda result: next_round(result, scene, each),
             grown=lambda rounds: (on_rank0(comm, make_plan, scene, *about, rounds), with_rounds(rounds)),
-            report=_report,
+            report=lambda result: plain_report(dataset(result)),
         )  # fmt: skip
 
     return with_rounds(())
-
-
-def _next_round(result: Result, scene: Scene, each: int) -> tuple[Any, ...]:
-    from softjaw.study.run.rounds import next_round
-
-    return next_round(result, scene, each)
-
-
-def _summary(result: Result) -> str:
-    from softjaw.study.show.best_grasps import summary
-
-    return summary(result)
-
-
-def _report(result: Result) -> str:
-    from softjaw.study.result.read import dataset
-    from softjaw.study.show.report.verdict import plain_report
-
-    return plain_report(dataset(result))

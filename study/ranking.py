@@ -8,10 +8,9 @@ from contextlib import suppress
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import xarray as xr
 
 from softjaw.fem.objects.gap import IntArray
 from softjaw.friction.patch import FloatArray
@@ -23,6 +22,9 @@ from softjaw.study.messages import StudyError
 from softjaw.study.quantities import DONE, LEAST_FORCE, LISTED
 from softjaw.study.result.read import at_force, half_width, scene_of, stated_error, values_of
 from softjaw.study.scene.text import scene_table
+
+if TYPE_CHECKING:
+    import xarray as xr  # slow to load, and a run needs it at its end only
 
 LARGEST = "the largest solved"
 MIN_ROLL_COSINE = math.cos(math.radians(30.0))  # pads rolled by more are another place

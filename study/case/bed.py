@@ -25,6 +25,7 @@ GRID = (25, 11)  # points of a pad's face along length and width
 CRUSHED = 0.25  # strain of the bed at its highest pressure that leaves half of a grasp
 MOTIONS = 50  # slip motions whose wrenches bound what a contact on springs carries
 INNER = (slice(1, -1), slice(1, -1))  # of height fields that reach one cell beyond the pad's face
+closing_of_bed = njit(cache=True)(bed_closing)
 
 
 @njit(cache=True)
@@ -60,6 +61,42 @@ def height_fields(points, triangles, x, y):
 
 
 @njit(cache=True)
+def lowest_and_highest(points, triangles, a, b):
+    """`fit.extremes` over the rectangle ``|x| <= a, |y| <= b``."""
+    low, high = np.inf, -np.inf
+    p = np.empty((3, 3))
+    for t in range(len(triangles)):
+        for k in range(3):
+            for d in range(3):
+                p[k, d] = points[triangles[t, k], d]
+        if min(p[0, 0], p[1, 0], p[2, 0]) > a or max(p[0, 0], p[1, 0], p[2, 0]) < -a:
+            continue
+        if min(p[0, 1], p[1, 1], p[2, 1]) > b or max(p[0, 1], p[1, 1], p[2, 1]) < -b:
+            continue
+        for k in range(3):
+            x, y, z = p[k]
+            if abs(x) <= a and abs(y) <= b:
+                low, high = min(low, z), max(high, z)
+            dx, dy, dz = p[(k + 1) % 3] - p[k]
+            for side in (-1.0, 1.0):  # where an edge crosses the sides of the rectangle
+                u = (side * a - x) / dx if dx != 0.0 else -1.0
+                v = (side * b - y) / dy if dy != 0.0 else -1.0
+                if 0.0 <= u <= 1.0 and abs(y + u * dy) <= b:
+                    low, high = min(low, z + u * dz), max(high, z + u * dz)
+                if 0.0 <= v <= 1.0 and abs(x + v * dx) <= a:
+                    low, high = min(low, z + v * dz), max(high, z + v * dz)
+        (x, y, z), u, v = p[0], p[1] - p[0], p[2] - p[0]
+        area = u[0] * v[1] - u[1] * v[0]
+        for i in (-a, a):
+            for j in (-b, b):
+                if area != 0.0:  # seen from its edge a triangle has no height of its own: its neighbours have it
+                    r, q = ((i - x) * v[1] - (j - y) * v[0]) / area, (u[0] * (j - y) - u[1] * (i - x)) / area
+                    if r >= -1e-12 and q >= -1e-12 and r + q <= 1.0 + 1e-12:
+                        low, high = min(low, z + r * u[2] + q * v[2]), max(high, z + r * u[2] + q * v[2])
+    return low, high
+
+
+@njit(cache=True)
 def on_springs(height, dx, dy, springs):
     """First touch, and there heights ``(m, n)``, pressures ``(m, n)`` and slopes ``(m, n, 2)`` of a bed of springs.
 
@@ -67,7 +104,7 @@ def on_springs(height, dx, dy, springs):
     """
     (m, n), (stiffness, force, length), touch = height.shape, springs, height.min()
     h, slope = height - touch, np.empty((*height.shape, 2))
-    depth = bed_closing(h.ravel(), force / (stiffness * dx * dy))
+    depth = closing_of_bed(h.ravel(), force / (stiffness * dx * dy))
     pressure = stiffness * np.maximum(depth - h, 0.0)
     filled = np.where(np.isfinite(h), h, length)
     for i in range(m):

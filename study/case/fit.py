@@ -11,7 +11,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from softjaw.fem.objects.gap import IntArray
@@ -42,44 +41,12 @@ def extremes(points: FloatArray, triangles: IntArray, sides: tuple[float, float]
     ``points, triangles`` (k, 3) array, (m, 3) int array: [m]. ``sides``: length and width of the rectangle, along x and
     y [m].
     """
-    low, high = _extremes(np.ascontiguousarray(points), np.ascontiguousarray(triangles), 0.5 * sides[0], 0.5 * sides[1])
+    from softjaw.study.case.bed import lowest_and_highest  # compiled loops, which most scenes are checked without
+
+    low, high = lowest_and_highest(
+        np.ascontiguousarray(points), np.ascontiguousarray(triangles), 0.5 * sides[0], 0.5 * sides[1]
+    )
     return float(low), float(high)
-
-
-@njit(cache=True)
-def _extremes(points, triangles, a, b):
-    """`extremes` over the rectangle ``|x| <= a, |y| <= b``."""
-    low, high = np.inf, -np.inf
-    p = np.empty((3, 3))
-    for t in range(len(triangles)):
-        for k in range(3):
-            for d in range(3):
-                p[k, d] = points[triangles[t, k], d]
-        if min(p[0, 0], p[1, 0], p[2, 0]) > a or max(p[0, 0], p[1, 0], p[2, 0]) < -a:
-            continue
-        if min(p[0, 1], p[1, 1], p[2, 1]) > b or max(p[0, 1], p[1, 1], p[2, 1]) < -b:
-            continue
-        for k in range(3):
-            x, y, z = p[k]
-            if abs(x) <= a and abs(y) <= b:
-                low, high = min(low, z), max(high, z)
-            dx, dy, dz = p[(k + 1) % 3] - p[k]
-            for side in (-1.0, 1.0):  # where an edge crosses the sides of the rectangle
-                u = (side * a - x) / dx if dx != 0.0 else -1.0
-                v = (side * b - y) / dy if dy != 0.0 else -1.0
-                if 0.0 <= u <= 1.0 and abs(y + u * dy) <= b:
-                    low, high = min(low, z + u * dz), max(high, z + u * dz)
-                if 0.0 <= v <= 1.0 and abs(x + v * dx) <= a:
-                    low, high = min(low, z + v * dz), max(high, z + v * dz)
-        (x, y, z), u, v = p[0], p[1] - p[0], p[2] - p[0]
-        area = u[0] * v[1] - u[1] * v[0]
-        for i in (-a, a):
-            for j in (-b, b):
-                if area != 0.0:  # seen from its edge a triangle has no height of its own: its neighbours have it
-                    r, q = ((i - x) * v[1] - (j - y) * v[0]) / area, (u[0] * (j - y) - u[1] * (i - x)) / area
-                    if r >= -1e-12 and q >= -1e-12 and r + q <= 1.0 + 1e-12:
-                        low, high = min(low, z + r * u[2] + q * v[2]), max(high, z + r * u[2] + q * v[2])
-    return low, high
 
 
 def heights_over(corners: FloatArray, points: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
@@ -127,7 +94,6 @@ def stiffness(gripper: Gripper) -> float:
     return 2.0 * gripper.shear_modulus * (1.0 - nu) / (1.0 - 2.0 * nu) / gripper.pad_thickness
 
 
-@njit(cache=True)
 def bed_closing(height: FloatArray, wanted: float) -> float:
     """Closing at which springs that touch at ``height (n,)``, infinite: never, are shortened by ``wanted`` in all."""
     h = np.sort(height[np.isfinite(height)])

@@ -11,7 +11,9 @@ from softjaw.study.case.candidates import with_sampled_grasps
 from softjaw.study.cli.quick import petsc_overrides, results_folder, target
 from softjaw.study.launch import solve_objects, solve_scene
 from softjaw.study.messages import DONE, SOME_FAILED, write_file
+from softjaw.study.result.read import open as open_dataset
 from softjaw.study.run.progress import Unbreakable
+from softjaw.study.show import objects
 from softjaw.study.table import terminal_width
 
 
@@ -23,8 +25,6 @@ def run(options: Namespace) -> int:
         out = results_folder(options)
         code = solve_objects(options.folder, out, MPI.COMM_WORLD, retry_failed=options.retry_failed)
         if MPI.COMM_WORLD.rank == 0:
-            from softjaw.study.show import objects
-
             print(objects.summary(out / "index.hdf", terminal_width()), flush=True)
         return code
     about = {"scene_file": options.scene, "overrides": [*options.overrides, *petsc_overrides(options.petsc)]}
@@ -35,7 +35,6 @@ def run(options: Namespace) -> int:
 def cost(options: Namespace) -> int:
     """Solve a few cases of a scene on several meshes, and say what their accuracy costs in time."""
     from softjaw.study.accuracy.cost import cost_picture, cost_scene, cost_text  # matplotlib
-    from softjaw.study.result.read import open as open_dataset
 
     sys.stdout = Unbreakable(sys.stdout)
     path, comm = target(options, "-cost"), MPI.COMM_WORLD

@@ -9,10 +9,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from softjaw.study.flags import OF_FILE, Flag
@@ -22,6 +21,9 @@ from softjaw.study.result.layout import DONE, VERSION
 from softjaw.study.result.store import Result, open_result
 from softjaw.study.scene import Scene, parse_scene
 from softjaw.study.scene.sections import UPPER
+
+if TYPE_CHECKING:
+    import xarray as xr  # slow to load, and a run needs it at its end only
 
 XYZ = ("x", "y", "z")
 FIELDS = ("wall/place",)  # too large to be read with the rest
@@ -89,6 +91,8 @@ def read_patch(file: str | Path, **at: int | slice) -> xr.Dataset:
     --------
     ``read_patch("results/smoke.hdf", station=0, angle=0, normal_force=-1).pressure.sum("face")``
     """
+    import xarray as xr
+
     with open_result(file) as result:
         rows = xr.DataArray(np.arange(result.layout.rows).reshape(result.layout.shape), dims=result.layout.names)
         rows = rows.isel(_as_given(result) | at)
@@ -108,6 +112,8 @@ def read_field(file: str | Path, path: str, **at: int | slice) -> xr.DataArray:
 
     ``at`` is as in `read_patch`; `KeyError` if the file has no such dataset.
     """
+    import xarray as xr
+
     with open_result(file) as result:
         q = next((q for q in result.layout.quantities if q.key == path), None)
         if q is None:
@@ -122,6 +128,8 @@ def _as_given(result: Result) -> dict[str, int | slice]:
 
 def dataset(result: Result) -> xr.Dataset:
     """The dataset of an open result file."""
+    import xarray as xr
+
     layout = result.layout
     listed = [q for q in layout.quantities if q.group not in ("patch", "status") and q.key not in FIELDS]
     variables = {q.variable: _variable(result, q) for q in listed}
@@ -193,6 +201,8 @@ def maps_in(ds: xr.Dataset) -> dict[str, str]:
 
 def _variable(result: Result, q: Quantity) -> xr.Variable:
     """A quantity of all cases."""
+    import xarray as xr
+
     names = result.layout.names
     if q.group == "maps" and q.by_model:
         values = np.stack([result.read(f"{q.key}/{model}") for model in MODELS], axis=-1)
@@ -210,6 +220,8 @@ def _about(q: Quantity) -> dict[str, Any]:
 
 
 def _coordinates(result: Result, variables: dict[str, Any]) -> dict[str, Any]:
+    import xarray as xr
+
     layout = result.layout
     coordinates: dict[str, Any] = {}
     for axis in result.axes:

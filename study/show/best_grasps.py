@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from softjaw.friction.patch import NEGLIGIBLE
 from softjaw.study.case.result import TIE
@@ -32,6 +31,9 @@ from softjaw.study.show.status import (
 )
 from softjaw.study.table import PAPER, Column, Row, Table, as_text, number, terminal_width, with_error, wrapped
 from softjaw.study.units import in_si, shown, shown_text, shown_unit
+
+if TYPE_CHECKING:
+    import xarray as xr  # slow to load, and a run needs it at its end only
 
 NOTES_WIDTH, OTHERS_WIDTH, LABEL_WIDTH = 13, 16, 20  # characters
 MU_ERROR = 0.1  # of mu, by which it is off where nothing is known of it

@@ -6,10 +6,9 @@ grasp are shown. A case is named by its index ``(..., station, angle, force)`` o
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from softjaw.study.flags import OF_FILE, flag_words
 from softjaw.study.quantities import FORCE_RANGE, MAIN, MODELS, STATES
@@ -20,6 +19,9 @@ from softjaw.study.result.store import place_text, value_text
 from softjaw.study.show.status import Index, grouped
 from softjaw.study.table import number, with_unit
 from softjaw.study.units import shown, shown_unit
+
+if TYPE_CHECKING:
+    import xarray as xr  # slow to load, and a run needs it at its end only
 
 # Maps to choose from besides the main ones.
 MORE = ("epsilon", "safety_factor", "F_N", "S", "contact_area", "p_max", "closing", "curvature_loss", "overclaim",

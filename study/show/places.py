@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from softjaw.study.case.build import centroid_and_bounds
 from softjaw.study.ranking import Place
@@ -13,6 +13,9 @@ from softjaw.study.result.read import scene_of
 from softjaw.study.scene import SceneError
 from softjaw.study.show.grasps import Index, axis_text, field, unravelled
 from softjaw.study.units import shown_text
+
+if TYPE_CHECKING:
+    import xarray as xr  # slow to load, and a run needs it at its end only
 
 SAME_EXTENT = 0.05  # relative difference of extents that makes no side the longer one
 NEARBY = 1e-3  # from the centre of mass, within which a grasp is at it [m]

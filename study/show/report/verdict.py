@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import textwrap
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from softjaw.study.flags import BORNE, flags_in
 from softjaw.study.quantities import MISSING, MODEL_NAMES, MODELS
@@ -17,6 +17,9 @@ from softjaw.study.show.best_grasps import best_text
 from softjaw.study.show.grasps import Index, at, flagged, reason_lines, spoken
 from softjaw.study.show.status import state_counts
 from softjaw.study.table import number
+
+if TYPE_CHECKING:
+    import xarray as xr  # slow to load, and a run needs it at its end only
 
 CAVEAT = (
     "The paper publishes neither its gripper's pad dimensions nor the numbers behind its figures. The dimensions are in"
