@@ -92,6 +92,19 @@ def linear(F, B, J, par, P, A, work):
             A[i, j, j, i] += G
 
 
+@njit(cache=True, inline="always")
+def inverted(M, out):
+    """Write the inverse of a 3 x 3 matrix; returns its determinant, and nothing is divided where that is 0."""
+    a, b, c, d, e, f, g, h, i = M[0, 0], M[0, 1], M[0, 2], M[1, 0], M[1, 1], M[1, 2], M[2, 0], M[2, 1], M[2, 2]
+    x, y, z = e * i - f * h, f * g - d * i, d * h - e * g
+    det = a * x + b * y + c * z
+    s = 1.0 / det if det != 0.0 else 1.0
+    out[0, 0], out[1, 0], out[2, 0] = s * x, s * y, s * z
+    out[0, 1], out[1, 1], out[2, 1] = s * (c * h - b * i), s * (a * i - c * g), s * (b * g - a * h)
+    out[0, 2], out[1, 2], out[2, 2] = s * (b * f - c * e), s * (c * d - a * f), s * (a * e - b * d)
+    return det
+
+
 @njit(cache=True)
 def principal(C):
     """Eigenvalues ``(3,)`` and eigenvectors (columns) of a symmetric 3 x 3 matrix, by cyclic Jacobi rotations."""
@@ -199,7 +212,7 @@ def stress(law, F, B, J, par, P, A, work):
 
 @njit(cache=True, inline="always")
 def _gradient(u, dN, nodes, F, B):
-    """Deformation gradient and its inverse, without the division where it has none; returns ``det F``."""
+    """Deformation gradient and its inverse at one point; returns ``det F``."""
     f00 = f11 = f22 = 1.0
     f01 = f02 = f10 = f12 = f20 = f21 = 0.0
     for a in range(nodes):
@@ -209,13 +222,7 @@ def _gradient(u, dN, nodes, F, B):
         f20, f21, f22 = f20 + z * d0, f21 + z * d1, f22 + z * d2
     F[0, 0], F[0, 1], F[0, 2], F[1, 0], F[1, 1], F[1, 2] = f00, f01, f02, f10, f11, f12
     F[2, 0], F[2, 1], F[2, 2] = f20, f21, f22
-    b00, b10, b20 = f11 * f22 - f12 * f21, f12 * f20 - f10 * f22, f10 * f21 - f11 * f20
-    det = f00 * b00 + f01 * b10 + f02 * b20
-    s = 1.0 / det if det != 0.0 else 1.0
-    B[0, 0], B[1, 0], B[2, 0] = b00 * s, b10 * s, b20 * s
-    B[0, 1], B[1, 1], B[2, 1] = (f02 * f21 - f01 * f22) * s, (f00 * f22 - f02 * f20) * s, (f01 * f20 - f00 * f21) * s
-    B[0, 2], B[1, 2], B[2, 2] = (f01 * f12 - f02 * f11) * s, (f02 * f10 - f00 * f12) * s, (f00 * f11 - f01 * f10) * s
-    return det
+    return inverted(F, B)
 
 
 @njit(cache=True)

@@ -6,10 +6,9 @@ linear system is factorised by MUMPS, by L D L^T where the problem can make its 
 symbolic analysis is kept as long as the pattern is. Steps that older factors are good enough for do without a
 factorisation of their own, see `NonlinearSolver`.
 
-The BLAS libraries of this process take their work memory here, while there is room for it: OpenBLAS takes its own, 32
-or 128 MiB of addresses, at its first larger operation. Where a limit (``ulimit -v``, a batch system, ``run.memory_gb``)
-leaves less, older versions ask for ever and newer ones end the process, both without a word. So every library makes a
-first operation when the solver is loaded, after a look whether there is room.
+The BLAS libraries of this process take their work memory here, while there is room for it: where a limit (``ulimit
+-v``, a batch system, ``run.memory_gb``) leaves less, older OpenBLAS asks for ever and newer one ends the process, both
+without a word.
 """
 
 from __future__ import annotations

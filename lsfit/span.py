@@ -184,12 +184,9 @@ def _solve(
     b = np.zeros(len(order))
     b[: 3 * m] = np.repeat([1.0, -1.0, 0.0], m)
     slope = np.repeat([0.0, beta, gamma, lam], [k + f + m, m, m, 1])
-    return conic_solution(csc_array((len(slope),) * 2), slope, rows[order], b, _cones(m, d, k, side(S)))[:k]
-
-
-def _cones(m: int, d: int, k: int, size: int) -> list:
     of_slip, of_length = [clarabel.SecondOrderConeT(d + 1)] * m, clarabel.SecondOrderConeT(k + 1)
-    return [clarabel.NonnegativeConeT(3 * m), *of_slip, of_length, clarabel.PSDTriangleConeT(size)]
+    cones = [clarabel.NonnegativeConeT(3 * m), *of_slip, of_length, clarabel.PSDTriangleConeT(side(S))]
+    return conic_solution(csc_array((len(slope),) * 2), slope, rows[order], b, cones)[:k]
 
 
 def refuse_runaway(surface: Quartic | Ellipsoid, Y: FloatArray) -> None:

@@ -322,19 +322,17 @@ class Stepping:
         return self.followed.largest_strain(x) if self.followed else 0.0
 
     def _place(self, x: FloatArray, force: float, tangent: FloatArray | None) -> _Place:
-        strain = self._strain(x)
+        strain, stable = self._strain(x), True
         # foam that is strained little does not buckle: the check's factorisation is spared
-        return _Place(x, force, strain, strain <= STRAINED or self._stable(x), tangent)
+        if self.followed and not strain <= STRAINED:
+            entries, held = self.followed.symmetric_tangent(x)
+            # every node in contact has one as a multiplier; any more is a direction of instability
+            stable = self.solver.negative_eigenvalues(entries) == held
+        return _Place(x, force, strain, stable, tangent)
 
     def _tangent(self, x: FloatArray) -> FloatArray | None:
         """Tangent of the path at the state at which the last solve ended; None where it is not followed."""
         return self.followed.path_tangent(x, self.solver.answer) if self.followed else None
-
-    def _stable(self, x: FloatArray) -> bool:
-        assert self.followed is not None
-        entries, held = self.followed.symmetric_tangent(x)
-        # every node in contact has one as a multiplier; any more is a direction of instability
-        return self.solver.negative_eigenvalues(entries) == held
 
     def _ahead(self, here: _Place, force: float) -> FloatArray:
         """Start for the state at a force [N], on the tangent of the path as far as it is a state of sound elements."""

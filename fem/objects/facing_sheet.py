@@ -47,7 +47,7 @@ def _seen(which, normals, sides, directions, spacing, rotation, origin, lower, u
 
     ``sides`` is 2 where backs of triangles can be seen, too.
     """
-    corners, order, low, high, start, count = nodes
+    corners = nodes[0]
     stack, spot, y = np.empty(DEPTH, np.int64), np.empty(3), np.empty(3)
     seen, hides = np.zeros(len(which), np.int64), np.zeros(len(directions), np.int64)
     for m in range(len(which)):
@@ -85,7 +85,7 @@ def _seen(which, normals, sides, directions, spacing, rotation, origin, lower, u
                     # what hid the spot before mostly hides this one, too
                     if hides[k] != which[m] and 0.0 < hits(spot, back, corners, hides[k]) < np.inf:
                         continue
-                    hit = first_hit(spot, back, 0.0, which[m], True, corners, order, low, high, start, count, stack)[1]
+                    hit = first_hit(spot, back, 0.0, which[m], True, nodes, stack)[1]
                     if hit >= 0:
                         hides[k] = hit
                     else:

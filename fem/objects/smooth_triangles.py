@@ -164,17 +164,14 @@ def _corner_normals(
     links = np.concatenate([before, _following(before)]), np.concatenate([_following(after), after])
     m = triangles.size
     group = connected_components(coo_array((np.ones(len(links[0])), links), shape=(m, m)), directed=False)[1]
-    weight = (_corner_angles(points[triangles]) * np.einsum("md,md->m", area, area)[:, None]).ravel()
-    total = np.stack([np.bincount(group, weight * np.repeat(normal[:, d], 3)) for d in range(3)], axis=1)
-    return (total / np.maximum(np.linalg.norm(total, axis=1), 1e-300)[:, None])[group]
-
-
-def _corner_angles(corners: FloatArray) -> FloatArray:
-    """Angles ``(m, 3)`` of triangles ``(m, 3, 3)`` at their corners [rad]."""
+    corners = points[triangles]
     along = np.roll(corners, -1, axis=1) - corners
     along /= np.maximum(np.linalg.norm(along, axis=2), 1e-300)[:, :, None]
     # rounding can push the cosine beyond 1
-    return np.asarray(np.arccos(np.clip(-np.einsum("mkd,mkd->mk", along, np.roll(along, 1, axis=1)), -1.0, 1.0)))
+    angle = np.arccos(np.clip(-np.einsum("mkd,mkd->mk", along, np.roll(along, 1, axis=1)), -1.0, 1.0))
+    weight = (angle * np.einsum("md,md->m", area, area)[:, None]).ravel()
+    total = np.stack([np.bincount(group, weight * np.repeat(normal[:, d], 3)) for d in range(3)], axis=1)
+    return (total / np.maximum(np.linalg.norm(total, axis=1), 1e-300)[:, None])[group]
 
 
 def _tangent(chord: FloatArray, first: FloatArray, second: FloatArray) -> FloatArray:

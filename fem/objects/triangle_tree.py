@@ -181,11 +181,12 @@ def hits(o, d, corners, m):
 
 
 @njit(cache=True)
-def first_hit(o, d, least, skipped, anyone, corners, order, low, high, start, count, stack):
+def first_hit(o, d, least, skipped, anyone, nodes, stack):
     """Distance beyond ``least`` to the first triangle but ``skipped`` on a ray and its number; infinite and -1 if none.
 
     ``anyone`` stops at whichever triangle is found first.
     """
+    corners, order, low, high, start, count = nodes
     best, nearest = np.inf, -1
     top, stack[0] = 1, 0
     while top > 0:
@@ -219,26 +220,10 @@ def first_hit(o, d, least, skipped, anyone, corners, order, low, high, start, co
 @njit(cache=True)
 def _along(x, d, least, skipped, nodes):
     """`first_hit` from points ``(n, 3)`` in directions ``(n, 3)``, each without a triangle ``skipped (n,)``."""
-    corners, order, low, high, start, count = nodes
     stack, distance, hit = np.empty(DEPTH, np.int64), np.empty(len(x)), np.empty(len(x), np.int64)
     for i in range(len(x)):
-        distance[i], hit[i] = first_hit(x[i], d[i], least, skipped[i], False, corners, order, low, high, start, count,
-                                        stack)  # fmt: skip
+        distance[i], hit[i] = first_hit(x[i], d[i], least, skipped[i], False, nodes, stack)
     return distance, hit
-
-
-@njit(cache=True)
-def _round_points(triangles, points):
-    """Triangles round each of so many ``points``: where they start ``(points + 1,)`` in a list ``(3 m,)``."""
-    start, members = np.zeros(points + 2, np.int64), np.empty(triangles.size, np.int64)
-    for k in triangles.ravel():
-        start[k + 2] += 1
-    start = np.cumsum(start)
-    for k in range(triangles.size):
-        corner = triangles[k // 3, k % 3]
-        members[start[corner + 1]] = k // 3
-        start[corner + 1] += 1
-    return start[:-1], members
 
 
 @njit(cache=True)
@@ -306,8 +291,11 @@ class TriangleTree:
         return np.ascontiguousarray(area / np.where(size > 0, size, 1.0)[:, None])
 
     @cached_property
-    def _at_points(self) -> tuple[np.ndarray, np.ndarray]:
-        return _round_points(np.ascontiguousarray(self.triangles), len(self.points))
+    def _round_points(self) -> tuple[np.ndarray, np.ndarray]:
+        """Triangles round each point: where they start ``(k + 1,)`` in a list ``(3 m,)``, and the list."""
+        corners = self.triangles.ravel()
+        order = np.argsort(corners, kind="stable")
+        return np.searchsorted(corners[order], np.arange(len(self.points) + 1)), order // 3
 
     def along(self, x: FloatArray, direction: FloatArray) -> FloatArray:
         """Distances ``(n,)`` [m] from points ``(n, 3)`` to the first triangle in a direction; infinite without one."""
@@ -327,7 +315,7 @@ class TriangleTree:
         """Signed distance ``(n,)`` [m], its unit gradient ``(n, 3)``, and whether the border is closest ``(n,)``."""
         x = np.ascontiguousarray(x, dtype=float)
         away, triangle, feature = closest(x, *self.nodes)
-        about = self.nodes[0], np.ascontiguousarray(self.triangles), self.face_normals, *self._at_points
+        about = self.nodes[0], np.ascontiguousarray(self.triangles), self.face_normals, *self._round_points
         vector, border = _pseudo_normals(triangle, feature, *about)
         length = np.linalg.norm(away, axis=1)
         sign = np.where(np.einsum("nd,nd->n", away, vector) < 0, -1.0, 1.0)

@@ -23,6 +23,7 @@ from numba import njit
 from scipy.spatial import cKDTree
 
 from softjaw.fem.assembly import IntArray
+from softjaw.fem.materials import inverted
 from softjaw.fem.objects.splines import SplineSurface, evaluate
 from softjaw.friction.patch import FloatArray
 
@@ -134,22 +135,6 @@ def _search(wall: Wall, points: FloatArray, places: FloatArray, v: FloatArray, w
         facing.nodes, facing.N, facing.H, facing.G, facing.S,
     )  # fmt: skip
     return facing
-
-
-@njit(cache=True)
-def inverted(M, out):
-    """Write the inverse of a 3 x 3 matrix; returns its determinant, and nothing is divided where that is 0."""
-    for i in range(3):
-        a, b = (i + 1) % 3, (i + 2) % 3
-        for j in range(3):
-            c, d = (j + 1) % 3, (j + 2) % 3
-            out[j, i] = M[a, c] * M[b, d] - M[a, d] * M[b, c]
-    det = M[0, 0] * out[0, 0] + M[0, 1] * out[1, 0] + M[0, 2] * out[2, 0]
-    if det != 0.0:
-        for i in range(3):
-            for j in range(3):
-                out[i, j] /= det
-    return det
 
 
 @njit(cache=True)

@@ -295,12 +295,9 @@ class Grip(LoadPath[WallProblem]):
                 f"the state at {force:.4g} N converged but is wrong: a node of the wall is out of balance "
                 f"by {worst:.3g} N"
             )
-        wall = WallState(problem.model.shell.mesh, q, load, self._reaction(load), here.snapped, self.opening(q))
+        # the supports balance both fingers: forces across a plane of symmetry cancel, the others add up
+        mirrored = np.array([*problem.model.shell.mesh.symmetry, False])
+        reaction = np.where(mirrored, 0.0, -load.sum(axis=0)) * 2.0 ** mirrored.sum()
+        wall = WallState(problem.model.shell.mesh, q, load, reaction, here.snapped, self.opening(q))
         first, *others = (replace(pad, wall=wall) for pad in pads)
         return replace(first, other=others[0]) if others else first
-
-    def _reaction(self, load: FloatArray) -> FloatArray:
-        """Force of the supports on the whole object: it balances the contact forces of both fingers [N]."""
-        # forces across a plane of symmetry cancel with those of the other half; the others add up
-        mirrored = np.array([*self.problem.model.shell.mesh.symmetry, False])
-        return np.where(mirrored, 0.0, -load.sum(axis=0)) * 2.0 ** mirrored.sum()

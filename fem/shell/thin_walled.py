@@ -105,8 +105,9 @@ def grasp(body: ThinWalled, poses: tuple[Pose, Pose], allowed: tuple[bool, bool]
         same = np.abs(p.rotation - q.rotation).max() <= NEGLIGIBLE
         return same and np.abs(p.origin - q.origin).max() <= NEGLIGIBLE * size
 
-    # the plane y = 0 halves both pads, the plane x = 0 makes one finger the other's image
-    across = allowed[1] and turned.symmetric[1] and all(_is_own_image(pose, NEGLIGIBLE * size) for pose in turned_poses)
+    # the plane y = 0 halves both pads, whichever way up, and the plane x = 0 makes one finger the other's image
+    off = [(abs(pose.rotation[1, 1]) - 1.0, pose.origin[1] / size) for pose in turned_poses]
+    across = allowed[1] and turned.symmetric[1] and bool(np.abs(off).max() <= NEGLIGIBLE)
     between = allowed[0] and turned.symmetric[0] and alike(_image(turned_poses[0]), turned_poses[1])
     flipped = tuple(across and pose.rotation[1, 1] < 0 for pose in turned_poses)
     halves = zip(turned_poses, flipped, strict=True)
@@ -164,9 +165,3 @@ def _image(pose: Pose) -> Pose:
     """Mirror image in x = 0 of a pad that is its own image in its plane y = 0."""
     mirror = np.diag([-1.0, 1.0, 1.0])
     return Pose(mirror @ pose.rotation @ np.diag([1.0, -1.0, 1.0]), mirror @ pose.origin)
-
-
-def _is_own_image(pose: Pose, tolerance: float) -> bool:
-    """Whether y = 0 of the grasp frame is the pad's own plane y = 0."""
-    # either sign: half a turn about the approach leaves the pad in the same plane
-    return abs(abs(pose.rotation[1, 1]) - 1.0) <= NEGLIGIBLE and abs(pose.origin[1]) <= tolerance

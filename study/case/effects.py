@@ -187,7 +187,9 @@ class EffectChoice:
     def __init__(self, solver: CandidateSolver) -> None:
         self.solver, self.count = solver, len(solver.forces)
         self.target = solver.scene.accuracy.target or E_N_TARGET
-        self._wanted = wanted_levels(solver.scene)
+        self._wanted = {name: getattr(solver.scene.effects, name) for name in Levels._fields}
+        if solver.scene.gripper.tilt_stiffness_nm_per_rad is not None:
+            self._wanted["sheet"] = "rigid"  # a plate that tilts is
         cheapest = {name: STEPS[name][0].low for name in Levels._fields}
         self.levels = Levels(*(cheapest[n] if level == "auto" else level for n, level in self._wanted.items()))
         self._chosen: dict[tuple[str, int], Level] = {}
@@ -334,13 +336,6 @@ class EffectChoice:
     def flags_at(self, k: int) -> Flag:
         """Flag of a case that lacks an effect that moves its numbers by more than the target."""
         return Flag.LEFT_OUT if self.level(COUPLING, k).reason == FAILED else Flag(0)
-
-
-def wanted_levels(scene: Scene) -> dict[str, str]:
-    """Levels of the effects with steps that a scene asks for, ``auto`` among them."""
-    levels = {name: getattr(scene.effects, name) for name in Levels._fields}
-    # a plate that tilts is rigid itself
-    return levels | ({} if scene.gripper.tilt_stiffness_nm_per_rad is None else {"sheet": "rigid"})
 
 
 def largest(changes: Sequence[float]) -> float:

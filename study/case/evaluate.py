@@ -175,7 +175,10 @@ def _scores(
                 # quartics in a pose take seconds: the pose enters by ellipsoids near them
                 tilt = _tilt(contacts, bodies, settings) if math.isnan(tilt) else tilt
                 both *= tilt
-            least = _epsilon(contacts, ellipsoids, settings) if settings.epsilon_everywhere else math.nan
+            least = math.nan
+            if settings.epsilon_everywhere:
+                lengths = settings.arms, settings.torques, 0.5 * (contacts[0].origin + contacts[1].origin)
+                least = epsilon(soft(contacts, ellipsoids), *lengths, tolerance=EPSILON_GAP).upper
             rows.append((exact, both, least))
     names = ("maps/quality", "maps/quality_fitted", "maps/epsilon")
     return dict(zip(names, map(list, zip(*rows, strict=True)), strict=True)), closed[MODELS[0]]
@@ -256,9 +259,3 @@ def exact_score(pair: Sequence[SoftContact], arms: float, torques: float) -> dic
     lengths = arms, torques, (pair[0].position + pair[1].position) / 2
     volume, ball = grasp_score(pair, *lengths, with_epsilon=False), epsilon(pair, *lengths)
     return {"quality": volume.quality, "quality_l1": volume.quality_l1, "epsilon": [ball.lower, ball.upper]}
-
-
-def _epsilon(contacts: Sequence[Contact], bodies: Sequence[Any], settings: EvaluationSettings) -> float:
-    """Radius of the largest ball in the grasp wrench space about the midpoint of the contacts, in any pose."""
-    middle = 0.5 * (contacts[0].origin + contacts[1].origin)
-    return epsilon(soft(contacts, bodies), settings.arms, settings.torques, middle, tolerance=EPSILON_GAP).upper

@@ -71,7 +71,9 @@ def create(path: Path, layout: Layout, header: Header, *, packed: bool = False) 
             _write_skeleton(file, layout, header, packed)
         # Opened anew: the sums are of what a reader will find in the file.
         with h5py.File(part, "r+", libver=HDF5_VERSIONS) as file:
-            _write_checksums(file, StoredFile(part, file), layout)
+            file[ROOT].attrs.modify("checksum", np.uint32(checksums.of_header(StoredFile(part, file), layout)))
+            for i, name in enumerate(layout.closing):
+                file[CLOSING_SUMS][i] = checksums.of_array(file[f"{ROOT}/{name}"][()])
         if not packed:  # blocks that exist now cannot be missing when a rank writes
             with part.open("r+b") as handle:
                 os.posix_fallocate(handle.fileno(), 0, part.stat().st_size)
@@ -151,13 +153,6 @@ def _write_skeleton(file: h5py.File, layout: Layout, header: Header, packed: boo
     _write_texts(study, layout, header, packed)
     views = {f"{ROOT}/map/{name}": tuple(layout.names[i] for i in layout.shown) for name in FIRST}
     _attach_scales(file, {d.path: d.scales for d in layout.datasets} | views | {SESSION_ROWS: ("session",)})
-
-
-def _write_checksums(file: h5py.File, stored: StoredFile, layout: Layout) -> None:
-    """Checksums of what stands in the new file already."""
-    file[ROOT].attrs.modify("checksum", np.uint32(checksums.of_header(stored, layout)))
-    for i, name in enumerate(layout.closing):
-        file[CLOSING_SUMS][i] = checksums.of_array(file[f"{ROOT}/{name}"][()])
 
 
 def _write_texts(study: h5py.Group, layout: Layout, header: Header, packed: bool) -> None:

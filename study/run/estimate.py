@@ -31,11 +31,11 @@ from softjaw.study.run.shares import makespan
 
 FACE_GRID = (13, 7)  # points of a pad's face
 # Measured on cylinders, boxes, bottles and meshes of 64 to 2304 solved elements, CPU time of one core of 2024.
-CASE, ELEMENT = 0.03, 2.5e-4  # seconds of a force: friction, fits and score; contact, for each trilinear element
+CASE, ELEMENT = 0.05, 2.2e-4  # seconds of a force: friction, fits and score; contact, for each trilinear element
 QUADRATIC_FACTOR = 10.0  # times as dear is a triquadratic element
 START_S = 0.3  # seconds until a rank has loaded what it solves with
 FIRST_FORCE_FACTOR = 2.0  # times as long the first force takes, which begins with a coarse step
-REGION_S = 0.45  # seconds until the distance to a mesh is known round both pads
+REGION_S = 0.3  # seconds until the distance to a mesh is known round both pads
 # times as dear with friction that acts back, everywhere or where it is found to matter
 COUPLED = {"none": 1.0, "auto": 2.2, "tangential": 2.2}
 SCREENED_COST = 0.15  # of a force on the coarse mesh alone, over that on the scene's

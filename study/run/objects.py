@@ -14,7 +14,7 @@ import os
 import sys
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -168,7 +168,12 @@ class _ObjectsRun:
         """Solve what is missing of some objects; whether a signal came."""
         writers = [ResultWriter(part.path, part.plan.layout, self._comm, part.plan.wanted) for part in parts]
         files = Files(self._out, writers)
-        codes = on_rank0(self._comm, _settled, writers, parts, self._retry)
+
+        def settled() -> np.ndarray:
+            each = zip(writers, parts, strict=True)
+            return np.concatenate([settle(writer, part.plan.units, part.torn, self._retry) for writer, part in each])
+
+        codes = on_rank0(self._comm, settled)
         units = [files.counted(i, part.plan.units) for i, part in enumerate(parts)]
         # A rank that hangs ends the run, and the next one derives what follows from all cases.
         session = Session(units, self._work, files, self._comm, codes, more=True)
@@ -256,12 +261,6 @@ def _rows_of(folder: ObjectFolder, out: Path, retry_failed: bool) -> list[Row]:
             row = before | ({"state": index.MISSING} if before["state"] in again else {})
         rows.append(row | {"key": key, "mass": np.nan if mass is None else in_si("mass_g", mass)})
     return rows
-
-
-def _settled(writers: Sequence[ResultWriter], parts: Sequence[Part], retry_failed: bool) -> np.ndarray:
-    """State of every case of some objects as their run begins; by one process."""
-    each = zip(writers, parts, strict=True)
-    return np.concatenate([settle(writer, part.plan.units, part.torn, retry_failed) for writer, part in each])
 
 
 def _why(error: BaseException, limit: float) -> Row:

@@ -48,12 +48,6 @@ IN_REACH = 3.0  # times the target: what an error may be that twice the elements
 POSES_PER_ROUND = 4  # poses of a round: few, so that the next ones start from the better of them
 
 
-def best_places(values: FloatArray) -> list[int]:
-    """Numbers of the best poses, each once; ``values (poses, columns)`` with NaN where a grasp cannot be used."""
-    known = [column for column in values.T if np.nanmax(column, initial=0.0) > 0.0]
-    return list(dict.fromkeys(largest(column) for column in known))
-
-
 def next_round(result: Any, scene: Scene, each: int) -> tuple[Any, ...]:
     """What the next round solves; nothing where the best is known well enough or the budget is spent.
 
@@ -100,7 +94,8 @@ def _neighbours(scene: Scene, rounds: Any, values: FloatArray, share: float) -> 
         return not any(apart(frame, other, jaws.pad) < SAME_POSE_STEPS * share for other in known)
 
     poses: list[tuple[float, Place]] = []
-    for best in best_places(values):
+    columns = (column for column in values.T if np.nanmax(column, initial=0.0) > 0.0)
+    for best in dict.fromkeys(map(largest, columns)):
         # payload on a bed of springs, below which it is none [kg]
         reference = max(promise(JawsOnSurface(surface, *known[best], jaws)), 1e-9)
         for grip in grips(surface, filter(unknown, _moved(known[best], share, jaws.pad)), jaws, lids):

@@ -195,8 +195,8 @@ def test_the_tree_finds_what_all_triangles_give_and_the_edges_of_a_coarse_cylind
     assert (border == (rim <= np.abs(g) + 1e-15)).all()
     stack = np.empty(128, np.int64)
     for o, d in zip(points[:100], rng.normal(size=(100, 3)), strict=True):
-        t, hit = first_hit(o, d, 0.0, -1, False, *tree.nodes, stack)
-        every = [first_hit(o, d, 0.0, -1, False, *one.nodes, stack)[0] for one in alone]
+        t, hit = first_hit(o, d, 0.0, -1, False, tree.nodes, stack)
+        every = [first_hit(o, d, 0.0, -1, False, one.nodes, stack)[0] for one in alone]
         assert t == pytest.approx(min(every), abs=1e-12)
         if hit >= 0:
             p, n = o + t * d, tree.face_normals[hit]

@@ -53,17 +53,14 @@ def models(ds: xr.Dataset, roles: dict[str, Index], mu: float | None) -> list[Bl
     for role, index in roles.items():
         title = f"{role}, over the force: {place(ds, index)}"
         blocks += [{"kind": "heading", "text": title}, _models(ds, len(best) - 1, index, mu)]
-    for position in worth_a_curve(ds):
+    *sweeps, stations, _, _ = ds.status.shape
+    worth_it = [p for p, length in enumerate(sweeps) if length > 1]
+    if stations >= FEWEST and not ds.attrs["poses"]:  # that lie along an object
+        worth_it.append(len(sweeps))
+    for position in worth_it:
         title = f"Over the {spoken(str(ds.status.dims[position]))}, all else as in the best case"
         blocks += [{"kind": "heading", "text": title}, _models(ds, position, best, mu)]
     return blocks
-
-
-def worth_a_curve(ds: xr.Dataset) -> list[int]:
-    """Axes of enough values to be drawn as curves: the sweeps, and stations that lie along an object."""
-    *sweeps, stations, _, _ = ds.status.shape
-    own = [len(sweeps)] if stations >= FEWEST and not ds.attrs["poses"] else []
-    return [p for p, length in enumerate(sweeps) if length > 1] + own
 
 
 def _models(ds: xr.Dataset, position: int, index: Index, mu: float | None) -> Block:

@@ -32,12 +32,6 @@ MOST_PANELS, MOST_LABELS, MOST_NOTES = 6, 16, 8000
 MARKS = (((FAILED,), "x-thin-open", 8), (NO_GRASP, "line-ew-open", 8), ((MISSING,), "circle", 3))  # of states; size
 
 
-def main_axis(ds: xr.Dataset) -> int:
-    """Position of the axis that maps are drawn over: the stations, or a sweep where there is only one station."""
-    *sweeps, stations, _, _ = ds.status.shape
-    return int(np.argmax(sweeps)) if stations == 1 and max(sweeps, default=1) > 1 else len(sweeps)
-
-
 def plane(array: np.ndarray, x: int, y: int, index: Sequence[int]) -> np.ndarray:
     """Two-dimensional cut ``(y, x)`` through an array over all cases, all other axes at ``index``."""
     cut = array[tuple(slice(None) if i in (x, y) else index[i] for i in range(array.ndim))]
@@ -75,8 +69,10 @@ def some(values: Sequence[int], kept: int) -> list[int]:
 
 
 def maps(ds: xr.Dataset, index: Index) -> list[Block]:
-    """Maps over the main axis and the force for the different angles; over main axis and angle for the forces."""
-    x, force = main_axis(ds), len(index) - 1
+    """Maps over stations, or a sweep if there is one station, and force for the angles; over the angle for forces."""
+    *sweeps, stations, _, _ = ds.status.shape
+    swept = stations == 1 and max(sweeps, default=1) > 1
+    x, force = int(np.argmax(sweeps)) if swept else len(sweeps), len(index) - 1
     angles = different_angles(ds)
     made = [_maps(ds, index, x, force, force - 1, some(angles, index[-2]))]
     if len(angles) > 1:
