@@ -48,7 +48,7 @@ def _seen(which, normals, sides, directions, spacing, rotation, origin, lower, u
     ``sides`` is 2 where backs of triangles can be seen, too.
     """
     corners = nodes[0]
-    stack, spot, y = np.empty(DEPTH, np.int64), np.empty(3), np.empty(3)
+    stack, spot = np.empty(DEPTH, np.int64), np.empty(3)
     seen, hides = np.zeros(len(which), np.int64), np.zeros(len(directions), np.int64)
     for m in range(len(which)):
         p, normal = corners[which[m]], normals[which[m]]
@@ -66,13 +66,8 @@ def _seen(which, normals, sides, directions, spacing, rotation, origin, lower, u
                 sign = 1.0 - 2.0 * s
                 for d in range(3):
                     spot[d] = p[0, d] + b * (p[1, d] - p[0, d]) + c * (p[2, d] - p[0, d]) + sign * lift * normal[d]
-                inside = True
-                for d in range(3):
-                    y[d] = 0.0
-                    for e in range(3):
-                        y[d] += (spot[e] - origin[e]) * rotation[e, d]
-                    inside = inside and lower[d] <= y[d] <= upper[d]
-                if not inside or abs(seen[m]) == 2:
+                y = (spot - origin) @ rotation
+                if (y < lower).any() or (y > upper).any() or abs(seen[m]) == 2:
                     continue
                 for k in range(len(directions)):
                     # seen on a slant already: only the straight line, which comes first, can tell more

@@ -28,15 +28,11 @@ LOOKS = (("#12436d", "o"), ("#c05a00", "s"), ("#2a8c82", "^"), ("#801650", "D"))
 def cost_scene(scene: Scene) -> Scene:
     """The scene whose results tell the cost: a few of its cases, with its own sweep or one over meshes."""
     plain: dict[str, Any] = dict.fromkeys(("accuracy.target", "candidates.refine"))
-    plain |= {"uncertainty.spread": {}, "run.patches": "none", "load.normal_force_n": _few(scene.load.normal_force_n)}
+    forces, last = scene.load.normal_force_n, len(scene.load.normal_force_n) - 1
+    plain["load.normal_force_n"] = [forces[i] for i in sorted({0, last // 2, last})]
+    plain |= {"uncertainty.spread": {}, "run.patches": "none"}
     few = scene.with_values(plain | _few_candidates(scene))
     return Scene.of_tables({**few.effective(), "sweep": dict(scene.sweep) or mesh_sweep(scene)})
-
-
-def _few(values: Sequence[Any]) -> list[Any]:
-    """The first, the last and one in the middle."""
-    last = len(values) - 1
-    return [values[i] for i in dict.fromkeys((0, last // 2, last))]
 
 
 def _few_candidates(scene: Scene) -> dict[str, Any]:
