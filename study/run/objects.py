@@ -169,11 +169,10 @@ class _ObjectsRun:
         writers = [ResultWriter(part.path, part.plan.layout, self._comm, part.plan.wanted) for part in parts]
         files = Files(self._out, writers)
 
-        def settled() -> np.ndarray:
-            each = zip(writers, parts, strict=True)
-            return np.concatenate([settle(writer, part.plan.units, part.torn, self._retry) for writer, part in each])
+        def states() -> list[np.ndarray]:
+            return [settle(w, part.plan.units, part.torn, self._retry) for w, part in zip(writers, parts, strict=True)]
 
-        codes = on_rank0(self._comm, settled)
+        codes = np.concatenate(on_rank0(self._comm, states))
         units = [files.counted(i, part.plan.units) for i, part in enumerate(parts)]
         # A rank that hangs ends the run, and the next one derives what follows from all cases.
         session = Session(units, self._work, files, self._comm, codes, more=True)

@@ -12,7 +12,7 @@ import numpy as np
 from softjaw.friction.patch import NEGLIGIBLE
 from softjaw.study.case.result import TIE
 from softjaw.study.flags import LOST, OF_FILE, Flag, flag_words, flags_in
-from softjaw.study.quantities import BY_KEY, FORCE_RANGE, LEAST_FORCE, LISTED, MAIN, MODELS, STATES, map_row
+from softjaw.study.quantities import BY_KEY, FORCE_RANGE, LEAST_FORCE, LISTED, MAIN, MISSING, MODELS, STATES, map_row
 from softjaw.study.ranking import distinct, index_of, judge, passed_over, rank_values, score_of, sure, task_keys
 from softjaw.study.result.layout import DONE
 from softjaw.study.result.read import axes_of, dataset, values_of
@@ -58,9 +58,6 @@ def best(
 
     Raises `ValueError` for a force outside of the solved ones.
     """
-    errors = ds.get(f"{aim(ds)[0]}_error")
-    known = errors is not None or "e_n_interval" not in ds
-    error = largest_error(errors, ds, axes_of(ds), ds.label.values, ds.get("work_mesh")) if known else []
     ds = judge(ds, force=force, by=by, top=top, lines=lines)
     k, score, found = ds.attrs["level"], ds.attrs["score"], order(ds, ds.attrs["level"])
     places = distinct(ds, [candidate_of(ds, index) for index in found], rank_values(ds, score, k), k, top)
@@ -77,6 +74,11 @@ def best(
     columns = [*columns[:-1], *others, columns[-1]]
     what = "places" if lines else "candidates"
     title = f"best {len(listed)} {what} of {len(found)} solved candidates by {score} at {forces(ds)[k]:g} N"
+    shown = np.full(ds.status.shape, MISSING)
+    shown[tuple(np.array(listed).T)] = DONE
+    errors, alone = ds.get(f"{aim(ds)[0]}_error"), ds.assign(status=(ds.status.dims, shown))
+    known = errors is not None or "e_n_interval" not in ds
+    error = largest_error(errors, alone, axes_of(ds), ds.label.values, ds.get("work_mesh")) if known else []
     notes = _notes(ds, [certainty(ds, [place.best for place in places], score, k), *error], marks)
     told = {key: ", ".join(filter(None, texts)) for key, texts in answer(ds, found[0]).items()}
     facts = {"answer": told, "pads": pads(ds, found[0]), "force": float(forces(ds)[k]), "ranked_by": score,

@@ -55,8 +55,7 @@ def models(ds: xr.Dataset, roles: dict[str, Index], mu: float | None) -> list[Bl
         blocks += [{"kind": "heading", "text": title}, _models(ds, len(best) - 1, index, mu)]
     *sweeps, stations, _, _ = ds.status.shape
     worth_it = [p for p, length in enumerate(sweeps) if length > 1]
-    if stations >= FEWEST and not ds.attrs["poses"]:  # that lie along an object
-        worth_it.append(len(sweeps))
+    worth_it += [len(sweeps)] * (stations >= FEWEST and not ds.attrs["poses"])  # where these lie along an object
     for position in worth_it:
         title = f"Over the {spoken(str(ds.status.dims[position]))}, all else as in the best case"
         blocks += [{"kind": "heading", "text": title}, _models(ds, position, best, mu)]
