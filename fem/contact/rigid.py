@@ -17,7 +17,7 @@ from softjaw.friction.patch import FloatArray
 NO_DIRECTIONS = np.empty((0, 3))
 
 
-# Of the pads in use, for all candidates of a scene share a few: `_entries`.
+# `_entries` of the pads in use: all candidates of a scene share a few
 _ENTRIES: WeakKeyDictionary[Pad, tuple[Pattern, IntArray, IntArray]] = WeakKeyDictionary()
 
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
@@ -172,6 +173,42 @@ def area_vectors(points: FloatArray, triangles: IntArray) -> FloatArray:
     """Normals ``(m, 3)`` of triangles, as long as twice their areas [m^2]."""
     a, b, c = points[triangles].transpose(1, 0, 2)
     return np.cross(b - a, c - a)
+
+
+@njit(cache=True)
+def lowest_and_highest(points, triangles, a, b):
+    """Lowest and highest z of triangles over the rectangle ``|x| <= a, |y| <= b``; infinite where there are none."""
+    low, high = np.inf, -np.inf
+    p = np.empty((3, 3))
+    for t in range(len(triangles)):
+        for k in range(3):
+            for d in range(3):
+                p[k, d] = points[triangles[t, k], d]
+        if min(p[0, 0], p[1, 0], p[2, 0]) > a or max(p[0, 0], p[1, 0], p[2, 0]) < -a:
+            continue
+        if min(p[0, 1], p[1, 1], p[2, 1]) > b or max(p[0, 1], p[1, 1], p[2, 1]) < -b:
+            continue
+        for k in range(3):
+            x, y, z = p[k]
+            if abs(x) <= a and abs(y) <= b:
+                low, high = min(low, z), max(high, z)
+            dx, dy, dz = p[(k + 1) % 3] - p[k]
+            for side in (-1.0, 1.0):  # where an edge crosses the sides of the rectangle
+                u = (side * a - x) / dx if dx != 0.0 else -1.0
+                v = (side * b - y) / dy if dy != 0.0 else -1.0
+                if 0.0 <= u <= 1.0 and abs(y + u * dy) <= b:
+                    low, high = min(low, z + u * dz), max(high, z + u * dz)
+                if 0.0 <= v <= 1.0 and abs(x + v * dx) <= a:
+                    low, high = min(low, z + v * dz), max(high, z + v * dz)
+        (x, y, z), u, v = p[0], p[1] - p[0], p[2] - p[0]
+        area = u[0] * v[1] - u[1] * v[0]
+        for i in (-a, a):
+            for j in (-b, b):
+                if area != 0.0:  # seen from its edge a triangle has no height of its own: its neighbours have it
+                    r, q = ((i - x) * v[1] - (j - y) * v[0]) / area, (u[0] * (j - y) - u[1] * (i - x)) / area
+                    if r >= -1e-12 and q >= -1e-12 and r + q <= 1.0 + 1e-12:
+                        low, high = min(low, z + r * u[2] + q * v[2]), max(high, z + r * u[2] + q * v[2])
+    return low, high
 
 
 def _areas(points: FloatArray, triangles: IntArray) -> FloatArray:

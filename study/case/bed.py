@@ -25,7 +25,6 @@ GRID = (25, 11)  # points of a pad's face along length and width
 CRUSHED = 0.25  # strain of the bed at its highest pressure that leaves half of a grasp
 MOTIONS = 50  # slip motions whose wrenches bound what a contact on springs carries
 INNER = (slice(1, -1), slice(1, -1))  # of height fields that reach one cell beyond the pad's face
-closing_of_bed = njit(cache=True)(bed_closing)
 
 
 @njit(cache=True)
@@ -61,52 +60,10 @@ def height_fields(points, triangles, x, y):
 
 
 @njit(cache=True)
-def lowest_and_highest(points, triangles, a, b):
-    """`fit.extremes` over the rectangle ``|x| <= a, |y| <= b``."""
-    low, high = np.inf, -np.inf
-    p = np.empty((3, 3))
-    for t in range(len(triangles)):
-        for k in range(3):
-            for d in range(3):
-                p[k, d] = points[triangles[t, k], d]
-        if min(p[0, 0], p[1, 0], p[2, 0]) > a or max(p[0, 0], p[1, 0], p[2, 0]) < -a:
-            continue
-        if min(p[0, 1], p[1, 1], p[2, 1]) > b or max(p[0, 1], p[1, 1], p[2, 1]) < -b:
-            continue
-        for k in range(3):
-            x, y, z = p[k]
-            if abs(x) <= a and abs(y) <= b:
-                low, high = min(low, z), max(high, z)
-            dx, dy, dz = p[(k + 1) % 3] - p[k]
-            for side in (-1.0, 1.0):  # where an edge crosses the sides of the rectangle
-                u = (side * a - x) / dx if dx != 0.0 else -1.0
-                v = (side * b - y) / dy if dy != 0.0 else -1.0
-                if 0.0 <= u <= 1.0 and abs(y + u * dy) <= b:
-                    low, high = min(low, z + u * dz), max(high, z + u * dz)
-                if 0.0 <= v <= 1.0 and abs(x + v * dx) <= a:
-                    low, high = min(low, z + v * dz), max(high, z + v * dz)
-        (x, y, z), u, v = p[0], p[1] - p[0], p[2] - p[0]
-        area = u[0] * v[1] - u[1] * v[0]
-        for i in (-a, a):
-            for j in (-b, b):
-                if area != 0.0:  # seen from its edge a triangle has no height of its own: its neighbours have it
-                    r, q = ((i - x) * v[1] - (j - y) * v[0]) / area, (u[0] * (j - y) - u[1] * (i - x)) / area
-                    if r >= -1e-12 and q >= -1e-12 and r + q <= 1.0 + 1e-12:
-                        low, high = min(low, z + r * u[2] + q * v[2]), max(high, z + r * u[2] + q * v[2])
-    return low, high
-
-
-@njit(cache=True)
-def on_springs(height, dx, dy, springs):
-    """First touch, and there heights ``(m, n)``, pressures ``(m, n)`` and slopes ``(m, n, 2)`` of a bed of springs.
-
-    ``springs`` have a stiffness, a force and a length; they stand ``dx`` and ``dy`` apart.
-    """
-    (m, n), (stiffness, force, length), touch = height.shape, springs, height.min()
-    h, slope = height - touch, np.empty((*height.shape, 2))
-    depth = closing_of_bed(h.ravel(), force / (stiffness * dx * dy))
-    pressure = stiffness * np.maximum(depth - h, 0.0)
-    filled = np.where(np.isfinite(h), h, length)
+def slopes_of(h, dx, dy, far):
+    """Slopes ``(m, n, 2)`` of heights ``(m, n)`` that are ``dx`` and ``dy`` apart, and ``far`` where infinite."""
+    (m, n), slope = h.shape, np.empty((*h.shape, 2))
+    filled = np.where(np.isfinite(h), h, far)
     for i in range(m):
         for j in range(n):
             a, b, c, d = max(i - 1, 0), min(i + 1, m - 1), max(j - 1, 0), min(j + 1, n - 1)
@@ -116,7 +73,7 @@ def on_springs(height, dx, dy, springs):
             # nothing; one that is steeper than this is the object's flank
             if np.abs(slope[i, j]).max() > 3.0:
                 slope[i, j] = 0.0
-    return touch, h, pressure, slope
+    return slope
 
 
 class Side:
@@ -124,9 +81,11 @@ class Side:
 
     def __init__(self, height: FloatArray, x: FloatArray, y: FloatArray, jaws: Jaws) -> None:
         self.jaws, (self.x, self.y) = jaws, np.meshgrid(x, y, indexing="ij")
-        steps = x[1] - x[0], y[1] - y[0]
-        self.cell, springs = steps[0] * steps[1], np.array([jaws.stiffness, jaws.force, jaws.pad[2]])
-        self.touch, self.height, self.pressure, self.slope = on_springs(np.ascontiguousarray(height), *steps, springs)
+        self.touch, steps = float(height.min()), (x[1] - x[0], y[1] - y[0])
+        self.height, self.cell = np.ascontiguousarray(height - self.touch), steps[0] * steps[1]
+        depth = bed_closing(self.height, jaws.force / (jaws.stiffness * self.cell))
+        self.pressure = jaws.stiffness * np.maximum(depth - self.height, 0.0)
+        self.slope = slopes_of(self.height, *steps, jaws.pad[2])
 
     @cached_property
     def centre(self) -> FloatArray:

@@ -41,7 +41,7 @@ def extremes(points: FloatArray, triangles: IntArray, sides: tuple[float, float]
     ``points, triangles`` (k, 3) array, (m, 3) int array: [m]. ``sides``: length and width of the rectangle, along x and
     y [m].
     """
-    from softjaw.study.case.bed import lowest_and_highest  # compiled loops, which most scenes are checked without
+    from softjaw.fem.objects.triangles import lowest_and_highest  # compiled: most scenes are checked without
 
     low, high = lowest_and_highest(
         np.ascontiguousarray(points), np.ascontiguousarray(triangles), 0.5 * sides[0], 0.5 * sides[1]
@@ -95,11 +95,11 @@ def stiffness(gripper: Gripper) -> float:
 
 
 def bed_closing(height: FloatArray, wanted: float) -> float:
-    """Closing at which springs that touch at ``height (n,)``, infinite: never, are shortened by ``wanted`` in all."""
+    """Closing at which springs that touch at ``height`` (infinite: never) are shortened by ``wanted`` in all [m]."""
     h = np.sort(height[np.isfinite(height)])
     # for the k lowest springs in contact the closing is known; the largest k that touches is right
     closing = (wanted + np.cumsum(h)) / np.arange(1, len(h) + 1)
-    return closing[np.flatnonzero(closing >= h)[-1]]
+    return float(closing[np.flatnonzero(closing >= h)[-1]])
 
 
 def jaws_of(scene: Scene) -> Jaws:

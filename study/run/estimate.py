@@ -71,7 +71,7 @@ def _seconds(unit: Any, points: FloatArray, triangles: NDArray[np.int64]) -> tup
     forces = scene.load.normal_force
     times = [FIRST_FORCE_FACTOR, *[1.0] * (len(forces) - 1)]
     if np.isfinite(low).any():
-        bed = (low - low.min()).ravel()
+        bed = low - low.min()
         shares = [bed_closing(bed, f / (jaws.stiffness * cell)) / gripper.pad_thickness for f in forces]
         times = [t * (HARD if share > DEEP else 1.0) for t, share in zip(times, shares, strict=True)]
     region = REGION_S if scene.object.shape == "mesh" else 0.0
