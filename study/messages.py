@@ -107,6 +107,11 @@ def closest(word: str, words: Sequence[str]) -> str | None:
     return next((lower[w] for w in difflib.get_close_matches(word.lower().replace("-", "_"), lower, n=1)), None)
 
 
+def launched() -> bool:
+    """Whether this process was started as a rank, of one or several; known without MPI."""
+    return any(name in os.environ for name in RANK)
+
+
 def first_rank() -> bool:
     """Whether this process speaks for all ranks; known without MPI."""
     return next((os.environ[name] == "0" for name in RANK if name in os.environ), True)

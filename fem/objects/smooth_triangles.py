@@ -18,7 +18,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from softjaw.fem.objects.gap import IntArray, edges_of
-from softjaw.fem.objects.triangles import area_vectors, neighbours
+from softjaw.fem.objects.triangle_tree import area_vectors
+from softjaw.fem.objects.triangles import neighbours
 from softjaw.friction.patch import FloatArray
 
 CREASE_ANGLE = 30.0  # [deg]: edges that turn by less are taken for facets of a smooth surface

@@ -34,7 +34,7 @@ from softjaw.fem.objects.traced_outline import (
     smooth_rings,
     smooth_spline,
 )
-from softjaw.fem.objects.triangles import area_vectors
+from softjaw.fem.objects.triangle_tree import area_vectors
 from softjaw.friction.patch import FloatArray
 
 PER_WAVE = 16  # heights at which rays are cast

@@ -261,6 +261,12 @@ def _pseudo_normals(which, feature, corners, triangles, normals, start, members)
     return vectors, border
 
 
+def area_vectors(points: FloatArray, triangles: IntArray) -> FloatArray:
+    """Normals ``(m, 3)`` of triangles, as long as twice their areas [m^2]."""
+    a, b, c = points[triangles].transpose(1, 0, 2)
+    return np.cross(b - a, c - a)
+
+
 @dataclass(frozen=True, eq=False)
 class TriangleTree:
     """Triangles that can be asked for closest points and for what a ray meets.
@@ -285,8 +291,7 @@ class TriangleTree:
     @cached_property
     def face_normals(self) -> FloatArray:
         """Unit normals ``(m, 3)``; zero for a triangle without area."""
-        a, b, c = self.nodes[0].transpose(1, 0, 2)
-        area = np.cross(b - a, c - a)
+        area = area_vectors(self.points, self.triangles)
         size = np.linalg.norm(area, axis=1)
         return np.ascontiguousarray(area / np.where(size > 0, size, 1.0)[:, None])
 

@@ -21,7 +21,7 @@ from softjaw.fem.errors import MeshError
 from softjaw.fem.objects.gap import IntArray, cone_volumes, edges_of
 from softjaw.fem.objects.mesh_file import LENGTHS
 from softjaw.fem.objects.mesh_holes import border_loops, lid_corners, with_holes_filled
-from softjaw.fem.objects.triangle_tree import TriangleTree
+from softjaw.fem.objects.triangle_tree import TriangleTree, area_vectors
 from softjaw.friction.patch import FloatArray
 
 SMALLEST, LARGEST = 1e-3, 2.0  # plausible largest extent of an object that a gripper holds [m]
@@ -167,12 +167,6 @@ def pieces_of(points: FloatArray, triangles: IntArray) -> IntArray:
     edges = triangles[:, [0, 1, 1, 2]].reshape(-1, 2)
     links = coo_array((np.ones(len(edges)), edges.T), shape=(len(points), len(points)))
     return np.unique(connected_components(links, directed=False)[1][triangles[:, 0]], return_inverse=True)[1].ravel()
-
-
-def area_vectors(points: FloatArray, triangles: IntArray) -> FloatArray:
-    """Normals ``(m, 3)`` of triangles, as long as twice their areas [m^2]."""
-    a, b, c = points[triangles].transpose(1, 0, 2)
-    return np.cross(b - a, c - a)
 
 
 @njit(cache=True)

@@ -235,8 +235,7 @@ class EffectChoice:
         """
         forces = [k] if name == COUPLING else range(self.count)
         # what is not known at some force may be the largest
-        compared = [self._compared(name, step, i) for i in forces]
-        return max(compared, key=lambda c: inf if np.isnan(largest(c)) else largest(c))
+        return max((self._compared(name, step, i) for i in forces), key=lambda c: np.nan_to_num(largest(c), nan=inf))
 
     def _compared(self, name: str, step: Step, k: int) -> tuple[float, float, float]:
         pair = self._coarse_pair(name, step, k)

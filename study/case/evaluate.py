@@ -170,7 +170,7 @@ def _scores(
             ellipsoids = [c.ellipsoids[m] for c in contacts]
             exact = _volume(contacts, ellipsoids, settings)
             if not any(isinstance(body, Quartic) for body in bodies):
-                both = exact if _alike(bodies, ellipsoids) else _volume(contacts, bodies, settings)
+                both = exact if settings.surface.model == "three_motions" else _volume(contacts, bodies, settings)
             else:
                 # quartics in a pose take seconds: the pose enters by ellipsoids near them
                 tilt = _tilt(contacts, bodies, settings) if math.isnan(tilt) else tilt
@@ -182,12 +182,6 @@ def _scores(
             rows.append((exact, both, least))
     names = ("maps/quality", "maps/quality_fitted", "maps/epsilon")
     return dict(zip(names, map(list, zip(*rows, strict=True)), strict=True)), closed[MODELS[0]]
-
-
-def _alike(bodies: Sequence[Any], others: Sequence[Any]) -> bool:
-    """Whether ellipsoids are the same but for rounding, as surfaces from three motions are."""
-    pairs = zip(bodies, others, strict=True)
-    return all(b.rank == other.rank and np.allclose(b.F, other.F, 1e-12, 0.0) for b, other in pairs)
 
 
 def quality(contacts: Sequence[Contact], settings: EvaluationSettings) -> float:

@@ -12,7 +12,7 @@ from importlib import import_module
 from typing import Any
 
 from softjaw.study.cli.options import program
-from softjaw.study.doctor import keep_compiled_loops, pin_threads
+from softjaw.study.doctor import begin_mpi, keep_compiled_loops, pin_threads
 from softjaw.study.messages import BUG, CANNOT_WRITE, DONE, STOPPED, USAGE, StudyError, complain, printable
 from softjaw.study.run.limits import is_out_of_memory, no_room, require_room
 
@@ -65,6 +65,7 @@ def command(options: Namespace) -> int:
     if options.command in SOLVING:
         # Before the solvers load, which may hang instead of failing where memory is short.
         require_room()
+        begin_mpi()
     if options.command == "run":
         os.environ["H5PY_ALWAYS_USE_MPI"] = "1"  # before h5py is imported: its own guess misses srun and single runs
     options.folder = _module("cli.quick").objects_of(options) if "objects" in options else None

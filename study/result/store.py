@@ -53,7 +53,7 @@ class Result:
             raise ValueError("it does not name its program")
         # Before the layout: an older one need not have what is read below.
         if (version := root.get("layout_version", "")) != str(VERSION):
-            raise StudyError(OTHER_FILE, _other_version(path, version))
+            raise StudyError(OTHER_FILE, f"{path}: layout {version or 'none'}, expected {VERSION}; run the scene again")
         self.layout = layout_of(self._string("layout"))
         self.header = header_of(self._string("header"), self.scene)
         self.axes, self.title, self.digest = self.layout.axes, printable(self.header.title), self.header.digest
@@ -222,13 +222,6 @@ def place_text(axes: Sequence[Any], labels: Any, index: Sequence[int]) -> str:
 def value_text(axis: Any, i: int) -> str:
     """A value of an axis with its unit, or the text that it stands for."""
     return str(axis.options[i]) if axis.options else shown_text(axis.values[i], axis.units)
-
-
-def _other_version(path: Path, version: str) -> str:
-    """What is said of a file whose layout this program does not read."""
-    if version.isdecimal() and int(version) < VERSION:
-        return f"{path}: written by an older version (layout {version}, expected {VERSION}); run the scene again"
-    return f"{path}: its layout has version {version or 'none'}, expected {VERSION}; take the softjaw that wrote it"
 
 
 @contextmanager

@@ -19,7 +19,7 @@ from typing import Any, TypeVar
 import numpy as np
 from mpi4py import MPI
 
-from softjaw.study.messages import CANNOT_WRITE, STOPPED, StudyError, make_folders
+from softjaw.study.messages import CANNOT_WRITE, STOPPED, StudyError, launched, make_folders
 from softjaw.study.quantities import DONE as CASE_DONE
 from softjaw.study.result import provenance
 from softjaw.study.result.layout import FAILED, MISSING
@@ -338,5 +338,4 @@ def _progress(objects: Iterable[Iterable[Any]], codes: np.ndarray, ranks: int) -
         # A unit costs the same however many candidates it serves, so they share its weight.
         weights[np.array(unit.rows)] = unit.cost / np.size(unit.rows) or 1.0
     # Under mpirun every rank's output claims to be a terminal, also when it goes to a file.
-    launched = ranks > 1 or any(name.startswith(("OMPI_", "PMIX_", "PMI_")) for name in os.environ)
-    return Progress(weights, codes, sys.stdout, live=not launched and sys.stdout.isatty())
+    return Progress(weights, codes, sys.stdout, live=ranks == 1 and not launched() and sys.stdout.isatty())
