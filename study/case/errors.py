@@ -86,7 +86,7 @@ def coarse_errors(
     for q in (q for q in TABLE if q.error and q.key in viewed[0]):
         apart = max(distance(solved[q.key], view[q.key], q.error) for view in viewed)
         # friction that is left out here may move any of them as much
-        share = floor * max(WIDER.get(q.name, 1.0), 1.0)
+        share = floor * max(WIDER.get(q.name, 1.3 if q.name in PAYLOADS else 1.0), 1.0)
         errors[q.of_error.key] = DOUBTED * (apart + share * _size(q, solved[q.key]))
     return errors
 
