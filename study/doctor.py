@@ -64,7 +64,7 @@ def keep_compiled_loops() -> None:
 
 def begin_mpi() -> None:
     """Begin MPI before others do: of a process that is alone in a third of a second less."""
-    if not launched():
+    if not launched() and not ALONE.keys() & os.environ.keys():
         os.environ |= ALONE
         import mpi4py.MPI  # noqa: F401
 
