@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-TIMES = 1.4  # as many elements: on the bottle nearer to the limit, and cheaper, than twice as many along the sides
+TIMES = 1.25  # as many elements: with 1.4 most cases end on a mesh far finer than asked for, at three times the time
 
 
 def halved(elements: tuple[int, int, int]) -> tuple[int, int, int]:
@@ -17,10 +17,10 @@ def halved(elements: tuple[int, int, int]) -> tuple[int, int, int]:
 
 
 def refined(elements: tuple[int, int, int]) -> tuple[int, int, int]:
-    """1.4 times as many elements in every direction; even numbers along the sides, of which symmetry leaves half.
+    """1.25 times as many elements in every direction; even numbers along the sides, of which symmetry leaves half.
 
     >>> refined((20, 10, 6)), refined((4, 2, 1))
-    ((28, 14, 8), (6, 4, 2))
+    ((24, 12, 8), (6, 4, 2))
     """
     length, width = (2 * max(round(TIMES * n / 2), n // 2 + 1) for n in elements[:2])
     return length, width, max(round(TIMES * elements[2]), elements[2] + 1)

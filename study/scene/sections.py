@@ -25,7 +25,7 @@ Grading = Annotated[float, Field(ge=0.05, le=20)]
 MOST_ELEMENTS, LARGEST_ASPECT = 1_000_000, 20.0
 UNCERTAIN = ("object", "gripper", "friction", "candidates", "task")  # sections whose numbers may be
 COARSE, FINE = 0, 1  # meshes of a case: half as many elements in every direction as the scene says, and its own
-MOST_MESHES = 4  # of a case, each further one 1.4 times as fine in every direction, which costs 3 times as much
+MOST_MESHES = 4  # of a case, each further one 1.25 times as fine in every direction, which costs twice as much
 FINEST = MOST_MESHES - 1
 CONVEX_FITS = ("full", "quartic")  # models that a convex program can fit, too
 SAMPLES_SEED = 20240229  # any number; the samples of a scene are always the same

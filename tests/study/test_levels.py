@@ -107,7 +107,7 @@ def test_where_the_coarse_path_ends_the_fine_mesh_is_solved_and_its_error_is_unk
         assert not found[k].values["maps/flags"] & Flag.JUMPED
 
 
-OWN, FINER, FINEST = (8, 4, 2), (12, 6, 3), (16, 8, 4)
+OWN, FINER, FINEST = (8, 4, 2), (10, 6, 3), (12, 8, 4)
 
 
 def aim(target, of="e_n"):
