@@ -244,8 +244,7 @@ class CandidateSolver:
     def _alone(self, k: int, mesh: int, levels: Levels, part: int) -> Any:
         """A state that depends on no other one of its mesh."""
         try:
-            press = self.pressing(mesh, levels).parts[part]
-            return press.at(self.forces[k], self._starts(k, mesh, levels, part))
+            return self.pressing(mesh, levels).parts[part].at(self.forces[k], self._starts(k, mesh, levels, part))
         except (ConvergenceError, CheckError) as failure:
             return failure
 

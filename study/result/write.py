@@ -107,7 +107,7 @@ class ResultWriter:
         if self._code[index] == DONE:
             if self.codes()[row] == DONE:
                 raise ValueError(f"row {row} is done already and must not be written again")
-            self._code[index] = MISSING
+            self._code[index], self._attempts[index] = MISSING, 1  # a later round may name it again
         if not self._attempts[index]:  # a row that is stored is begun: only such a one may be without its mark
             self._attempts[index] = 1
         # Values, sums, state: a kill in between leaves a row that reads as not computed.

@@ -32,7 +32,7 @@ from softjaw.study.run.estimate import SCREENED_COST, START_S, estimated, measur
 from softjaw.study.run.progress import duration
 from softjaw.study.run.refine import Rounds, added_cases, refined
 from softjaw.study.run.shares import makespan, sensible_ranks
-from softjaw.study.scene.sections import COARSE, FINE, FINEST
+from softjaw.study.scene.sections import COARSE, FINEST
 
 LIBRARY_BYTES = 3e8  # bytes of a rank that has loaded PETSc, numba and scipy and nothing else
 FILL_FACTOR = 20.0  # factor entries over dofs^(4/3), the growth of nested dissection in 3-D
@@ -116,7 +116,7 @@ def _with_meshes(unit: Any, scene: Any, rounds: Rounds) -> Any:
     named = Counter(case for some in rounds if is_case(some[0]) for case in some)
     forces, count = len(scene.load.normal_force), scene.candidates.total
     times = [max(named[*divmod(rows[0] // forces, count), k] for rows in unit.rows) for k in range(forces)]
-    finest = tuple((COARSE, FINE, FINEST)[min(n, 2)] for n in times)
+    finest = tuple(min(COARSE + n, FINEST) for n in times)
     share = sum(1.0 if mesh else SCREENED_COST for mesh in finest) / forces
     return replace(unit, finest=finest, cost=unit.cost * share)
 

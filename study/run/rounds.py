@@ -3,8 +3,8 @@
 Of sampled grasps finer meshes for some cases. All candidates are solved on the coarse mesh first. The scene's mesh goes
 to the places that a list of the best grasps has at the force that is shown, then to those that may still be better
 within their errors, also if the coarse mesh says that they slip: where few elements bear beside an edge it may tilt the
-contact normal. Those that may be the best, and whose payload is not known to ``accuracy.target``, then are solved once
-more, on up to two finer meshes. Each case is named at most twice, so the rounds end.
+contact normal. Those that may be the best, and whose payload is not known to ``accuracy.target``, are solved on a finer
+mesh, and on one more where that may do. Each case is named at most three times, so the rounds end.
 
 Of poses that are refined neighbours of the best grasp at each force: shifted along the pads' sides, turned about the
 approach or tilted, by a share of a first step. A round solves those of them that a bed of springs ranks highest; the
@@ -37,6 +37,7 @@ from softjaw.study.result.read import dataset
 from softjaw.study.run.refine import Place, gained, next_stations, scores_of_poses, with_places
 from softjaw.study.scene import Scene
 from softjaw.study.scene.grasps import GraspPose
+from softjaw.study.scene.sections import FINEST
 
 Case = tuple[int, int, int]  # numbers of the point of a sweep, of the candidate and of the force
 Frame = tuple[FloatArray, FloatArray]  # a point [m]; long side, short side and approach as columns
@@ -44,7 +45,7 @@ FIRST_STEP_SHARE = 0.25  # first step of a shift, of the pad's side
 ROLL, TILT = math.radians(15.0), math.radians(5.0)  # first steps of a turn about the approach and of a tilt of it
 FINEST_STEP_SHARE = 1 / 8  # of the first step: 1.6 mm along a pad of 50 mm, 0.6 degrees of tilt
 SAME_POSE_STEPS = 0.5  # of a step, within which two poses are one
-IN_REACH = 3.0  # times the target: what an error may be that twice the elements in every direction bring below it
+IN_REACH = 3.0  # times the target: what an error may be that two further meshes bring below it; one, half as much
 POSES_PER_ROUND = 4  # poses of a round: few, so that the next ones start from the better of them
 
 
@@ -155,9 +156,10 @@ def next_cases(result: Any, scene: Scene) -> tuple[Case, ...]:
     if not chosen:
         relative = error / np.maximum(known.value, np.finfo(float).tiny)
         target, most = scene.accuracy.target, max((known.value[i] - error[i] for i in order), default=-np.inf)
-        listed = {place.best for place in places[:LISTED] if not target or relative[place.best] < IN_REACH * target}
-        near = [i for i in order if times[i] == 1 and (i in listed or known.value[i] + error[i] > most)]
-        chosen = [i for i in near if not (target and surely_below(relative[i], target))]
+        reach = relative < IN_REACH / np.maximum(times, 1) * (target or np.inf)
+        near = {place.best for place in places[:LISTED] if reach[place.best]}
+        near |= {i for i in order if known.value[i] + error[i] > most and (times[i] == 1 or reach[i])}
+        chosen = [i for i in near if 0 < times[i] < FINEST and not (target and surely_below(relative[i], target))]
     # The least force that holds a mass lies between this force and the one below.
     levels = (k - 1, k) if k and "safety_factor" in ds else (k,)
     return tuple(sorted({case_of(i, level, shape) for i in chosen for level in levels}))

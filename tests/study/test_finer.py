@@ -74,6 +74,21 @@ def test_a_case_keeps_its_coarse_values_until_finer_ones_replace_them(tmp_path):
     assert torn_rows(path, first.layout) == []
 
 
+def test_a_case_that_rounds_name_three_times_counts_as_begun_once(tmp_path):
+    made = sampled()
+    first, path, row = make_plan(made), tmp_path / "a.hdf", (0, 3, 1)
+    create(path, first.layout, first.header)
+    for mesh in range(4):
+        plan = make_plan(made, rounds=((row,),) * mesh)
+        writer = ResultWriter(path, first.layout, None, plan.wanted)
+        assert writer.attempts()[7] == 0
+        writer.count_attempt(7)
+        values = CaseResult({"maps/payload": [1.0] * 3, "maps/flags": 0.0, "work/mesh": mesh})
+        writer.write(7, record(first.layout, values))
+        assert writer.codes()[7] == DONE
+        writer.close()
+
+
 @pytest.mark.parametrize(("changes", "levels"), [
     ((), {1}), (("object.mass_g=100",), {0, 1}), (("object.mass_g=100", "load.normal_force_n=[5]"), {0}),
 ])  # fmt: skip
