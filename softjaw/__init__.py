@@ -26,8 +26,6 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module 'softjaw' has no attribute {name!r}")
     # Before numba is loaded, which refuses to compile where it cannot keep what it compiles.
     import_module("softjaw.study.doctor").keep_compiled_loops()
-    if name in ("press", "run"):
-        import_module("softjaw.study.doctor").begin_mpi()
     return getattr(import_module(f"softjaw.{_HOMES[name]}"), name)
 
 
