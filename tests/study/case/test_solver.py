@@ -69,7 +69,7 @@ def test_a_fine_state_starts_from_the_three_nearest_coarse_ones(monkeypatch):
     # a finer mesh starts from the state on the mesh before it
     finer = solver.solve(0, FINE + 1, PLAIN)
     assert given == [[3.0, 2.0, 1.5]] * 2 + [[1.0]] * 4
-    assert finer.contacts[0].state.pad.shape.elements == (12, 6, 3)
+    assert finer.contacts[0].state.pad.shape.elements == (10, 6, 3)
     solver.put_away()
 
 
