@@ -65,12 +65,13 @@ def command(options: Namespace) -> int:
     if options.command in SOLVING:
         # Before the solvers load, which may hang instead of failing where memory is short.
         require_room()
-        begin_mpi()
     if options.command == "run":
         os.environ["H5PY_ALWAYS_USE_MPI"] = "1"  # before h5py is imported: its own guess misses srun and single runs
     options.folder = _module("cli.quick").objects_of(options) if "objects" in options else None
-    if options.command in SOLVING and not options.folder:  # a wrong scene is refused before the solvers are loaded
-        options.scene_read = _module("cli.quick").scene_of(options)
+    if options.command in SOLVING:
+        if not options.folder:  # a wrong scene is refused before the solvers are loaded
+            options.scene_read = _module("cli.quick").scene_of(options)
+        begin_mpi()
     answer = getattr(_module(options.module), options.command)(options)
     if isinstance(answer, str):
         print(printable(answer))
