@@ -12,6 +12,14 @@ def accessors(**changes):
     return [accessor | changes for accessor in gltf_tree()["accessors"]]
 
 
+def doublings(count=DEEP):
+    """Objects of a 3MF file, each of which has the one before twice."""
+    pair = '<component objectid="{0}"/><component objectid="{0}"/>'
+    return "".join(
+        f'<object id="{i + 1}" type="model"><components>{pair.format(i)}</components></object>' for i in range(1, count)
+    )
+
+
 CIRCLE = (
     '<object id="2" type="model"><components><component objectid="3"/></components></object>'
     '<object id="3" type="model"><components><component objectid="2"/></components></object>'
@@ -60,6 +68,7 @@ def hostile():
         "bombs.3mf": packed(model_3mf(), *[ZEROS[: 50 * 2**20]] * 6),
         "circle.3mf": packed(model_3mf(CIRCLE, 2)),
         "itself.3mf": packed(model_3mf(CIRCLE.replace("3", "2"), 2)),
+        "doublings.3mf": packed(model_3mf(doublings(), DEEP)),
         "entities.3mf": packed(model_3mf(head=ENTITIES).replace(b"30", b"&k;", 1)),
         "other file.3mf": packed(model_3mf(head=FILE).replace(b"30", b"&a;", 1)),
         "empty.3mf": packed(),
