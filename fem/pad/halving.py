@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-TIMES = 1.25  # as many elements: with 1.4 most cases end on a mesh far finer than asked for, at three times the time
+TIMES = 1.25  # as many elements: with 1.4 the same target took up to twice the time, on meshes finer than it asks for
 
 
 def halved(elements: tuple[int, int, int]) -> tuple[int, int, int]:
