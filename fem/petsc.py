@@ -94,7 +94,9 @@ LIBRARY = ctypes.CDLL(PETSc.__file__)  # for what petsc4py does not reach
 REASONS = {value: name for name, value in vars(PETSc.SNES.ConvergedReason).items() if isinstance(value, int)}
 OUT_OF_MEMORY = (-5, -7, -13)  # INFOG(1) of MUMPS
 WITHIN, FAST = 1e5, 0.05  # see NonlinearSolver
-STALLED = 5  # iterations without a fall to less than a part `FAST`: good ones need fewer
+# Iterations in which the residual has to fall below a part `SLOW` of the three before: of 950 good solves with friction
+# this ends 6, of 88 failed ones it saves more than half of the iterations.
+STALLED, SLOW = 5, 0.7
 ITERATIONS_TO_RECOVER = 8  # before a growth of the residual counts: solves that converge pass 20 times the first one
 PREFIX = "contact_"  # of the options of a solve
 PRINTING = re.compile("monitor|view|converged_reason")
@@ -322,8 +324,9 @@ class NonlinearSolver:
 
     def _stalls(self) -> bool:
         """Whether the residual has not fallen any more for some iterations, as where an active set alternates."""
-        before, after = self._norms[:-STALLED], self._norms[-STALLED:]
-        return len(before) >= STALLED and min(after) > FAST * min(before)
+        before, after = self._norms[-STALLED - 3 : -STALLED], self._norms[-STALLED:]
+        # walls jump by orders of magnitude in the first iterations
+        return len(self._norms) > 2 * STALLED and min(after) > SLOW * min(before)
 
     def _out_of_memory(self) -> bool:
         factors = self._snes.getKSP().getPC()
@@ -375,7 +378,8 @@ class NonlinearSolver:
 
     def _on_tangent(self, snes, x, matrix, _preconditioner) -> None:
         self._norms.append(snes.getFunctionNorm())
-        if len(self._norms) > ITERATIONS_TO_RECOVER and self._norms[-1] > self._growth * self._norms[0]:
+        grown = len(self._norms) > ITERATIONS_TO_RECOVER and self._norms[-1] > self._growth * self._norms[0]
+        if grown or self._stalls():
             # the solver ends behind this step, which the factors at hand are good enough for
             snes.setConvergedReason(PETSc.SNES.ConvergedReason.DIVERGED_DTOL)
             return

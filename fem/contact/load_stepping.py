@@ -25,7 +25,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from softjaw.fem.contact.checks import ALTERNATING, BALANCE
+from softjaw.fem.contact.checks import ALTERNATING, BALANCE, PASSED
 from softjaw.fem.contact.problem import ContactProblem, Control
 from softjaw.fem.contact.rigid import RigidProblem
 from softjaw.fem.errors import ConvergenceError, NotReachedError, SpentError
@@ -95,7 +95,7 @@ class Stepping:
     watch : callable
         Called with every new state and its force [N]; what it raises ends the load path.
     near : callable
-        Whether the iterate that a failed solve ended at keeps the laws of contact to `ALTERNATING` and may pass.
+        Whether the iterate that a failed solve ended at keeps the laws of contact to ``slack`` and may pass.
     deepest : float
         Closing displacement at which the backing plate would be in a rigid object [m].
     followed : RigidProblem, optional
@@ -106,13 +106,14 @@ class Stepping:
     solver: NonlinearSolver
     most: int | None = None
     watch: Callable[[FloatArray, float], None] = lambda x, force: None
-    near: Callable[[FloatArray], bool] = lambda x: False
+    near: Callable[[FloatArray, float], bool] = lambda x, slack: False
     deepest: float = np.inf
     followed: RigidProblem | None = None
     jumped: bool = False  # whether a step is known to have left the path of equilibria
     off: float = 0.0  # residual over the force on the meshed part where the last state is near enough only
     closed: bool = False  # whether displacement control was needed
     residual: float = RESIDUAL
+    slack: float = ALTERNATING  # of a state that a load path was asked for
     _last: _Place | None = None
 
     def __post_init__(self) -> None:
@@ -121,11 +122,13 @@ class Stepping:
             self.followed = None
 
     def solve(
-        self, x: FloatArray, control: Control, work: Work, most: int | None = None, growth: float = np.inf
-    ) -> FloatArray:
+        self, x: FloatArray, control: Control, work: Work, most: int | None = None, growth: float = np.inf,
+        slack: float = ALTERNATING,
+    ) -> FloatArray:  # fmt: skip
         """One Newton solve; its tolerance is relative to the force on the meshed part of the pad.
 
-        ``growth`` of the residual ends it, as in `fem.petsc.NonlinearSolver.solve`.
+        ``growth`` of the residual ends it, as in `fem.petsc.NonlinearSolver.solve`; where it stalls, its end may be off
+        by ``slack``.
         """
         self.problem.control = control
         scale = control.force if control.force is not None else self.problem.force_scale(control.closing)
@@ -141,7 +144,7 @@ class Stepping:
             x, self.off = error.end or (x, np.inf)
             self.off /= scale
             # `not <=`: a residual that is not a number is not near
-            if not self.off <= ALTERNATING or not self.near(x):
+            if not self.off <= slack or not self.near(x, slack):
                 work.halvings += 1
                 raise
         closing = self.problem.closing(x)
@@ -150,6 +153,11 @@ class Stepping:
             work.halvings += 1
             raise ConvergenceError(f"the backing plate would be in the object, {1e3 * closing:.4g} mm from first touch")
         return x
+
+    @property
+    def _passed(self) -> float:
+        """What a state on the way may be off by; where a path of equilibria is followed no more than its end."""
+        return ALTERNATING if self.followed else PASSED
 
     def displacement_control(
         self,
@@ -162,17 +170,19 @@ class Stepping:
     ) -> FloatArray:
         """Closing displacement on, at most ``longest`` [m] a step, until the force is bracketed; then solve for it.
 
-        The forces of the steps are appended to ``forces``. Steps are halved down to a part ``shortest`` of the longest.
+        The forces of the steps are appended to ``forces``. Steps are halved down to a part ``shortest`` of the longest,
+        or of the first.
         """
         problem, failures, self.closed = self.problem, 0, True
         ended: Exception
         # a failed step is halved and an easy one lengthened, so the first length only has to be safe
         step, low = min(0.02 * self.problem.thickness, longest), (x, problem.normal_force(x))
         peak = low[1], problem.closing(x)
-        least = max(1e-5 * self.problem.thickness, shortest * longest if np.isfinite(longest) else 0.0)
+        least = shortest * (longest if np.isfinite(longest) else step)
         for _ in range(MOST_STEPS):
             try:
-                ahead = self.solve(low[0], Control(closing=problem.closing(low[0]) + step), work, self.most)
+                there = Control(closing=problem.closing(low[0]) + step)
+                ahead = self.solve(low[0], there, work, self.most, slack=self._passed)
                 high = (ahead, problem.normal_force(ahead))
                 # bracketed: from here on the state is looked for between two that lie on the path
                 if high[1] >= force:
@@ -254,7 +264,8 @@ class Stepping:
             goal = min(1.0, done + cut * allowed)
             target = force if goal == 1.0 else reached + goal * (force - reached)
             try:
-                x = self.solve(self._ahead(here, target), Control(force=target), work, self.most)
+                slack = self.slack if goal == 1.0 else self._passed
+                x = self.solve(self._ahead(here, target), Control(force=target), work, self.most, slack=slack)
             except ConvergenceError:
                 cut *= 0.5
                 # `not >` instead of `<=`: NaN, where nothing is foretold, has to end the halving

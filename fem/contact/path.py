@@ -18,7 +18,7 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-from softjaw.fem.contact.checks import ALTERNATING, Checks, check
+from softjaw.fem.contact.checks import ALTERNATING, PASSED, Checks, check
 from softjaw.fem.contact.friction import PATH_RESIDUAL, Anchor, load_steps
 from softjaw.fem.contact.load_stepping import ASTRAY, RESIDUAL, STRAY, Stepping, Work
 from softjaw.fem.contact.problem import ContactPoints, ContactProblem
@@ -154,12 +154,13 @@ class LoadPath(ABC, Generic[ProblemT]):
         """Steps of the problem as it is now, of which none has been made."""
 
     def _switch(self, problem: ProblemT) -> None:
-        """Go on with another problem; clock and iterations that are left go on."""
-        seconds, left = self.solver.seconds, self.solver.left
+        """Go on with another problem; clock, iterations that are left and tolerances go on."""
+        seconds, left, before = self.solver.seconds, self.solver.left, self._stepping
         self.solver.destroy()
         self.problem = problem
         self._set_up()
         self.solver.seconds, self.solver.left = seconds, left
+        self._stepping.residual, self._stepping.slack = before.residual, before.slack
 
     def _begin(self) -> None:
         """Nothing has been solved on the load path yet."""
@@ -175,9 +176,9 @@ class LoadPath(ABC, Generic[ProblemT]):
         problem.forget()
         if self.problem is problem:
             self.solver.forget()
-            self._stepping = self._steps()
         else:
             self._switch(problem)
+        self._stepping = self._steps()
         self.solver.left = self.MOST_ITERATIONS
         if state:
             assert problem.friction is not None
@@ -238,7 +239,7 @@ class LoadPath(ABC, Generic[ProblemT]):
             self._begin_afresh(before)
             # all that has led to the state, so that the effort of a case does not depend on others
             work = replace(before.work) if before else Work()
-            self._stepping.residual = PATH_RESIDUAL
+            self._stepping.residual, self._stepping.slack = PATH_RESIDUAL, PASSED
             try:
                 here = self._next(before.at if before else None, goal, work)
             except (ConvergenceError, CheckError) as error:

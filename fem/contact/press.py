@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from softjaw.fem.contact.checks import ALTERNATING, check, explained, refuse_fall
+from softjaw.fem.contact.checks import check, explained, refuse_fall
 from softjaw.fem.contact.load_stepping import RESIDUAL, State, Stepping, Work
 from softjaw.fem.contact.path import LoadPath, OnPath, Pressed
 from softjaw.fem.contact.problem import Control, Gap
@@ -77,8 +77,8 @@ class Press(LoadPath[RigidProblem]):
             followed=problem if problem.friction is None else None,
         )  # fmt: skip
 
-    def _keeps_laws(self, x: FloatArray) -> bool:
-        """Whether an iterate that no solve has ended at keeps all laws of contact to `ALTERNATING`."""
+    def _keeps_laws(self, x: FloatArray, slack: float) -> bool:
+        """Whether an iterate that no solve has ended at keeps all laws of contact to a part of their scales."""
         # vinewtonrsls has another residual, which says nothing of pressures at their bounds
         if self.problem.complementarity:
             return False
@@ -89,7 +89,7 @@ class Press(LoadPath[RigidProblem]):
             return False
         try:
             imbalance = float(np.abs(residual).max()) / self.pad.share
-            check(self.problem.foam, x, self.problem.contact_state(x), imbalance, force, RESIDUAL, ALTERNATING)
+            check(self.problem.foam, x, self.problem.contact_state(x), imbalance, force, RESIDUAL, slack)
         except CheckError:
             return False
         return True

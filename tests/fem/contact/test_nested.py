@@ -103,8 +103,8 @@ class CubeRoot:
         return 1.0
 
 
-@pytest.mark.parametrize(("growth", "iterations"), [(np.inf, 25), (5.0, 8), (2.0 ** (9.5 / 3.0), 10)])
-def test_a_solve_that_diverges_ends_once_the_residual_has_grown(growth, iterations):
+@pytest.mark.parametrize(("growth", "iterations"), [(np.inf, 10), (5.0, 8), (2.0 ** (8.5 / 3.0), 9)])
+def test_a_solve_that_diverges_ends_once_the_residual_has_grown_or_does_not_fall(growth, iterations):
     problem = CubeRoot()
     solver = NonlinearSolver(problem)
     with pytest.raises(ConvergenceError):
@@ -113,7 +113,7 @@ def test_a_solve_that_diverges_ends_once_the_residual_has_grown(growth, iteratio
     solver.left = 3
     with pytest.raises(ConvergenceError):  # the next solve has the limits of its own
         solver.solve(np.ones(1), 1e-10)
-    assert problem.asked == iterations + 25
+    assert problem.asked == iterations + 10
     solver.destroy()
 
 
