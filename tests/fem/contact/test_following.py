@@ -194,3 +194,23 @@ def test_a_state_whose_nodes_alternate_passes_where_it_is_near_enough(scatter, p
     else:
         with pytest.raises(ConvergenceError):
             last(press, [5])
+
+
+@pytest.mark.parametrize(("off", "passes"), [(5e-4, True), (2e-3, False)])
+def test_with_friction_a_state_on_the_way_may_be_off_by_more_than_the_last_one(off, passes):
+    """At an edge a point may have no place between stick and slip: solves stall there and would beyond for ever."""
+    press = press_of(mu=0.6)
+    proper = press.solver.solve
+
+    def stalls(x, tolerance, *limits):
+        x, iterations = proper(x, tolerance, *limits)
+        if press.problem.control.force is None:
+            return x, iterations
+        error = ConvergenceError("alternates")
+        error.end = x, off * press.problem.control.force * press.pad.share
+        raise error
+
+    press.solver.solve, press._fallbacks = stalls, ()
+    with pytest.raises(ConvergenceError):
+        last(press, [5])
+    assert bool(press._path) == passes
