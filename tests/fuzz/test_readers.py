@@ -20,7 +20,7 @@ from tests.fuzz.hostile_meshes import hostile
 from tests.fuzz.readers import QUICK, Reader
 from tests.study.launching import ROOT
 
-SECONDS, ROOM = 10, 2**30  # of CPU, and bytes beyond what the tests have already
+SECONDS, ROOM = 30, 2**30  # of CPU, three times what the slowest takes, and bytes beyond what the tests have already
 CHECKS = {"deadline": None, "database": None, "suppress_health_check": list(HealthCheck)}
 
 
