@@ -97,7 +97,6 @@ WITHIN, FAST = 1e5, 0.05  # see NonlinearSolver
 # Iterations in which the residual has to fall below a part `SLOW` of the three before: of 950 good solves with friction
 # this ends 6, of 88 failed ones it saves more than half of the iterations.
 STALLED, SLOW = 5, 0.7
-ITERATIONS_TO_RECOVER = 8  # before a growth of the residual counts: solves that converge pass 20 times the first one
 PREFIX = "contact_"  # of the options of a solve
 PRINTING = re.compile("monitor|view|converged_reason")
 
@@ -251,12 +250,8 @@ class NonlinearSolver:
                 else:
                     database.delValue(key)
 
-    def solve(
-        self, x: FloatArray, tolerance: float, iterations: int | None = None, growth: float = math.inf
-    ) -> tuple[FloatArray, int]:
+    def solve(self, x: FloatArray, tolerance: float, iterations: int | None = None) -> tuple[FloatArray, int]:
         """Solve from ``x`` until the residual's norm is below ``tolerance``; returns the solution and the iterations.
-
-        From `ITERATIONS_TO_RECOVER` on it gives up where the norm is more than ``growth`` times the first one.
 
         Raises
         ------
@@ -274,7 +269,7 @@ class NonlinearSolver:
         # relative and step tolerances are off, so a solve ends by the force out of balance alone
         snes.setTolerances(atol=tolerance, max_it=iterations or limit)
         self._x.array[:] = x
-        self._norms, self._goal, self._limit, self._growth = [], tolerance, iterations or limit, growth
+        self._norms, self._goal, self._limit = [], tolerance, iterations or limit
         try:
             with self._options_in_effect():  # MUMPS reads its own when it first analyses the matrix
                 snes.solve(None, self._x)
@@ -378,8 +373,7 @@ class NonlinearSolver:
 
     def _on_tangent(self, snes, x, matrix, _preconditioner) -> None:
         self._norms.append(snes.getFunctionNorm())
-        grown = len(self._norms) > ITERATIONS_TO_RECOVER and self._norms[-1] > self._growth * self._norms[0]
-        if grown or self._stalls():
+        if self._stalls():
             # the solver ends behind this step, which the factors at hand are good enough for
             snes.setConvergedReason(PETSc.SNES.ConvergedReason.DIVERGED_DTOL)
             return
@@ -410,7 +404,7 @@ class NonlinearSolver:
             return self.is_at(x) and keep(x, True)
         # near the limit of iterations Newton's quadratic end is worth its factorisation
         # the last iterations that a solve may take are always made with new factors
-        if not self.thrifty or len(norms) > self._limit - 5:
+        if not self.thrifty or len(norms) > self._limit - 3:
             return False
         return norms[-1] <= min(FAST * norms[-2], WITHIN * self._goal) and keep(x, False)
 

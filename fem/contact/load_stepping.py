@@ -25,7 +25,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from softjaw.fem.contact.checks import ALTERNATING, BALANCE, PASSED
+from softjaw.fem.contact.checks import ALTERNATING, BALANCE
 from softjaw.fem.contact.problem import ContactProblem, Control
 from softjaw.fem.contact.rigid import RigidProblem
 from softjaw.fem.errors import ConvergenceError, NotReachedError, SpentError
@@ -44,7 +44,6 @@ SHORTEST_FORETOLD = 0.025  # foretold closing displacement of a step that is not
 FOLD = 0.25  # growth of the largest strain in one step; good steps of practice keep to 0.15
 FOLDING, FOLDS = 0.1, 3.0  # the same, and over the growth of the force's logarithm, where 0.2 is usual
 ASTRAY = "the state at {force:.4g} N differs from the state on the coarser mesh"
-DIVERGED = 10.0  # residual over that of a start on another mesh, beyond which no state is near it
 STRAINED = 0.5  # largest strain from which on a state is checked for stability
 
 
@@ -113,7 +112,8 @@ class Stepping:
     off: float = 0.0  # residual over the force on the meshed part where the last state is near enough only
     closed: bool = False  # whether displacement control was needed
     residual: float = RESIDUAL
-    slack: float = ALTERNATING  # of a state that a load path was asked for
+    passed: float = ALTERNATING  # slack of a state on the way
+    slack: float = ALTERNATING  # of the last one
     _last: _Place | None = None
 
     def __post_init__(self) -> None:
@@ -122,13 +122,11 @@ class Stepping:
             self.followed = None
 
     def solve(
-        self, x: FloatArray, control: Control, work: Work, most: int | None = None, growth: float = np.inf,
-        slack: float = ALTERNATING,
-    ) -> FloatArray:  # fmt: skip
+        self, x: FloatArray, control: Control, work: Work, most: int | None = None, slack: float = ALTERNATING
+    ) -> FloatArray:
         """One Newton solve; its tolerance is relative to the force on the meshed part of the pad.
 
-        ``growth`` of the residual ends it, as in `fem.petsc.NonlinearSolver.solve`; where it stalls, its end may be off
-        by ``slack``.
+        Where it stalls its end may be off by ``slack``.
         """
         self.problem.control = control
         scale = control.force if control.force is not None else self.problem.force_scale(control.closing)
@@ -138,7 +136,7 @@ class Stepping:
         self.off = 0.0
         try:
             # a tolerance below what rounding leaves would never be met
-            x, iterations = self.solver.solve(x, max(self.residual * scale, floor), most, growth)
+            x, iterations = self.solver.solve(x, max(self.residual * scale, floor), most)
             work.iterations += iterations
         except ConvergenceError as error:
             x, self.off = error.end or (x, np.inf)
@@ -153,11 +151,6 @@ class Stepping:
             work.halvings += 1
             raise ConvergenceError(f"the backing plate would be in the object, {1e3 * closing:.4g} mm from first touch")
         return x
-
-    @property
-    def _passed(self) -> float:
-        """What a state on the way may be off by; where a path of equilibria is followed no more than its end."""
-        return ALTERNATING if self.followed else PASSED
 
     def displacement_control(
         self,
@@ -182,7 +175,7 @@ class Stepping:
         for _ in range(MOST_STEPS):
             try:
                 there = Control(closing=problem.closing(low[0]) + step)
-                ahead = self.solve(low[0], there, work, self.most, slack=self._passed)
+                ahead = self.solve(low[0], there, work, self.most, slack=self.passed)
                 high = (ahead, problem.normal_force(ahead))
                 # bracketed: from here on the state is looked for between two that lie on the path
                 if high[1] >= force:
@@ -264,7 +257,7 @@ class Stepping:
             goal = min(1.0, done + cut * allowed)
             target = force if goal == 1.0 else reached + goal * (force - reached)
             try:
-                slack = self.slack if goal == 1.0 else self._passed
+                slack = self.slack if goal == 1.0 else self.passed
                 x = self.solve(self._ahead(here, target), Control(force=target), work, self.most, slack=slack)
             except ConvergenceError:
                 cut *= 0.5
@@ -302,9 +295,8 @@ class Stepping:
         ConvergenceError
             Where there is none near it, or where a path that is followed from first contact need not lead to it.
         """
-        # Newton iterations from the state of a coarser mesh; good starts take 4 to 7
-        most = self.most or (12 if self.followed else None)
-        x = self.solve(start, Control(force=force), work, most, DIVERGED)
+        # Newton iterations from the state of a coarser mesh; good starts take 4 to 8
+        x = self.solve(start, Control(force=force), work, self.most or (8 if self.followed else None))
         here = self._place(x, force, None)
         if here.strain - self._strain(start) > FOLD or not here.stable:
             work.halvings += 1

@@ -18,7 +18,7 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-from softjaw.fem.contact.checks import ALTERNATING, PASSED, Checks, check
+from softjaw.fem.contact.checks import ALTERNATING, Checks, check
 from softjaw.fem.contact.friction import PATH_RESIDUAL, Anchor, load_steps
 from softjaw.fem.contact.load_stepping import ASTRAY, RESIDUAL, STRAY, Stepping, Work
 from softjaw.fem.contact.problem import ContactPoints, ContactProblem
@@ -239,7 +239,7 @@ class LoadPath(ABC, Generic[ProblemT]):
             self._begin_afresh(before)
             # all that has led to the state, so that the effort of a case does not depend on others
             work = replace(before.work) if before else Work()
-            self._stepping.residual, self._stepping.slack = PATH_RESIDUAL, PASSED
+            self._stepping.residual, self._stepping.slack = PATH_RESIDUAL, self._stepping.passed
             try:
                 here = self._next(before.at if before else None, goal, work)
             except (ConvergenceError, CheckError) as error:

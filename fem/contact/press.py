@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from softjaw.fem.contact.checks import check, explained, refuse_fall
+from softjaw.fem.contact.checks import ALTERNATING, PASSED, check, explained, refuse_fall
 from softjaw.fem.contact.load_stepping import RESIDUAL, State, Stepping, Work
 from softjaw.fem.contact.path import LoadPath, OnPath, Pressed
 from softjaw.fem.contact.problem import Control, Gap
@@ -70,11 +70,11 @@ class Press(LoadPath[RigidProblem]):
         self._last = np.zeros(self.problem.size), 0.0
 
     def _steps(self) -> Stepping:
-        problem = self.problem
+        problem, rough = self.problem, self.problem.friction is not None
         # with friction there is no one path of equilibria to keep to
         return Stepping(
             problem, self.solver, watch=self._watch, near=self._keeps_laws, deepest=problem.thickness,
-            followed=problem if problem.friction is None else None,
+            followed=None if rough else problem, passed=PASSED if rough else ALTERNATING,
         )  # fmt: skip
 
     def _keeps_laws(self, x: FloatArray, slack: float) -> bool:

@@ -103,17 +103,16 @@ class CubeRoot:
         return 1.0
 
 
-@pytest.mark.parametrize(("growth", "iterations"), [(np.inf, 10), (5.0, 8), (2.0 ** (8.5 / 3.0), 9)])
-def test_a_solve_that_diverges_ends_once_the_residual_has_grown_or_does_not_fall(growth, iterations):
+def test_a_solve_whose_residual_does_not_fall_is_given_up():
     problem = CubeRoot()
     solver = NonlinearSolver(problem)
     with pytest.raises(ConvergenceError):
-        solver.solve(np.ones(1), 1e-10, growth=growth)
-    assert problem.asked == iterations
-    solver.left = 3
-    with pytest.raises(ConvergenceError):  # the next solve has the limits of its own
         solver.solve(np.ones(1), 1e-10)
-    assert problem.asked == iterations + 10
+    assert problem.asked == 10
+    solver.left = 3
+    with pytest.raises(ConvergenceError):  # the next solve is judged by its own
+        solver.solve(np.ones(1), 1e-10)
+    assert problem.asked == 20
     solver.destroy()
 
 
