@@ -174,6 +174,8 @@ class NonlinearSolver:
     ----------
     left : float
         Newton iterations that further solves may take in all, failed ones too; a caller sets it.
+    patient : bool
+        Whether a solve goes on where its residual stalls; a caller sets it.
     """
 
     problem: Problem
@@ -182,7 +184,7 @@ class NonlinearSolver:
     def __post_init__(self) -> None:
         """Create matrix, vectors and solver."""
         comm, n = PETSc.COMM_SELF, self.problem.size
-        self.seconds, self.thrifty, self.left = Seconds(), True, math.inf
+        self.seconds, self.thrifty, self.patient, self.left = Seconds(), True, True, math.inf
         pattern = self.problem.pattern
         self._stored = pattern.start
         self._stepped: SteppedProblem | None = None
@@ -320,7 +322,6 @@ class NonlinearSolver:
     def _stalls(self) -> bool:
         """Whether the residual has not fallen any more for some iterations, as where an active set alternates."""
         before, after = self._norms[-STALLED - 3 : -STALLED], self._norms[-STALLED:]
-        # walls jump by orders of magnitude in the first iterations
         return len(self._norms) > 2 * STALLED and min(after) > SLOW * min(before)
 
     def _out_of_memory(self) -> bool:
@@ -373,7 +374,7 @@ class NonlinearSolver:
 
     def _on_tangent(self, snes, x, matrix, _preconditioner) -> None:
         self._norms.append(snes.getFunctionNorm())
-        if self._stalls():
+        if not self.patient and self._stalls():
             # the solver ends behind this step, which the factors at hand are good enough for
             snes.setConvergedReason(PETSc.SNES.ConvergedReason.DIVERGED_DTOL)
             return

@@ -103,16 +103,18 @@ class CubeRoot:
         return 1.0
 
 
-def test_a_solve_whose_residual_does_not_fall_is_given_up():
+@pytest.mark.parametrize(("patient", "iterations"), [(False, 10), (True, 25)])
+def test_a_solve_whose_residual_does_not_fall_is_given_up(patient, iterations):
     problem = CubeRoot()
     solver = NonlinearSolver(problem)
+    solver.patient = patient
     with pytest.raises(ConvergenceError):
         solver.solve(np.ones(1), 1e-10)
-    assert problem.asked == 10
+    assert problem.asked == iterations
     solver.left = 3
     with pytest.raises(ConvergenceError):  # the next solve is judged by its own
         solver.solve(np.ones(1), 1e-10)
-    assert problem.asked == 20
+    assert problem.asked == 2 * iterations
     solver.destroy()
 
 
