@@ -21,6 +21,7 @@ path.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -311,11 +312,9 @@ class Stepping:
         if known and self._last is not None and self._last.x is x:
             return replace(self._last, tangent=self._tangent(x))
         if self.followed and not known:
-            try:
-                # another problem's state is not quite this one's: solve here, or go without a tangent if that fails
+            # another problem's state is not quite this one's: solve here, or go without a tangent if that fails
+            with suppress(ConvergenceError):
                 x, known = self.solve(x, Control(force=reached), work, self.most), True
-            except ConvergenceError:
-                pass
         here = self._place(x, reached, self._tangent(x) if known else None)
         self.jumped |= not here.stable
         return here

@@ -174,10 +174,9 @@ class LoadPath(ABC, Generic[ProblemT]):
         self._begin()
         self._others, problem = (state.others, state.problem) if state else (self._fallbacks, self._wanted)
         problem.forget()
-        if self.problem is problem:
-            self.solver.forget()
-        else:
+        if self.problem is not problem:
             self._switch(problem)
+        self.solver.forget()
         self._stepping = self._steps()
         self.solver.left = self.MOST_ITERATIONS
         if state:

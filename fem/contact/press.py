@@ -71,8 +71,7 @@ class Press(LoadPath[RigidProblem]):
 
     def _steps(self) -> Stepping:
         problem, rough = self.problem, self.problem.friction is not None
-        # an edge under friction stalls solves for ever; what alternates without it may yet settle
-        self.solver.patient = not rough
+        self.solver.patient = False  # walls jump and settle, pads at edges stall for ever
         # with friction there is no one path of equilibria to keep to
         return Stepping(
             problem, self.solver, watch=self._watch, near=self._keeps_laws, deepest=problem.thickness,

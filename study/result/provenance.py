@@ -57,10 +57,9 @@ def versions(mpi_library: str) -> str:
     """Versions of the libraries that had a part in the numbers, as far as they are loaded."""
     # Some MPI libraries give several lines and zero bytes at the end.
     known = [f"python {platform.python_version()}", mpi_library.split(",")[0].splitlines()[0].strip("\0 ")]
-    for name in ("numpy", "scipy", "numba", "skfem", "clarabel", "mpi4py", "petsc4py", "h5py"):
-        # Importing a library only to name it would slow the start.
-        if name in sys.modules:
-            known.append(f"{name} {getattr(sys.modules[name], '__version__', '?')}")
+    names = ("numpy", "scipy", "numba", "skfem", "clarabel", "mpi4py", "petsc4py", "h5py")
+    # Importing a library only to name it would slow the start.
+    known += [f"{name} {getattr(sys.modules[name], '__version__', '?')}" for name in names if name in sys.modules]
     if "petsc4py.PETSc" in sys.modules:
         known.append(f"PETSc {'.'.join(map(str, sys.modules['petsc4py.PETSc'].Sys.getVersion()))}")
     known.append(f"HDF5 {sys.modules['h5py'].version.hdf5_version}")
