@@ -104,7 +104,7 @@ def test_extents_scale_arms_contacts_that_lean_are_flagged_and_errors_are_differ
         assert errors[f"maps/{name}_error"] == pytest.approx(expected, rel=1e-9, abs=1e-12)
     assert not any(mesh_errors(fine, fine, values, {}, SETTINGS).values())
     floor = mesh_errors(fine, fine, values, {}, SETTINGS, floor=0.01)
-    found = [floor[f"maps/{name}_error"] for name in ("e_n", "quality", "p_max")]
+    found = [floor[f"maps/{name}_error"] for name in ("e_n", "tau_z_max", "p_max")]
     assert found == pytest.approx([0.01, 0.01, 0.01 * weights.WIDER["p_max"]])
     # of a coarse mesh alone all is in doubt, that of f_x no less: friction that is left out would move it
     alone = coarse_errors(fine, values, [fine, coarse], SETTINGS)
