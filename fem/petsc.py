@@ -94,8 +94,8 @@ LIBRARY = ctypes.CDLL(PETSc.__file__)  # for what petsc4py does not reach
 REASONS = {value: name for name, value in vars(PETSc.SNES.ConvergedReason).items() if isinstance(value, int)}
 OUT_OF_MEMORY = (-5, -7, -13)  # INFOG(1) of MUMPS
 WITHIN, FAST = 1e5, 0.05  # see NonlinearSolver
-# Iterations in which the residual has to fall below a part `SLOW` of the three before: of 950 good solves with friction
-# this ends 6, of 88 failed ones it saves more than half of the iterations.
+# Iterations in which the residual has to fall below a part `SLOW` of the three before: on a drill and a bracket this
+# ends 12 of 1545 good solves, and of 127 failed ones it saves more than half of the iterations.
 STALLED, SLOW = 5, 0.7
 PREFIX = "contact_"  # of the options of a solve
 PRINTING = re.compile("monitor|view|converged_reason")
