@@ -16,7 +16,7 @@ import numpy as np
 from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.fem.pad.halving import halved
 from softjaw.fem.petsc import Seconds
-from softjaw.study.case.build import forces_apart, own_frame, pad_shape
+from softjaw.study.case.build import forces_apart, own_frame, pad_shape, rounds_edges
 from softjaw.study.case.contact import of_fingers, on_faces
 from softjaw.study.case.effects import COUPLING, SCREENED, EffectChoice, settled
 from softjaw.study.case.errors import coarse_errors
@@ -72,25 +72,26 @@ class UnitSolver:
 
     def __init__(self, unit: Any, scene: Scene) -> None:
         self.unit = unit
-        self._solver = CandidateSolver(scene, unit.candidate.poses, finest=unit.finest)
+        rounder: CandidateSolver | None = solver_of(unit, screened(scene)).solver if rounds_edges(scene) else None
+        self.solver: CandidateSolver = CandidateSolver(scene, unit.candidate.poses, unit.finest, rounder)
         self._choice: EffectChoice | None = None
 
     def cases(self, wanted: Collection[int]) -> Generator[tuple[int, CaseResult | CaseFailure], None, None]:
         """Cases at these forces, upward."""
-        start, before = time.perf_counter(), self._solver.seconds
-        self._solver.finest = tuple(self.unit.finest) or (FINEST,) * len(self._solver.forces)
-        choice = self._choice = self._choice or EffectChoice(self._solver)
+        start, before = time.perf_counter(), self.solver.seconds
+        self.solver.finest = tuple(self.unit.finest) or (FINEST,) * len(self.solver.forces)
+        choice = self._choice = self._choice or EffectChoice(self.solver)
         for k, outcome in _outcomes(choice, wanted):
             if isinstance(outcome, CaseFailure):
                 yield k, outcome
             elif k in wanted:
                 # the first case has the time in which the effects of all were chosen
                 yield k, _result(choice, k, outcome, self.unit, start, before)
-                start, before = time.perf_counter(), self._solver.seconds
+                start, before = time.perf_counter(), self.solver.seconds
 
     def put_away(self) -> None:
         """Give the memory of meshes and factors back; what was solved stays."""
-        self._solver.put_away()
+        self.solver.put_away()
 
 
 # of units, by scene and number; the last one used comes last

@@ -260,6 +260,12 @@ def forces_apart(scene: Scene) -> bool:
     return scene.accuracy.meshes > 1
 
 
+def rounds_edges(scene: Scene) -> bool:
+    """Whether the object's edges are rounded over a part of a pad's element, and a coarser pad tells what that does."""
+    mesh = scene.object.shape == "mesh" and not has_wall(scene.object) and scene.object.grid_step is None
+    return mesh and forces_apart(scene)
+
+
 def listed_accuracy(scene: Scene) -> Accuracy:
     """The accuracy in effect: of sampled grasps without a target of their own that of those that are listed."""
     own = not scene.candidates.sampled or scene.accuracy.target is not None or not forces_apart(scene)

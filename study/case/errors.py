@@ -37,28 +37,29 @@ PAYLOADS = ("payload", "safety_factor")  # what arms and couples leave of the fr
 def mesh_errors(
     fine: Sequence[Contact], coarse: Sequence[Contact], values: Mapping[str, Any], other: Mapping[str, Any],
     settings: EvaluationSettings, views: Sequence[Sequence[Contact]] = (),
-    pairs: Sequence[tuple[Sequence[Any], Sequence[Any]]] = (), floor: float = 0.0, left_out: float = 0.0,
+    pairs: Sequence[tuple[Sequence[Any], Sequence[Any], float]] = (), floor: float = 0.0, left_out: float = 0.0,
 ) -> dict[str, float]:  # fmt: skip
     """Errors of all quantities that have one, from the contacts on the mesh and on a coarser one.
 
     ``values`` are those of the fine mesh, ``other`` what the coarser one says beside its contacts; keyed alike.
     ``views`` are the coarse contacts with their pressures at Gauss points and at nodes, ``pairs`` are contacts on the
-    coarse mesh that differ too, ``floor`` is a share of the value, `WIDER` for some, and ``left_out`` one of every
-    value.
+    coarse mesh that differ too, and which share of that counts; ``floor`` is a share of the value, `WIDER` for some,
+    and ``left_out`` one of every value.
     """
     fine_mesh, coarse_mesh = _on_mesh(values, fine), _on_mesh(other, coarse) | grasp_values(tuple(coarse), settings)
     viewed = [_sums(view) | grasp_values(tuple(view), settings) for view in views]
-    compared = [[_all(contacts, settings) for contacts in pair] for pair in pairs]
+    compared = [(_all(low, settings), _all(high, settings), share) for low, high, share in pairs]
+    acts = any(contact.state.points.friction is not None for _, high, _ in pairs for contact in high)
     errors = {}
     for q in (q for q in TABLE if q.error and q.key in coarse_mesh):
         seen = [view[q.key] for view in viewed if q.key in view]
         value, size = fine_mesh[q.key], _size(q, fine_mesh[q.key])
         error = estimate(value, coarse_mesh[q.key], seen, q.error, q.name in PAYLOADS)
         # pressures alone give forces along the face by balance, with friction that acts back they do not
-        error += floor * WIDER.get(q.name, 1.0) * (2.0 if pairs and q.name.startswith("f_") else 1.0) * size
+        error += floor * WIDER.get(q.name, 1.0) * (2.0 if acts and q.name.startswith("f_") else 1.0) * size
         if q.error == "relative" and not np.all(coarse_mesh[q.key]):
             error = max(error, 1.0)  # a payload of which the coarse mesh has nothing
-        apart = [distance(low[q.key], high[q.key], q.error, value) for low, high in compared if q.key in low]
+        apart = [s * distance(low[q.key], high[q.key], q.error, value) for low, high, s in compared if q.key in low]
         errors[q.of_error.key] = error + OF_PAIRS.get(q.name, 1.0) * sum(apart) + left_out * size
     return errors
 

@@ -23,7 +23,7 @@ from softjaw.study.case.build import build_object, forces_apart, has_wall, pad_e
 from softjaw.study.case.contact import Contact
 from softjaw.study.case.errors import DOUBTED, edge_floor, grasp_values, mesh_errors
 from softjaw.study.case.evaluate import EvaluationSettings, settings_of
-from softjaw.study.case.model import approach
+from softjaw.study.case.model import Finger, approach
 from softjaw.study.case.pressing import OnRigid, OnWall, PressedContact, pressing, refuse_along_axis
 from softjaw.study.case.result import surely_below
 from softjaw.study.scene import Scene
@@ -33,7 +33,7 @@ LONG_STEPS = COARSE - 1  # the coarse mesh, with a load path of half as many ste
 NEGLIGIBLE_FORCE = 1e-3  # of the largest one; below it a failed load step says nothing of the forces above
 MOST_STARTS = 3  # coarse states that a force on the scene's mesh is started from, before it starts from nothing
 NO_ERROR = "the error of the mesh is not known, for on the coarser one {reason}"
-NO_PATH_ERROR = "the error of the load path is not known, for in longer steps {reason}"
+PART_OF_ERROR = "what load steps and rounded edges leave is not known, for on the coarse mesh {reason}"
 NOT_REFINED = "on a finer mesh, which accuracy.target asks for, it was not solved ({reason})"
 Failure = ConvergenceError | CheckError
 State = TypeVar("State")
@@ -68,12 +68,14 @@ class Solution:
 class Solved:
     """Solutions of one case on all its meshes, the finest first, and a note on meshes that have none.
 
-    The ``pairs`` of contacts on the coarse mesh differ by what the steps of the load path, or an effect, leave.
+    The ``pairs`` of contacts on the coarse mesh differ by what the steps of the load path, or an effect, leave; the
+    ``edges`` by how far the object's are rounded: as on the scene's mesh, and twice as far.
     """
 
     meshes: Sequence[Solution]
     note: str = ""
     pairs: Sequence[tuple[Sequence[PressedContact], Sequence[PressedContact]]] = ()
+    edges: tuple[Sequence[PressedContact], Sequence[PressedContact]] | None = None
 
     @property
     def fine(self) -> Solution:
@@ -91,8 +93,12 @@ class Solved:
         """Errors of the values of a case that has a coarser mesh; see `mesh_errors`."""
         fine, coarse = self.fine.contacts, self.meshes[1]
         floor = edge_floor(fine) * (DOUBTED if any(contact.coarse for contact in fine) else 1.0)
-        solved = fine, coarse.contacts, values, other, settings, coarse.views, self.pairs
-        return mesh_errors(*solved, floor, left_out)
+        pairs = [(*pair, 1.0) for pair in self.pairs]
+        if self.edges:
+            # they are rounded over a part of an element, and what that does falls with it
+            sizes = [mesh.contacts[0].state.pad.shape.elements[0] for mesh in (self.meshes[-2], self.fine)]
+            pairs.append((*self.edges, sizes[0] / sizes[1]))
+        return mesh_errors(fine, coarse.contacts, values, other, settings, coarse.views, pairs, floor, left_out)
 
 
 def followed(
@@ -118,12 +124,14 @@ class CandidateSolver:
 
     ``scene``: its levels of effects do not count: they are asked for. ``poses``: of the pads before they touch;
     ``fingers`` are they at first touch. ``finest``: finest mesh of each force that ``accuracy.target`` may ask for;
-    `FINEST` where it is empty.
+    `FINEST` where it is empty. ``rounder``: solver of the candidate where edges of a mesh are rounded twice as far.
     """
 
-    def __init__(self, scene: Scene, poses: Sequence[Pose], finest: Sequence[int] = ()) -> None:
-        self.scene, self.poses, self.walled = scene, poses, has_wall(scene.object)
-        self.fingers = [approach(build_object(scene.object), pose, scene.gripper) for pose in poses]
+    def __init__(
+        self, scene: Scene, poses: Sequence[Pose], finest: Sequence[int] = (), rounder: CandidateSolver | None = None
+    ) -> None:
+        self.scene, self.poses, self.walled, self.rounder = scene, poses, has_wall(scene.object), rounder
+        self.fingers = touching(scene, poses)
         if self.walled:
             refuse_along_axis(self.fingers)
         self.forces = tuple(scene.load.normal_force)  # the load path; forces are asked for by their number in it
@@ -149,12 +157,13 @@ class CandidateSolver:
         """What presses both fingers on a mesh."""
         # each load path has a solver of its own, or what one needed would change the other
         if (mesh, levels) not in self._pressing:
-            scene = self.at_levels(levels)
+            scene, fingers = self.at_levels(levels), self.fingers
             if mesh > FINE:
                 gripper = scene.gripper.model_copy(update={"elements": pad_elements(scene, mesh)})
                 scene = scene.model_copy(update={"gripper": gripper})
+                fingers = touching(scene, self.poses) if self.rounder else fingers
             stride = 2 if mesh == LONG_STEPS else 1
-            self._pressing[mesh, levels] = pressing(scene, self.fingers, self.poses, mesh <= COARSE, stride)
+            self._pressing[mesh, levels] = pressing(scene, fingers, self.poses, mesh <= COARSE, stride)
         return self._pressing[mesh, levels]
 
     def solve(self, k: int, mesh: int, levels: Levels) -> Solution:
@@ -181,15 +190,19 @@ class CandidateSolver:
         fine = self.solve(k, FINE, levels)
         if not forces_apart(self.scene):
             return Solved([fine])
-        solved, unknown = Solved([fine]), NO_ERROR
+        solved = Solved([fine])
         try:
             coarse = self.solve(k, COARSE, levels)
-            solved, unknown = Solved([fine, coarse]), NO_PATH_ERROR
+            solved = Solved([fine, coarse])
             if levels.friction_pressure_coupling != "none":
                 # what the steps of its load path leave: the difference to steps of twice the length
                 solved = replace(solved, pairs=[(coarse.contacts, self.solve(k, LONG_STEPS, levels).contacts)])
+            if self.rounder:
+                plain = levels._replace(friction_pressure_coupling="none")
+                contacts = self.solve(k, COARSE, plain).contacts, self.rounder.solve(k, FINE, plain).contacts
+                solved = replace(solved, edges=contacts)
         except (ConvergenceError, CheckError) as failure:
-            solved = replace(solved, note=unknown.format(reason=failure))
+            solved = replace(solved, note=(PART_OF_ERROR if solved.coarse else NO_ERROR).format(reason=failure))
         return self._refined(solved, k, levels, left_out) if isinstance(fine.fingers, OnRigid) else solved
 
     @property
@@ -259,11 +272,18 @@ class CandidateSolver:
     def put_away(self) -> None:
         """Give the memory of meshes and factors back; solutions stay, and what else is asked for makes them anew."""
         self._spent = self.seconds
+        if self.rounder:
+            self.rounder.put_away()
         for fingers in self._pressing.values():
             for part in fingers.parts:
                 part.destroy()
             fingers.parts = []
         self._pressing, self._paths = {}, {}
+
+
+def touching(scene: Scene, poses: Sequence[Pose]) -> list[Finger]:
+    """Both fingers of these poses at first touch."""
+    return [approach(build_object(scene.object), pose, scene.gripper) for pose in poses]
 
 
 def join_notes(*notes: str) -> str:

@@ -7,7 +7,7 @@ import pytest
 
 from softjaw.fem.pad.mesh import RULES
 from softjaw.study.case.result import CaseFailure
-from softjaw.study.scene import parse_scene
+from softjaw.study.scene import Scene, parse_scene
 from tests.study.launching import ROOT
 from tests.study.scenes import results_of
 
@@ -82,3 +82,23 @@ def test_the_usual_mesh_is_within_one_and_a_half_percent_but_on_the_neck_and_est
     assert told[known].mean() < 5 * true[known].mean()
     # what is not covered is not far off
     assert np.quantile(true[known] / told[known], 0.99) < 3
+
+
+@pytest.mark.long
+def test_errors_hold_what_the_rounding_of_edges_does_to_a_pad_over_the_rim_of_a_mug():
+    pad = {"pad_length_mm": 48, "pad_width_mm": 18, "pad_thickness_mm": 10, "elements": [8, 6, 3]}
+    tables = {
+        "object": {"shape": "mesh", "mesh": str(ROOT / "jobs" / "objects" / "mug.stl"), "unit": "mm"},
+        "gripper": pad, "candidates": {"stations_mm": [78], "angles_deg": [22]}, "load": {"normal_force_n": [5.3]},
+        "effects": {"friction_pressure_coupling": "none"}, "limit_surface": {"model": "three_motions"},
+    }  # fmt: skip
+    scene = Scene.of_tables(tables)
+    default, same, sharper = (
+        results_of(scene.with_values(**{"object.grid_step_mm": step}))[0].values for step in ("auto", 0.75, 0.375)
+    )
+    for name in ("f_x_max", "tau_z_max"):
+        value, error = f"maps/{name}", f"maps/{name}_error"
+        assert same[value][0] == pytest.approx(default[value][0], rel=1e-9)
+        change = abs(sharper[value][0] / default[value][0] - 1.0)
+        assert same[error] + 0.2 * change < default[error]
+        assert change < default[error] < 4.0 * change
