@@ -60,7 +60,7 @@ def fast() -> list[Stage]:
     """What ``make test`` runs."""
     return [
         Stage("serial", tests("not long and not ranks", *workers()), 20),
-        Stage("ranks", tests("ranks and not long"), 10, ("mpirun",)),
+        Stage("ranks", tests("ranks and not long", *workers()), 10, ("mpirun",)),
     ]
 
 
