@@ -114,8 +114,10 @@ def clearance(points: FloatArray, corners: FloatArray) -> float:
     >>> clearance(np.array([[3.0, 0, 0], [0, 5, 4]]), np.array([[[-1.0, -1, -1], [1, 1, 1]]]))
     2.0
     """
-    outside = np.maximum(corners[:, :1] - points, points - corners[:, 1:])
-    return float((np.linalg.norm(np.maximum(outside, 0.0), axis=-1) + np.minimum(outside.max(axis=-1), 0.0)).min())
+    # a row for each coordinate: sums over three neighbours in memory take two to four times as long
+    x, (low, high) = np.ascontiguousarray(points.T), corners.transpose(1, 0, 2)[..., None]
+    outside = np.maximum(low - x, x - high)
+    return float((np.sqrt((np.maximum(outside, 0.0) ** 2).sum(axis=1)) + np.minimum(outside.max(axis=1), 0.0)).min())
 
 
 def clearest(
