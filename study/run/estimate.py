@@ -39,7 +39,7 @@ REGION_S = 0.3  # seconds until the distance to a mesh is known round both pads
 # times as dear with friction that acts back, everywhere or where it is found to matter
 COUPLED = {"none": 1.0, "auto": 2.2, "tangential": 2.2}
 SCREENED_COST = 0.15  # of a force on the coarse mesh alone, over that on the scene's
-ROUNDS = 3.0  # of the cases that a list shows, each once on the scene's mesh: with others, and with finer meshes
+ROUNDS = 3.5  # of the cases that a list shows, each once on the scene's mesh: with others, and with finer meshes
 DEEP, HARD = 0.4, 4.0  # closing over the pad's thickness from which forces are cut into steps, and how much that costs
 
 WRITE_S = 1.5e-5  # seconds of one write of a rank, measured on one machine with a local disk
