@@ -30,6 +30,7 @@ ALONE = {"OMPI_MCA_pml": "ob1", "OMPI_MCA_btl": "self"}
 ALLOWED = {"OMPI_MCA_rmaps_base_oversubscribe": "1", "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe"}
 AS_ROOT = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
 NOT_IN_TIME = 124  # exit code of timeout(1)
+NEEDED_SPACE = 1e9  # bytes; the largest shipped study writes about 0.2 GB
 SYSTEM_PACKAGES = "python3-petsc4py python3-h5py python3-h5py-mpi python3-mpi4py openmpi-bin"
 USE_MUMPS = "use a PETSc that was configured with MUMPS; Debian's and conda-forge's are"
 INSTALL = f"run 'make setup', or: apt-get install --no-install-recommends {SYSTEM_PACKAGES}"
@@ -187,11 +188,13 @@ def check_speed() -> Finding:
 
 
 def check_disk() -> Finding:
-    """Results can be written here."""
+    """Results can be written here, and there is room for them."""
     folder = Path.cwd()
     if not _writable(folder):
         return f"{folder} is not writable", "start softjaw in a folder of your own", CANNOT_WRITE
-    return f"{shutil.disk_usage(folder).free / 1e9:.1f} GB free in {folder}", "", DONE
+    free = shutil.disk_usage(folder).free
+    cure = f"free at least {NEEDED_SPACE / 1e9:.0f} GB" if free < NEEDED_SPACE else ""
+    return f"{free / 1e9:.1f} GB free in {folder}", cure, CANNOT_WRITE if cure else DONE
 
 
 CHECKS: dict[str, Callable[[], Finding]] = {name: partial(probed, name) for name in PROBES}
