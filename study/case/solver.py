@@ -131,7 +131,7 @@ class CandidateSolver:
         self, scene: Scene, poses: Sequence[Pose], finest: Sequence[int] = (), rounder: CandidateSolver | None = None
     ) -> None:
         self.scene, self.poses, self.walled, self.rounder = scene, poses, has_wall(scene.object), rounder
-        self.fingers = touching(scene, poses)
+        self.fingers = fingers_of(scene, poses)
         if self.walled:
             refuse_along_axis(self.fingers)
         self.forces = tuple(scene.load.normal_force)  # the load path; forces are asked for by their number in it
@@ -161,7 +161,7 @@ class CandidateSolver:
             if mesh > FINE:
                 gripper = scene.gripper.model_copy(update={"elements": pad_elements(scene, mesh)})
                 scene = scene.model_copy(update={"gripper": gripper})
-                fingers = touching(scene, self.poses) if self.rounder else fingers
+                fingers = fingers_of(scene, self.poses) if self.rounder else fingers
             stride = 2 if mesh == LONG_STEPS else 1
             self._pressing[mesh, levels] = pressing(scene, fingers, self.poses, mesh <= COARSE, stride)
         return self._pressing[mesh, levels]
@@ -281,7 +281,7 @@ class CandidateSolver:
         self._pressing, self._paths = {}, {}
 
 
-def touching(scene: Scene, poses: Sequence[Pose]) -> list[Finger]:
+def fingers_of(scene: Scene, poses: Sequence[Pose]) -> list[Finger]:
     """Both fingers of these poses at first touch."""
     return [approach(build_object(scene.object), pose, scene.gripper) for pose in poses]
 

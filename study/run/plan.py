@@ -200,7 +200,7 @@ def _estimated_time(plan: Plan, scene: Any, ranks: int) -> str:
     on = f"on {ranks} rank{'s' * (ranks > 1)}"
     if not shells(scene):
         seconds = makespan(plan.in_parts(estimated(plan.tried)), ranks)
-        # measured on eleven objects: 0.6 times for boxes and capsules, 1.9 for a drill, whose best need finer meshes
+        # measured on seven objects: half for a capsule, 1.8 times for a hammer, 2.4 for a bracket, with finer meshes
         about = ", half to twice that" if scene.candidates.sampled else ""
         return f"about {duration(START_S + seconds)} {on}{about}, estimated on a bed of springs"
     pads, shell = wall_unknowns(scene)
