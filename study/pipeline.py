@@ -30,7 +30,7 @@ from softjaw.study.quantities import misses
 from softjaw.study.scene import Scene
 from softjaw.study.scene.sections import COARSE, FINEST
 
-MOST_SOLVERS = 24  # whose solutions are kept: some MB each, on meshes 30 to 50
+MOST_SOLVERS = 24  # whose solutions are kept: some MB each, on a wall 40
 
 
 def solve_unit(

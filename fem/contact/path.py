@@ -344,5 +344,6 @@ class LoadPath(ABC, Generic[ProblemT]):
         return elapsed
 
     def destroy(self) -> None:
-        """Give the factors' memory back."""
+        """Give the memory back; nothing can be solved any more."""
         self.solver.destroy()
+        del self._stepping  # it holds methods of the path, and rings of objects are collected late

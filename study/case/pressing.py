@@ -44,7 +44,7 @@ class PressedContact(Contact):
     def __init__(
         self, scene: Scene, finger: Finger, state: Pressed, signs: tuple[float, float, float] = UPRIGHT
     ) -> None:
-        self.finger, self.state, self._signs = finger, state, signs
+        self.state, self._signs, self.hole_share = state, signs, finger.hole_share
         self._reduced = scene.friction.used_by_pressing
         self._views: list[Contact] = []  # shared by all copies, so that the first one asked fills it for all
         super().__init__(self._extracted(), scene.friction.mu, finger.pose, whole_face=True)
@@ -60,7 +60,7 @@ class PressedContact(Contact):
         # Touched here, because cached properties are copied only when they have been computed.
         _ = self.ellipsoids, self.tau_pure, self.area, self.largest_pressure  # computed once for both
         other = self.at(finger.pose)
-        other.finger = finger
+        other.hole_share = finger.hole_share
         return other
 
     @cached_property
@@ -152,12 +152,12 @@ def _neighbours(grid: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
 def state_flags(contacts: Sequence[PressedContact]) -> int:
     """Flags of the solved states of both fingers."""
     first, second = contacts
-    between_faces = float((second.finger.pose.origin - first.finger.pose.origin) @ first.finger.pose.rotation[:, 2])
+    between_faces = float((second.pose.origin - first.pose.origin) @ first.pose.rotation[:, 2])
     flags = Flag.COLLISION * (first.free_face + second.free_face > between_faces * (1.0 - UNDECIDED))
     flags |= Flag.UNSTABLE * (min(c.state.checks.ellipticity for c in contacts) <= 0)
     flags |= Flag.JUMPED * any(c.state.path_dependent for c in contacts)
     flags |= Flag.OBLIQUE * (max(abs(c.force_excess) for c in contacts) > OBLIQUE_EXCESS - UNDECIDED)
-    flags |= Flag.MESH_HOLE * (max(c.finger.hole_share for c in contacts) > MESH_HOLE)
+    flags |= Flag.MESH_HOLE * (max(c.hole_share for c in contacts) > MESH_HOLE)
     for c in contacts:
         flags |= Flag.NODAL * c.nodal_instead | Flag.COARSE * c.coarse
     return flags

@@ -122,18 +122,18 @@ def followed(
 class CandidateSolver:
     """Solutions of one candidate.
 
-    ``scene``: its levels of effects do not count: they are asked for. ``poses``: of the pads before they touch;
-    ``fingers`` are they at first touch. ``finest``: finest mesh of each force that ``accuracy.target`` may ask for;
-    `FINEST` where it is empty. ``rounder``: solver of the candidate where edges of a mesh are rounded twice as far.
+    ``scene``: its levels of effects do not count: they are asked for. ``poses``: of the pads before they touch.
+    ``finest``: finest mesh of each force that ``accuracy.target`` may ask for; `FINEST` where it is empty. ``rounder``:
+    solver of the candidate where edges of a mesh are rounded twice as far.
     """
 
     def __init__(
         self, scene: Scene, poses: Sequence[Pose], finest: Sequence[int] = (), rounder: CandidateSolver | None = None
     ) -> None:
         self.scene, self.poses, self.walled, self.rounder = scene, poses, has_wall(scene.object), rounder
-        self.fingers = fingers_of(scene, poses)
+        fingers = self.fingers
         if self.walled:
-            refuse_along_axis(self.fingers)
+            refuse_along_axis(fingers)
         self.forces = tuple(scene.load.normal_force)  # the load path; forces are asked for by their number in it
         self.finest = tuple(finest) or (FINEST,) * len(self.forces)
         self._pressing: dict[tuple[int, Levels], OnRigid | OnWall] = {}
@@ -141,6 +141,11 @@ class CandidateSolver:
         self._states: dict[tuple[int, int, Levels, int], Any] = {}  # or failures, of every part
         self._solutions: dict[tuple[int, int, Levels], Solution] = {}
         self._spent = Seconds()  # by what was put away
+
+    @cached_property
+    def fingers(self) -> list[Finger]:
+        """Both of them at first touch; what they know of a mesh takes megabytes, so it is put away, too."""
+        return fingers_of(self.scene, self.poses)
 
     @cached_property
     def settings(self) -> EvaluationSettings:
@@ -277,8 +282,9 @@ class CandidateSolver:
         for fingers in self._pressing.values():
             for part in fingers.parts:
                 part.destroy()
-            fingers.parts = []
+            fingers.parts, fingers.fingers = [], []
         self._pressing, self._paths = {}, {}
+        self.__dict__.pop("fingers", None)
 
 
 def fingers_of(scene: Scene, poses: Sequence[Pose]) -> list[Finger]:

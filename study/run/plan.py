@@ -19,6 +19,7 @@ from softjaw.study.case.build import (
     forces_apart,
     geometry,
     has_wall,
+    listed_accuracy,
     outer_surface,
     own_frame,
     pad_elements,
@@ -34,11 +35,12 @@ from softjaw.study.run.refine import Rounds, added_cases, refined
 from softjaw.study.run.shares import makespan, sensible_ranks
 from softjaw.study.scene.sections import COARSE, FINEST
 
-LIBRARY_BYTES = 3e8  # bytes of a rank that has loaded PETSc, numba and scipy and nothing else
-FILL_FACTOR = 20.0  # factor entries over dofs^(4/3), the growth of nested dissection in 3-D
+# Measured on ten scenes at the end of a run: bytes of a rank with the libraries and compiled loops that it needs, and
+# numbers over dofs^(4/3), the growth of nested dissection in 3-D, of factors, matrices and the solutions that are kept.
+LIBRARY_BYTES, FILL_FACTOR = 4.5e8, 160.0
 # Measured on a cup of 0.4 mm, 5 000 to 21 000 unknowns: a force takes 7 Newton steps of 15 us per unknown each; the
-# factors, what they are made from and what is not given back take 16 kB per unknown of the wall.
-SECONDS_PER_UNKNOWN, BYTES_PER_UNKNOWN = 1e-4, 1.6e4
+# wall's factors take 16 kB per unknown, the solutions that are kept the rest.
+SECONDS_PER_UNKNOWN, BYTES_PER_UNKNOWN = 1e-4, 9e4
 
 
 @dataclass(frozen=True)
@@ -132,8 +134,8 @@ def has(scene: Any) -> tuple[str, ...]:
 
 
 def memory(scene: Any) -> float:
-    """Rough memory of one rank [bytes]: the libraries, the factors of the whole pad's stiffness, those of a wall."""
-    pad = 8.0 * FILL_FACTOR * (3.0 * _pad_nodes(scene, scene.accuracy.most_meshes - 1)) ** (4.0 / 3.0)
+    """Rough memory of one rank [bytes]: the libraries, what whole pads take on their finest mesh, and a wall."""
+    pad = 8.0 * FILL_FACTOR * (3.0 * _pad_nodes(scene, listed_accuracy(scene).most_meshes - 1)) ** (4.0 / 3.0)
     return LIBRARY_BYTES + pad + (BYTES_PER_UNKNOWN * wall_unknowns(scene)[1] if shells(scene) else 0.0)
 
 

@@ -125,7 +125,7 @@ def solve(outcome: Outcome, seed: int, folder: Path) -> None:
             words = [flag.word for flag in flags_in(int(result.values["maps/flags"]))]
             outcome.flags = dict(Counter(outcome.flags) + Counter(words))
             if isinstance(obj, MeshObject):
-                poses = (contact.finger.pose for contact in result.contacts)
+                poses = (contact.pose for contact in result.contacts)
                 depth = max(start_inside(obj, pose, unit.scene.gripper.pad_size) for pose in poses)
                 outcome.inside = max(outcome.inside, depth)
 

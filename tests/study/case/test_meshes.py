@@ -1,13 +1,16 @@
 """Whole cases of meshes: poses in the frame of the file, and the mirror image of the other finger."""
 
+import gc
+import weakref
+
 import numpy as np
 import pytest
 import trimesh
 
 from softjaw.study import pipeline
-from softjaw.study.case.build import build_object
+from softjaw.study.case import solver
 from softjaw.study.case.candidates import candidates
-from softjaw.study.case.model import approach, image_signs
+from softjaw.study.case.model import image_signs, quadrants
 from softjaw.study.case.pressing import OnRigid
 from softjaw.study.result.read import open as open_dataset
 from softjaw.study.result.skeleton import create
@@ -70,7 +73,7 @@ def test_the_other_finger_is_the_mirror_image(tmp_path):
     mesh.export(path := tmp_path / "ball.stl")
     lopsided = scene_of(mesh_of(path, "m"), NO_COUPLING, where=pose_of((0, 0, 4)), forces="[4]", elements="[6, 4, 2]")
     poses = candidates(lopsided)[0].poses
-    _, other = fingers = [approach(build_object(lopsided.object), pose, lopsided.gripper) for pose in poses]
+    _, other = fingers = solver.fingers_of(lopsided, poses)
     assert image_signs(*fingers, lopsided.gripper.pad_size) == (1, -1)
     both = OnRigid(lopsided, fingers, poses, coarser=False)
     assert len(both.parts) == 1
@@ -82,3 +85,16 @@ def test_the_other_finger_is_the_mirror_image(tmp_path):
     np.testing.assert_allclose(other.origin, solved.origin, atol=1e-6)
     np.testing.assert_allclose(other.normal, solved.normal, atol=1e-4)
     np.testing.assert_allclose(other.pressure_wrench, solved.pressure_wrench, atol=1e-4)
+
+
+def test_solutions_that_are_kept_hold_no_surface_of_a_mesh(files, monkeypatch):
+    """Megabytes each, given back without waiting for the collector of rings of objects."""
+    made, fingers_of = [], solver.fingers_of
+    monkeypatch.setattr(solver, "fingers_of", lambda *of: made.append(fingers_of(*of)) or made[-1])
+    gc.disable()
+    solved(scene(files, "upright"))
+    quadrants.cache_clear()
+    surfaces = [weakref.ref(finger.surface) for fingers in made for finger in fingers]
+    made.clear()
+    assert [surface() for surface in surfaces] == 4 * [None]
+    gc.enable()
