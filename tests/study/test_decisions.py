@@ -105,7 +105,7 @@ def facing(turn, lean, mu, distance=0.06, free=0.0, excess=0.0):
         made.append(SimpleNamespace(
             mu=mu, normal=R[:, 2], origin=origin, free_face=free, coarse=False, nodal_instead=False,
             force_excess=excess,
-            frame=SimpleNamespace(flag=FrameFlag(0)), finger=SimpleNamespace(pose=pose, hole_share=0.0),
+            frame=SimpleNamespace(flag=FrameFlag(0)), pose=pose, hole_share=0.0,
             state=SimpleNamespace(checks=SimpleNamespace(ellipticity=1.0), path_dependent=False),
         ))  # fmt: skip
     return made
