@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from softjaw.fem.errors import CheckError, ConvergenceError
+from softjaw.fem.objects.gap import about_z
 from softjaw.fem.pad.halving import halved
 from softjaw.fem.petsc import Seconds
 from softjaw.study.case.build import forces_apart, own_frame, pad_shape, rounds_edges
@@ -73,7 +74,7 @@ class UnitSolver:
     def __init__(self, unit: Any, scene: Scene) -> None:
         self.unit = unit
         rounder: CandidateSolver | None = solver_of(unit, screened(scene)).solver if rounds_edges(scene) else None
-        self.solver: CandidateSolver = CandidateSolver(scene, unit.candidate.poses, unit.finest, rounder)
+        self.solver: CandidateSolver = CandidateSolver(scene, unit.candidate.poses, rounder)
         self._choice: EffectChoice | None = None
 
     def cases(self, wanted: Collection[int]) -> Generator[tuple[int, CaseResult | CaseFailure], None, None]:
@@ -170,9 +171,8 @@ def image(result: CaseResult, unit: Any, c: int) -> CaseResult:
 
     It is the same grasp, turned about the object's axis.
     """
-    angle, placed = unit.turns[c], own_frame(unit.scene.object)
-    turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1.0]])
-    rotation = placed.rotation @ turn
+    placed = own_frame(unit.scene.object)
+    rotation = placed.rotation @ about_z(unit.turns[c])
     values = dict(result.values)
     values["fingers/pose_rotation"] = rotation @ values["fingers/pose_rotation"]
     for name in {"fingers/pose_origin", "wall/place"} & values.keys():

@@ -106,48 +106,6 @@ def stick_or_slip(
     return t, by_d, by_normal, np.where(slips & (most > 0.0)[..., None], mu * along, 0.0)
 
 
-class Damping:
-    """Shortens steps of Newton's method that take most of the last one back.
-
-    A point that slips to and fro beyond its place would make the method alternate for ever, with the same nodes in
-    contact and the same points slipping.
-
-    Parameters
-    ----------
-    moved : index
-        The unknowns that are displacements.
-    """
-
-    def __init__(self, moved: Any) -> None:
-        self.moved = moved
-        self.forget()
-
-    def forget(self) -> None:
-        """Begin another solve."""
-        # the last step and where it led to: nowhere yet
-        self._step: FloatArray = np.zeros(0)
-        self._reached: FloatArray | None = None
-        self._damping = 1.0
-
-    def goes_on(self, x: FloatArray) -> bool:
-        """Whether the last step led to ``x``; else another solve has begun."""
-        return self._reached is not None and np.array_equal(x, self._reached)
-
-    def shortened(self, x: FloatArray, step: FloatArray, factor: float) -> float:
-        """Factor of the step from ``x``, at most the one given."""
-        if not self.goes_on(x):
-            self._damping = 1.0
-        else:
-            before, now = self._step, step[self.moved]
-            # a step that takes back more than half of the last one is halved
-            back = before @ now < -0.5 * (before @ before)
-            # at most eight times shorter
-            self._damping = max(0.5 * self._damping, 0.125) if back else min(2.0 * self._damping, 1.0)
-        factor = min(factor, self._damping)
-        self._step, self._reached = factor * step[self.moved], x - factor * step
-        return factor
-
-
 @dataclass(frozen=True)
 class Anchor:
     """Last accepted state of one finger's points, in the frame of what it touches.
@@ -170,7 +128,10 @@ class Anchor:
 
 
 class Friction:
-    """What friction knows of the load path: where it is measured from.
+    """What friction knows of the load path: where it is measured from; and of a solve: its last step.
+
+    A point that slips to and fro beyond its place would make Newton's method alternate for ever, with the same nodes in
+    contact and the same points slipping. So steps that take most of the last one back are shortened.
 
     Attributes
     ----------
@@ -178,7 +139,8 @@ class Friction:
         Friction coefficient; stiffness of stick in units of E / thickness.
     anchors : tuple of Anchor
         Last accepted state of each finger. It is replaced, never changed, so that whoever keeps it can put it back.
-    damping : Damping
+    moved : index
+        The unknowns that are displacements.
     before : (n, 3) array
         Tractions with which the last step was made [Pa].
     """
@@ -186,18 +148,39 @@ class Friction:
     anchors: tuple[Anchor, ...]
 
     def __init__(self, mu: float, moved: Any) -> None:
-        self.mu, self.stick, self.damping = mu, STICK, Damping(moved)
+        self.mu, self.stick, self.moved = mu, STICK, moved
         self._iteration, self.before = 0, np.empty((0, 3))
 
     def judging(self, x: FloatArray) -> tuple[FloatArray, float]:
         """Tractions of the iterate before ``x`` and the share of the change since with which this one is judged."""
-        if not self.damping.goes_on(x):
+        if not self.goes_on(x):
             self._iteration, self.before = 0, self.anchors[0].traction
         share = SHARES[self._iteration] if self._iteration < len(SHARES) else 1.0
         self._iteration += 1
         return self.before, share
 
     def accept(self, anchors: Sequence[Anchor]) -> None:
-        """Measure what follows from these states."""
+        """Measure what follows from these states, and begin another solve."""
         self.anchors = tuple(anchors)
-        self.damping.forget()
+        # the last step and where it led to: nowhere yet
+        self._step: FloatArray = np.zeros(0)
+        self._reached: FloatArray | None = None
+        self._damping = 1.0
+
+    def goes_on(self, x: FloatArray) -> bool:
+        """Whether the last step led to ``x``; else another solve has begun."""
+        return self._reached is not None and np.array_equal(x, self._reached)
+
+    def shortened(self, x: FloatArray, step: FloatArray, factor: float) -> float:
+        """Factor of the step from ``x``, at most the one given."""
+        if not self.goes_on(x):
+            self._damping = 1.0
+        else:
+            before, now = self._step, step[self.moved]
+            # a step that takes back more than half of the last one is halved
+            back = before @ now < -0.5 * (before @ before)
+            # at most eight times shorter
+            self._damping = max(0.5 * self._damping, 0.125) if back else min(2.0 * self._damping, 1.0)
+        factor = min(factor, self._damping)
+        self._step, self._reached = factor * step[self.moved], x - factor * step
+        return factor

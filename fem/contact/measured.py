@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -29,25 +29,6 @@ from softjaw.friction.patch import FloatArray
 NOISE_MARGIN = 2.0  # standard errors of the face that a contact has to stand
 LIFT, RAMP = 3.0, 2.0  # standard errors by which the face is lifted where nothing surely bears; elements of the ramp
 LIFT_SAMPLES = 60  # of the lift along a side of the pad
-
-
-@dataclass(frozen=True)
-class Measured:
-    """A pad pressed into the shape of its measured face.
-
-    Parameters
-    ----------
-    state : Pressed
-        In the frame at first touch, from which the backing plate has moved on by the closing displacement.
-    margin : float
-        What the closing displacement is uncertain by, `NOISE_MARGIN` standard errors of the face [m].
-    judged : bool
-        Whether contact could be told from noise.
-    """
-
-    state: Pressed
-    margin: float
-    judged: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,68 +50,71 @@ class LiftedFace:
         return g + d[0, 0], normal, hessian
 
 
-@dataclass
-class MeasuredPress:
-    """Presses pads into the shape of measured faces.
+def press_measured(
+    face: MeasuredFace, pad: Pad, fallbacks: Sequence[Pad] = (), options: dict[str, Any] | None = None
+) -> tuple[Pressed, bool]:
+    """State of a pad that is pressed into the shape of its measured face, and whether contact is told from noise.
 
     Parameters
     ----------
+    face : MeasuredFace
+        Measured from where the undeformed face would be.
     pad : Pad
         Whole, on a rigid backing plate.
     fallbacks : sequence of Pad
         With other gaps, as in `fem.contact.press.Press`.
     options : dict
         PETSc options with the prefix ``contact_``.
+
+    Returns
+    -------
+    state, judged
+        In the frame at first touch, from which the backing plate has moved on by the closing displacement.
+
+    Raises
+    ------
+    NoContactError
+        If the face is not pressed in anywhere.
+    ConvergenceError, CheckError
+        If there is no acceptable state.
     """
+    depth = _depth(face, pad)
+    if not depth > 1e-6 * pad.shape.size[2]:
+        raise NoContactError("the face lies nowhere below the undeformed one, so it touches nothing")
+    touching, margin = face.lifted(depth), NOISE_MARGIN * face.doubt
 
-    pad: Pad
-    fallbacks: Sequence[Pad] = ()
-    options: dict[str, Any] = field(default_factory=dict)
-
-    def solve(self, face: MeasuredFace) -> Measured:
-        """State of the pad with this face, which is measured from where the undeformed face would be.
-
-        Raises
-        ------
-        NoContactError
-            If the face is not pressed in anywhere.
-        ConvergenceError, CheckError
-            If there is no acceptable state.
-        """
-        depth = self._depth(face)
-        if not depth > 1e-6 * self.pad.shape.size[2]:
-            raise NoContactError("the face lies nowhere below the undeformed one, so it touches nothing")
-        touching, margin = face.lifted(depth), NOISE_MARGIN * face.doubt
-        # share of the closing displacement: with a larger margin nothing tells contact from noise
-        if margin >= 0.5 * depth:
-            return Measured(self._pressed(touching, depth), margin, False)
-        sure = self._pressed(touching, depth - margin)
-        return Measured(self._pressed(self._released(touching, sure, depth), depth), margin, True)
-
-    def _pressed(self, face: MeasuredFace | LiftedFace, closing: float) -> Pressed:
-        press = Press(self.pad, face.gap, self.options, self.fallbacks)
+    def pressed(surface: MeasuredFace | LiftedFace, closing: float) -> Pressed:
+        press = Press(pad, surface.gap, options, fallbacks)
         try:
             return press.at_closing(closing)
         finally:
             press.destroy()
 
-    def _depth(self, face: MeasuredFace) -> float:
-        """How far the deepest point of the face lies below the undeformed one [m]."""
-        nodes = self.pad.nodes[self.pad.contact_nodes]
-        x, y = (np.linspace(nodes[:, k].min(), nodes[:, k].max(), 4 * LIFT_SAMPLES + 1) for k in (0, 1))
-        X, Y = np.meshgrid(x, y, indexing="ij")
-        return float(-face.height(X.ravel(), Y.ravel())[0].min())
+    # share of the closing displacement: with a larger margin nothing tells contact from noise
+    if margin >= 0.5 * depth:
+        return pressed(touching, depth), False
+    sure = pressed(touching, depth - margin)
+    return pressed(_released(pad, touching, sure, depth), depth), True
 
-    def _released(self, face: MeasuredFace, sure: Pressed, depth: float) -> LiftedFace | MeasuredFace:
-        """The face, lifted where the pad bears nothing on the way to it, nor may on the rest of the way."""
-        bearing = sure.contact_face[sure.pressure > 0][:, :2]
-        if not len(bearing):
-            return face
-        widths = [side / n for side, n in zip(self.pad.shape.size[:2], self.pad.shape.elements, strict=False)]
-        growth = math.sqrt(depth / sure.closing) - 1.0
-        reach = 0.5 * float(np.ptp(bearing, axis=0).max()) * growth + max(widths)
-        x, y = (np.linspace(-0.7, 0.7, LIFT_SAMPLES) * side for side in self.pad.shape.size[:2])
-        places = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
-        t = np.clip((cKDTree(bearing).query(places)[0] - reach) / (RAMP * max(widths)), 0.0, 1.0)
-        lift = LIFT * face.doubt * t**3 * (10.0 - 15.0 * t + 6.0 * t**2)
-        return LiftedFace(face, RectBivariateSpline(x, y, lift))
+
+def _depth(face: MeasuredFace, pad: Pad) -> float:
+    """How far the deepest point of the face lies below the undeformed one [m]."""
+    nodes = pad.nodes[pad.contact_nodes]
+    x, y = (np.linspace(nodes[:, k].min(), nodes[:, k].max(), 4 * LIFT_SAMPLES + 1) for k in (0, 1))
+    X, Y = np.meshgrid(x, y, indexing="ij")
+    return float(-face.height(X.ravel(), Y.ravel())[0].min())
+
+
+def _released(pad: Pad, face: MeasuredFace, sure: Pressed, depth: float) -> LiftedFace | MeasuredFace:
+    """The face, lifted where the pad bears nothing on the way to it, nor may on the rest of the way."""
+    bearing = sure.contact_face[sure.pressure > 0][:, :2]
+    if not len(bearing):
+        return face
+    widths = [side / n for side, n in zip(pad.shape.size[:2], pad.shape.elements, strict=False)]
+    growth = math.sqrt(depth / sure.closing) - 1.0
+    reach = 0.5 * float(np.ptp(bearing, axis=0).max()) * growth + max(widths)
+    x, y = (np.linspace(-0.7, 0.7, LIFT_SAMPLES) * side for side in pad.shape.size[:2])
+    places = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
+    t = np.clip((cKDTree(bearing).query(places)[0] - reach) / (RAMP * max(widths)), 0.0, 1.0)
+    lift = LIFT * face.doubt * t**3 * (10.0 - 15.0 * t + 6.0 * t**2)
+    return LiftedFace(face, RectBivariateSpline(x, y, lift))

@@ -27,14 +27,13 @@ from numpy.typing import NDArray
 
 from softjaw.fem.assembly import Pattern, gather, shifted
 from softjaw.fem.contact.friction import Anchor, Friction, stick_or_slip
-from softjaw.fem.objects.gap import Pose
+from softjaw.fem.objects.gap import IN_PLACE, Pose
 from softjaw.fem.pad.foam import Foam
 from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.shell.facing import FAR
 from softjaw.friction.patch import NEGLIGIBLE, FloatArray
 
 Gap = Callable[[FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
-IN_PLACE = Pose(np.eye(3), np.zeros(3))
 
 
 def borne(pressure: FloatArray, active: NDArray[np.bool_]) -> FloatArray:
@@ -288,7 +287,7 @@ class ContactProblem(ABC):
     def shorten(self, x: FloatArray, step: FloatArray) -> float:
         """Factor that keeps the change of closing displacements and the compression of every element within reason."""
         factor = min(f.foam.shorten(x[f.unknowns], step[f.unknowns], self.longest_closing) for f in self.fingers)
-        return factor if self.friction is None else self.friction.damping.shortened(x, step, factor)
+        return factor if self.friction is None else self.friction.shortened(x, step, factor)
 
     # -- friction that acts back --------------------------------------------------------------------------------------
 

@@ -42,6 +42,9 @@ class Pose:
         return (x - self.origin) @ self.rotation
 
 
+IN_PLACE = Pose(np.eye(3), np.zeros(3))
+
+
 def about_z(angle: float) -> FloatArray:
     """Rotation ``(3, 3)`` about the axis z [rad]."""
     c, s = np.cos(angle), np.sin(angle)

@@ -20,7 +20,7 @@ import numpy as np
 
 from softjaw.fem.errors import MeshError
 from softjaw.fem.objects.facing_sheet import COARSE, FacingSheet, facing_sheet
-from softjaw.fem.objects.gap import Gap, IntArray, NoContactError, Pose, Surface
+from softjaw.fem.objects.gap import IN_PLACE, Gap, IntArray, NoContactError, Pose, Surface
 from softjaw.fem.objects.mesh_file import read_triangles
 from softjaw.fem.objects.mesh_holes import centroid
 from softjaw.fem.objects.smooth_triangles import CREASE_ANGLE, SmoothTriangles, smooth_triangles
@@ -29,7 +29,6 @@ from softjaw.fem.objects.triangle_tree import TriangleTree
 from softjaw.fem.objects.triangles import cleaned, decimated, pieces_of
 from softjaw.friction.patch import FloatArray
 
-__all__ = ["MeshError", "MeshObject", "MeshRegion"]
 MARGIN_CELLS = 3  # least number of cells sampled beyond the box
 MOST_SAMPLES = 4_000_000
 CYCLES = {"x": [1, 2, 0], "y": [2, 0, 1], "z": [0, 1, 2]}  # cyclic, so that no mesh is mirrored
@@ -52,7 +51,7 @@ class MeshObject:
     notes: tuple[str, ...] = ()
     crease_angle: float = CREASE_ANGLE
     lids: FloatArray = field(default_factory=lambda: np.empty((0, 3, 3)))
-    placed: Pose = field(default_factory=lambda: Pose(np.eye(3), np.zeros(3)))
+    placed: Pose = IN_PLACE
     closed: bool = True
 
     @classmethod

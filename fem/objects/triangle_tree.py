@@ -313,8 +313,7 @@ class TriangleTree:
         Infinite and -1 where there is none; nearer than ``lift`` [m] does not count.
         """
         middle = self.points[self.triangles[which]].sum(axis=1) / 3.0
-        distance, hit = _along(middle, -normals, lift, which, self.nodes)
-        return distance, hit
+        return _along(middle, -normals, lift, which, self.nodes)
 
     def signed(self, x: FloatArray) -> tuple[FloatArray, FloatArray, np.ndarray]:
         """Signed distance ``(n,)`` [m], its unit gradient ``(n, 3)``, and whether the border is closest ``(n,)``."""

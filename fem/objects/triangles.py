@@ -122,8 +122,7 @@ def _merged(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArr
         links = coo_array((np.ones(len(close)), close.T), shape=(len(points), len(points)))
         group = connected_components(links, directed=False)[1]
         first = np.unique(group, return_index=True)[1]
-        used, inverse = np.unique(first[group][triangles], return_inverse=True)
-        points, triangles = points[used], inverse.reshape(-1, 3).astype(np.int64)
+        points, triangles = _used(points, first[group][triangles])
     a, b, c = triangles.T
     proper = (a != b) & (b != c) & (c != a)
     if not proper.any():

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softjaw.fem.objects import shapes as objects
-from softjaw.fem.objects.gap import GapObject, Pose, cone_volumes, solid_centroid
+from softjaw.fem.objects.gap import IN_PLACE, GapObject, Pose, cone_volumes, solid_centroid
 from softjaw.fem.objects.outer_surface import OuterSurface, Section, of_revolution, of_sections
 from softjaw.fem.pad.halving import refined
 from softjaw.fem.pad.shape import PadShape
@@ -61,7 +61,7 @@ def surface_triangles(shape: Any) -> tuple[NDArray[np.float64], NDArray[np.int64
 
 def own_frame(shape: Any) -> Pose:
     """Where the object's frame lies in that of its mesh file [m]; every other shape is described in its own frame."""
-    return geometry().mesh_object(shape).placed if shape.shape == "mesh" else Pose(np.eye(3), np.zeros(3))
+    return geometry().mesh_object(shape).placed if shape.shape == "mesh" else IN_PLACE
 
 
 def centre_of_volume(obj: Any) -> NDArray[np.float64]:

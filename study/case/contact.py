@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 
-from softjaw.fem.objects.gap import Pose
+from softjaw.fem.objects.gap import IN_PLACE, Pose
 from softjaw.fem.pad.shape import PadShape
 from softjaw.friction.frame import Frame, contact_frame, contact_length, in_frame
 from softjaw.friction.patch import NEGLIGIBLE, ContactPatch, FloatArray, cross
@@ -61,12 +61,11 @@ class Contact:
         self,
         patch: ContactPatch,
         mu: float,
-        pose: Pose | None = None,
+        pose: Pose = IN_PLACE,
         x_hint: ArrayLike = X_OF_PAD,
         whole_face: bool = False,
     ) -> None:
-        self.patch, self.mu = patch, mu
-        self.pose = pose or Pose(np.eye(3), np.zeros(3))
+        self.patch, self.mu, self.pose = patch, mu, pose
         self.frame: Frame = contact_frame(patch, x_hint, whole_face)
         self.local: ContactPatch = in_frame(patch, self.frame)
         # what may fail is done here; what takes time waits until it is asked for
@@ -207,8 +206,7 @@ def on_faces(contact: Any, shape: PadShape) -> dict[str, FloatArray]:
     if pad.shape == shape:
         return {name: getattr(patch, name) for name in ("pressure", "area", "centroid", "normal")}
     edges = [[_edges(mesh, axis, pad.side_weights) for axis in (0, 1)] for mesh in (pad.shape, shape)]
-    shares = [_shares(*lines) for lines in zip(*edges, strict=True)]
-    return joined(patch, shares[0], shares[1])
+    return joined(patch, *(_shares(*lines) for lines in zip(*edges, strict=True)))
 
 
 def joined(patch: ContactPatch, along: FloatArray, across: FloatArray) -> dict[str, FloatArray]:

@@ -123,19 +123,17 @@ class CandidateSolver:
     """Solutions of one candidate.
 
     ``scene``: its levels of effects do not count: they are asked for. ``poses``: of the pads before they touch.
-    ``finest``: finest mesh of each force that ``accuracy.target`` may ask for; `FINEST` where it is empty. ``rounder``:
-    solver of the candidate where edges of a mesh are rounded twice as far.
+    ``rounder``: solver of the candidate where edges of a mesh are rounded twice as far. ``finest``: finest mesh of each
+    force that ``accuracy.target`` may ask for.
     """
 
-    def __init__(
-        self, scene: Scene, poses: Sequence[Pose], finest: Sequence[int] = (), rounder: CandidateSolver | None = None
-    ) -> None:
+    def __init__(self, scene: Scene, poses: Sequence[Pose], rounder: CandidateSolver | None = None) -> None:
         self.scene, self.poses, self.walled, self.rounder = scene, poses, has_wall(scene.object), rounder
         fingers = self.fingers
         if self.walled:
             refuse_along_axis(fingers)
         self.forces = tuple(scene.load.normal_force)  # the load path; forces are asked for by their number in it
-        self.finest = tuple(finest) or (FINEST,) * len(self.forces)
+        self.finest: tuple[int, ...] = (FINEST,) * len(self.forces)
         self._pressing: dict[tuple[int, Levels], OnRigid | OnWall] = {}
         self._paths: dict[tuple[int, Levels, int], Iterator[Any]] = {}
         self._states: dict[tuple[int, int, Levels, int], Any] = {}  # or failures, of every part

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from softjaw.fem.objects.gap import Pose
+from softjaw.fem.objects.gap import IN_PLACE, Pose
 from softjaw.study.case.poses import explicit_poses, moved, pose_of
 from softjaw.study.export.cases import MEANING, cases
 from softjaw.study.export.selection import GripperFrame, gripper_frame, holds
@@ -165,8 +165,7 @@ def grasp_arrays(ds: xr.Dataset, gripper: GripperFrame) -> Arrays:
 
     Errors of maps are relative, NaN where they are not known, as is everything of a grasp that was not solved.
     """
-    flags = judged(ds)
-    ds = ds.assign(flags=(ds.status.dims, flags, ds["flags"].attrs))
+    ds = ds.assign(flags=(ds.status.dims, judged(ds), ds["flags"].attrs))
     status = ds.status.values
     solved = [tuple(map(int, at)) for at in np.argwhere(status == DONE)]
     poses = _poses(ds)
@@ -205,12 +204,11 @@ def _offered(like: dict[str, Any], row: np.ndarray) -> dict[str, Any]:
     pose = pose_of(tuple(row[:9].astype(float)))
     fingers = [{name: np.full_like(value, np.nan, dtype=float) for name, value in f.items()} for f in like["fingers"]]
     case = {"place": {"normal_force": np.nan}, "state": STATES[int(row[9])], "flags": 0, "fingers": fingers}
-    _placed(case, explicit_poses(pose, Pose(np.eye(3), np.zeros(3))))
+    _placed(case, explicit_poses(pose, IN_PLACE))
     return case | {"maps": dict.fromkeys(like["maps"], np.nan)}
 
 
 def _poses(ds: xr.Dataset) -> list[tuple[Pose, Pose]]:
     """Poses of the scene's explicit candidates in the frame of the object's file, solved or not."""
     where = scene_of(ds).candidates
-    own = Pose(np.eye(3), np.zeros(3))
-    return [moved(explicit_poses(pose, own), where.shift, where.roll) for pose in where.poses or ()]
+    return [moved(explicit_poses(pose, IN_PLACE), where.shift, where.roll) for pose in where.poses or ()]

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from softjaw.fem.contact.extract import extract
-from softjaw.fem.contact.measured import MeasuredPress
+from softjaw.fem.contact.measured import press_measured
 from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.fem.objects.gap import NoContactError
 from softjaw.fem.objects.measured_face import cell_of, measured_face
@@ -40,25 +40,24 @@ def solve_deformed(file: str, unit: str | None, scene: Scene) -> ReadPatch:
         raise StudyError(USAGE, f"{file}: {error}; measure more of the face") from error
     wanted, *others = pads_of(scene, (False, False), coarser=False)
     try:
-        measured = MeasuredPress(wanted, others, dict(scene.petsc)).solve(face)
+        state, judged = press_measured(face, wanted, others, dict(scene.petsc))
     except NoContactError as error:
         remedy = "z points along the approach, so that pressed foam has z < 0: change its sign if it is the other way"
         raise StudyError(USAGE, f"{file}: {error}; {remedy}") from error
     except (ConvergenceError, CheckError) as error:
         raise StudyError(SOME_FAILED, f"{file}: the pad has no state with this face: {error}") from error
-    patch = extract(measured.state.pad, measured.state)
+    patch = extract(state.pad, state)
     loaded = patch.pressure > NEGLIGIBLE * patch.pressure.max(initial=0.0)
     kept = np.flatnonzero(loaded).tolist()
-    back = np.array([0.0, 0.0, measured.state.closing])  # to where the backing plate stands
+    back = np.array([0.0, 0.0, state.closing])  # to where the backing plate stands
     in_file = ContactPatch(
         patch.centroid[loaded] - back, patch.area[loaded], patch.normal[loaded], patch.pressure[loaded],
         None if patch.corners is None else patch.corners[loaded] - back,
     )  # fmt: skip
-    state = measured.state
     smooth = f"the points scatter by {1e3 * face.noise:.2g} mm round the smoothed face, whose error is"
     text = f"{smooth} {1e3 * face.doubt:.2g} mm; closed by {1e3 * state.closing:.3g} mm, {state.force:.3g} N"
     weak = "the face is pressed in by hardly more than its error: contact may be noise"
-    notes = (*notes, text, *[weak] * (not measured.judged), *state.notes)
+    notes = (*notes, text, *[weak] * (not judged), *state.notes)
     return ReadPatch(file, in_file, len(loaded), lambda i: f"face {kept[i]} of the pad", notes)
 
 

@@ -287,12 +287,11 @@ class Session:
             self._progress.update(self._files.codes())
 
 
-def finish_alone(work: Work, path: Path, plan: Plan, session: int, name: str) -> int:
-    """`finish` by a process that has the file for itself; the exit code."""
+def finish_alone(work: Work, path: Path, plan: Plan, session: int, name: str) -> None:
+    """`finish` by a process that has the file for itself."""
     with contextlib.closing(ResultWriter(path, plan.layout, MPI.COMM_SELF, plan.wanted)) as writer:
         writer.session = session
         finish(work, writer, name)
-        return code_of(writer.codes())
 
 
 def finish(work: Work, writer: ResultWriter, name: str) -> None:

@@ -319,8 +319,7 @@ def plain_tables(tables: Mapping[str, Any]) -> dict[str, Any]:
     """
     if not isinstance(tables, Mapping) or not all(isinstance(key, str) for key in tables):
         raise TypeError(f"tables of a scene: found {shown(tables)}, expected a mapping of sections, {{'object': ...}}")
-    plain: dict[str, Any] = json.loads(json.dumps(dict(tables), default=lambda v: getattr(v, "tolist", v.__str__)()))
-    return plain
+    return json.loads(json.dumps(dict(tables), default=lambda v: getattr(v, "tolist", v.__str__)()))
 
 
 @lru_cache(maxsize=16)

@@ -289,8 +289,7 @@ class Accuracy(SceneSection):
     def wall_sizes(self) -> tuple[float, float, float]:
         """Sizes of a thin wall's elements round the object and along it under the pads, and elsewhere at most [m]."""
         around = self.wall_element_mm
-        sizes: tuple[float, float, float] = in_si("sizes_mm", (around, 5 * around / 3, 4 * around))
-        return sizes
+        return in_si("sizes_mm", (around, 5 * around / 3, 4 * around))
 
     @property
     def refined_within(self) -> float:

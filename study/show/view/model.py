@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from softjaw.fem.objects.gap import Pose
+from softjaw.fem.objects.gap import IN_PLACE, Pose
 from softjaw.study.case.build import own_frame
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.pictures import span
@@ -91,7 +91,7 @@ class View:
         try:
             return own_frame(self.scene.object)
         except (AttributeError, ValueError, OSError):  # the object is not drawn either
-            return Pose(np.eye(3), np.zeros(3))
+            return IN_PLACE
 
     @cached_property
     def surface(self) -> Surface:

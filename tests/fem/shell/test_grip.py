@@ -89,7 +89,7 @@ def test_so_is_that_of_a_grasp_with_friction(allowed, level, control):
     x = stirred(problem, rng)
     problem.accept(x)
     for size in (3e-6, 1e-6):
-        x = x + size * rng.normal(size=problem.size) * np.isin(np.arange(problem.size), problem.friction.damping.moved)
+        x = x + size * rng.normal(size=problem.size) * np.isin(np.arange(problem.size), problem.friction.moved)
         if size == 3e-6:
             problem.accept(x)
     problem.control = control
