@@ -181,8 +181,8 @@ def rank_values(ds: xr.Dataset, name: str, k: int) -> np.ndarray:
 def ranked(ds: xr.Dataset, k: int, by: str | None = None) -> IntArray:
     """The candidates solved at a force level, flat, the best first; see `score_of` and `ranking`.
 
-    Of grasps that their errors cannot tell from the best of them the simpler ones come first: antipodal, without a
-    flag, at a smaller opening.
+    Of grasps that their errors cannot tell from the best of them the simpler ones come first, antipodal and without a
+    flag, and then those that surely reach more.
     """
     done = np.flatnonzero(ds["status"].values[..., k].ravel() == DONE)
     name = score_of(ds, by)
@@ -196,9 +196,8 @@ def ranked(ds: xr.Dataset, k: int, by: str | None = None) -> IntArray:
             alike = errors.apart(first, i) is False and score[i] > score[first] - errors.half_width[first]
         head = head if alike and lost[0] == lost[1] else n
         group[n] = head
-    width = values_of(ds, "opening")[..., k].ravel() if "opening" in ds else np.zeros(len(score))
-    marks, wide = flags[order], _places(-width)[order]
-    return order[np.lexsort((wide, marks != 0, marks & Flag.NOT_ANTIPODAL, group))]
+    marks, surely = flags[order], _places(score if errors is None else score - errors.half_width)[order]
+    return order[np.lexsort((surely, marks != 0, marks & Flag.NOT_ANTIPODAL, group))]
 
 
 # --- distinct places, and the force that is shown ---------------------------------------------------------------------

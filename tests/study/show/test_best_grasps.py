@@ -141,9 +141,9 @@ def test_grasps_are_ranked_by_payload_or_what_is_named_and_of_those_alike_the_si
     ds["payload_error"] = (ds.status.dims, np.full(ds.status.shape, 0.02), {"units": ""})
     assert stations(best(ds)) == [2.0, 1.0, 0.0, 3.0]
     ds["flags"].values[:] = 0
-    assert stations(best(ds)) == [2.0, 1.0, 0.0, 3.0]  # by their opening, which is the number of the payload here
-    ds["opening"] = (ds.status.dims, np.repeat([0.01, 0.02, 0.03, 0.001], 2).reshape(ds.status.shape), {"units": "m"})
     assert stations(best(ds)) == [0.0, 1.0, 2.0, 3.0]
+    ds["payload_error"].values[0] = 0.04
+    assert stations(best(ds)) == [1.0, 2.0, 0.0, 3.0]  # 0.97, 0.965 and 0.96 are sure
     ds = study([[1.0], [0.5]], flags=[float(Flag.NOT_ANTIPODAL), 0.0])
     ds["payload_error"] = (ds.status.dims, np.repeat([0.02, 1.2], 2).reshape(ds.status.shape), {"units": ""})
     assert stations(best(ds)) == [0.0, 1.0]
