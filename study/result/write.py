@@ -60,8 +60,8 @@ class ResultWriter:
 
     def attempts(self) -> np.ndarray:
         """How often every row was begun without an end, ``(rows,)``."""
-        # a row with the values of a coarser mesh was begun once for these
-        return np.maximum(self._attempts[()].ravel().astype(int) - (self._code[()].ravel() == DONE), 0)
+        # a row that was tried on a coarser mesh was begun once for that
+        return np.maximum(self._attempts[()].ravel().astype(int) - np.isin(self._code[()], (DONE, FAILED)).ravel(), 0)
 
     def count_attempt(self, row: int, change: int = 1) -> None:
         """Note that a case is about to be solved (or, with -1, that it was given up in an orderly way)."""
@@ -89,7 +89,8 @@ class ResultWriter:
         if self._wanted is not None and self._code[self._index(row)] == DONE:
             self.write(row, self._kept(row, message))
         else:
-            self.write(row, blank(self.layout, message, seconds), state)
+            mesh = math.nan if self._wanted is None else self._wanted[row]
+            self.write(row, blank(self.layout, message, seconds, mesh), state)
 
     def _kept(self, row: int, message: str) -> list[np.ndarray]:
         """The stored values of a row, tried on the mesh that is wanted, with one more message."""
@@ -207,10 +208,10 @@ class _Column:
         self.dataset.write(self._room, self._space, values, self._kind)
 
 
-def blank(layout: Layout, message: str = "", seconds: float = math.nan) -> list[np.ndarray]:
-    """A row without values, as a case without a result leaves it; ``seconds`` is what was spent on it."""
-    spent = {"work/seconds_total": seconds}
-    row = [np.full(c.share, spent.get(c.key, c.fill), c.dtype) for c in layout.columns]
+def blank(layout: Layout, message: str = "", seconds: float = math.nan, mesh: float = math.nan) -> list[np.ndarray]:
+    """A row without values, as a case without a result leaves it after so many ``seconds`` on a ``mesh``."""
+    known = {"work/seconds_total": seconds, MESH: mesh}
+    row = [np.full(c.share, known.get(c.key, c.fill), c.dtype) for c in layout.columns]
     row[-1] = np.array(text_bytes(message, MESSAGE_BYTES), layout.columns[-1].dtype)
     return row
 
@@ -265,8 +266,8 @@ def _flattened(layout: Layout, result: CaseResult) -> dict[str, Any]:
 
 
 def codes_on(wanted: np.ndarray, codes: np.ndarray, meshes: np.ndarray) -> np.ndarray:
-    """States ``(rows,)`` of which a case that is complete on a coarser mesh than ``wanted (rows,)`` is missing."""
-    return np.where((codes.ravel() == DONE) & (meshes.ravel() < wanted), MISSING, codes.ravel())
+    """States ``(rows,)`` of which a case that was tried on a coarser mesh than ``wanted (rows,)`` alone is missing."""
+    return np.where(np.isin(codes, (DONE, FAILED)).ravel() & (meshes.ravel() < wanted), MISSING, codes.ravel())
 
 
 def verify(path: Path, layout: Layout, header: Header) -> bool:

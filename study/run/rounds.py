@@ -1,10 +1,11 @@
 """What the next round of a run solves, by stored numbers and the object's triangles alone.
 
 Of sampled grasps finer meshes for some cases. All candidates are solved on the coarse mesh first. The scene's mesh goes
-to the places that a list of the best grasps has at the force that is shown, then to those that may still be better
-within their errors, also if the coarse mesh says that they slip: where few elements bear beside an edge it may tilt the
-contact normal. Those that may be the best, and whose payload is not known to ``accuracy.target``, are solved on a finer
-mesh, and on one more where that may do. Each case is named at most three times, so the rounds end.
+to the places that a list of the best grasps has at the force that is shown, and to grasps that failed, then to those
+that may still be better within their errors, also if the coarse mesh says that they slip: where few elements bear
+beside an edge it may tilt the contact normal. Those that may be the best, and whose payload is not known to
+``accuracy.target``, are solved on a finer mesh, and on one more where that may do. Each case is named at most three
+times, so the rounds end.
 
 Of poses that are refined neighbours of the best grasp at each force: shifted along the pads' sides, turned about the
 approach or tilted, by a share of a first step. A round solves those of them that a bed of springs ranks highest; the
@@ -31,7 +32,7 @@ from softjaw.study.case.result import UNDECIDED, surely_below
 from softjaw.study.case.sampler import lids_of
 from softjaw.study.case.task import task_of
 from softjaw.study.flags import LOST
-from softjaw.study.quantities import LISTED, NO_GRASP
+from softjaw.study.quantities import FAILED, LISTED, NO_GRASP
 from softjaw.study.ranking import at_level, distinct, judged, largest, rank_values, ranked, sure
 from softjaw.study.result.read import dataset
 from softjaw.study.run.refine import Place, gained, next_stations, scores_of_poses, with_places
@@ -142,7 +143,7 @@ def next_cases(result: Any, scene: Scene) -> tuple[Case, ...]:
         return ()
     ds, k, _ = at_level(dataset(result))
     order, known = [int(i) for i in ranked(ds, k, "payload")], sure(ds, "payload", k)
-    if known is None or not order:
+    if known is None:
         return ()
     named, shape = result.layout.finer, ds.status.shape
     times = np.array([named[case_of(i, k, shape)] for i in range(len(known.value))])
@@ -151,7 +152,9 @@ def next_cases(result: Any, scene: Scene) -> tuple[Case, ...]:
     order = [i for i in order if not flags[i] & LOST and np.isfinite(known.value[i])]
     places = distinct(ds, order, rank_values(ds, "payload", k), k)
     error = np.nan_to_num(known.error, nan=np.inf)
-    chosen = [place.best for place in places[:LISTED] if not times[place.best]]
+    # thin parts may have no state on a mesh this coarse; what a bed of springs ranks first comes first
+    failed = [] if named else np.flatnonzero(ds.status.values[..., k].ravel() == FAILED)[:LISTED].tolist()
+    chosen = failed + [place.best for place in places[:LISTED] if not times[place.best]]
     chosen = chosen or [i for i in rivals(places, known.value, error, lost) if not times[i]][:LISTED]
     if not chosen:
         relative = error / np.maximum(known.value, np.finfo(float).tiny)

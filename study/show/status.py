@@ -19,7 +19,7 @@ from softjaw.study.result.lock import holder
 from softjaw.study.result.store import open_result, place_text
 from softjaw.study.run.progress import duration
 from softjaw.study.run.refine import about
-from softjaw.study.scene.sections import COARSE, FINE, FINEST
+from softjaw.study.scene.sections import COARSE, FINEST
 from softjaw.study.scene.text import scene_table
 from softjaw.study.show import objects
 from softjaw.study.table import (
@@ -103,9 +103,8 @@ def waits(result: Any) -> int:
     mesh = meshes(result)
     if mesh is None or not result.layout.finer:
         return 0
-    stored = mesh.reshape(-1, np.prod(mesh.shape[-3:-1]), mesh.shape[-1])
-    done = (result.status == DONE).reshape(stored.shape)
-    return sum(bool(done[case] and stored[case] < (FINE, FINEST)[n > 1]) for case, n in result.layout.finer.items())
+    tried = mesh.reshape(-1, np.prod(mesh.shape[-3:-1]), mesh.shape[-1])
+    return sum(bool(tried[case] < min(COARSE + n, FINEST)) for case, n in result.layout.finer.items())
 
 
 def unfinished(result: Any) -> bool:
