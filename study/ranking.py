@@ -20,7 +20,7 @@ from softjaw.study.flags import BORNE, LOST, Flag, flags_in
 from softjaw.study.grippers import Hand, gripper_file
 from softjaw.study.messages import StudyError
 from softjaw.study.quantities import DONE, LEAST_FORCE, LISTED
-from softjaw.study.result.read import at_force, half_width, scene_of, stated_error, values_of
+from softjaw.study.result.read import BETWEEN, at_force, half_width, scene_of, stated_error, values_of
 from softjaw.study.scene.text import scene_table
 
 if TYPE_CHECKING:
@@ -157,13 +157,15 @@ def sure(ds: xr.Dataset, name: str, k: int) -> Sure | None:
 def score_of(ds: xr.Dataset, by: str | None = None) -> str:
     """What grasps are ranked by: what is named, else payload; quality or e_n where a file has no value of it.
 
-    Raises `ValueError` for the least force where the scene names no mass.
+    Raises `ValueError` for what no grasp has a value of, the least force where the scene names no mass among it.
     """
     if by == LEAST_FORCE:
         if "force_low" not in ds:
             raise ValueError("--by force: the scene names no object.mass_g to hold; expected it, or another order")
         return by
     known = [n for n in (by or "payload", "quality", "e_n") if n in ds and np.isfinite(ds[n].values).any()]
+    if by and known and by not in known:
+        raise ValueError(f"--by {by}: no grasp has a value of it; name another order")
     return known[0] if known else "e_n"
 
 
@@ -259,7 +261,7 @@ def at_level(ds: Any, force: float | None = None) -> tuple[Any, int, str]:
     if near.size:
         return ds, int(near[0]), ""
     k = int(np.searchsorted(forces, force))
-    return at_force(ds, force), 0, f"by straight lines from {forces[k - 1]:g} to {forces[k]:g} N"
+    return at_force(ds, force), 0, f"{BETWEEN} from {forces[k - 1]:g} to {forces[k]:g} N"
 
 
 def shown_level(ds: Any, flags: np.ndarray) -> tuple[int, str]:

@@ -30,7 +30,7 @@ from softjaw.study.export.rigid_body import scene_of
 from softjaw.study.flags import LOST, flag_words, flags_in
 from softjaw.study.grippers import Hand
 from softjaw.study.messages import USAGE, StudyError
-from softjaw.study.quantities import FORCE_RANGE, LEAST_FORCE, MAIN
+from softjaw.study.quantities import BY_KEY, FORCE_RANGE, LEAST_FORCE, MAIN
 from softjaw.study.ranking import at_level, index_of, judged, ranked, score_of
 from softjaw.study.result.read import axes_of, maps_in
 from softjaw.study.result.store import place_text
@@ -115,10 +115,11 @@ class RankedGrasp:
         """Place, force, and what the format has no field for, in a few lines."""
         known = []
         for name in (n for n in (*MAIN, *FORCE_RANGE) if np.isfinite(self.maps.get(n, np.nan))):
-            error = self.maps.get(f"{name}_error", np.nan)
-            doubt = f" +- {100 * error:.2g} %" if np.isfinite(error) else ""
-            text = f"{name} {shown_text(self.maps[name], self.units[name])}{doubt}"
-            known.append(text.replace(" ", "\xa0"))  # a value stays in one line with its name and unit
+            q, value, error = BY_KEY.get(f"maps/{name}"), self.maps[name], self.maps.get(f"{name}_error", np.nan)
+            error, unit = q.error_in_unit(error, value) if q else error, self.units[name]
+            doubt = f" +- {shown_text(error, unit, 2)}" if np.isfinite(error) else ""
+            # a value stays in one line with its name and unit
+            known.append(f"{name} {shown_text(value, unit)}{doubt}".replace(" ", "\xa0"))
         words = flag_words(self.case["flags"], self.maps.get("misalignment", np.nan)) or "none"
         lines = [line.replace("\xa0", " ") for line in textwrap.wrap(", ".join(known), COMMENT)]
         return "\n".join([f"{self.place} per finger", *lines, f"warnings: {words}"])

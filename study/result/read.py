@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 XYZ = ("x", "y", "z")
 FIELDS = ("wall/place",)  # too large to be read with the rest
 KINDS = {"pieces": 7, "holes": 7, "rims": 1}  # what a kind of contact is told by, and the largest number that counts
+BETWEEN = "by straight lines"  # begins what is said of a force between two that were solved
 UNCERTAIN_MAPS = tuple(q.name for q in TABLE if q.group == "maps" and q.error and q.rank)
 
 

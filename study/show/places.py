@@ -58,8 +58,6 @@ def spot(ds: xr.Dataset, index: Index) -> tuple[str, str]:
     middle, closing = origin[index].mean(axis=0), turn[index][0, :, 2]
     given = scene.task.centre_of_mass
     offset = middle - (body["object_centroid"] if given is None else np.array(given))
-    half = 0.5 * abs(np.diff(origin[index], axis=0)[0] @ closing)
-    offset -= np.clip(offset @ closing, -half, half) * closing  # between the fingers both bear along it
     if ds.attrs["poses"]:
         part = _sides(body["object_bounds"], middle, closing)
     else:

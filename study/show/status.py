@@ -208,7 +208,7 @@ def reasons(result: Any, width: int = PAPER, notes: bool = True) -> list[str]:
     found = [reason for reason in reasons_in(result) if notes or reason.state != DONE]
     lines = [reason.text(result.axes, result.labels) for reason in found[:MOST_NOTES]]
     rest = found[MOST_NOTES:]
-    cases = sum(len(reason.cases) for reason in rest)
+    cases = len({case for reason in rest for case in reason.cases})
     lines += [f"and {len(rest)} more kinds on {cases} cases: 'softjaw status --json' lists all"] * bool(rest)
     return [wrapped(line, width, "  ", "    ") for line in lines]
 
