@@ -22,6 +22,7 @@ from softjaw.study.table import PAPER, Column, Row, Table, as_text, with_unit, w
 from softjaw.study.units import shown, shown_unit
 
 Pair = tuple[xr.Dataset, xr.Dataset]
+SAME_PLACE = 1e-3  # distance of the middles of the pads of one grasp, which edges and meshes move by less [m]
 
 
 def compare(one: xr.Dataset, other: xr.Dataset, quantity: str = "e_n", model: str = "ccm") -> Table:
@@ -116,6 +117,8 @@ def _matched(one: xr.Dataset, other: xr.Dataset) -> tuple[dict[str, Row], Pair]:
         same = np.abs(a.values[:, None] - b.values) <= 1e-9 * scale
         if a.options and b.options:  # the numbers are those of texts
             same = np.array(a.options)[:, None] == np.array(b.options)
+        if a.name == "station" and not a.units:  # poses, of which samplers may have found others
+            same &= ~(np.linalg.norm(_middles(one)[:, None] - _middles(other), axis=-1) > SAME_PLACE)
         only = a.values[~same.any(axis=1)], b.values[~same.any(axis=0)]
         if not same.any():
             raise StudyError(USAGE, f"{one.file} and {other.file} have no common {a.name}: nothing to compare")
@@ -123,6 +126,14 @@ def _matched(one: xr.Dataset, other: xr.Dataset) -> tuple[dict[str, Row], Pair]:
         pair = pair[0].isel({a.name: at[0]}), pair[1].isel({a.name: at[1]})
         axes[a.name] = {"units": a.units, "common": a.values[at[0]], "only_a": only[0], "only_b": only[1]}
     return axes, pair
+
+
+def _middles(ds: xr.Dataset) -> FloatArray:
+    """Middle of both pads of each pose ``(n, 3)`` [m]; NaN where it was not solved."""
+    if "finger_pose_origin" not in ds:
+        return np.full((ds.sizes["station"], 3), np.nan)
+    origin = ds.finger_pose_origin.mean("finger")
+    return np.asarray(origin.max([d for d in origin.dims[:-1] if d != "station"]).values)
 
 
 def _left_out(name: str, axis: dict[str, Any]) -> list[str]:

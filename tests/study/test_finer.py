@@ -5,13 +5,14 @@ import pytest
 import trimesh
 
 from softjaw.study.case.result import CaseResult
-from softjaw.study.quantities import DONE, LISTED, MISSING
+from softjaw.study.quantities import DONE, FAILED, LISTED, MISSING
 from softjaw.study.ranking import Place
 from softjaw.study.result.skeleton import create
 from softjaw.study.result.store import open_result, torn_rows
 from softjaw.study.result.write import ResultWriter, record
 from softjaw.study.run.plan import make_plan
 from softjaw.study.run.rounds import next_cases, rivals
+from softjaw.study.show.status import unfinished
 from tests.study.formula_results import written
 from tests.study.launching import contents, differing, launch
 from tests.study.scenes import BALL, mesh_of, pose_of, scene_of, text_of
@@ -79,8 +80,11 @@ def test_a_case_that_rounds_name_three_times_counts_as_begun_once(tmp_path):
     first, path, row = make_plan(made), tmp_path / "a.hdf", (0, 3, 1)
     create(path, first.layout, first.header)
     for mesh in range(4):
-        plan = make_plan(made, rounds=((row,),) * mesh)
+        plan = make_plan(made, rounds=((row, (0, 2, 1)),) * mesh)
         writer = ResultWriter(path, first.layout, None, plan.wanted)
+        assert writer.codes()[5] == MISSING
+        writer.fail(5, "no state")
+        assert writer.codes()[5] == FAILED
         assert writer.attempts()[7] == 0
         writer.count_attempt(7)
         values = CaseResult({"maps/payload": [1.0] * 3, "maps/flags": 0.0, "work/mesh": mesh})
@@ -98,12 +102,16 @@ def test_with_a_mass_finer_meshes_go_to_the_force_below_too(tmp_path, changes, l
     *_, last = range(plan.layout.shape[-1])
 
     def case(index):
+        if index == (3, 0, last):
+            return "no state"
         held = 1.0 if index[-1] == last else 0.01  # kg
         values = {"maps/payload": [held] * 3, "maps/payload_error": 0.02, "maps/flags": 0.0, "work/mesh": 0}
         return CaseResult(values | ({"maps/safety_factor": [10 * held] * 3} if changes else {}))
 
     with open_result(written(tmp_path / "a.hdf", plan.layout, case, plan.header)) as result:
-        assert {level for *_, level in next_cases(result, made)} == levels
+        named = next_cases(result, made)
+    assert {level for *_, level in named} == levels
+    assert (0, 3, last) in named  # the scene's mesh may have a state where the coarse one has none
 
 
 @pytest.mark.long
@@ -121,6 +129,7 @@ def test_the_best_of_a_sampled_study_are_solved_well_with_the_same_bits_on_any_r
         mesh, payload = (result.read(name).reshape(-1, 2) for name in ("work/mesh", "payload/ccm"))
         error = result.read("payload/error").reshape(-1, 2)
         finer = result.layout.finer
+        assert not unfinished(result)
     assert (mesh[:, 0] == 0).all()  # the force that is shown is the largest
     assert (mesh[:, 1] > 0).sum() == len(finer) >= LISTED
     assert np.isfinite(error).all()

@@ -119,10 +119,16 @@ def test_maps_that_share_nothing_are_refused(pair, tmp_path, axes, name):
 
 
 def test_poses_are_shown_by_label_sweeps_by_word_and_commands_give_the_usual_codes(tmp_path, pair):
-    poses = make(tmp_path / "a.hdf", axes=grid_axes([0, 1], [0], poses=True), labels=("lid", "neck"))
+    def posed(name, place):
+        where = {"axes": grid_axes([0, 1], [0], poses=True), "labels": ("lid", "neck")}
+        at = np.array([0.0, place]).reshape(2, 1, 1, 1, 1)
+        return make(tmp_path / name, **where, fingers__pose_origin=lambda origin: 0.0 * origin + at)
+
+    poses, others = posed("a.hdf", 0.1), posed("b.hdf", 0.2)
     found = compared(poses, poses)
     assert [row["label"] for row in found.rows[::4]] == ["lid", "neck"]
     assert " neck " in compare_text(found)
+    assert {row["label"] for row in compared(poses, others).rows} == {"lid"}  # the other is elsewhere
 
     def swept(words):
         axis = Axis("material", np.arange(len(words), dtype=float), "", "gripper.material", tuple(words))
