@@ -52,7 +52,7 @@ def solve_unit(
             except GeneratorExit:  # nobody asks for more
                 return keep(unit, scene, solver)
             except BaseException:  # interrupted amid a solve, it is not kept
-                solver.put_away()
+                solver.solver.put_away()
                 raise
             keep(unit, scene, solver)
 
@@ -90,10 +90,6 @@ class UnitSolver:
                 yield k, _result(choice, k, outcome, self.unit, start, before)
                 start, before = time.perf_counter(), self.solver.seconds
 
-    def put_away(self) -> None:
-        """Give the memory of meshes and factors back; what was solved stays."""
-        self.solver.put_away()
-
 
 # of units, by scene and number; the last one used comes last
 _SOLVERS: dict[tuple[Scene, int], UnitSolver] = {}
@@ -110,7 +106,7 @@ def keep(unit: Any, scene: Scene, solver: UnitSolver, ready: int = 0) -> None:
     """Keep what a solver has solved; the last few, ``ready``, keep their meshes and factors, too."""
     _SOLVERS[scene, unit.index] = solver
     for older in list(_SOLVERS.values())[: len(_SOLVERS) - ready]:
-        older.put_away()
+        older.solver.put_away()
     if len(_SOLVERS) > MOST_SOLVERS:
         del _SOLVERS[next(iter(_SOLVERS))]
 
@@ -136,7 +132,7 @@ def _result(choice: EffectChoice, k: int, solved: Solved, unit: Any, begun: floa
     if finest == COARSE:
         if scene.effects.friction_pressure_coupling == "auto":
             effects[COUPLING] = effects[COUPLING]._replace(reason=SCREENED)
-        values |= coarse_errors(contacts, values, fine.views, settings)
+        values |= coarse_errors(contacts, values, fine.views, settings, rounds_edges(scene))
         values["maps/flags"] &= ~Flag.COARSE  # its errors say so
     values |= _work(choice.solver, solved, start, begun, before)
     if scene.accuracy.target is not None:

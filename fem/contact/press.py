@@ -84,9 +84,7 @@ class Press(LoadPath[RigidProblem]):
         if self.problem.complementarity:
             return False
         residual = self.problem.residual(x)[: self.pad.closing_dof + 1]
-        if not np.isfinite(residual).all():
-            return False
-        if not (force := self.problem.normal_force(x)) > 0.0:
+        if not np.isfinite(residual).all() or not (force := self.problem.normal_force(x)) > 0.0:
             return False
         try:
             imbalance = float(np.abs(residual).max()) / self.pad.share

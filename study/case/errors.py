@@ -30,6 +30,7 @@ WIDER = dict.fromkeys((q.name for q in TABLE if q.error == "absolute"), 10.0) | 
     "f_x_max": 0.3, "f_y_max": 0.3, "opening_loaded": 0.1, "quality": 1.3, "contact_area": 4.5, "p_max": 19.0,
     "wall_stress": 4.5, "wall_strain": 4.5,
 }  # fmt: skip
+EDGES_ROUNDED = 1.6  # times the error of a payload on the coarse mesh alone, where the object's edges are rounded
 OF_PAIRS = {"p_max": 3.0}  # of what pairs differ by: peaks that an effect makes at an edge grow as elements shrink
 PAYLOADS = ("payload", "safety_factor")  # what arms and couples leave of the friction: little of it moves all of them
 
@@ -75,11 +76,12 @@ def edge_floor(contacts: Sequence[Contact]) -> float:
 
 def coarse_errors(
     contacts: Sequence[Contact], values: Mapping[str, Any], views: Sequence[Sequence[Contact]],
-    settings: EvaluationSettings,
+    settings: EvaluationSettings, rounded: bool,
 ) -> dict[str, float]:  # fmt: skip
     """Errors of quantities of a case that is solved on the coarse mesh alone, from the two ``views`` of its contacts.
 
-    All count in doubt: the distance to the farther view, and the floor. ``values`` are the case's own.
+    All count in doubt: the distance to the farther view, and the floor. ``values`` are the case's own; ``rounded``:
+    whether it is a mesh's, whose edges are rounded over a part of these large elements.
     """
     solved = _on_mesh(values, contacts)
     viewed = [_sums(view) | grasp_values(tuple(view), settings) for view in views]
@@ -88,7 +90,8 @@ def coarse_errors(
         apart = max(distance(solved[q.key], view[q.key], q.error) for view in viewed)
         # friction that is left out here may move any of them as much
         share = floor * max(WIDER.get(q.name, 1.3 if q.name in PAYLOADS else 1.0), 1.0)
-        errors[q.of_error.key] = DOUBTED * (apart + share * _size(q, solved[q.key]))
+        doubt = DOUBTED * (EDGES_ROUNDED if rounded and q.name in PAYLOADS else 1.0)
+        errors[q.of_error.key] = doubt * (apart + share * _size(q, solved[q.key]))
     return errors
 
 

@@ -36,8 +36,8 @@ class GraspPose(SceneSection):
 
     def rules(self) -> Errors:
         """Directions that do not fix a frame, points far from any object."""
-        cosine = sum(a * b for a, b in zip(_unit(self.approach), _unit(self.long_side), strict=True))
-        if abs(cosine) > 0.996:  # parallel, to some 5 degrees
+        along = sum(a * b for a, b in zip(self.approach, self.long_side, strict=True))
+        if abs(along) > 0.996 * math.hypot(*self.approach) * math.hypot(*self.long_side):  # parallel, to some 5 degrees
             yield wrong(self.long_side, "a direction across the approach, in the pad's face", "long_side")
         if max(map(abs, self.point_mm)) > LARGEST_MM:
             yield wrong(self.point_mm, f"a point within {LARGEST_MM:g} mm of the origin, in mm", "point_mm")
@@ -156,7 +156,3 @@ class Candidates(SceneSection):
 def listed(places: Sequence[float]) -> str:
     """The first few of some places."""
     return ", ".join(f"{s:g}" for s in places[:4]) + (", ..." if len(places) > 4 else "")
-
-
-def _unit(vector: Sequence[float]) -> tuple[float, ...]:
-    return tuple(v / math.hypot(*vector) for v in vector)

@@ -195,14 +195,13 @@ def _notes(ds: xr.Dataset, accuracy: Sequence[str], marks: np.ndarray) -> list[s
     """
     states = ds.status.values[..., ds.attrs["level"]]
     apart = np.count_nonzero(states == MISSING) * ds.attrs["why"].startswith(BETWEEN)
-    changed = f"{apart} whose contact is of another kind at the two forces"
     count = {flag: int(np.count_nonzero(marks & flag)) for flag in Flag if flag != Flag.OUT_OF_REACH}
     raised = sorted(filter(count.get, count), key=lambda flag: (-count[flag], flag))
     words = {flag: f"{flag.word} ({count[flag]} of {len(marks)})" for flag in raised}
     faults = [flag for flag in raised if not flag & FINER]
     parts = {"accuracy": [*filter(None, accuracy), *(words[flag] for flag in raised if flag & FINER)],
              "look at": [f"{words[f]}{f': {f.sentence}' * (len(faults) == 1)}" for f in faults],
-             "left out": [*no_grasps(states), *[changed] * (apart > 0)]}  # fmt: skip
+             "left out": [*no_grasps(states), *[f"{apart} whose contact changes between"] * (apart > 0)]}  # fmt: skip
     if gone := [short_name(ds, c) for c, approach in ds.attrs["reach"].items() if approach == ()]:
         hand = Path(task_keys(ds, "gripper")["preset"]).stem
         more = f" and {len(gone) - MOST_PLACES} more" * (len(gone) > MOST_PLACES)

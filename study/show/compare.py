@@ -132,8 +132,7 @@ def _middles(ds: xr.Dataset) -> FloatArray:
     """Middle of both pads of each pose ``(n, 3)`` [m]; NaN where it was not solved."""
     if "finger_pose_origin" not in ds:
         return np.full((ds.sizes["station"], 3), np.nan)
-    origin = ds.finger_pose_origin.mean("finger")
-    return np.asarray(origin.max([d for d in origin.dims[:-1] if d != "station"]).values)
+    return np.asarray(ds.finger_pose_origin.mean("finger").max([*ds.status.dims[:-3], *ds.status.dims[-2:]]).values)
 
 
 def _left_out(name: str, axis: dict[str, Any]) -> list[str]:

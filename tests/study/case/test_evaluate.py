@@ -107,7 +107,7 @@ def test_extents_scale_arms_contacts_that_lean_are_flagged_and_errors_are_differ
     found = [floor[f"maps/{name}_error"] for name in ("e_n", "tau_z_max", "p_max")]
     assert found == pytest.approx([0.01, 0.01, 0.01 * weights.WIDER["p_max"]])
     # of a coarse mesh alone all is in doubt, that of f_x no less: friction that is left out would move it
-    alone = coarse_errors(fine, values, [fine, coarse], SETTINGS)
+    alone = coarse_errors(fine, values, [fine, coarse], SETTINGS, rounded=False)
     assert alone["maps/f_x_max_error"] == pytest.approx(weights.DOUBTED * edge_floor(fine), rel=1e-6)
     # more elements that bear agree by luck to less
     few, many = (int(np.count_nonzero(side[0].loaded)) for side in (coarse, fine))
@@ -117,9 +117,12 @@ def test_extents_scale_arms_contacts_that_lean_are_flagged_and_errors_are_differ
     error = mesh_errors(fine, coarse, {**values, "maps/payload": [held]}, {}, task)["maps/payload_error"]
     apart = abs(less / held - 1)
     assert error == pytest.approx(weights.OF_FARTHEST * apart * (1 + apart), rel=1e-9)
+    held = {**values, "maps/payload": [held]}
+    sharp, edged = (coarse_errors(fine, held, [fine, coarse], task, r)["maps/payload_error"] for r in (False, True))
+    assert edged == pytest.approx(weights.EDGES_ROUNDED * sharp, rel=1e-12)
     # a coarse mesh on which friction does not bear the squeeze leaves all of the payload in doubt
     slips = pair(math.radians(60.0), strips=17)
-    errors = mesh_errors(fine, slips, {**values, "maps/payload": [held]}, {}, task)
+    errors = mesh_errors(fine, slips, held, {}, task)
     assert errors["maps/payload_error"] == 1.0
 
 
