@@ -121,8 +121,7 @@ def _merged(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArr
     if len(close):
         links = coo_array((np.ones(len(close)), close.T), shape=(len(points), len(points)))
         group = connected_components(links, directed=False)[1]
-        first = np.unique(group, return_index=True)[1]
-        points, triangles = _used(points, first[group][triangles])
+        points, triangles = _used(points, np.unique(group, return_index=True)[1][group][triangles])
     a, b, c = triangles.T
     proper = (a != b) & (b != c) & (c != a)
     if not proper.any():

@@ -28,8 +28,6 @@ from softjaw.study.quantities import (
     quantities,
 )
 from softjaw.study.quantities import DONE as DONE
-from softjaw.study.quantities import FAILED as FAILED
-from softjaw.study.quantities import MISSING as MISSING
 from softjaw.study.result.datasets import CODE, Dataset, of_cases, others
 from softjaw.study.result.datasets import ROOT as ROOT
 

@@ -19,20 +19,10 @@ from typing import Any
 import numpy as np
 
 from softjaw.study.messages import OTHER_FILE, StudyError, printable
-from softjaw.study.quantities import STATES
+from softjaw.study.quantities import MISSING, STATES
 from softjaw.study.result import checksums
 from softjaw.study.result.hdf5 import opened, text_of
-from softjaw.study.result.layout import (
-    MISSING,
-    MOST_SESSIONS,
-    PROGRAM,
-    ROOT,
-    SESSION,
-    VERSION,
-    Layout,
-    header_of,
-    layout_of,
-)
+from softjaw.study.result.layout import MOST_SESSIONS, PROGRAM, ROOT, SESSION, VERSION, Layout, header_of, layout_of
 from softjaw.study.result.lock import holder
 from softjaw.study.units import shown_text
 

@@ -15,11 +15,11 @@ import numpy as np
 
 from softjaw.study.case.result import CaseResult
 from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, StudyError
-from softjaw.study.quantities import EFFECTS, MEASURED, MEASURED_EFFECTS, MODELS
+from softjaw.study.quantities import EFFECTS, FAILED, MEASURED, MEASURED_EFFECTS, MISSING, MODELS
 from softjaw.study.result import checksums
 from softjaw.study.result.datasets import CLOSING_SUMS, MESSAGE_BYTES, SUMS
 from softjaw.study.result.hdf5 import StoredFile, text_of
-from softjaw.study.result.layout import DONE, FAILED, MISSING, ROOT, SESSION, Header, Layout
+from softjaw.study.result.layout import DONE, ROOT, SESSION, Header, Layout
 from softjaw.study.result.skeleton import HDF5_VERSIONS, report_bytes, text_bytes
 from softjaw.study.result.store import Result, open_result
 from softjaw.study.scene.text import differences

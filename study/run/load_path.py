@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 
 from softjaw.study.case.result import CaseFailure, TimeLimitError
-from softjaw.study.quantities import NO_GRASP
-from softjaw.study.result.layout import FAILED, MISSING
+from softjaw.study.quantities import FAILED, MISSING, NO_GRASP
 from softjaw.study.result.lock import OpenedFile
 from softjaw.study.result.write import Files, record
 from softjaw.study.run.limits import AbandonedError, Stopper, is_out_of_memory

@@ -203,8 +203,8 @@ def _estimated_time(plan: Plan, scene: Any, ranks: int) -> str:
     if not shells(scene):
         seconds = makespan(plan.in_parts(estimated(plan.tried)), ranks)
         # measured on seven objects: half for a capsule, 1.8 times for a hammer, 2.4 for a bracket, with finer meshes
-        about = ", half to twice that" if scene.candidates.sampled else ""
-        return f"about {duration(START_S + seconds)} {on}{about}, estimated on a bed of springs"
+        on += ", half to twice that" * bool(scene.candidates.sampled)
+        return f"about {duration(START_S + seconds)} {on}, estimated on a bed of springs"
     pads, shell = wall_unknowns(scene)
     # between rigid candidates and shells where the scene leaves that open
     size = pads + shell if scene.effects.object.endswith("shell") else math.sqrt(pads * (pads + shell))

@@ -20,9 +20,8 @@ import numpy as np
 from mpi4py import MPI
 
 from softjaw.study.messages import CANNOT_WRITE, STOPPED, StudyError, launched, make_folders
-from softjaw.study.quantities import DONE as CASE_DONE
+from softjaw.study.quantities import DONE, FAILED, MISSING
 from softjaw.study.result import provenance
-from softjaw.study.result.layout import FAILED, MISSING
 from softjaw.study.result.lock import Lock, OpenedFile
 from softjaw.study.result.skeleton import create, rewrite
 from softjaw.study.result.store import Result, open_result, torn_rows
@@ -297,7 +296,7 @@ def finish_alone(work: Work, path: Path, plan: Plan, session: int, name: str) ->
 def finish(work: Work, writer: ResultWriter, name: str) -> None:
     """Fill the derived datasets if nothing is missing, and write how this session ended; by one rank."""
     codes = writer.codes()
-    missing, done, failed = (int(np.sum(codes == state)) for state in (MISSING, CASE_DONE, FAILED))
+    missing, done, failed = (int(np.sum(codes == state)) for state in (MISSING, DONE, FAILED))
     # Derived values of half a study would look like those of a whole one.
     if work.finalise is not None and not missing:
         work.finalise(writer)

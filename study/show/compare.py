@@ -117,7 +117,8 @@ def _matched(one: xr.Dataset, other: xr.Dataset) -> tuple[dict[str, Row], Pair]:
         same = np.abs(a.values[:, None] - b.values) <= 1e-9 * scale
         if a.options and b.options:  # the numbers are those of texts
             same = np.array(a.options)[:, None] == np.array(b.options)
-        if a.name == "station" and not a.units:  # poses, of which samplers may have found others
+        # poses, of which samplers may have found others
+        if a.name == "station" and not a.units and "finger_pose_origin" in one and "finger_pose_origin" in other:
             same &= ~(np.linalg.norm(_middles(one)[:, None] - _middles(other), axis=-1) > SAME_PLACE)
         only = a.values[~same.any(axis=1)], b.values[~same.any(axis=0)]
         if not same.any():
@@ -130,8 +131,6 @@ def _matched(one: xr.Dataset, other: xr.Dataset) -> tuple[dict[str, Row], Pair]:
 
 def _middles(ds: xr.Dataset) -> FloatArray:
     """Middle of both pads of each pose ``(n, 3)`` [m]; NaN where it was not solved."""
-    if "finger_pose_origin" not in ds:
-        return np.full((ds.sizes["station"], 3), np.nan)
     return np.asarray(ds.finger_pose_origin.mean("finger").max([*ds.status.dims[:-3], *ds.status.dims[-2:]]).values)
 
 

@@ -66,7 +66,7 @@ function object3d(div, all) {
   }
 
   function contact(one) {
-    const [pressed, blocks, lines, arrows, tips, limit] = div.data.slice(2);
+    const [pressed, blocks, lines, arrows, tips] = div.data.slice(2), limit = div.data.find((t) => t.type === "surface");
     const quads = (s) => {
       const a = Float32Array.from(new Int16Array(bytes(s || "")), (v) => v * one.step), i = [], j = [], k = [];
       for (let f = 0; f < a.length / 3; f += 4) { i.push(f, f); j.push(f + 1, f + 2); k.push(f + 2, f + 3); }

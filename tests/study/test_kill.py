@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from softjaw.study.messages import CANNOT_WRITE, SOME_FAILED, STOPPED
-from softjaw.study.result.layout import DONE, FAILED, MISSING
+from softjaw.study.quantities import DONE, FAILED, MISSING
 from softjaw.study.result.lock import holder
 from softjaw.study.result.store import open_result, torn_rows
 from tests.study.launching import contents, differing, done, start, states, study, wait_for

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from softjaw.study.doctor import launch_environment
-from softjaw.study.result.layout import MISSING
+from softjaw.study.quantities import MISSING
 from softjaw.study.result.store import open_result
 from softjaw.study.run.plan import make_plan
 from softjaw.study.run.shares import shares

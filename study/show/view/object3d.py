@@ -36,7 +36,7 @@ def object_block(
     if not len(view.surface.points):
         return text(f"{view.note[:1].upper()}{view.note[1:]}.", "warn")
     content, left_out = payload(view, index, quantity, cases, motion, whole)
-    made = go.Figure([*_traces(whole)])
+    made = go.Figure([*_traces(whole), _room(view, index)])
     made.update_layout(template="none", margin={"l": 0, "r": 0, "t": 10, "b": 0}, uirevision="keep", showlegend=False)
     made.update_layout(meta={"object3d": content}, scene=plots.scene(camera=_camera(view, index)))
     if whole:
@@ -145,6 +145,14 @@ def _traces(whole: bool) -> list[Any]:
     blue = plots.MODELS["ccm"][1]
     limit = {"showscale": False, "colorscale": [[0, blue], [1, blue]], "opacity": 0.85, "scene": "scene2"}
     return [*made, go.Surface(**limit)] if whole else made
+
+
+def _room(view: View, index: Index) -> Any:
+    """Points that nobody sees round what is slender: plotly fits a volume, in which that would stand too tall."""
+    points = 1e3 * np.concatenate([view.surface.points, *(pad.sides().reshape(-1, 3) for pad in view.pads(index))])
+    ends, extent = np.stack([points.min(axis=0), points.max(axis=0)]), np.ptp(points, axis=0)
+    x, y, z = (ends.mean(axis=0) + np.outer([-0.5, 0.5], np.maximum(extent, extent[2] / 2.8))).T
+    return go.Scatter3d(x=x, y=y, z=z, mode="markers", marker={"opacity": 0.0}, hoverinfo="skip")
 
 
 def _camera(view: View, index: Index) -> dict[str, Any]:

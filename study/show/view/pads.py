@@ -10,6 +10,7 @@ import xarray as xr
 
 from softjaw.fem.objects.gap import Pose
 from softjaw.friction.patch import NEGLIGIBLE
+from softjaw.study.case.build import pad_shape
 from softjaw.study.result.layout import DONE
 from softjaw.study.show.grasps import Index, at
 
@@ -127,8 +128,7 @@ def pads_of(ds: xr.Dataset, gripper: Any, index: Index, faces: Faces) -> list[Pa
 def _pad(gripper: Any, faces: Faces, lift: Any, R: Any, o: Any, closing: Any, axes: Any, origin: Any) -> Pad:
     pose, (length, width, thickness) = Pose(R, o), gripper.pad_size
     x, y = 0.5 * length * np.array([-1, 1, 1, -1]), 0.5 * width * np.array([-1, -1, 1, 1])
-    per_side = 3 if gripper.element == "hex27" else 2
-    grid = tuple(per_side * n for n in gripper.elements[:2])
+    grid = pad_shape(gripper).patch_faces
     if not faces or faces["pressure"].size != np.prod(grid):  # only the block before it is pressed
         face = np.column_stack([x, y, np.zeros(4)])[[0, 3, 1, 2]].reshape(2, 2, 3)
         grid, faces = (0, 0), {name: np.empty(0) for name in ("centroid", "normal", "pressure", "area")}

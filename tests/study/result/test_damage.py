@@ -10,8 +10,8 @@ from softjaw.study import pipeline
 from softjaw.study.cli import main
 from softjaw.study.lookup import GraspMap
 from softjaw.study.messages import OTHER_FILE, StudyError
+from softjaw.study.quantities import DONE, MISSING
 from softjaw.study.result.derived import finalise
-from softjaw.study.result.layout import DONE, MISSING
 from softjaw.study.result.read import dataset
 from softjaw.study.result.skeleton import create
 from softjaw.study.result.store import open_result, torn_rows

@@ -7,9 +7,8 @@ import xarray as xr
 
 import softjaw
 from softjaw.study.flags import Flag
-from softjaw.study.quantities import STATES
+from softjaw.study.quantities import DONE, FAILED, MISSING, STATES
 from softjaw.study.result.derived import first_crossing
-from softjaw.study.result.layout import DONE, FAILED, MISSING
 from softjaw.study.result.read import FIELDS, read_field
 from softjaw.study.result.store import open_result
 from tests.study.fake_run import fake_plan, fake_result

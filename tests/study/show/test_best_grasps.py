@@ -9,10 +9,9 @@ from scipy.spatial.transform import Rotation
 
 from softjaw.study.flags import Flag
 from softjaw.study.lookup import GraspMap
-from softjaw.study.quantities import MODELS, quantities
+from softjaw.study.quantities import DONE, FAILED, MODELS, quantities
 from softjaw.study.ranking import distinct, judge
 from softjaw.study.result import read
-from softjaw.study.result.layout import DONE, FAILED
 from softjaw.study.result.store import open_result
 from softjaw.study.run.objects import row_of
 from softjaw.study.show.best_grasps import best, force_to_use, safe_range

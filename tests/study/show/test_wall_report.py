@@ -8,9 +8,9 @@ from softjaw.study import pipeline
 from softjaw.study.case.effects import EffectChoice
 from softjaw.study.case.solver import FINE, CandidateSolver
 from softjaw.study.flags import Flag
+from softjaw.study.quantities import DONE, FAILED
 from softjaw.study.ranking import judge, judged, ranking, shown_level
 from softjaw.study.result import derived
-from softjaw.study.result.layout import DONE, FAILED
 from softjaw.study.result.read import open, read_field
 from softjaw.study.result.write import ResultWriter
 from softjaw.study.run.plan import make_plan, memory, wall_unknowns

@@ -8,7 +8,7 @@ import pytest
 
 from softjaw.study.cli import main
 from softjaw.study.messages import OTHER_FILE
-from softjaw.study.result.layout import DONE, FAILED, MISSING
+from softjaw.study.quantities import DONE, FAILED, MISSING
 from softjaw.study.show import watch as view
 from softjaw.study.show.watch import INTERRUPTED, file_look, watch
 from tests.study.formula_results import grid_axes, make
