@@ -105,7 +105,7 @@ class ResultWriter:
         """Store a case; ``values`` as from ``record``."""
         index = self._index(row)
         # A complete case is final, unless a finer mesh is wanted: readers that look on must not see it change.
-        if self._code[index] == DONE:
+        if self._code[index] in (DONE, FAILED):
             if self.codes()[row] == DONE:
                 raise ValueError(f"row {row} is done already and must not be written again")
             self._code[index], self._attempts[index] = MISSING, 1  # a later round may name it again
