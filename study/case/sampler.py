@@ -350,7 +350,8 @@ def check_sampler(scene: Scene) -> None:
 
 def _no_grasp(found: Sequence[SampledGrasp]) -> NoGraspError:
     states = [STATES[state] for state in sorted({grasp.state for grasp in found})] or ["the pads miss the object"]
-    text = f"candidates.sampled: found no grasp between the pads ({', '.join(states)}); expected at least one: give"
+    width = f"; the narrowest needs an opening of {1e3 * min(g.opening for g in found):.3g} mm" * (len(found) > 0)
+    text = f"candidates.sampled: found no grasp between the pads ({', '.join(states)}{width}); expected one: give"
     return NoGraspError(USAGE, f"{text} poses, another pad, or a larger gripper.max_opening_mm")
 
 

@@ -150,7 +150,8 @@ class GraspPoint(GraspNumbers):
             return f"{lines[0]}: {self.reason}"
         for name in (n for n in (*MAIN, *FORCE_RANGE) if self.map.has(n)):
             units, value, error = self.map.quantities[name][0], self.value(name), self.error(name)
-            lines.append(f"  {name:<14} {shown_text(value, units, 5)}  +- {shown_text(error, units, 2)}")
+            doubt = f"  +- {shown_text(error, units, 2)}" * bool(error > 0)
+            lines.append(f"  {name:<14} {shown_text(value, units, 5)}{doubt}")
         lines += [f"  {flag.sentence}" for flag in flags_in(self.flags)]
         return "\n".join(lines)
 
