@@ -10,6 +10,7 @@ ranks in the order in which they come. The counter that hands out the work takes
 from __future__ import annotations
 
 import math
+import timeit
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -45,6 +46,7 @@ DEEP, HARD = 0.4, 4.0  # closing over the pad's thickness from which forces are 
 WRITE_S = 1.5e-5  # seconds of one write of a rank, measured on one machine with a local disk
 WRITES_PER_S, BYTES_PER_S = 5e4, 1e9  # what a file system is assumed to take from all ranks together
 GOOD_EFFICIENCY = 0.8
+PRODUCTS_S = 3e-3  # seconds that `slowness` counts where cases take what is said above
 
 
 def estimated(units: Sequence[Any]) -> list[float]:
@@ -55,6 +57,12 @@ def estimated(units: Sequence[Any]) -> list[float]:
     # any of sampled grasps may be among those that rounds solve well
     rounds = ROUNDS * min(LISTED, len(units)) / max(len(units), 1)
     return [known[i // step][0] + rounds * known[i // step][1] for i in range(len(units))]
+
+
+def slowness() -> float:
+    """How long sums of products take here, over where the seconds of this module were measured."""
+    a = np.sin(np.arange(14400.0)).reshape(120, 120)  # by einsum: BLAS may have several threads
+    return min(timeit.repeat(lambda: np.einsum("ij,jk->ik", a, a), number=5, repeat=5)) / PRODUCTS_S
 
 
 def _seconds(unit: Any, points: FloatArray, triangles: NDArray[np.int64]) -> tuple[float, float]:

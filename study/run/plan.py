@@ -29,7 +29,7 @@ from softjaw.study.case.candidates import decided
 from softjaw.study.quantities import ALONG, AROUND, NO_GRASP, STATES
 from softjaw.study.result.derived import derived
 from softjaw.study.result.layout import Header, Layout, is_case
-from softjaw.study.run.estimate import SCREENED_COST, START_S, estimated, measured_seconds, unit_seconds
+from softjaw.study.run.estimate import SCREENED_COST, START_S, estimated, measured_seconds, slowness, unit_seconds
 from softjaw.study.run.progress import duration
 from softjaw.study.run.refine import Rounds, added_cases, refined
 from softjaw.study.run.shares import makespan, sensible_ranks
@@ -38,9 +38,9 @@ from softjaw.study.scene.sections import COARSE, FINEST
 # Measured on ten scenes at the end of a run: bytes of a rank with the libraries and compiled loops that it needs, and
 # numbers over dofs^(4/3), the growth of nested dissection in 3-D, of factors, matrices and the solutions that are kept.
 LIBRARY_BYTES, FILL_FACTOR = 4.5e8, 160.0
-# Measured on a cup of 0.4 mm, 5 000 to 21 000 unknowns: a force takes 7 Newton steps of 15 us per unknown each; the
-# wall's factors take 16 kB per unknown, the solutions that are kept the rest.
-SECONDS_PER_UNKNOWN, BYTES_PER_UNKNOWN = 1e-4, 9e4
+# Of a wall, measured on a cup and a bottle: all that a force takes, with the coarse mesh; 16 kB are factors, the rest
+# solutions that are kept.
+SECONDS_PER_UNKNOWN, BYTES_PER_UNKNOWN = 5e-4, 9e4
 
 
 @dataclass(frozen=True)
@@ -201,15 +201,15 @@ def _estimated_time(plan: Plan, scene: Any, ranks: int) -> str:
     """Time before anything is solved: of elements and springs, for walls the middle between their levels."""
     on = f"on {ranks} rank{'s' * (ranks > 1)}"
     if not shells(scene):
-        seconds = makespan(plan.in_parts(estimated(plan.tried)), ranks)
-        # measured on seven objects: half for a capsule, 1.8 times for a hammer, 2.4 for a bracket, with finer meshes
+        seconds = slowness() * makespan(plan.in_parts(estimated(plan.tried)), ranks)
+        # measured on ten objects: half for a capsule and a mug, twice for an angle of sharp edges
         on += ", half to twice that" * bool(scene.candidates.sampled)
         return f"about {duration(START_S + seconds)} {on}, estimated on a bed of springs"
     pads, shell = wall_unknowns(scene)
     # between rigid candidates and shells where the scene leaves that open
     size = pads + shell if scene.effects.object.endswith("shell") else math.sqrt(pads * (pads + shell))
-    forces = plan.layout.shape[-1] * (1.25 if scene.accuracy.meshes > 1 else 1.0)
-    seconds = SECONDS_PER_UNKNOWN * size * makespan([forces] * len(plan.tried), ranks)
+    forces = makespan([plan.layout.shape[-1]] * len(plan.tried), ranks)
+    seconds = slowness() * SECONDS_PER_UNKNOWN * size * forces
     return f"about {duration(START_S + seconds)} {on}, estimated from the size of pads and wall"
 
 
