@@ -4,8 +4,8 @@ Of sampled grasps finer meshes for some cases. All candidates are solved on the 
 to the places that a list of the best grasps has at the force that is shown, and to grasps that failed, then to those
 that may still be better within their errors, also if the coarse mesh says that they slip: where few elements bear
 beside an edge it may tilt the contact normal. Those that may be the best, and whose payload is not known to
-``accuracy.target``, are solved on a finer mesh, and on one more where that may do. Each case is named at most three
-times, so the rounds end.
+``accuracy.target``, are solved on a finer mesh, and on one more where that may do; at last the best at other forces.
+Each case is named at most three times, so the rounds end.
 
 Of poses that are refined neighbours of the best grasp at each force: shifted along the pads' sides, turned about the
 approach or tilted, by a share of a first step. A round solves those of them that a bed of springs ranks highest; the
@@ -165,6 +165,9 @@ def next_cases(result: Any, scene: Scene) -> tuple[Case, ...]:
         chosen = [i for i in near if 0 < times[i] < FINEST and not (target and surely_below(relative[i], target))]
     # The least force that holds a mass lies between this force and the one below.
     levels = (k - 1, k) if k and "safety_factor" in ds else (k,)
+    if not chosen and places and "safety_factor" not in ds:  # the first lines say what the best holds at these forces
+        chosen, forces = [places[0].best], {0, (shape[-1] - 1) // 2, shape[-1] - 1} - {k}
+        levels = tuple(level for level in forces if not named[case_of(chosen[0], level, shape)])
     return tuple(sorted({case_of(i, level, shape) for i in chosen for level in levels}))
 
 

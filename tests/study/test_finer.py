@@ -131,8 +131,8 @@ def test_the_best_of_a_sampled_study_are_solved_well_with_the_same_bits_on_any_r
         error = result.read("payload/error").reshape(-1, 2)
         finer = result.layout.finer
         assert not unfinished(result)
-    assert (mesh[:, 0] == 0).all()  # the force that is shown is the largest
-    assert (mesh[:, 1] > 0).sum() == len(finer) >= LISTED
+    assert (mesh[:, 0] > 0).sum() == 1  # the force that is shown is the largest, and the best is known at both
+    assert (mesh[:, 1] > 0).sum() == len(finer) - 1 >= LISTED
     assert np.isfinite(error).all()
     unsolved = mesh[:, 1] == 0
     best = np.sort((payload - payload * error)[~unsolved, 1])[-LISTED]
