@@ -15,7 +15,7 @@ import numpy as np
 from softjaw.study.case.build import build_object, check_object, geometry, mesh_notes, told, with_mass
 from softjaw.study.case.candidates import check_candidates, with_sampled_grasps
 from softjaw.study.messages import USAGE, StudyError, with_ending
-from softjaw.study.run.estimate import START_S, estimated, scaling_text
+from softjaw.study.run.estimate import START_S, estimated, scaling_text, slowness
 from softjaw.study.run.object_folder import ObjectFolder, folder_of
 from softjaw.study.run.plan import free_bytes, make_plan, memory, plan_text
 from softjaw.study.run.progress import duration
@@ -96,7 +96,7 @@ def objects_text(folder: ObjectFolder, out: Path, ranks: int) -> str:
     if planned:
         paths = [seconds for made, _ in planned for seconds in estimated(made.tried)]
         many = paths * max(1, round(scale))
-        solving = makespan(many, ranks) * scale * len(paths) / len(many)
+        solving = slowness() * makespan(many, ranks) * scale * len(paths) / len(many)
         cases, space = (scale * sum(getattr(made.layout, name) for made, _ in planned) for name in ("rows", "nbytes"))
         need, free = max(needs for _, needs in planned), free_bytes(out / "index.hdf")
         rows |= {
