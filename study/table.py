@@ -43,7 +43,7 @@ class Column:
     label : str
         Head for people; the name where it is empty.
     error : str
-        Key that holds the error of this quantity: relative, or in the unit where the column of that name has one.
+        Key that holds the error of this quantity: relative, or in the unit where that column has one other than 1.
     digits : int
         Significant digits where no error says how many there are.
     people, programs : bool
@@ -91,7 +91,7 @@ class Table:
         value, error = float(shown(value, column.unit)), row.get(column.error, math.nan)
         if math.isfinite(error):
             unit = next(c.unit for c in self.columns if c.name == column.error)
-            return with_error(value, shown(error, unit) if unit else abs(value * error))
+            return with_error(value, abs(value * error) if unit in ("", "1") else shown(error, unit))
         return number(value, column.digits)
 
     def records(self) -> list[Row]:

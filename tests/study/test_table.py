@@ -31,6 +31,8 @@ def test_people_read_units_and_as_many_digits_as_the_errors_leave():
     assert units.split() == ["grasp", "[mm]", "[mm]", "[N]", "range"]
     assert first.split() == ["1", "17.10", "±", "0.17", "60.00", "±", "0.20", "2", "a,", "b"]
     assert second.split() == ["2", "-", "60.00", "±", "0.20", "-", "-"]
+    held = Column("held", "kg", error="off"), Column("off", "1", people=False)
+    assert "641 ± 13" in as_text(Table("", held, [{"held": 0.641, "off": 0.02}]))
     assert notes[:MOST_NOTES] == list(TABLE.notes[:MOST_NOTES])
     assert len(notes) == MOST_NOTES + 1
     assert "2 more" in notes[-1]
