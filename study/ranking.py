@@ -20,7 +20,7 @@ from softjaw.study.flags import BORNE, LOST, Flag, flags_in
 from softjaw.study.grippers import Hand, gripper_file
 from softjaw.study.messages import StudyError
 from softjaw.study.quantities import DONE, LEAST_FORCE, LISTED
-from softjaw.study.result.read import BETWEEN, at_force, half_width, scene_of, stated_error, values_of
+from softjaw.study.result.read import at_force, half_width, scene_of, stated_error, values_of
 from softjaw.study.scene.text import scene_table
 
 if TYPE_CHECKING:
@@ -260,8 +260,9 @@ def at_level(ds: Any, force: float | None = None) -> tuple[Any, int, str]:
     near = np.flatnonzero(np.isclose(forces, force))
     if near.size:
         return ds, int(near[0]), ""
-    k = int(np.searchsorted(forces, force))
-    return at_force(ds, force), 0, f"{BETWEEN} from {forces[k - 1]:g} to {forces[k]:g} N"
+    found = at_force(ds, force)
+    low, high = found.attrs["between"]
+    return found, 0, f"by straight lines from {low:g} to {high:g} N"
 
 
 def shown_level(ds: Any, flags: np.ndarray) -> tuple[int, str]:

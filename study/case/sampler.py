@@ -29,6 +29,7 @@ from softjaw.study.grippers import gripper_file
 from softjaw.study.messages import USAGE, NoGraspError
 from softjaw.study.quantities import COLLIDES, MISSING, SLIPS, STATES, WIDE
 from softjaw.study.scene import Scene
+from softjaw.study.units import shown_text
 
 SAMPLES = 300  # points of the surface from which grasps are looked for
 TURNS = 4  # rounds of setting a grasp straight; most end after two
@@ -350,7 +351,9 @@ def check_sampler(scene: Scene) -> None:
 
 def _no_grasp(found: Sequence[SampledGrasp]) -> NoGraspError:
     states = [STATES[state] for state in sorted({grasp.state for grasp in found})] or ["the pads miss the object"]
-    width = f"; the narrowest needs an opening of {1e3 * min(g.opening for g in found):.3g} mm" * (len(found) > 0)
+    width = ""
+    if found:
+        width = f"; the narrowest needs an opening of {shown_text(min(g.opening for g in found), 'm', 3)}"
     text = f"candidates.sampled: found no grasp between the pads ({', '.join(states)}{width}); expected one: give"
     return NoGraspError(USAGE, f"{text} poses, another pad, or a larger gripper.max_opening_mm")
 

@@ -129,7 +129,7 @@ class CandidateSolver:
 
     def __init__(self, scene: Scene, poses: Sequence[Pose], rounder: CandidateSolver | None = None) -> None:
         self.scene, self.poses, self.walled, self.rounder = scene, poses, has_wall(scene.object), rounder
-        fingers = self.fingers
+        fingers = self.fingers  # at once: where a pad misses the object there is no solver
         if self.walled:
             refuse_along_axis(fingers)
         self.forces = tuple(scene.load.normal_force)  # the load path; forces are asked for by their number in it

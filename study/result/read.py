@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 XYZ = ("x", "y", "z")
 FIELDS = ("wall/place",)  # too large to be read with the rest
 KINDS = {"pieces": 7, "holes": 7, "rims": 1}  # what a kind of contact is told by, and the largest number that counts
-BETWEEN = "by straight lines"  # begins what is said of a force between two that were solved
 UNCERTAIN_MAPS = tuple(q.name for q in TABLE if q.group == "maps" and q.error and q.rank)
 
 
@@ -263,8 +262,8 @@ def contact_kinds(name: str, values: np.ndarray) -> NDArray[np.int64]:
 def at_force(ds: xr.Dataset, force: float) -> xr.Dataset:
     """The dataset at one force [N] between two solved ones, by straight lines; flags of both. `ValueError` beyond them.
 
-    A case beside one that is not solved has that one's state. Across a snap-in of the wall, and between contacts that
-    differ in kind, nothing is known: the state is "not computed".
+    Both are in its attribute ``between``. A case beside one that is not solved has that one's state. Across a snap-in
+    of the wall, and between contacts that differ in kind, nothing is known: the state is "not computed".
     """
     forces = ds["normal_force"].values
     if not forces[0] <= force <= forces[-1] or len(forces) < 2:
@@ -273,7 +272,7 @@ def at_force(ds: xr.Dataset, force: float) -> xr.Dataset:
     k = min(int(np.searchsorted(forces, force, side="right")) - 1, len(forces) - 2)
     share = (force - forces[k]) / (forces[k + 1] - forces[k])
     low, high = (ds.isel(normal_force=[i]).assign_coords(normal_force=[force]) for i in (k, k + 1))
-    between = low.copy()
+    between = low.assign_attrs(between=forces[k : k + 2].tolist())
     for name in (str(n) for n, v in ds.data_vars.items() if "normal_force" in v.dims):
         if ds[name].dtype.kind == "f":
             between[name] = (ds[name].dims, (1 - share) * low[name].values + share * high[name].values, ds[name].attrs)
@@ -284,6 +283,11 @@ def at_force(ds: xr.Dataset, force: float) -> xr.Dataset:
     between["status"] = (ds["status"].dims, states, ds["status"].attrs)
     between["normal_force"].attrs.update(ds["normal_force"].attrs)
     return between
+
+
+def other_levels(count: int, k: int) -> list[int]:
+    """Force levels of ``count`` at which it is told too what a grasp holds that is shown at the ``k``-th."""
+    return sorted({0, (count - 1) // 2, count - 1} - {k})
 
 
 def _apart(low: xr.Dataset, high: xr.Dataset) -> NDArray[np.bool_]:

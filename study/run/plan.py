@@ -19,7 +19,6 @@ from softjaw.study.case.build import (
     forces_apart,
     geometry,
     has_wall,
-    listed_accuracy,
     outer_surface,
     own_frame,
     pad_elements,
@@ -135,7 +134,7 @@ def has(scene: Any) -> tuple[str, ...]:
 
 def memory(scene: Any) -> float:
     """Rough memory of one rank [bytes]: the libraries, what whole pads take on their finest mesh, and a wall."""
-    pad = 8.0 * FILL_FACTOR * (3.0 * _pad_nodes(scene, listed_accuracy(scene).most_meshes - 1)) ** (4.0 / 3.0)
+    pad = 8.0 * FILL_FACTOR * (3.0 * _pad_nodes(scene, scene.accuracy.most_meshes - 1)) ** (4.0 / 3.0)
     return LIBRARY_BYTES + pad + (BYTES_PER_UNKNOWN * wall_unknowns(scene)[1] if shells(scene) else 0.0)
 
 

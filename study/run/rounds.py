@@ -34,7 +34,7 @@ from softjaw.study.case.task import task_of
 from softjaw.study.flags import LOST
 from softjaw.study.quantities import FAILED, LISTED, NO_GRASP
 from softjaw.study.ranking import at_level, distinct, judged, largest, rank_values, ranked, sure
-from softjaw.study.result.read import dataset
+from softjaw.study.result.read import dataset, other_levels
 from softjaw.study.run.refine import Place, gained, next_stations, scores_of_poses, with_places
 from softjaw.study.scene import Scene
 from softjaw.study.scene.grasps import GraspPose
@@ -164,10 +164,10 @@ def next_cases(result: Any, scene: Scene) -> tuple[Case, ...]:
         near |= {i for i in order if known.value[i] + error[i] > most and (times[i] == 1 or reach[i])}
         chosen = [i for i in near if 0 < times[i] < FINEST and not (target and surely_below(relative[i], target))]
     # The least force that holds a mass lies between this force and the one below.
-    levels = (k - 1, k) if k and "safety_factor" in ds else (k,)
+    levels: tuple[int, ...] = (k - 1, k) if k and "safety_factor" in ds else (k,)
     if not chosen and places and "safety_factor" not in ds:  # the first lines say what the best holds at these forces
-        chosen, forces = [places[0].best], {0, (shape[-1] - 1) // 2, shape[-1] - 1} - {k}
-        levels = tuple(level for level in forces if not named[case_of(chosen[0], level, shape)])
+        chosen = [places[0].best]
+        levels = tuple(i for i in other_levels(shape[-1], k) if not named[case_of(chosen[0], i, shape)])
     return tuple(sorted({case_of(i, level, shape) for i in chosen for level in levels}))
 
 

@@ -15,7 +15,7 @@ from softjaw.study.flags import LOST, OF_FILE, Flag, flag_words, flags_in
 from softjaw.study.quantities import BY_KEY, FORCE_RANGE, LEAST_FORCE, LISTED, MAIN, MISSING, MODELS, STATES, map_row
 from softjaw.study.ranking import distinct, index_of, judge, passed_over, rank_values, score_of, sure, task_keys
 from softjaw.study.result.layout import DONE
-from softjaw.study.result.read import BETWEEN, axes_of, dataset, values_of
+from softjaw.study.result.read import axes_of, dataset, other_levels, values_of
 from softjaw.study.show.grasps import Index, at, candidate_of, forces, note, order, place
 from softjaw.study.show.places import folded_text, named, short_name, side_text, spot
 from softjaw.study.show.status import (
@@ -194,7 +194,7 @@ def _notes(ds: xr.Dataset, accuracy: Sequence[str], marks: np.ndarray) -> list[s
     Each has its first clause, and of the others what a line of a terminal has room for.
     """
     states = ds.status.values[..., ds.attrs["level"]]
-    apart = np.count_nonzero(states == MISSING) * ds.attrs["why"].startswith(BETWEEN)
+    apart = np.count_nonzero(states == MISSING) * ("between" in ds.attrs)
     count = {flag: int(np.count_nonzero(marks & flag)) for flag in Flag if flag != Flag.OUT_OF_REACH}
     raised = sorted(filter(count.get, count), key=lambda flag: (-count[flag], flag))
     words = {flag: f"{flag.word} ({count[flag]} of {len(marks)})" for flag in raised}
@@ -259,7 +259,7 @@ def _force(ds: xr.Dataset, index: Index) -> tuple[str, str]:
     mass, safety = task_keys(ds, "object").get("mass_g"), task_keys(ds).get("safety", 1.0)
     pressed = f"{forces(ds)[index[-1]]:.3g} N per finger"
     if mass is None:
-        some = [(*index[:-1], k) for k in sorted({0, (len(forces(ds)) - 1) // 2, len(forces(ds)) - 1} - {index[-1]})]
+        some = [(*index[:-1], k) for k in other_levels(len(forces(ds)), index[-1])]
         known = [i for i in some if np.isfinite(at(ds, "payload", i)) and not int(ds["flags"].values[i]) & LOST]
         held = ", ".join(f"{value_text(ds, 'payload', i, 3, unit=True)} at {forces(ds)[i[-1]]:g} N" for i in known)
         return pressed, "; ".join(filter(None, (ds.attrs["why"], held, "object.mass_g gives the least")))
@@ -304,7 +304,7 @@ def _beyond(ds: xr.Dataset, index: Index) -> str:
     """What a larger force would do, at the largest one that is solved."""
     last = (*index[:-1], len(forces(ds)) - 1)
     if last == index:
-        return ", the largest solved" * (not ds.attrs["why"].startswith(BETWEEN))
+        return ", the largest solved" * ("between" not in ds.attrs)
     held = f"it holds {value_text(ds, 'payload', last, 3, unit=True)}" * bool(np.isfinite(at(ds, "payload", last)))
     more = flag_words(int(ds["flags"].values[last]) & LOST) or held
     return f"; at {forces(ds)[-1]:g} N {more}" if more else ""

@@ -19,7 +19,7 @@ from softjaw.study.case.result import CaseFailure
 from softjaw.study.case.sampler import with_sampled_grasps
 from softjaw.study.flags import LOST
 from softjaw.study.result.read import values_of
-from softjaw.study.scene import parse_scene
+from softjaw.study.scene import load_scene
 from tests.objects.bad_meshes import box, cylinder, joined, moved
 from tests.objects.bodies import SCANS, hollow_bowl
 
@@ -63,7 +63,7 @@ def test_payloads_on_the_coarse_mesh_are_off_by_what_they_state_where_rounds_sol
     for name in ("L", "hammer", "long box", "bowl", "power_drill"):
         scene, ds = solved(name, tmp_path)
         held, mesh = values_of(ds, "payload").ravel(), ds.work_mesh.values.ravel()
-        for unit in decided(units(with_sampled_grasps(parse_scene(Path(scene).read_text(), Path(scene), [FORCE])))):
+        for unit in decided(units(with_sampled_grasps(load_scene(scene, [FORCE])))):
             if mesh[unit.index] > 0:
                 [(_, case)] = pipeline.solve_unit(replace(unit, finest=(0,)))
                 if not isinstance(case, CaseFailure):

@@ -92,9 +92,11 @@ def test_solutions_that_are_kept_hold_no_surface_of_a_mesh(files, monkeypatch):
     made, fingers_of = [], solver.fingers_of
     monkeypatch.setattr(solver, "fingers_of", lambda *of: made.append(fingers_of(*of)) or made[-1])
     gc.disable()
-    solved(scene(files, "upright"))
-    quadrants.cache_clear()
-    surfaces = [weakref.ref(finger.surface) for fingers in made for finger in fingers]
-    made.clear()
-    assert [surface() for surface in surfaces] == 4 * [None]
-    gc.enable()
+    try:
+        solved(scene(files, "upright"))
+        quadrants.cache_clear()
+        surfaces = [weakref.ref(finger.surface) for fingers in made for finger in fingers]
+        made.clear()
+        assert [surface() for surface in surfaces] == 4 * [None]
+    finally:
+        gc.enable()
