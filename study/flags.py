@@ -43,7 +43,7 @@ class Flag(IntFlag):
     NODAL = 1 << 9, "nodal", "mortar contact did not converge, node-to-surface contact used"
     SLIPS = 1 << 10, "slips", "the line that joins the contacts leaves a friction cone, so the grasp slips"
     COLLISION = 1 << 11, "pads collide", "the pads run into each other beside the object, which is not simulated"
-    COARSE = 1 << 12, "coarse", "the mesh is coarse for this contact, use more elements before trusting it", (
+    COARSE = 1 << 12, "coarse", "the mesh is coarse for this contact, so its errors are large", (
         "the contact face overlaps the object by more than a tenth of the closing, fewer than six elements carry load,"
         " only one along its length or its width does, the object's normal turns by more than 120 deg between loaded"
         " neighbours, trilinear elements have a Poisson's ratio above 0.45, or the error is above accuracy.target"

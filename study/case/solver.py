@@ -31,6 +31,8 @@ from softjaw.study.scene.sections import COARSE, FINE, FINEST, MOST_ELEMENTS
 
 LONG_STEPS = COARSE - 1  # the coarse mesh, with a load path of half as many steps
 NEGLIGIBLE_FORCE = 1e-3  # of the largest one; below it a failed load step says nothing of the forces above
+# Of what longer steps change, that the steps of the load path leave: to steps of a quarter it is a third in the mean.
+OF_LONG_STEPS = 0.5
 MOST_STARTS = 3  # coarse states that a force on the scene's mesh is started from, before it starts from nothing
 NO_ERROR = "the error of the mesh is not known, for on the coarser one {reason}"
 PART_OF_ERROR = "what load steps and rounded edges leave is not known, for on the coarse mesh {reason}"
@@ -68,13 +70,13 @@ class Solution:
 class Solved:
     """Solutions of one case on all its meshes, the finest first, and a note on meshes that have none.
 
-    The ``pairs`` of contacts on the coarse mesh differ by what the steps of the load path, or an effect, leave; the
-    ``edges`` by how far the object's are rounded: as on the scene's mesh, and twice as far.
+    The ``pairs`` of contacts on the coarse mesh differ by the steps of the load path or by an effect, with the share of
+    it that is left; the ``edges`` by how far the object's are rounded: as on the scene's mesh, and twice as far.
     """
 
     meshes: Sequence[Solution]
     note: str = ""
-    pairs: Sequence[tuple[Sequence[PressedContact], Sequence[PressedContact]]] = ()
+    pairs: Sequence[tuple[Sequence[PressedContact], Sequence[PressedContact], float]] = ()
     edges: tuple[Sequence[PressedContact], Sequence[PressedContact]] | None = None
 
     @property
@@ -93,7 +95,7 @@ class Solved:
         """Errors of the values of a case that has a coarser mesh; see `mesh_errors`."""
         fine, coarse = self.fine.contacts, self.meshes[1]
         floor = edge_floor(fine) * (DOUBTED if any(contact.coarse for contact in fine) else 1.0)
-        pairs = [(*pair, 1.0) for pair in self.pairs]
+        pairs = list(self.pairs)
         if self.edges:
             # they are rounded over a part of an element, and what that does falls with it
             sizes = [mesh.contacts[0].state.pad.shape.elements[0] for mesh in (self.meshes[-2], self.fine)]
@@ -198,8 +200,8 @@ class CandidateSolver:
             coarse = self.solve(k, COARSE, levels)
             solved = Solved([fine, coarse])
             if levels.friction_pressure_coupling != "none":
-                # what the steps of its load path leave: the difference to steps of twice the length
-                solved = replace(solved, pairs=[(coarse.contacts, self.solve(k, LONG_STEPS, levels).contacts)])
+                longer = self.solve(k, LONG_STEPS, levels).contacts
+                solved = replace(solved, pairs=[(coarse.contacts, longer, OF_LONG_STEPS)])
             if self.rounder:
                 plain = levels._replace(friction_pressure_coupling="none")
                 contacts = self.solve(k, COARSE, plain).contacts, self.rounder.solve(k, FINE, plain).contacts

@@ -235,8 +235,10 @@ class Parser(argparse.ArgumentParser):
             self.error(f"unknown command '{value}'{meant} '{self.prog} --help' lists all")
         if action.choices is not None and value not in action.choices:
             known = [str(choice) for choice in action.choices]
-            text = f"found '{value}', expected {', '.join(known)}{_meant(str(value), known)}"
-            raise argparse.ArgumentError(action, text.rstrip(";"))
+            meant = _meant(str(value), known).rstrip(";")
+            if "mesh" in known and "." in value:
+                meant = f"; of a mesh, with its unit: 'init mesh --mesh {value} --unit mm'"
+            raise argparse.ArgumentError(action, f"found '{value}', expected {', '.join(known)}{meant}")
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> tuple[Any, list[str]]:
         """Refuse what is left over here, where the options that exist are known."""
