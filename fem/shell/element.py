@@ -196,11 +196,11 @@ class Shell(Generic[MeshT]):
     mesh : ShellMesh
     young_modulus, poisson_ratio : float
         [Pa], [-].
+    springs : tuple, optional
+        Nodes ``(m,)`` and the stiffness to ground of their displacements ``(3 m, 3 m)`` [N/m].
 
     Attributes
     ----------
-    springs : (6 k,) array
-        Stiffness to ground of every number [N/m], 0 until it is set; the weak springs of a freely held object.
     loops : tuple
         Leading arguments of the compiled loops, see `elements`.
     size : int
@@ -211,20 +211,24 @@ class Shell(Generic[MeshT]):
         Reference area that belongs to each node [m^2].
     """
 
-    def __init__(self, mesh: MeshT, young_modulus: float, poisson_ratio: float) -> None:
+    def __init__(
+        self, mesh: MeshT, young_modulus: float, poisson_ratio: float,
+        springs: tuple[IntArray, FloatArray] | None = None,
+    ) -> None:  # fmt: skip
         self.mesh, self.young_modulus, self.poisson_ratio = mesh, float(young_modulus), float(poisson_ratio)
         self.loops, area = elements(mesh.X, mesh.D, mesh.elements, self.young_modulus, self.poisson_ratio)
         self.size = 6 * len(mesh.X)
-        self.springs = np.zeros(self.size)
+        self.springs = springs or (np.zeros(0, dtype=np.int32), np.zeros((0, 0)))
         self._reference = np.hstack([mesh.X, mesh.D])
         self.node_area = np.bincount(mesh.elements.ravel(), (area @ kernel.N_G).ravel(), minlength=len(mesh.X))
         self._build_pattern()
 
     def _build_pattern(self) -> None:
-        """Blocks of 6 x 6 between nodes that share an element."""
-        nodes, n = self.loops[0], len(self.mesh.X)
+        """Blocks of 6 x 6 between nodes that share an element, or springs."""
+        nodes, n, sprung = self.loops[0], len(self.mesh.X), self.springs[0]
         rows, columns = pairs(nodes[:, :, None], nodes[:, None, :])
-        graph = Pattern(n, rows, columns)
+        between = pairs(sprung[:, None], sprung[None, :])
+        graph = Pattern(n, np.concatenate([rows, between[0]]), np.concatenate([columns, between[1]]))
         count = np.diff(graph.start)
         row = np.repeat(np.arange(n), count)
         # the kernel adds whole blocks: where each begins, and how far apart its six rows are
@@ -234,7 +238,9 @@ class Shell(Generic[MeshT]):
         blocks = np.zeros((len(row), 6, 6))
         matrix = bsr_matrix((blocks, graph.column, graph.start), shape=(self.size, self.size)).tocsr()
         self.start, self.column = matrix.indptr.astype(np.int32), matrix.indices.astype(np.int32)
-        self._diagonal = np.flatnonzero(np.repeat(np.arange(self.size), np.diff(self.start)) == self.column)
+        inner = np.arange(3)[:, None] * self._width[between[0]][:, None, None] + np.arange(3)
+        inner += place[graph.slots(*between)][:, None, None]
+        self._sprung = inner.reshape(len(sprung), len(sprung), 3, 3).swapaxes(1, 2).ravel()
 
     @property
     def nodes(self) -> int:
@@ -243,7 +249,8 @@ class Shell(Generic[MeshT]):
 
     def residual(self, q: FloatArray) -> FloatArray:
         """Inner forces of the state ``q (6 k,)``, springs included: ``(6 k,)`` [N]."""
-        out = (self.springs * q).reshape(-1, 6)
+        out, (sprung, stiffness) = np.zeros((self.nodes, 6)), self.springs
+        out[sprung, :3] = (stiffness @ q.reshape(-1, 6)[sprung, :3].ravel()).reshape(-1, 3)
         kernel.residual(*self.loops, self._reference + q.reshape(-1, 6), out)
         return out.ravel()
 
@@ -261,7 +268,7 @@ class Shell(Generic[MeshT]):
         """
         values = np.zeros(self.start[-1])
         # assigned, not added: the kernel adds the elements to it
-        values[self._diagonal] = self.springs
+        values[self._sprung] = self.springs[1].ravel()
         q = q.reshape(-1, 6)
         # an array without rows, so that the compiled loop sees one type
         step = NO_STEP if before is None else q - before.reshape(-1, 6)

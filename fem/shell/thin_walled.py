@@ -14,6 +14,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from softjaw.fem.assembly import IntArray
 from softjaw.fem.objects.gap import Pose, about_z
 from softjaw.fem.objects.outer_surface import OuterSurface
 from softjaw.fem.objects.stacked import wall_surface
@@ -30,15 +31,14 @@ HALF_TURN = np.diag([-1.0, -1.0, 1.0])
 def supported(
     mesh: BodyMesh, material: WallMaterial, support: str = "free", stiffness: float = 1.0
 ) -> tuple[Shell[BodyMesh], FloatArray]:
-    """Shell of a body with weak springs, and which of its numbers ``(6 k,)`` its support fixes.
+    """Shell of a body with springs, and which of its numbers ``(6 k,)`` its support fixes.
 
     "clamped": the flat bottom does not move, or both rims of a tube; "standing": the rim of the bottom keeps its
-    height; "free". The springs hold what is left of rigid motions: ``stiffness`` is that of all together, per direction
-    [N/m].
+    height; "free". The springs hold the rigid motions that are left, and resist no others: ``stiffness`` is that of all
+    together, per direction [N/m].
     """
-    shell = Shell(mesh, material.young_modulus, material.poisson_ratio)
-    # spread by area, so that they resist rigid motions alike whatever the mesh
-    shell.springs.reshape(-1, 6)[:, :3] = (stiffness * mesh.share * shell.node_area / shell.node_area.sum())[:, None]
+    springs = _springs(mesh, support, stiffness)
+    shell = Shell(mesh, material.young_modulus, material.poisson_ratio, springs)
     held = np.zeros((shell.nodes, 6), dtype=bool)
     if support == "clamped":
         lines = mesh.s <= max(mesh.surface.flat[0], mesh.s[0]) + NEGLIGIBLE
@@ -49,6 +49,27 @@ def supported(
     elif support == "standing":
         held[mesh.foot, 2] = True
     return shell, held.ravel() | mesh.symmetric
+
+
+def _springs(mesh: BodyMesh, support: str, stiffness: float) -> tuple[IntArray, FloatArray]:
+    """Nodes and stiffness of springs that hold what a support leaves of the rigid motions; see `Shell`.
+
+    There are as many conditions on the displacements of a few nodes as motions, so loads in balance meet no force.
+    """
+    # between the pads, which lie at 0 and at half a turn, and away from the ends
+    angles = [at for at in np.pi * np.array([-0.25, 0.25, 0.75, 1.25, 1.75]) if mesh.theta[0] < at < mesh.theta[-1]]
+    i = [np.abs(mesh.theta - at).argmin() for at in angles]
+    j = [np.abs(mesh.s - mesh.s[0] - share * np.ptp(mesh.s)).argmin() for share in (0.25, 0.75)]
+    nodes = np.unique(mesh.number[np.ix_(i, j)])
+    x, y, z = mesh.X[nodes].T
+    none, one = np.zeros(len(nodes)), np.ones(len(nodes))
+    between, across = mesh.symmetry
+    motions = [([one, none, none], not between), ([none, one, none], not across), ([-y, x, none], mesh.closed)]
+    if support == "free":
+        motions += [([none, none, one], True), ([none, -z, y], not across), ([z, none, -x], not between)]
+    left = [np.stack(motion, axis=1) for motion, free in motions if free and support != "clamped"]
+    basis = np.linalg.qr(np.reshape(left, (len(left), 3 * len(nodes))).T)[0]
+    return nodes, stiffness * mesh.share / len(nodes) * basis @ basis.T
 
 
 @dataclass(frozen=True, eq=False)

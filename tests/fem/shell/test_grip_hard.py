@@ -50,8 +50,8 @@ def test_the_opening_is_the_part_of_the_distance_that_is_left(symmetry):
 def test_a_wall_as_soft_as_foam_collapses_before_the_force_is_reached():
     """It folds between the pads; how far it is followed before depends on rounding, so the force is high."""
     soft = grip(thin(2e-4, WallMaterial(1e8, 0.38)), elements=(6, 4, 2), mesh=ROUGH)
-    path = soft.load_path([0.02, 1.0, 6.0, 12.0])
-    assert [next(path).wall.opening < 0.75 for _ in range(3)] == [False, True, True]
+    path = soft.load_path([0.02, 0.22, 6.0])
+    assert [next(path).wall.opening < 0.75 for _ in range(2)] == [False, True]
     with pytest.raises(CheckError):
         next(path)
 

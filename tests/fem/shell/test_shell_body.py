@@ -132,7 +132,9 @@ def reaction(body, q, load=0.0):
     """Force of the whole body's support and weak springs on it in the equilibrium under ``load``."""
     mesh = body[0].mesh
     held = body[1] & ~mesh.symmetric
-    force = np.where(held, body[0].residual(q) - load, -body[0].springs * q).reshape(-1, 6)
+    force = np.where(held, body[0].residual(q) - load, 0.0).reshape(-1, 6)
+    sprung, stiffness = body[0].springs
+    force[sprung, :3] -= (stiffness @ q.reshape(-1, 6)[sprung, :3].ravel()).reshape(-1, 3)
     return np.where([*mesh.symmetry, False], 0.0, force[:, :3].sum(axis=0)) / mesh.share
 
 
@@ -158,6 +160,21 @@ def test_the_support_carries_what_is_left_over(support):
     assert reaction(body, q, load.ravel()) == pytest.approx([0, 0, -2e-3], rel=1e-5, abs=1e-9)
     rise = q.reshape(-1, 2, 3)[:, :, 2].sum(axis=1).mean()
     assert rise == pytest.approx(2e-3, rel=0.05) if support == "free" else rise < 1e-5
+
+
+@pytest.mark.parametrize("symmetry", [(False, False), HALF_Y, QUARTER])
+def test_springs_hold_a_pinched_ring_and_do_not_stiffen_it(symmetry):
+    """F R^3 / (E I) (pi/4 - 2/pi) on the diameter (Timoshenko, Strength of Materials II, art. 12), of plane stress."""
+    ring = of_revolution(Revolution(np.array([[0.0, 0.03], [0.001, 0.03], [0.002, 0.03]])))
+    size = MeshSize(heights=(0.0, 0.002), half_width=0.01, around=1e-3, along=5e-4, coarse=2e-3)
+    mesh = body_mesh(ring, 3e-4, size, symmetry, open_bottom=True)
+    body, load = supported(mesh, PET, stiffness=1e3), np.zeros((len(mesh.X), 6))
+    pinched = mesh.number[np.abs(np.mod(mesh.theta + 0.1, np.pi) - 0.1) < 1e-9]
+    load[pinched, 0] = -np.sign(mesh.X[pinched, 0]) / mesh.number.shape[1] * (0.5 if symmetry[1] else 1.0)
+    q, R = LinearShell(*body).solve(load.ravel()).reshape(-1, 6), 0.03 - 1.5e-4
+    inertia, node = 0.002 * 3e-4**3 / 12, mesh.number[np.abs(mesh.theta).argmin()]
+    change = R**3 / (PET.young_modulus * inertia) * (np.pi / 4 - 2 / np.pi)
+    assert -2 * q[node, 0].mean() == pytest.approx(change, rel=0.03)
 
 
 def test_a_tube_under_pressure():
