@@ -243,7 +243,7 @@ def test_a_fourth_mesh_follows_where_the_error_is_above_the_target_no_fifth_and_
     unit = unit_of(*ROUGH)
     solver = CandidateSolver(unit.scene, unit.candidate.poses)
     solved = solver.case(1, Levels("rigid", "rigid", "tangential"))
-    [(coarse, longer)] = solved.pairs
+    [(coarse, longer, _)] = solved.pairs
     assert coarse is solved.coarse.contacts
     assert longer[0].state.steps < coarse[0].state.steps
     change = abs(longer[0].state.closing / coarse[0].state.closing - 1.0)

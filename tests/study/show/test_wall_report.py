@@ -25,7 +25,7 @@ from tests.study.scenes import text_of
 
 CAN = """shape = "revolution"
 profile_mm = [[0, 30], [40, 30], [70, 30], [100, 30]]
-wall_mm = 0.3
+wall_mm = 0.35
 wall_material = "PP"
 mass_g = 60
 allowed_dent_mm = 1.5"""
@@ -115,7 +115,7 @@ def test_the_report_answers_at_a_force_that_the_wall_bears_and_shows_the_wall_as
     assert safe_range(data, (0, 0, 0)).endswith(f"{high:.3g}")
     words, *figures = writing.wall(View(data), data.attrs["best"])
     (over_force,) = maps.maps(data, data.attrs["best"])
-    assert "0.3 mm PP" in words["text"]
+    assert "0.35 mm PP" in words["text"]
     assert len(figures) == 2  # sections of the wall, force over indentation
     *buttons, level = over_force["figure"].layout.updatemenus[0].buttons
     borne = buttons[maps._names(data).index("force_high")]
