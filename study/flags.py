@@ -29,6 +29,10 @@ class Flag(IntFlag):
         made.word, made.sentence, made.more = word, sentence, more
         return made
 
+    def __invert__(self) -> int:  # type: ignore[override]
+        """All other bits: Python's own forgets those above where members carry texts."""
+        return ~int(self)
+
     NO_TORQUE = 1 << 0, "no torque", "a contact carries no torque about its normal"
     NO_FORCE = 1 << 1, "no force", "a contact carries no force along one of its axes"
     CYCLE = 1 << 2, "cycle", "the contact normal alternated between faces, their mean was used"
@@ -82,8 +86,9 @@ class Flag(IntFlag):
 
 
 DERIVED = Flag.TOO_WEAK | Flag.TOO_STRONG | Flag.OUT_OF_REACH
-BORNE = Flag.SLIDES_OUT | Flag.YIELDS | Flag.TOO_WEAK | Flag.TOO_STRONG  # what another force may cure
-LOST = Flag.SLIPS | Flag.COLLISION | Flag.NOT_BORNE | Flag.OUT_OF_REACH | BORNE  # of a grasp that fails or does harm
+HARM = Flag.SLIDES_OUT | Flag.YIELDS | Flag.TOO_STRONG  # what a smaller force may cure
+# of a grasp that fails or does harm
+LOST = Flag.SLIPS | Flag.COLLISION | Flag.NOT_BORNE | Flag.OUT_OF_REACH | HARM | Flag.TOO_WEAK
 OF_FILE = sum(flag for flag in Flag if not flag & DERIVED)  # mask of the bits that a file holds
 
 

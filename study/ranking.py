@@ -16,7 +16,7 @@ from softjaw.fem.objects.gap import IntArray
 from softjaw.friction.patch import FloatArray
 from softjaw.study.case.reach import FREE, clearest, hand_axes, opened, refused
 from softjaw.study.case.result import TIE
-from softjaw.study.flags import BORNE, LOST, Flag, flags_in
+from softjaw.study.flags import HARM, LOST, Flag, flags_in
 from softjaw.study.grippers import Hand, gripper_file
 from softjaw.study.messages import StudyError
 from softjaw.study.quantities import DONE, LEAST_FORCE, LISTED
@@ -274,10 +274,10 @@ def shown_level(ds: Any, flags: np.ndarray) -> tuple[int, str]:
     ``flags``: as `judged` gives them.
     """
     forces, done = ds["normal_force"].values, ds["status"].values == DONE
-    solved, borne, usable = ((done & (flags & bad == 0)).reshape(-1, len(forces)) for bad in (0, BORNE, LOST))
+    solved, borne, usable = ((done & (flags & bad == 0)).reshape(-1, len(forces)) for bad in (0, HARM, LOST))
     if "force_low" in ds and usable.any():
         return int(np.flatnonzero(usable.any(axis=0))[0]), "the lowest solved force at which a grasp holds the object"
-    if (flags[done] & BORNE).any() and borne.any():
+    if (flags[done] & HARM).any() and borne.any():
         k = int(np.flatnonzero(borne.any(axis=0))[-1])
         return k, "the highest at which a grasp does no harm" if k < len(forces) - 1 else LARGEST
     # one failed case must not move all grasps to another force, nor a few that went far

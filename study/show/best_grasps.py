@@ -78,7 +78,7 @@ def best(
     shown[tuple(np.array(listed).T)] = DONE
     errors, alone = ds.get(f"{aim(ds)[0]}_error"), ds.assign(status=(ds.status.dims, shown))
     known = errors is not None or "e_n_interval" not in ds
-    error = largest_error(errors, alone, axes_of(ds), ds.label.values, ds.get("work_mesh")) if known else []
+    error = largest_error(errors, alone, axes_of(ds), ds.label.values) if known else []
     notes = _notes(ds, [certainty(ds, [place.best for place in places], score, k), *error], marks)
     told = {key: ", ".join(filter(None, texts)) for key, texts in answer(ds, found[0]).items()}
     facts = {"answer": told, "pads": pads(ds, found[0]), "force": float(forces(ds)[k]), "ranked_by": score,
@@ -246,12 +246,12 @@ def value_text(ds: xr.Dataset, name: str, index: Index, digits: int = 4, unit: b
 
 
 def force_to_use(ds: xr.Dataset, index: Index) -> tuple[float, float]:
-    """Smallest force that holds the object at a candidate, and its error by mesh, curve and mu [N]; NaN if not known.
+    """Smallest force that holds the object at a candidate, and its error by mesh, curve and mu [N]; NaN: not known.
 
     Friction bears in proportion to mu, so a share by which mu is off moves the force by that share.
     """
     low, error = (at(ds, name, index) for name in ("force_low", "force_low_error"))
-    return low, float(np.hypot(np.nan_to_num(error), MU_ERROR * low))
+    return low, float(np.hypot(error, MU_ERROR * low))
 
 
 def _force(ds: xr.Dataset, index: Index) -> tuple[str, str]:
@@ -265,8 +265,12 @@ def _force(ds: xr.Dataset, index: Index) -> tuple[str, str]:
         return pressed, "; ".join(filter(None, (ds.attrs["why"], held, "object.mass_g gives the least")))
     wanted, (low, error) = f"{safety:g} times its {shown_text(in_si('mass_g', mass), 'kg', 3)}", force_to_use(ds, index)
     if np.isfinite(low):
-        covers = f"±: mesh, interpolation, {100 * MU_ERROR:g} % of mu"
-        return f"{with_error(low, error)} N per finger", f"the least that holds {wanted} ({covers})"
+        known = np.isfinite(error)
+        covers = f"±: mesh, interpolation, {100 * MU_ERROR:g} % of mu" if known else "error not known"
+        least = with_error(low, error) if known else number(low, 3)
+        if (high := at(ds, "force_high", index)) < low:
+            return "none is safe", f"{wanted} need {least} N per finger ({covers}), and the wall bears {high:.3g} N"
+        return f"{least} N per finger", f"the least that holds {wanted} ({covers})"
     weak = not at(ds, "safety_factor", index) >= safety * (1 - TIE)
     return pressed, f"no solved force holds {wanted}" if weak else f"the smallest solved force that holds {wanted}"
 
@@ -287,7 +291,8 @@ def _limit(ds: xr.Dataset, index: Index) -> str:
     """Why a grasp holds no more: what lies beyond its force, and better grasps that fail."""
     k, high = index[-1], at(ds, "force_high", index)
     if high < forces(ds)[-1] * (1 - NEGLIGIBLE):
-        parts = [f"the wall, which bears {high:.3g} N at most"]
+        friction = f"friction at {forces(ds)[k]:g} N, and " * bool(forces(ds)[k] < high)
+        parts = [f"{friction}the wall, which bears {high:.3g} N at most"]
     else:
         parts = [f"friction at {forces(ds)[k]:g} N{_beyond(ds, index)}"]
     done = np.flatnonzero(ds["status"].values[..., k].ravel() == DONE)

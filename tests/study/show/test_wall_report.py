@@ -103,7 +103,8 @@ def test_cases_outside_their_window_are_judged_by_the_force():
     assert flags.tolist() == [[Flag.TOO_WEAK, 0, 0, Flag.TOO_STRONG]]
     ds = ds.drop_vars("force_low").assign(status=(over, np.full((1, 4), DONE)))
     assert shown_level(ds, flags)[0] == 2
-    assert shown_level(ds, flags | Flag.TOO_WEAK)[0] == 3
+    assert shown_level(ds, flags | Flag.TOO_WEAK)[0] == 2
+    assert shown_level(ds, np.full((1, 4), Flag.TOO_STRONG))[0] == 3
     assert ranking(np.array([4.0, 1, 2, 5]), flags[0]).tolist() == [2, 1, 3, 0]
 
 
