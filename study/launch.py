@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +33,7 @@ def solve_scene(
     scene_file: str = "",
     overrides: Sequence[str] = (),
     retry_failed: bool = False,
+    last: Callable[[Any], str] = summary,
 ) -> int:
     """Solve a scene into its file, or what is missing there; collective over ``comm``.
 
@@ -46,6 +47,8 @@ def solve_scene(
         Where the scene comes from, and what was changed by ``--set``; kept in the file.
     retry_failed : bool
         Whether cases that failed before are tried again.
+    last : callable
+        ``last(result)`` gives the text that is printed at the end.
 
     Returns
     -------
@@ -59,7 +62,7 @@ def solve_scene(
     """
     scene = on_rank0(comm, with_sampled_grasps, scene)
     plan = on_rank0(comm, prepare, scene, scene_file, overrides)
-    return run_study(plan, work(scene, plan, comm), path, comm, retry_failed=retry_failed)
+    return run_study(plan, work(scene, plan, comm, last), path, comm, retry_failed=retry_failed)
 
 
 def solve_objects(folder: ObjectFolder, out: Path, comm: Any, *, retry_failed: bool = False) -> int:
@@ -90,14 +93,14 @@ def prepare(scene: Scene, scene_file: str, overrides: Sequence[str]) -> Any:
     return plan
 
 
-def work(scene: Scene, plan: Any, comm: Any) -> Work:
+def work(scene: Scene, plan: Any, comm: Any, last: Callable[[Any], str] = summary) -> Work:
     """How the cases of a scene are solved, and in rounds its grasps and their meshes refined."""
     each, about = added_cases(plan.units, plan.layout), (plan.header.scene_file, plan.header.overrides)
 
     def with_rounds(rounds: Rounds) -> Work:
         grown_scene = refined(scene, rounds)
         return Work(
-            pipeline.solve_unit, pipeline.image, lambda writer: derived.finalise(writer, grown_scene), summary,
+            pipeline.solve_unit, pipeline.image, lambda writer: derived.finalise(writer, grown_scene), last,
             scene.run.time_limit_s, scene.run.memory_gb,
             more=lambda result: next_round(result, scene, each),
             grown=lambda rounds: (on_rank0(comm, make_plan, scene, *about, rounds), with_rounds(rounds)),

@@ -201,8 +201,8 @@ class Stepping:
         if falls([peak[0], low[1]]):
             ended = NotReachedError(
                 f"the force stays below {force:.4g} N: it has a maximum of {peak[0]:.4g} N at a closing displacement "
-                f"of {1e3 * peak[1]:.4g} mm and falls to {low[1]:.4g} N at {1e3 * problem.closing(low[0]):.4g} mm, a "
-                "limit point of the pad on this mesh"
+                f"of {1e3 * peak[1]:.4g} mm and falls to {low[1]:.4g} N at {1e3 * problem.closing(low[0]):.4g} mm: "
+                "the pad gives way, on this mesh"
             )
         raise ended
 

@@ -187,8 +187,8 @@ class Press(LoadPath[RigidProblem]):
         if not (known := [error for error in errors if isinstance(error, ConvergenceError)]):
             raise errors[0]
         limits = [error for error in (failed, *known) if isinstance(error, NotReachedError)]
-        names = " nor ".join(dict.fromkeys(tried))
-        text = f"{(limits or known)[0]}; neither {names} gaps lead further, a finer mesh was not tried"
+        text = f"{(limits or known)[0]} (tried with {', '.join(dict.fromkeys(tried))} gaps)"
+        text += "; more elements may lead further, or a place farther from an edge"
         raise (NotReachedError if limits else ConvergenceError)(text) from known[0]
 
     def _through(self, below: OnPath | None, force: float, work: Work) -> FloatArray:

@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from softjaw.fem.objects.gap import IntArray, edges_of, solid_centroid
+from softjaw.fem.objects.gap import IntArray, cone_volumes, edges_of, solid_centroid
 from softjaw.friction.patch import FloatArray
 
 SMALL_HOLE = 0.02  # of the object's diagonal: smaller holes are filled, others stay open
@@ -134,14 +134,14 @@ def lid_corners(points: FloatArray, loops: list[list[int]]) -> FloatArray:
 OFF_CENTRE = 0.5 + 1e-4 * np.sqrt(2.0)  # of a cell, where lines run: not through the corners of regular meshes
 
 
-def centroid(points: FloatArray, triangles: IntArray, closed: bool) -> tuple[FloatArray, float]:
-    """Centroid ``(3,)`` of the volume inside triangles turned as their neighbours, and its estimated error [m].
+def solid(points: FloatArray, triangles: IntArray, closed: bool) -> tuple[float, FloatArray, float]:
+    """Volume inside triangles turned as their neighbours [m^3], its centroid ``(3,)``, and the error of that [m].
 
-    The error is 0 for one ``closed`` surface, of which the divergence theorem holds.
+    What lies in several parts counts once. The error is 0 for one ``closed`` surface: the divergence theorem holds.
     """
     low, high = points.min(axis=0), points.max(axis=0)
     if closed:
-        return solid_centroid(points, triangles), 0.0
+        return abs(float(cone_volumes(points, triangles).sum())), solid_centroid(points, triangles), 0.0
     step = float((high - low).max()) / 128  # cells along the longest side
     shape = np.maximum(np.ceil((high - low) / step).astype(int), 1)
     lines = _inside(points, triangles, low, step, shape)
@@ -150,7 +150,7 @@ def centroid(points: FloatArray, triangles: IntArray, closed: bool) -> tuple[Flo
     if not (inside > 0.5).any():
         a, b, c = points[triangles].transpose(1, 0, 2)
         area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-        return area @ (a + b + c) / (3 * area.sum()), float((high - low).max()) / 2
+        return 0.0, area @ (a + b + c) / (3 * area.sum()), float((high - low).max()) / 2
     # lines along an axis know the places of both ends on it; what they do not decide others tell, and what none does
     # counts half in one estimate and not at all in the other
     sure, soft = (inside > 0.5).astype(float), np.where(count > 0, inside, 0.5)
@@ -160,7 +160,8 @@ def centroid(points: FloatArray, triangles: IntArray, closed: bool) -> tuple[Flo
     )
     # others than those along an axis take its ends to lie between two cells
     rough = np.isnan(lines[:, sure > 0]).mean() + 2 / np.sqrt(sure.sum())
-    return low + step * (first + OFF_CENTRE), step * float(np.linalg.norm(first - second) + rough)
+    volume = step**3 * float(np.where(np.isnan(lines), sure, lines).sum()) / 3
+    return volume, low + step * (first + OFF_CENTRE), step * float(np.linalg.norm(first - second) + rough)
 
 
 def _mean_along(share: FloatArray, axis: int) -> float:

@@ -22,7 +22,7 @@ from softjaw.fem.errors import MeshError
 from softjaw.fem.objects.facing_sheet import COARSE, FacingSheet, facing_sheet
 from softjaw.fem.objects.gap import IN_PLACE, Gap, IntArray, NoContactError, Pose, Surface
 from softjaw.fem.objects.mesh_file import read_triangles
-from softjaw.fem.objects.mesh_holes import centroid
+from softjaw.fem.objects.mesh_holes import solid
 from softjaw.fem.objects.smooth_triangles import CREASE_ANGLE, SmoothTriangles, smooth_triangles
 from softjaw.fem.objects.splines import evaluate_grid, grid_coefficients
 from softjaw.fem.objects.triangle_tree import TriangleTree
@@ -94,10 +94,10 @@ class MeshObject:
         return float(distance)
 
     @cached_property
-    def centroid(self) -> tuple[FloatArray, float]:
-        """Centroid ``(3,)`` of the volume that the triangles enclose, as if it were full, and its error [m]."""
+    def solid(self) -> tuple[float, FloatArray, float]:
+        """Volume that the triangles enclose [m^3], as if it were full; centroid ``(3,)`` and the error of that [m]."""
         single = self.closed and not pieces_of(self.points, self.triangles).any()
-        return centroid(self.points, self.triangles, single)
+        return solid(self.points, self.triangles, single)
 
     def hole_share(self, pose: Pose, points: FloatArray, depth: float) -> float:
         """Share of the lines along the approach before ``points (n, 3)`` of the pad's frame that go through a hole.

@@ -104,7 +104,7 @@ def _check_size(extent: float, unit: str) -> None:
     if (1 - ROUNDED) * SMALLEST <= size <= (1 + ROUNDED) * LARGEST:
         return
     fits = [f'"{name}" ({extent * f * 1e3:.4g} mm)' for name, f in UNITS.items() if 0.02 <= extent * f <= 0.6]
-    advice = f"the unit should be {' or '.join(fits)}" if fits else "scale the mesh to the object's true size"
+    advice = f"the unit may be {' or '.join(fits)}" if fits else "scale the mesh to the object's true size"
     raise MeshError(
         f'an object of {size:.4g} m? With unit = "{unit}" its largest extent lies outside '
         f"{SMALLEST:g} m to {LARGEST:g} m; {advice}"

@@ -66,7 +66,7 @@ def own_frame(shape: Any) -> Pose:
 
 def centre_of_volume(obj: Any) -> NDArray[np.float64]:
     """Centroid ``(3,)`` [m] of the body that an object's surface encloses, as if it were full."""
-    return np.asarray(obj.centroid[0]) if hasattr(obj, "centroid") else solid_centroid(*obj.surface())
+    return np.asarray(obj.solid[1]) if hasattr(obj, "solid") else solid_centroid(*obj.surface())
 
 
 def centroid_and_bounds(shape: Any) -> dict[str, NDArray[np.float64]]:
@@ -78,7 +78,7 @@ def centroid_and_bounds(shape: Any) -> dict[str, NDArray[np.float64]]:
 
 
 def volume(shape: Any) -> float:
-    """Volume of the body that an object's surface encloses [m^3], to 0.3 % where there is no closed form.
+    """Volume of the body that an object's surface encloses [m^3], to 1 % where there is no closed form.
 
     Raises `ValueError`: the surface does not enclose one.
     """
@@ -95,7 +95,7 @@ def volume(shape: Any) -> float:
     obj = build_object(shape)
     if not getattr(obj, "closed", True):
         raise ValueError("the mesh is not closed")
-    return abs(float(cone_volumes(*surface_triangles(shape)).sum()))
+    return obj.solid[0] if hasattr(obj, "solid") else abs(float(cone_volumes(*surface_triangles(shape)).sum()))
 
 
 def with_mass(scene: Scene) -> Scene:
@@ -233,7 +233,7 @@ def mesh_notes(mesh: Any, centroid: bool = True) -> tuple[str, ...]:
     """What of a mesh was mended or left open, and how well its ``centroid`` is known where it is not closed."""
     if mesh.closed or not centroid:
         return tuple(mesh.notes)
-    place, error = mesh.centroid
+    _, place, error = mesh.solid
     named = ", ".join(f"{1e3 * x:.1f}" for x in mesh.placed.to_object(place[None])[0])
     note = (
         f"it is not closed: its centroid is estimated at ({named}) mm, to {1e3 * error:.1g} mm;"

@@ -17,7 +17,7 @@ from softjaw.study.case.candidates import check_candidates, with_sampled_grasps
 from softjaw.study.messages import USAGE, StudyError, with_ending
 from softjaw.study.run.estimate import START_S, estimated, scaling_text, slowness
 from softjaw.study.run.object_folder import ObjectFolder, folder_of
-from softjaw.study.run.plan import free_bytes, make_plan, memory, plan_text
+from softjaw.study.run.plan import free_bytes, gigabytes, make_plan, memory, plan_text
 from softjaw.study.run.progress import duration
 from softjaw.study.run.shares import makespan
 from softjaw.study.scene import Scene, load_scene, start
@@ -102,7 +102,7 @@ def objects_text(folder: ObjectFolder, out: Path, ranks: int) -> str:
         rows |= {
             "cases": f"about {cases:.0f}",
             "disk": f"about {space / 1e6:.3g} MB in {out}, {free / 1e9:.1f} GB free",
-            "memory": f"roughly {need / 1e9:.1g} GB on each rank, {need * ranks / 1e9:.2g} GB on {ranks}",
+            "memory": f"roughly {gigabytes(need, 1)} on each rank, {gigabytes(need * ranks, 2)} on {ranks}",
             "time": f"about {duration(START_S + preparing + solving)} on {ranks} rank{'s' * (ranks > 1)}, "
             f"{duration(preparing)} of it for sampling grasps; estimated on a bed of springs",
         }

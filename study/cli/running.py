@@ -14,6 +14,7 @@ from softjaw.study.messages import DONE, SOME_FAILED, write_file
 from softjaw.study.result.read import open as open_dataset
 from softjaw.study.run.progress import Unbreakable
 from softjaw.study.show import objects
+from softjaw.study.show.status import counts
 from softjaw.study.table import terminal_width
 
 
@@ -39,7 +40,7 @@ def cost(options: Namespace) -> int:
     sys.stdout = Unbreakable(sys.stdout)
     path, comm = target(options, "-cost"), MPI.COMM_WORLD
     scene = cost_scene(with_sampled_grasps(options.scene_read))
-    code = solve_scene(scene, path, comm, scene_file=options.scene, overrides=options.overrides)
+    code = solve_scene(scene, path, comm, scene_file=options.scene, overrides=options.overrides, last=counts)
     if comm.rank == 0 and code in (DONE, SOME_FAILED):
         ds = open_dataset(path)
         write_file(path.with_suffix(".png"), cost_picture(ds))

@@ -143,6 +143,15 @@ def shells(scene: Any) -> bool:
     return has_wall(scene.object) and scene.effects.object != "rigid"
 
 
+def gigabytes(size: float, digits: int) -> str:
+    """A size in bytes, rounded.
+
+    >>> gigabytes(2.62e11, 1), gigabytes(6.8e8, 2)
+    ('300 GB', '0.68 GB')
+    """
+    return f"{float(f'{size:.{digits}g}') / 1e9:g} GB"
+
+
 def plan_text(plan: Plan, scene: Any, path: Path, ranks: int) -> str:
     """Cases, units, disk, memory and time on so many ranks."""
     layout = plan.layout
@@ -157,7 +166,7 @@ def plan_text(plan: Plan, scene: Any, path: Path, ranks: int) -> str:
         "no grasp": _no_grasps(plan),
         "rounds": _rounds(plan, scene),
         "disk": f"{space}, {free_bytes(path) / 1e9:.1f} GB free",
-        "memory": f"roughly {each / 1e9:.1g} GB on each rank, {each * ranks / 1e9:.2g} GB on {ranks}",
+        "memory": f"roughly {gigabytes(each, 1)} on each rank, {gigabytes(each * ranks, 2)} on {ranks}",
         "time": _time(plan, scene, path, ranks),
         "ranks": f"up to {ranks_busy} are busy at least 80 % of the time",
     }

@@ -106,11 +106,11 @@ class Walled(Shape):
         for i, (low, high) in enumerate(pairwise(self.wall_mm if isinstance(self.wall_mm, tuple) else ()), 1):
             if high[0] <= low[0]:
                 yield wrong(high, f"pairs [z, thickness] with z rising from {low[0]:g} mm", "wall_mm", i)
-        # share of the smallest extent: a thicker wall is no shell
+        # a thinner foil is a slip of the unit; share of the smallest extent: a thicker wall is no shell
         most = 0.1 * min((high - low for low, high in self.spans_mm.values()), default=math.inf)
-        thick = [t for t in self.thicknesses_mm if not 0 < t <= most]
+        thick = [t for t in self.thicknesses_mm if not 0.01 <= t <= most]
         if thick:
-            expected = f"a thickness above 0 and up to {most:g} mm, a tenth of the object's smallest extent"
+            expected = f"a thickness from 0.01 to {most:g} mm, a tenth of the object's smallest extent"
             yield wrong(thick[0], f"{expected}; a thicker wall is as good as rigid: leave it out", "wall_mm")
         missing = [k for k in ("young_modulus_gpa", "wall_poisson_ratio") if getattr(self, k) is None]
         if self.wall_material == "custom" and missing:

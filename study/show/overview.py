@@ -24,6 +24,7 @@ def scene_text(scene: Any, file: str) -> str:
         "object": f"{o.shape}{name}{_extent(o)}",
         "mesh": getattr(o, "mesh", ""),  # the effective path, wherever the scene's leads
         "wall": wall_text(o),
+        "mass": f"{o.mass_g:g} g, to be held {scene.task.safety:g} times over" if o.mass_g else "",
         "candidates": f"{most}{c.total} {where}",
         "forces": listed(scene.load.normal_force_n, "N"),
         "friction": f"mu = {scene.friction.mu:g}; CCM, PCM and PCM scaled by F_N",

@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 from softjaw.fem.errors import MeshError
-from softjaw.fem.objects.mesh_holes import centroid
+from softjaw.fem.objects.mesh_holes import solid
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.fem.objects.smooth_triangles import smooth_triangles
 from softjaw.fem.objects.triangles import cleaned, neighbours
@@ -98,7 +98,7 @@ def test_a_body_is_the_same_to_a_finger_however_its_triangles_are_given(kind):
     close = np.abs(expected) < 1e-3
     assert close.sum() > 20
     assert np.abs(g - expected)[close].max() < (4e-5 if kind == "slabs" else 1e-12)
-    assert np.linalg.norm(torn.centroid[0] - sound.centroid[0]) < max(2e-4, 2 * torn.centroid[1])
+    assert np.linalg.norm(torn.solid[1] - sound.solid[1]) < max(2e-4, 2 * torn.solid[2])
 
 
 def test_parts_that_cross_are_one_volume():
@@ -107,8 +107,9 @@ def test_parts_that_cross_are_one_volume():
     points, triangles = joined(cube, cube.copy().apply_translation([0.02, 0.02, 0.0]))
     turn = np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))[0]
     for R in (np.eye(3), turn * np.linalg.det(turn)):
-        place, error = MeshObject(points @ R.T, triangles).centroid
+        volume, place, error = MeshObject(points @ R.T, triangles).solid
         assert error < 6e-6
+        assert volume == pytest.approx(1.75 * 0.04**3, rel=1e-2)
         np.testing.assert_allclose(place, R @ [0.01, 0.01, 0.0], atol=3e-6)
 
 
@@ -118,8 +119,9 @@ def test_the_centroid_of_an_open_box_is_within_its_stated_error(roll):
     box.apply_transform(trimesh.transformations.rotation_matrix(roll, [1, 2, 3], [0.1, 0.0, 0.0]))
     points, triangles = np.array(box.vertices), np.array(box.faces)
     for torn in (3, 70, 150):
-        place, error = centroid(points, np.delete(triangles, torn, axis=0), closed=False)
+        volume, place, error = solid(points, np.delete(triangles, torn, axis=0), closed=False)
         assert np.linalg.norm(place - box.center_mass) < error < 1e-4
+        assert volume == pytest.approx(box.volume, rel=1e-2)
 
 
 @pytest.mark.long

@@ -113,7 +113,7 @@ def test_nothing_is_replaced_unasked(tmp_path, there, capsys):
 @pytest.mark.parametrize(("words", "told"), [
     ([], "{bottle,cup,cylinder,mesh}"), (["botle"], "did you mean 'bottle'?"),
     (["mesh"], "a mesh needs --mesh FILE and --unit"), (["mesh", "--mesh", str(FLASK)], "a mesh needs --unit"),
-    (["mesh", "--mesh", str(FLASK), "--unit", "inch"], 'the unit should be "mm"'),
+    (["mesh", "--mesh", str(FLASK), "--unit", "inch"], 'the unit may be "mm"'),
     (["mesh", "--mesh", "no.stl", "--unit", "mm"], "no.stl"),
     (["cup", "--mesh", str(FLASK)], "--mesh: found beside 'cup'"), (["cup", "-o", "$(rm -r .)"], "expected letters"),
     (["cup", "-o", 'a"b'], "expected letters"),
