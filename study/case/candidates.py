@@ -13,12 +13,15 @@ from itertools import product
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from softjaw.fem.objects.gap import Pose
 from softjaw.friction.patch import NEGLIGIBLE
 from softjaw.study.case.build import (
+    build_object,
     check_object,
     forces_apart,
+    geometry,
     middle_of,
     own_frame,
     pad_shape,
@@ -67,6 +70,18 @@ def candidates(scene: Scene) -> list[Candidate]:
         Candidate(s, angle, moved(axis_poses(s, angle, where.roll, middle), where.shift, 0.0), label, notes[s])
         for (s, angle), label in zip(places, where.labels, strict=True)
     ]
+
+
+def first_touch(scene: Scene, station: float, angle: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Rotations ``(2, 3, 3)`` and origins ``(2, 3)`` [m] of both pads where they first touch at a station and an angle.
+
+    In the frame of the object's own file, of a scene whose candidates are stations [m] and angles [rad].
+    """
+    obj, placed, where = build_object(scene.object), own_frame(scene.object), scene.candidates
+    pads = moved(axis_poses(station, angle, where.roll, middle_of(scene)), where.shift, 0.0)
+    poses = [geometry().approach(obj, pad, scene.gripper).pose for pad in pads]
+    origins = placed.to_object(np.stack([pose.origin for pose in poses]))
+    return placed.rotation @ np.stack([pose.rotation for pose in poses]), origins
 
 
 def check_candidates(scene: Scene) -> None:

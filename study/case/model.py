@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -10,24 +9,19 @@ import numpy as np
 
 from softjaw.fem.contact.press import Press
 from softjaw.fem.materials import Material, material
-from softjaw.fem.objects.gap import GapFunction, GapObject, Pose, first_touch
-from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.fem.pad.backing_plate import relative_compliance
 from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.pad.shape import BackingPlate, TiltingMount
 from softjaw.fem.petsc import PETSc, unknown_options
-from softjaw.friction.patch import NEGLIGIBLE, FloatArray
+from softjaw.friction.patch import FloatArray
 from softjaw.study.case.build import pad_shape
-from softjaw.study.case.fit import extremes
+from softjaw.study.case.geometry import KNOWN_DEPTH, Finger
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.scene import Scene
 from softjaw.study.scene.sections import Gripper
 
 MIRRORED = 2e-5  # of the pad's length, to which images agree: files are of single precision, e_n moves by less
-STEPS_BACK = (0.1, 0.4, 1.6)  # of the pad's thickness: where it stands before it is brought to the smooth surface
-ROUNDED_OFF = 2e-5  # so far a smooth surface may lie behind the triangles it is made of where a pad touches first [m]
 PLATE_POISSON = 0.3  # of the backing plate; the modulus is what a scene gives
-KNOWN_DEPTH = 0.9  # of the pad's thickness: how far round the undeformed contact face the object must be known
 
 
 def pad_material(gripper: Gripper) -> Material:
@@ -64,73 +58,6 @@ def pad(gripper: Gripper, symmetry: tuple[bool, bool], contact: str, coarser: bo
     """Discrete pad with its backing plate; the same for all candidates, so it is made once."""
     behind = backing_plate(gripper) if elastic_plate else tilting_mount(gripper)
     return Pad(pad_shape(gripper, coarser), pad_material(gripper), symmetry, contact, behind)
-
-
-@dataclass(frozen=True, eq=False)
-class Finger:
-    """A pad at first touch with the object.
-
-    ``pose``: the pad's frame at first touch. ``surface``: the object round the contact, in the object's frame.
-    ``hole_share``: share of the pad's face before a hole of the object's mesh.
-    """
-
-    pose: Pose
-    surface: GapFunction
-    hole_share: float = 0.0
-
-    @property
-    def half_turned(self) -> Finger:
-        """In the frame that half a turn about the approach gives the pad: x and y change their signs."""
-        return replace(self, pose=Pose(self.pose.rotation * [-1.0, -1.0, 1.0], self.pose.origin))
-
-    def gap(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Signed distance, gradient and Hessian at points of the pad's frame."""
-        R = self.pose.rotation
-        g, normal, hessian = self.surface.gap(self.pose.to_object(x))
-        return g, normal @ R, R.T @ hessian @ R
-
-
-def approach(obj: GapObject, pose: Pose, gripper: Gripper) -> Finger:
-    """Move a pad from afar along its approach to first touch; raises `NoContactError` if the pad passes the object."""
-    size = gripper.pad_size
-    touch = touching(obj, pose, size)
-    box = np.array([0.6 * size[0], 0.6 * size[1], KNOWN_DEPTH * size[2]])
-    element = min(side / n for side, n in zip(size[:2], gripper.elements, strict=False))
-    surface = obj.near(touch, box * [-1, -1, -0.5], box, element if gripper.element == "hex8" else 0.5 * element)
-    face = _contact_face(size)
-    if abs(surface.gap(touch.to_object(face))[0].min()) > NEGLIGIBLE:  # smoothed: met earlier or later
-        # A smoothed surface may stand before the old touch, so the pad steps back before it looks again.
-        for step in STEPS_BACK:
-            back = Pose(touch.rotation, touch.origin - step * size[2] * touch.rotation[:, 2])
-            if surface.gap(back.to_object(face))[0].min() > 0.0:
-                break
-        distance = first_touch(surface, back, face, 2 * step * size[2])
-        touch = Pose(touch.rotation, back.origin + distance * touch.rotation[:, 2])
-    if isinstance(obj, MeshObject):
-        # the smooth surface rounds sharp edges off, and corners pass between the points of the face
-        ahead = extremes(touch.to_pad(obj.points), obj.triangles, size[:2])[0]
-        if ahead < -ROUNDED_OFF:
-            touch = Pose(touch.rotation, touch.origin + ahead * touch.rotation[:, 2])
-    hole_share = obj.hole_share(touch, face, KNOWN_DEPTH * size[2]) if isinstance(obj, MeshObject) else 0.0
-    return Finger(touch, surface, hole_share)
-
-
-def touching(obj: GapObject, pose: Pose, size: tuple[float, float, float]) -> Pose:
-    """Pose at first touch; see `approach`."""
-    lower, upper = obj.bounds
-    # From outside of the object wherever the pose stands; the pad's size covers its corners.
-    reach = float(np.linalg.norm(upper - lower)) + size[0] + size[1]
-    ahead = float((0.5 * (lower + upper) - pose.origin) @ pose.rotation[:, 2])
-    start = Pose(pose.rotation, pose.origin + (ahead - reach) * pose.rotation[:, 2])
-    distance = obj.first_touch(start, _contact_face(size), 2.0 * reach)
-    return Pose(pose.rotation, start.origin + distance * pose.rotation[:, 2])
-
-
-def _contact_face(size: tuple[float, float, float]) -> FloatArray:
-    """Points spread over the undeformed contact face, independent of the mesh, the planes of symmetry among them."""
-    # Odd numbers of points put one on each plane of symmetry, where most objects are met first.
-    x, y = np.meshgrid(np.linspace(-0.5, 0.5, 41) * size[0], np.linspace(-0.5, 0.5, 21) * size[1], indexing="ij")
-    return np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
 
 
 @lru_cache(maxsize=8)

@@ -20,7 +20,8 @@ from softjaw.friction.patch import ContactPatch, cross
 from softjaw.friction.wrench import FrictionLimits
 from softjaw.study.case.build import pad_shape
 from softjaw.study.case.contact import Contact
-from softjaw.study.case.model import Finger, contact_rules, image_signs, pad_of, press_of, require_planes
+from softjaw.study.case.geometry import Finger
+from softjaw.study.case.model import contact_rules, image_signs, pad_of, press_of, require_planes
 from softjaw.study.case.poses import turn_of_pose
 from softjaw.study.case.result import UNDECIDED
 from softjaw.study.case.wall import thin_body, wall_values

@@ -23,7 +23,7 @@ from softjaw.study.case.build import build_object, forces_apart, has_wall, pad_e
 from softjaw.study.case.contact import Contact
 from softjaw.study.case.errors import DOUBTED, edge_floor, grasp_values, mesh_errors
 from softjaw.study.case.evaluate import EvaluationSettings, settings_of
-from softjaw.study.case.model import Finger, approach
+from softjaw.study.case.geometry import Finger, approach
 from softjaw.study.case.pressing import OnRigid, OnWall, PressedContact, pressing, refuse_along_axis
 from softjaw.study.case.result import surely_below
 from softjaw.study.scene import Scene

@@ -14,6 +14,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
+from softjaw.study.case.candidates import first_touch
 from softjaw.study.flags import Flag
 from softjaw.study.lookup.interpolation import (
     Corners,
@@ -96,6 +97,7 @@ class GraspMap:
         self.snapped = self.done & (self._grid(self.read("flags")) & Flag.SNAPPED > 0)
         self._tables: dict[tuple[str, str], FloatArray] = {}
         self._bends: dict[tuple[str, str], FloatArray] = {}
+        self._poses: dict[tuple[float, float], Any] = {}
         self.kind = self._kinds()
 
     def at(
@@ -205,6 +207,21 @@ class GraspMap:
         flat = np.stack([part.ravel() for part in parts], axis=-1)
         at = corners(self.axes, flat)
         return GraspPoint(self, parts[0].shape, flat, at, self.states(at))
+
+    def pose(self, station: float, angle: float) -> tuple[FloatArray, FloatArray]:
+        """Rotations ``(2, 3, 3)`` and origins ``(2, 3)`` [m] of both pads at first touch; see `GraspPoint.pose`."""
+        if (station, angle) not in self._poses:
+            axes = [axis.values for axis in self.file_axes[-3:-1]]
+            i, j = (int(np.abs(x - value).argmin()) for x, value in zip(axes, (station, angle), strict=True))
+            solved = np.isclose([axes[0][i], axes[1][j]], [station, angle], rtol=1e-9, atol=1e-12).all()
+            if solved and (self.status[i, j] == DONE).any():
+                k = (self.status[i, j] == DONE).argmax()  # a pose is the same at every force
+                self._poses[station, angle] = tuple(
+                    self.read(f"fingers/{name}")[i, j, k] for name in ("pose_rotation", "pose_origin")
+                )
+            else:
+                self._poses[station, angle] = first_touch(scene_of(self.data, self.index), station, angle)
+        return self._poses[station, angle]
 
     def read(self, name: str, model: str = "ccm") -> np.ndarray:
         """A map, or a finger's dataset ``(station, angle, force, finger, ...)`` in one friction model."""

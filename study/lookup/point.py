@@ -10,8 +10,8 @@ import numpy as np
 from softjaw.lsfit.surface import LimitSurface
 from softjaw.study.case.result import GraspNumbers
 from softjaw.study.flags import flags_in
-from softjaw.study.lookup.interpolation import Corners, FloatArray, blend, corners, plain
-from softjaw.study.quantities import BOTH_ENDS, BY_KEY, DONE, FAILED, FORCE_RANGE, MAIN, MISSING
+from softjaw.study.lookup.interpolation import Corners, FloatArray
+from softjaw.study.quantities import BOTH_ENDS, BY_KEY, FAILED, FORCE_RANGE, MAIN, MISSING
 from softjaw.study.quantities import STATES as OF_CASES
 from softjaw.study.units import shown_text
 
@@ -91,22 +91,12 @@ class GraspPoint(GraspNumbers):
     def pose(self) -> tuple[FloatArray, FloatArray]:
         """Rotations ``(..., 2, 3, 3)`` and origins ``(..., 2, 3)`` [m] of both pads at first touch.
 
-        ``x = rotation x_pad + origin`` in the frame of the object's own file; between cases the nearest rotation to
-        their mean. NaN at angles outside of the solved ones, where values are those of an image by symmetry.
+        ``x = rotation x_pad + origin`` in the frame of the object's own file; between solved places where the pads of
+        the scene meet its object. NaN where there is no value.
         """
-        stations, angles, _ = self.map.axes
-        # As they stand: no angle is folded to an image of itself.
-        turns = angles if self.map.by_poses else plain("angle", "rad", self.map.file_axes[-2].values)
-        at = corners((stations, turns, plain("force", "N", [0.0])), self.place * [1.0, 1.0, 0.0])
-        solved = (self.map.status == DONE).argmax(axis=-1)  # a pose is the same at every force
-        cases = np.ix_(stations.take, turns.take)
-        both = (self.map.read(f"fingers/{name}") for name in ("pose_rotation", "pose_origin"))
-        tables = (values[(*cases, solved[cases])] for values in both)
-        R, x = (blend(np.repeat(table.reshape(-1, *table.shape[2:]), 2, axis=0), at) for table in tables)
-        outside = (self.states != INSIDE) | ~at.inside.all(axis=1)
-        U, _, V = np.linalg.svd(R[~outside])
-        R[~outside] = U @ V
-        R[outside], x[outside] = np.nan, np.nan
+        R, x = np.full((len(self.states), 2, 3, 3), np.nan), np.full((len(self.states), 2, 3), np.nan)
+        for i in np.flatnonzero(self.states == INSIDE):
+            R[i], x[i] = self.map.pose(*self.place[i, :2].tolist())
         return R.reshape(*self.shape, 2, 3, 3), x.reshape(*self.shape, 2, 3)
 
     @property

@@ -13,7 +13,7 @@ from softjaw.fem.objects.gap import Pose
 from softjaw.fem.objects.shapes import EllipticCylinder
 from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.pad.shape import PadShape
-from softjaw.study.case.model import Finger, touching
+from softjaw.study.case.geometry import Finger, touching
 from tests.benchmark.table import line, title
 
 PYTHON = "/usr/bin/python3"  # sees Debian's python3-getfem

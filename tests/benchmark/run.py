@@ -21,7 +21,7 @@ from softjaw.fem.objects.gap import Pose
 from softjaw.fem.objects.shapes import EllipticCylinder
 from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.pad.shape import PadShape
-from softjaw.study.case.model import Finger, touching
+from softjaw.study.case.geometry import Finger, touching
 from softjaw.study.doctor import launch_environment
 from tests.benchmark import kernels, other_code, users
 from tests.benchmark.table import fastest, line, title

@@ -9,7 +9,7 @@ import trimesh
 from softjaw.fem.objects.gap import Pose
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.study.case.fit import Jaws
-from softjaw.study.case.model import ROUNDED_OFF, approach
+from softjaw.study.case.geometry import ROUNDED_OFF, approach
 from softjaw.study.case.sampler import antipodal_grasps
 from softjaw.study.case.task import Task
 from softjaw.study.scene import parse_scene

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from softjaw.study.case.build import build_object
-from softjaw.study.case.model import approach, press_of
+from softjaw.study.case.geometry import approach
+from softjaw.study.case.model import press_of
 from softjaw.study.case.poses import axis_poses
 from softjaw.study.scene import parse_scene
 from tests.fem import reference
