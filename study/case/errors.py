@@ -27,7 +27,7 @@ OF_FARTHEST, DOUBTED, EDGE, POWER = 0.3, 2.0, 0.27, 0.75
 # How many times the floor: shares that a model or the curvature takes off are small differences of large numbers, sums
 # over all faces tell less of single ones.
 WIDER = dict.fromkeys((q.name for q in TABLE if q.error == "absolute"), 10.0) | {
-    "f_x_max": 0.3, "f_y_max": 0.3, "opening_loaded": 0.1, "quality": 1.3, "contact_area": 4.5, "p_max": 19.0,
+    "f_x_max": 0.3, "f_y_max": 0.3, "quality": 1.3, "contact_area": 4.5, "p_max": 19.0,
     "wall_stress": 4.5, "wall_strain": 4.5,
 }  # fmt: skip
 EDGES_ROUNDED = 1.6  # times the error of a payload on the coarse mesh alone, where the object's edges are rounded
@@ -62,6 +62,8 @@ def mesh_errors(
             error = max(error, 1.0)  # a payload of which the coarse mesh has nothing
         apart = [s * distance(low[q.key], high[q.key], q.error, value) for low, high, s in compared if q.key in low]
         errors[q.of_error.key] = error + OF_PAIRS.get(q.name, 1.0) * sum(apart) + left_out * size
+    if (closing := errors.get("maps/closing_error")) is not None:  # of both pads
+        errors["maps/opening_loaded_error"] = 2.0 * closing * float(fine_mesh["maps/closing"][0])
     return errors
 
 

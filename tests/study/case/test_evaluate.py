@@ -136,7 +136,7 @@ def test_every_quantity_with_an_error_gets_one_and_a_weight_between_the_pads_is_
     assert set(errors) == {q.of_error.key for q in TABLE if q.error and "wall" not in q.needs}
     assert np.isfinite([*errors.values()]).all()
     assert errors["maps/closing_error"] == pytest.approx(weights.OF_FARTHEST * 0.1, rel=1e-9)
-    assert errors["maps/opening_loaded_error"] == pytest.approx(weights.OF_FARTHEST * 1e-3, rel=1e-9)
+    assert errors["maps/opening_loaded_error"] == pytest.approx(weights.OF_FARTHEST * 0.1 * 2e-3, rel=1e-9)
     peaks = [contacts[0].patch.pressure.max() for contacts in (fine, coarse)]
     assert errors["maps/p_max_error"] == pytest.approx(weights.OF_FARTHEST * abs(peaks[1] / peaks[0] - 1), rel=1e-9)
     assert errors["maps/safety_factor_error"] == pytest.approx(errors["maps/payload_error"], rel=1e-9)

@@ -205,6 +205,8 @@ def test_half_a_turn_of_the_gripper_exchanges_the_fingers_and_explicit_poses_go_
     for wrong in (1.5, 3, -1):
         assert "candidates 0 to 2 and nothing between" in poses.at(candidate=wrong, force=3).reason
         assert np.isnan(poses.value("e_n", float(wrong), 0.0, 3.0))
+    single = GraspMap(make(tmp_path / "one.hdf", axes=grid_axes([0], [0], FORCES, poses=True)))
+    assert single.at(candidate=0, force=3).e_n == pytest.approx(linear(0, 0, 3))
     with pytest.raises(ValueError, match="explicit poses"):
         poses.at(0.01, 0.0, 3)
 
