@@ -65,8 +65,9 @@ class GraspMap:
     Notes
     -----
     The error of a value is that of a straight line through a curve with the largest second derivative that the cases
-    around show, with those beside them along stations and forces, added up over the three axes and times 1.75: a claim,
-    below which at least 95 % of the true errors of the main maps stay where that was measured. Errors that the cases
+    around show, with those beside them, added up over the three axes and times 1.75, along angles 5.25: a claim, below
+    which at least 95 % of the true errors of the main maps stay where that was measured. Between angles more than 25
+    degrees apart there are no values: edges that come to bear between them would stay unseen. Errors that the cases
     around state themselves (``accuracy.meshes = 2``; in between as the values are) are added in squares.
     Along an axis of two values there is no second derivative, and half of their difference stands in. What is
     narrower than the spacing of the candidates stays unseen.
@@ -90,7 +91,8 @@ class GraspMap:
         self.quantities = {name: (unit, ds[name].definition) for name, unit in maps_in(ds).items()}
         self.by_poses = not station.units
         angles = circle("angle", "rad", angle.values, *((0.0, False) if self.by_poses else turning(ds, self.index)))
-        stations = plain("candidate" if self.by_poses else "station", station.units, station.values, self.by_poses)
+        name, most = ("candidate", 0.5) if self.by_poses else ("station", math.inf)
+        stations = plain(name, station.units, station.values, most)
         self.axes: tuple[Nodes, Nodes, Nodes] = (stations, angles, plain("force", "N", force.values))
         self.shape = tuple(len(nodes.x) for nodes in self.axes)
         self.done = self._grid(self.status == DONE)

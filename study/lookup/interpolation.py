@@ -21,6 +21,8 @@ from softjaw.fem.objects.gap import IntArray
 from softjaw.friction.patch import NEGLIGIBLE, FloatArray
 
 CLAIM_FACTOR = 1.75  # between estimate and claim: with less, less than 95 % of the errors stay within it
+OF_ANGLES = 3.0  # times that along angles, where payload and edges of contacts have kinks
+MOST_TURN = math.radians(25)  # between angles farther apart even such claims hold for half of the points
 CLOSING_GAP_RATIO = 1.5  # a gap that closes a circle may be this much wider than the others
 UPPER = np.array(list(np.ndindex(2, 2, 2)))  # which corners of a cell are its upper ones, along each axis
 
@@ -30,7 +32,7 @@ class Nodes:
     """Nodes of one axis: coordinates ``x (k,)``, rising, and where their values stand along the file's axis.
 
     A periodic axis brings coordinates into ``[x_0, x_0 + period)`` first; with ``half_turn`` every odd multiple of the
-    period exchanges the fingers, for nodes as ``swapped (k,)``. Between nodes of an ``exact`` axis there is nothing.
+    period exchanges the fingers, for nodes as ``swapped (k,)``. Between nodes farther apart than ``most`` is nothing.
     """
 
     name: str
@@ -40,7 +42,7 @@ class Nodes:
     swapped: NDArray[np.bool_]
     period: float = 0.0
     half_turn: bool = False
-    exact: bool = False
+    most: float = math.inf
     free: bool = False
 
     @property
@@ -49,14 +51,14 @@ class Nodes:
         return NEGLIGIBLE * max(abs(float(self.x[0])), abs(float(self.x[-1])))
 
 
-def plain(name: str, units: str, values: ArrayLike, exact: bool = False) -> Nodes:
+def plain(name: str, units: str, values: ArrayLike, most: float = math.inf) -> Nodes:
     """Axis without a period; one single value is a place where the grid can be asked, not beside it."""
     x = np.asarray(values, float)
     order = np.argsort(x)
     x = x[order]
     if len(x) == 1:
         x, order = _point(float(x[0])), order.repeat(2)
-    return Nodes(name, units, x, order, np.zeros(len(x), bool), exact=exact)
+    return Nodes(name, units, x, order, np.zeros(len(x), bool), most=most)
 
 
 def circle(name: str, units: str, values: ArrayLike, period: float, half_turn: bool = False) -> Nodes:
@@ -78,7 +80,7 @@ def circle(name: str, units: str, values: ArrayLike, period: float, half_turn: b
     if x[0] + period - x[-1] <= CLOSING_GAP_RATIO * np.diff(x).max() * (1 + NEGLIGIBLE):
         x, order = np.append(x, x[0] + period), np.append(order, order[0])
         swapped = np.append(swapped, swapped[0] ^ half_turn)
-    return Nodes(name, units, x, order, swapped, period, half_turn)
+    return Nodes(name, units, x, order, swapped, period, half_turn, MOST_TURN)
 
 
 def _point(x: float) -> FloatArray:
@@ -116,8 +118,7 @@ def corners(axes: Sequence[Nodes], points: FloatArray) -> Corners:
         i = np.clip(np.searchsorted(x, v, "right") - 1, 0, len(x) - 2)
         s = (v - x[i]) / (x[i + 1] - x[i])
         s = np.where(s < NEGLIGIBLE, 0.0, np.where(s > 1 - NEGLIGIBLE, 1.0, s))
-        # of a single value both nodes are its own, a hair beside it
-        inside[:, a] &= (s == 0) | (s == 1) | (not nodes.exact or nodes.take[0] == nodes.take[-1])
+        inside[:, a] &= (s == 0) | (s == 1) | (x[i + 1] - x[i] <= nodes.most)
         cell[:, a], share[:, a] = i, s
     at = cell[:, None] + UPPER
     index = (at[..., 0] * len(axes[1].x) + at[..., 1]) * len(axes[2].x) + at[..., 2]
@@ -158,9 +159,9 @@ def bends(table: FloatArray, axes: Sequence[Nodes], side: NDArray[np.bool_]) -> 
 
 
 def claims(bend: FloatArray, shape: tuple[int, ...]) -> FloatArray:
-    """`bends` ``(3, nodes)`` of this shape of nodes as claims: the largest around along stations and forces."""
-    claimed = maximum_filter(np.nan_to_num(bend.reshape(3, *shape)), (1, 3, 1, 3), mode="constant")
-    return CLAIM_FACTOR * claimed.reshape(3, -1)
+    """`bends` ``(3, nodes)`` of this shape of nodes as claims: the largest around."""
+    claimed = maximum_filter(np.nan_to_num(bend.reshape(3, *shape)), (1, 3, 3, 3), mode="constant")
+    return CLAIM_FACTOR * np.array([[1.0], [OF_ANGLES], [1.0]]) * claimed.reshape(3, -1)
 
 
 def error(bend: FloatArray, at: Corners) -> FloatArray:

@@ -185,10 +185,12 @@ class GraspPoint(GraspNumbers):
         a = int(np.argmin(self.corners.inside[i]))
         nodes, value, axis = self.map.axes[a], self.place[i, a], self.map.file_axes[-3 + a]
         text = f"outside the map: {nodes.name} {shown_text(value, nodes.units, 5)}"
-        if nodes.exact:
+        if self.map.by_poses and a == 0:
             return f"{text}, there are candidates 0 to {len(axis.values) - 1} and nothing between them"
         low, high = (shown_text(v, nodes.units, 5) for v in (axis.values.min(), axis.values.max()))
-        return f"{text}, solved: {low}" + (f" to {high}" if low != high else " only")
+        wide = bool(nodes.most < np.diff(nodes.x).max())
+        apart = f"; nothing is known between angles more than {shown_text(nodes.most, nodes.units, 3)} apart" * wide
+        return f"{text}, solved: {low}" + (f" to {high}" if low != high else " only") + apart
 
     def _cases(self, i: int) -> list[tuple[tuple[int, ...], int]]:
         """Indices of the cases around a point along the file's axes, with their nodes."""

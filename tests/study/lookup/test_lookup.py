@@ -5,6 +5,7 @@ import pytest
 
 from softjaw.study.case.build import build_object
 from softjaw.study.lookup import GraspMap
+from softjaw.study.lookup.interpolation import OF_ANGLES
 from softjaw.study.lookup.point import INSIDE, JUMP, NO_RESULT, OUTSIDE, SNAP
 from softjaw.study.quantities import Axis
 from softjaw.study.result.read import open as open_dataset
@@ -57,7 +58,8 @@ def test_the_estimate_covers_the_true_error_of_cases_left_out(tmp_path, along):
     assert left_out.mean() > 0.4
     assert (true <= estimate)[left_out].mean() >= 0.95
     assert true[~left_out].max() < 1e-15
-    assert np.median(estimate[left_out]) < 6 * np.median(true[left_out])  # covers without crying wolf
+    most = 6 if along in (0, 2) else 6 * OF_ANGLES  # covers without crying wolf
+    assert np.median(estimate[left_out]) < most * np.median(true[left_out])
 
 
 def test_one_point_is_the_same_as_an_array_of_points_and_units_are_those_of_people(straight):
@@ -105,7 +107,7 @@ def test_beside_a_case_without_result_there_is_no_value(tmp_path, code, word):
     assert np.isnan([beside.e_n, there.value("e_n", 0.019, 0.5, 1.9)]).all()
     assert np.isnan(beside.fingers("f_x_max")).all()
     assert beside.reason.endswith(word)
-    assert "station 20 mm, angle 30 deg, 2 N" in beside.reason
+    assert "station 20 mm, angle 20 deg, 2 N" in beside.reason
     assert there.at(0.01, ANGLES[1], 2).e_n == pytest.approx(linear(0.01, 0, 2))  # a solved case next to it
     assert there.value("e_n", 0.02, float(ANGLES[0]), 1.5) == pytest.approx(linear(0.02, 0, 1.5))
     with pytest.raises(ValueError, match="station 20 mm"):
@@ -166,15 +168,15 @@ def test_where_the_contact_changes_its_kind_there_is_no_smooth_value(tmp_path):
 
 
 def test_angles_repeat_with_the_objects_symmetry_and_a_gap_is_bridged_for_round_objects_alone(tmp_path):
-    around = GraspMap(make(tmp_path / "a.hdf", smooth))  # 0 to 150 deg; an elliptic cylinder repeats after 180
-    last, first = (smooth(0.01, a, 2.0) for a in (ANGLES[5], ANGLES[0]))
-    assert around.at(0.01, np.radians(165), 2).e_n == pytest.approx((last + first) / 2)
+    around = GraspMap(make(tmp_path / "a.hdf", smooth))  # 0 to 160 deg; an elliptic cylinder repeats after 180
+    last, first = (smooth(0.01, a, 2.0) for a in (ANGLES[-1], ANGLES[0]))
+    assert around.at(0.01, np.radians(170), 2).e_n == pytest.approx((last + first) / 2)
     same, one = (around.at(0.01, np.radians(a), 2).e_n for a in ([20, 200, -160, 380], 20))
     assert same == pytest.approx(one)
     turned, here = (around.at(0.01, np.radians(a), 2).error("e_n") for a in (185, 5))
     assert turned == pytest.approx(here)
-    far = GraspMap(make(tmp_path / "a.hdf", smooth, grid_axes(angles=[*ANGLES[:5], ANGLES[5] + np.pi])))
-    assert far.at(0.01, ANGLES[5], 2).e_n == pytest.approx(smooth(0.01, ANGLES[5], 2.0))  # of the next period
+    far = GraspMap(make(tmp_path / "a.hdf", smooth, grid_axes(angles=[*ANGLES[:-1], ANGLES[-1] + np.pi])))
+    assert far.at(0.01, ANGLES[-1], 2).e_n == pytest.approx(smooth(0.01, ANGLES[-1], 2.0))  # of the next period
     part = GraspMap(make(tmp_path / "a.hdf", axes=grid_axes(angles=[0, 0.1, 0.2])))
     assert part.at(0.01, 0.15, 2).ok
     assert "angle 90 deg, solved: 0 deg to 11.459 deg" in part.at(0.01, np.pi / 2, 2).reason
@@ -196,8 +198,8 @@ def test_half_a_turn_of_the_gripper_exchanges_the_fingers_and_explicit_poses_go_
     one, other = (there.at(0.01, np.radians(a), 2).fingers("f_x_max") for a in (40, 220))
     assert one == pytest.approx([1.6, 3.2])
     assert other == pytest.approx([3.2, 1.6])
-    # between 150 deg and 180 deg, where 180 deg is 0 deg with the fingers exchanged
-    assert there.at(0.01, np.radians(165), 2).fingers("f_x_max") == pytest.approx([2.4, 2.4])
+    # between 160 deg and 180 deg, where 180 deg is 0 deg with the fingers exchanged
+    assert there.at(0.01, np.radians(170), 2).fingers("f_x_max") == pytest.approx([2.4, 2.4])
     layout = grid_axes([0, 1, 2], [0], FORCES, poses=True)
     poses = GraspMap(make(tmp_path / "a.hdf", axes=layout, labels=("lid", "neck", "belly")))
     assert poses.at(candidate=1, force=3).e_n == pytest.approx(linear(1, 0, 3))
@@ -258,7 +260,7 @@ def test_limit_surfaces_come_between_those_of_the_cases_around_and_bounds_of_the
     with pytest.raises(ValueError, match="one point"):
         there.at(0.01, [0.1, 0.2], 6).limit_surface(1)
     layout = grid_axes()
-    bound = np.broadcast_to(3 + 100 * STATIONS[:, None], (5, 6))
+    bound = np.broadcast_to(3 + 100 * STATIONS[:, None], (5, 9))
     there = GraspMap(make(tmp_path / "a.hdf", axes=layout, derived=known.window(layout), derived__force_high=bound))
     assert there.at(0.015, 0.1, 2).value("force_high") == pytest.approx(4.5)
     assert "force_high" in str(there.at(0.015, 0.1, 2))
@@ -286,4 +288,4 @@ def test_the_best_grasps_are_those_of_show_as_points_which_know_the_poses_of_the
     across, surface = np.linspace(-0.01, 0.01, 41), build_object(scene_of(ds).object)
     for R, origins in zip(many.reshape(-1, 3, 3), x.reshape(-1, 3), strict=True):
         gaps = surface.gap(origins + across[:, None] * R[:, 1])[0]
-        assert -1e-9 < gaps.min() < 2e-5
+        assert abs(gaps.min()) < 2e-5
