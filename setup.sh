@@ -152,7 +152,8 @@ elif ! grep -q 'include-system-site-packages = true' $venv/pyvenv.cfg; then
 fi
 
 say "installing softjaw and its Python packages into $venv (a minute or two)"
-$venv/bin/python -m pip install -qq --disable-pip-version-check --editable '.[test]' \
+# as a path: with import hooks Python takes a checkout's own folder for the package where it is started beside it
+$venv/bin/python -m pip install -qq --disable-pip-version-check --config-settings editable_mode=compat --editable '.[test]' \
     || fail "pip could not install the packages of pyproject.toml; see its message above"
 if [ -n "$(find $venv/lib/python3*/site-packages -maxdepth 1 -iname h5py)" ]; then
     say "removing h5py from $venv: that build has no MPI and hides the system's"

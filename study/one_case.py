@@ -104,7 +104,10 @@ class Case(GraspNumbers):
 
     @property
     def contacts(self) -> tuple[Contact, Contact]:
-        """Both fingers: patch, contact frame, friction limits, in the frame of the object's own file."""
+        """Both fingers, with their friction limits.
+
+        ``origin``, ``axes`` and ``normal`` are in the frame of the object's own file, ``patch`` and ``frame`` in the pad's.
+        """
         first, second = (c.at(Pose(R, x)) for c, R, x in zip(self.result.contacts, *self.pose, strict=True))
         return first, second
 
