@@ -106,7 +106,7 @@ class Case(GraspNumbers):
     def contacts(self) -> tuple[Contact, Contact]:
         """Both fingers, with their friction limits.
 
-        ``origin``, ``axes`` and ``normal`` are in the frame of the object's own file, ``patch`` and ``frame`` in the pad's.
+        ``origin, axes, normal`` are in the frame of the object's own file, ``patch`` and ``frame`` in the pad's.
         """
         first, second = (c.at(Pose(R, x)) for c, R, x in zip(self.result.contacts, *self.pose, strict=True))
         return first, second
