@@ -18,7 +18,7 @@ from pydantic import ConfigDict, Field, ValidationError, ValidationInfo, field_v
 from softjaw.study.grippers import filled_in
 from softjaw.study.messages import Problem, closest, shortened, shown
 from softjaw.study.scene.grasps import OF_EVERY_KIND, Candidates, GraspPose
-from softjaw.study.scene.objects import SHAPES, Mesh, Object, SectionTable
+from softjaw.study.scene.objects import SHAPES, Mesh, Object, Sections, SectionTable
 from softjaw.study.scene.section import (
     Errors,
     KeyPath,
@@ -298,7 +298,8 @@ def tables_of(data: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     shape = data.get("object")
     models = models_of(str(shape.get("shape")) if isinstance(shape, Mapping) else None)
     tables = {name: dict(models[name].model_fields if name in models else {}) for name in Scene.model_fields}
-    tables["object"] = {**SectionTable.model_fields, **tables["object"]}
+    if models.get("object") is Sections:
+        tables["object"] |= SectionTable.model_fields
     tables["candidates"] |= GraspPose.model_fields
     return tables
 

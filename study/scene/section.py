@@ -204,8 +204,6 @@ def _right_key(path: KeyPath, tables: Tables) -> str:
     if len(path) == 1 and (near := closest(key, list(tables))):
         return f"did you mean [{near}]?"
     keys = list(dict.fromkeys(k for name, table in tables.items() if name == path[0] for k in table))
-    if key in keys:
-        return "other shapes have it, this one has not: remove it"
     same = [k for k in keys if split_unit(k)[0] == stem]
     if near := same[0] if same else closest(key, keys):
         return f"did you mean `{near}`?"
