@@ -15,7 +15,7 @@ from tests.study.sealing import sealed
 OBJECT = f"[object]\n{OVAL.replace('120', '100')}\n"
 SCENE = f"{OBJECT}[candidates]\nstations_mm = [0, 10]\n[load]\nnormal_force_n = [1, 5]\n"
 SKELETONS: dict[str, bytes] = {}  # files without values: to copy one is ten times faster than to make it
-STATIONS, ANGLES, FORCES = np.linspace(0, 0.04, 5), np.arange(9) * np.pi / 9, np.array([1.0, 2.0, 4.0, 8.0])
+STATIONS, ANGLES, FORCES = np.linspace(0, 0.04, 5), np.arange(6) * np.pi / 6, np.array([1.0, 2.0, 4.0, 8.0])
 
 
 def linear(station, angle, force):

@@ -12,10 +12,19 @@ from softjaw.study.result.read import open as open_dataset
 from softjaw.study.result.read import scene_of
 from softjaw.study.show.best_grasps import best
 from tests.study import formula_results as known
-from tests.study.formula_results import ANGLES, FORCES, SCENE, STATIONS, grid_axes, linear, make
+from tests.study.formula_results import FORCES, SCENE, STATIONS, linear
 
 MESH = '[object]\nshape = "mesh"\nmesh = "x.stl"\nunit = "mm"\n[candidates]' + SCENE.partition("[candidates]")[2]
 ROUND = SCENE.replace("semi_axis_b_mm = 20", "semi_axis_b_mm = 25")
+ANGLES = np.arange(9) * np.pi / 9
+
+
+def grid_axes(stations=STATIONS, angles=ANGLES, *rest, **more):
+    return known.grid_axes(stations, angles, *rest, **more)
+
+
+def make(path, formula=linear, axes=None, **more):
+    return known.make(path, formula, axes or grid_axes(), **more)
 
 
 def smooth(station, angle, force):
