@@ -166,8 +166,9 @@ OPTIONS = {
                     help="divides torques of forces (default: the distance)"),
     "torques": _option("--contact-length", type=POSITIVE, metavar="MM",
                        help="divides torques about normals (default: rho)"),
-    "surface": _option("--surface", choices=("three_motions", "axis_aligned", "full", "quartic"), default="quartic",
-                       help="limit surface that is scored (default: quartic)"),
+    "surface": _option("--surface", choices=("three_motions", "axis_aligned", "full", "quartic"),
+                       default="three_motions",
+                       help="limit surface that is scored (default: three_motions, as a study's quality)"),
     "sections": _option("-o", metavar="PICTURE", dest="picture", help="picture of the limit surface (.png or .svg)"),
 }  # fmt: skip
 GRIPPER = ("gripper", "approach", "wider", "frame")
