@@ -250,7 +250,7 @@ def _notes(patches: Sequence[EvaluatedPatch], grasp: dict[str, Any] | None) -> l
 def _patch_notes(evaluated: EvaluatedPatch) -> list[str]:
     frame, notes = evaluated.contact.frame, []
     if not evaluated.x_given:
-        notes.append("x follows the longer direction of the patch: no --long-side was given")
+        notes.append("x follows the longer direction of the patch, else an axis of the file: no --long-side was given")
     for flag in flags_in(raised(frame.flag) & OF_FRAME):
         share = f": {frame.overhang_count}, with {100 * frame.overhang_share:.2g} % of S"
         notes.append(flag.sentence + share * (flag == Flag.OVERHANG))

@@ -291,7 +291,7 @@ def grasp_quality(
         ``ccm``, ``pcm`` or ``pcm_projected``.
     object_length, contact_length : float, optional
         Lengths by which torques of forces and torques about normals are divided [m]; by default the distance, and the
-        longer side of the larger contact.
+        longer side of the larger contact: along its frame, so of a patch without a longer direction it depends on x.
 
     Returns
     -------
