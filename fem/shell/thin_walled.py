@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from softjaw.fem.assembly import IntArray
 from softjaw.fem.objects.gap import Pose, about_z
@@ -37,9 +38,7 @@ def supported(
     height; "free". The springs hold the rigid motions that are left, and resist no others: ``stiffness`` is that of all
     together, per direction [N/m].
     """
-    springs = _springs(mesh, support, stiffness)
-    shell = Shell(mesh, material.young_modulus, material.poisson_ratio, springs)
-    held = np.zeros((shell.nodes, 6), dtype=bool)
+    held = np.zeros((len(mesh.X), 6), dtype=bool)
     if support == "clamped":
         lines = mesh.s <= max(mesh.surface.flat[0], mesh.s[0]) + NEGLIGIBLE
         # the mesh of a tube begins off the axis
@@ -48,27 +47,27 @@ def supported(
         held[np.unique(mesh.number[:, lines])] = True
     elif support == "standing":
         held[mesh.foot, 2] = True
-    return shell, held.ravel() | mesh.symmetric
+    fixed = held.ravel() | mesh.symmetric
+    springs = _springs(mesh, fixed.reshape(-1, 6), stiffness)
+    return Shell(mesh, material.young_modulus, material.poisson_ratio, springs), fixed
 
 
-def _springs(mesh: BodyMesh, support: str, stiffness: float) -> tuple[IntArray, FloatArray]:
-    """Nodes and stiffness of springs that hold what a support leaves of the rigid motions; see `Shell`.
+def _springs(mesh: BodyMesh, fixed: NDArray[np.bool_], stiffness: float) -> tuple[IntArray, FloatArray]:
+    """Nodes and stiffness of springs that hold the rigid motions which numbers ``fixed (k, 6)`` leave.
 
     There are as many conditions on the displacements of a few nodes as motions, so loads in balance meet no force.
     """
+    motions, unit = np.zeros((6, *fixed.shape)), np.eye(3)[:, None]
+    motions[:3, :, :3], motions[3:, :, :3] = unit, np.cross(unit, mesh.X / np.abs(mesh.X).max())
+    motions[3:, :, 3:] = np.cross(unit, mesh.D / np.linalg.norm(mesh.D, axis=1, keepdims=True))
+    share, mixed = np.linalg.eigh(motions[:, fixed] @ motions[:, fixed].T)
+    left = mixed[:, share < 1e-9].T  # moved by rounding alone
     # between the pads, which lie at 0 and at half a turn, and away from the ends
     angles = [at for at in np.pi * np.array([-0.25, 0.25, 0.75, 1.25, 1.75]) if mesh.theta[0] < at < mesh.theta[-1]]
     i = [np.abs(mesh.theta - at).argmin() for at in angles]
     j = [np.abs(mesh.s - mesh.s[0] - share * np.ptp(mesh.s)).argmin() for share in (0.25, 0.75)]
     nodes = np.unique(mesh.number[np.ix_(i, j)])
-    x, y, z = mesh.X[nodes].T
-    none, one = np.zeros(len(nodes)), np.ones(len(nodes))
-    between, across = mesh.symmetry
-    motions = [([one, none, none], not between), ([none, one, none], not across), ([-y, x, none], mesh.closed)]
-    if support == "free":
-        motions += [([none, none, one], True), ([none, -z, y], not across), ([z, none, -x], not between)]
-    left = [np.stack(motion, axis=1) for motion, free in motions if free and support != "clamped"]
-    basis = np.linalg.qr(np.reshape(left, (len(left), 3 * len(nodes))).T)[0]
+    basis = np.linalg.qr((left @ motions[:, nodes, :3].reshape(6, -1)).T)[0]
     return nodes, stiffness * mesh.share / len(nodes) * basis @ basis.T
 
 
