@@ -72,15 +72,14 @@ class Setting:
     """One point of the sweep.
 
     ``values``: value of each swept key, in words. ``seconds``: time of a case on one core, mean over those that are
-    solved [s]. ``worst, median``: for each of `JUDGED` the largest and the median relative distance from the reference;
-    ``stated``: the largest error that the results state; NaN where none is known. ``failed``: cases without a result.
-    ``given, reference``: whether it is what the scene has without the sweep, and whether it is the most accurate point.
+    solved [s]. ``worst``: for each of `JUDGED` the largest relative distance from the reference; ``stated``: the
+    largest error that the results state; NaN where none is known. ``failed``: cases without a result. ``given,
+    reference``: whether it is what the scene has without the sweep, and whether it is the most accurate point.
     """
 
     values: dict[str, str]
     seconds: float
     worst: dict[str, float]
-    median: dict[str, float]
     stated: dict[str, float]
     failed: int
     given: bool
@@ -105,10 +104,10 @@ def settings_in(ds: xr.Dataset) -> list[Setting]:
         given = all(np.array_equal(tables[s].get(name), values[key]) for key, (s, name) in keys.items())
         words = {a.long_name: a.options[j] if a.options else f"{values[a.long_name]:g}"
                  for a, j in zip(swept, index, strict=True)}  # fmt: skip
-        worst, median = ({n: float(f(_known(e[i]))) for n, e in errors.items()} for f in (np.max, np.median))
+        worst = {n: float(_known(e[i]).max()) for n, e in errors.items()}
         stated = {n: float(_known(claims[n][i]).max()) if n in claims else np.nan for n in maps}
         mean, failed = float(_known(seconds[i]).mean()), int(np.isnan(seconds[i]).sum())
-        settings.append(Setting(words, mean, worst, median, stated, failed, given, i == last))
+        settings.append(Setting(words, mean, worst, stated, failed, given, i == last))
     return settings
 
 
@@ -138,18 +137,16 @@ def cost_text(ds: xr.Dataset) -> str:
     """The settings, the cheapest first, with time and errors; one line for each."""
     settings = settings_in(ds)
     names, reference = list(settings[0].worst), next(s for s in settings if s.reference)
-    errors = (*(f"error of {n}" for n in names), *(f"{n} states" for n in names))
-    head = (*settings[0].values, "time per case", *errors, "")
+    head = (*settings[0].values, "time per case", *names, "")
     rows = [
-        (*s.values.values(), f"{s.seconds:.2g} s", *(f"{percent(s.worst[n])} ({percent(s.median[n])})" for n in names),
-         *(percent(s.stated[n]) for n in names),
+        (*s.values.values(), f"{s.seconds:.2g} s", *(f"{percent(s.worst[n])} ({percent(s.stated[n])})" for n in names),
          ", ".join([*["as in the scene"] * s.given, *[f"{s.failed} failed"] * bool(s.failed)]))
         for s in sorted(settings, key=lambda s: s.seconds)
         if not s.reference
     ]  # fmt: skip
     lines = aligned(head, rows, range(len(head)))
     last = ", ".join(f"{key} = {value}" for key, value in reference.values.items())
-    about = f"largest error of {ds.status.size // len(settings)} cases (in brackets the median), against {last}"
+    about = f"largest error of {ds.status.size // len(settings)} cases (in brackets the largest stated), against {last}"
     return "\n".join([*lines, f"{about}, which takes {reference.seconds:.2g} s"])
 
 

@@ -307,8 +307,8 @@ class EffectChoice:
                 note = LEFT_OUT.format(reason=error)
         solved = solved or self.solver.case(k, self.levels, self._share_left_out(k))
         left_out = self._left_out(k) if solved.coarse else []
-        found = (self._coarse_pair(name, STEPS[name][0], k) for name in left_out)
-        pairs = [*solved.pairs, *((*pair, 1.0) for pair in found if pair)]
+        both = (self._coarse_pair(name, STEPS[name][0], k) for name in left_out)
+        pairs = [*solved.pairs, *((*pair, 1.0) for pair in both if pair)]
         return replace(solved, pairs=pairs, note=join_notes(note, solved.note))
 
     def _left_out(self, k: int) -> list[str]:

@@ -75,7 +75,7 @@ def test_errors_are_distances_from_the_last_or_smallest_point_and_failed_cases_c
     assert settings[-1].worst == pytest.approx(dict.fromkeys(("payload", "quality", "e_n"), 0.0), abs=1e-12)
     e_n = ds.e_n.sel(model="ccm")
     error = np.abs(e_n / e_n.isel(elements=-1, element=-1) - 1).isel(elements=1, element=0).values
-    assert (settings[2].worst["e_n"], settings[2].median["e_n"]) == pytest.approx((error.max(), np.median(error)))
+    assert settings[2].worst["e_n"] == pytest.approx(error.max())
     seconds = ds.work_seconds_total.isel(elements=1, element=0).values
     assert settings[2].seconds == pytest.approx(seconds.mean())
     # of triquadratic elements the finer mesh is nearer to the finest
