@@ -99,7 +99,7 @@ class GraspMap:
         self.snapped = self.done & (self._grid(self.read("flags")) & Flag.SNAPPED > 0)
         self._tables: dict[tuple[str, str], FloatArray] = {}
         self._bends: dict[tuple[str, str], FloatArray] = {}
-        self._poses: dict[tuple[float, float], Any] = {}
+        self._poses: dict[tuple[float, float], tuple[FloatArray, FloatArray]] = {}
         self.kind = self._kinds()
 
     def at(
@@ -214,15 +214,14 @@ class GraspMap:
         """Rotations ``(2, 3, 3)`` and origins ``(2, 3)`` [m] of both pads at first touch; see `GraspPoint.pose`."""
         if (station, angle) not in self._poses:
             axes = [axis.values for axis in self.file_axes[-3:-1]]
-            i, j = (int(np.abs(x - value).argmin()) for x, value in zip(axes, (station, angle), strict=True))
-            solved = np.isclose([axes[0][i], axes[1][j]], [station, angle], rtol=1e-9, atol=1e-12).all()
-            if solved and (self.status[i, j] == DONE).any():
-                k = (self.status[i, j] == DONE).argmax()  # a pose is the same at every force
-                self._poses[station, angle] = tuple(
-                    self.read(f"fingers/{name}")[i, j, k] for name in ("pose_rotation", "pose_origin")
-                )
+            place = tuple(int(np.abs(x - value).argmin()) for x, value in zip(axes, (station, angle), strict=True))
+            case = (*place, (self.status[place] == DONE).argmax())  # a pose is the same at every force
+            solved = [x[i] for x, i in zip(axes, place, strict=True)]
+            if self.status[case] == DONE and np.allclose(solved, (station, angle), rtol=1e-9, atol=1e-12):
+                pose = self.read("fingers/pose_rotation")[case], self.read("fingers/pose_origin")[case]
             else:
-                self._poses[station, angle] = first_touch(scene_of(self.data, self.index), station, angle)
+                pose = first_touch(scene_of(self.data, self.index), station, angle)
+            self._poses[station, angle] = pose
         return self._poses[station, angle]
 
     def read(self, name: str, model: str = "ccm") -> np.ndarray:
