@@ -177,7 +177,7 @@ def test_fig6_the_quartic_fits_better_than_the_ellipsoid_everywhere(data, name):
     if found.status.ndim == 3:  # of one object
         # nearly all motions of the paper's grid are translations, which any surface through the axes fits
         grid = surfaces.on_grid_along(found, 0)
-        assert grid["fit_error"].mean() < 1.1 * grid["fit_error_ellipsoid"].mean()
+        assert grid["fit_error"].mean() < 1.25 * grid["fit_error_ellipsoid"].mean()
         assert (grid["fit_error_ellipsoid"] < 100 * field(found, "fit_error_ellipsoid")[..., 0]).all()
 
 

@@ -312,6 +312,7 @@ print(state.closing)
 def test_a_changed_material_takes_effect_although_its_callers_were_compiled_before(tmp_path):
     """A foam twice as stiff yields less, also with the machine code of the last run at hand."""
     (tmp_path / "softjaw").mkdir()
+    (tmp_path / "softjaw" / "__init__.py").touch()
     for package in ("fem", "friction"):
         shutil.copytree(ROOT / package, tmp_path / "softjaw" / package, ignore=shutil.ignore_patterns("__pycache__"))
 
