@@ -247,6 +247,12 @@ def test_the_answer_says_what_is_held_and_which_force_holds_a_mass():
     assert low == pytest.approx(3.0)
     assert error == pytest.approx(np.hypot(0.03, 0.3))  # of the curve, and 10 % of mu
     assert f"{low:.2f} ± {error:.2f} N" in best(rising(0.3)).facts["answer"]["force"]
+    weak = rising(0.3)
+    weak["force_low_error"] *= np.nan
+    weak["force_high"] = weak.force_low.copy(data=np.full(weak.force_low.shape, 2.0))
+    told = best(weak).facts["answer"]
+    assert told["force"].startswith("none")
+    assert "±" not in told["force"]
 
 
 @pytest.mark.parametrize(
