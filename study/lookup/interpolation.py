@@ -118,7 +118,7 @@ def corners(axes: Sequence[Nodes], points: FloatArray) -> Corners:
         i = np.clip(np.searchsorted(x, v, "right") - 1, 0, len(x) - 2)
         s = (v - x[i]) / (x[i + 1] - x[i])
         s = np.where(s < NEGLIGIBLE, 0.0, np.where(s > 1 - NEGLIGIBLE, 1.0, s))
-        inside[:, a] &= (s == 0) | (s == 1) | (x[i + 1] - x[i] <= nodes.most)
+        inside[:, a] &= (s == 0) | (s == 1) | (x[i + 1] - x[i] <= nodes.most * (1 + NEGLIGIBLE))
         cell[:, a], share[:, a] = i, s
     at = cell[:, None] + UPPER
     index = (at[..., 0] * len(axes[1].x) + at[..., 1]) * len(axes[2].x) + at[..., 2]

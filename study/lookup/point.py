@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from softjaw.friction.patch import NEGLIGIBLE
 from softjaw.lsfit.surface import LimitSurface
 from softjaw.study.case.result import GraspNumbers
 from softjaw.study.flags import flags_in
@@ -188,7 +189,7 @@ class GraspPoint(GraspNumbers):
         if self.map.by_poses and a == 0:
             return f"{text}, there are candidates 0 to {len(axis.values) - 1} and nothing between them"
         low, high = (shown_text(v, nodes.units, 5) for v in (axis.values.min(), axis.values.max()))
-        wide = bool(nodes.most < np.diff(nodes.x).max())
+        wide = bool(np.diff(nodes.x).max() > nodes.most * (1 + NEGLIGIBLE))
         apart = f"; nothing is known between angles more than {shown_text(nodes.most, nodes.units, 3)} apart" * wide
         return f"{text}, solved: {low}" + (f" to {high}" if low != high else " only") + apart
 

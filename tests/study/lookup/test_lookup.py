@@ -188,6 +188,8 @@ def test_angles_repeat_with_the_objects_symmetry_and_a_gap_is_bridged_for_round_
     assert far.at(0.01, ANGLES[-1], 2).e_n == pytest.approx(smooth(0.01, ANGLES[-1], 2.0))  # of the next period
     part = GraspMap(make(tmp_path / "a.hdf", axes=grid_axes(angles=[0, 0.1, 0.2])))
     assert part.at(0.01, 0.15, 2).ok
+    steps = GraspMap(make(tmp_path / "c.hdf", axes=grid_axes(angles=np.radians([0, 25, 50, 75, 105]))))
+    assert steps.at(0.01, np.radians([10, 30, 60, 90]), 2).ok.tolist() == [True, True, True, False]
     assert "angle 90 deg, solved: 0 deg to 11.459 deg" in part.at(0.01, np.pi / 2, 2).reason
     assert part.at(0.01, 0.15 + np.pi, 2).ok
     one = GraspMap(make(tmp_path / "b.hdf", axes=grid_axes(angles=[0.3])))
