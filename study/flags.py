@@ -87,8 +87,8 @@ class Flag(IntFlag):
 
 DERIVED = Flag.TOO_WEAK | Flag.TOO_STRONG | Flag.OUT_OF_REACH
 HARM = Flag.SLIDES_OUT | Flag.YIELDS | Flag.TOO_STRONG  # what a smaller force may cure
-# of a grasp that fails or does harm
-LOST = Flag.SLIPS | Flag.COLLISION | Flag.NOT_BORNE | Flag.OUT_OF_REACH | HARM | Flag.TOO_WEAK
+BORNE = HARM | Flag.TOO_WEAK  # what another force may cure
+LOST = Flag.SLIPS | Flag.COLLISION | Flag.NOT_BORNE | Flag.OUT_OF_REACH | BORNE  # of a grasp that fails or does harm
 OF_FILE = sum(flag for flag in Flag if not flag & DERIVED)  # mask of the bits that a file holds
 
 

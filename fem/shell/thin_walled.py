@@ -60,8 +60,9 @@ def _springs(mesh: BodyMesh, fixed: NDArray[np.bool_], stiffness: float) -> tupl
     motions, unit = np.zeros((6, *fixed.shape)), np.eye(3)[:, None]
     motions[:3, :, :3], motions[3:, :, :3] = unit, np.cross(unit, mesh.X / np.abs(mesh.X).max())
     motions[3:, :, 3:] = np.cross(unit, mesh.D / np.linalg.norm(mesh.D, axis=1, keepdims=True))
-    share, mixed = np.linalg.eigh(motions[:, fixed] @ motions[:, fixed].T)
-    left = mixed[:, share < 1e-9].T  # moved by rounding alone
+    at_fixed = motions[:, fixed]
+    squares, mixed = np.linalg.eigh(at_fixed @ at_fixed.T)
+    left = mixed[:, squares < 1e-9].T  # what is fixed moves by rounding alone
     # between the pads, which lie at 0 and at half a turn, and away from the ends
     angles = [at for at in np.pi * np.array([-0.25, 0.25, 0.75, 1.25, 1.75]) if mesh.theta[0] < at < mesh.theta[-1]]
     i = [np.abs(mesh.theta - at).argmin() for at in angles]

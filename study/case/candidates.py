@@ -67,18 +67,23 @@ def candidates(scene: Scene) -> list[Candidate]:
     notes = {s: middle.remark(s, half) if middle else "" for s in where.station_values}
     places = product(where.station_values, where.angles)
     return [
-        Candidate(s, angle, moved(axis_poses(s, angle, where.roll, middle), where.shift, 0.0), label, notes[s])
+        Candidate(s, angle, _pads(where, s, angle, middle), label, notes[s])
         for (s, angle), label in zip(places, where.labels, strict=True)
     ]
 
 
-def first_touch(scene: Scene, station: float, angle: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _pads(where: Any, station: float, angle: float, middle: Any) -> tuple[Pose, Pose]:
+    """Both pads at a station and an angle before they touch, as the scene's section ``where`` turns and shifts them."""
+    return moved(axis_poses(station, angle, where.roll, middle), where.shift, 0.0)
+
+
+def touching_pads(scene: Scene, station: float, angle: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Rotations ``(2, 3, 3)`` and origins ``(2, 3)`` [m] of both pads where they first touch at a station and an angle.
 
     In the frame of the object's own file, of a scene whose candidates are stations [m] and angles [rad].
     """
-    obj, placed, where = build_object(scene.object), own_frame(scene.object), scene.candidates
-    pads = moved(axis_poses(station, angle, where.roll, middle_of(scene)), where.shift, 0.0)
+    obj, placed = build_object(scene.object), own_frame(scene.object)
+    pads = _pads(scene.candidates, station, angle, middle_of(scene))
     poses = [geometry().approach(obj, pad, scene.gripper).pose for pad in pads]
     origins = placed.to_object(np.stack([pose.origin for pose in poses]))
     return placed.rotation @ np.stack([pose.rotation for pose in poses]), origins

@@ -55,6 +55,14 @@ def number(
 POSITIVE = number("a number above 0", math.ulp(0.0))
 
 
+def no_file(text: str) -> str:
+    """A type of kinds to start from: in place of one a mesh is often given."""
+    if "." in text:
+        meant = f"of a mesh, with its unit: 'init mesh --mesh {text} --unit mm'"
+        raise ArgumentTypeError(f"found '{text}', expected {', '.join(KINDS)}; {meant}")
+    return text
+
+
 def whole(least: int) -> Callable[[str], int]:
     """A type of whole numbers from ``least`` to a million."""
     return number(f"a whole number from {least} to {MILLION}", least, MILLION, int)
@@ -143,7 +151,7 @@ OPTIONS = {
     "wider": _option("--wider", type=number("a number, 0 or above", 0.0), default=20.0, metavar="MM",
                      help="how far the gripper opens beyond first touch (default 20)"),
     "frame": _option("--frame", default="object", metavar="NAME", help="name of the object's frame (default object)"),
-    "kind": _option("kind", choices=tuple(KINDS), help="what to start from"),
+    "kind": _option("kind", type=no_file, choices=tuple(KINDS), help="what to start from"),
     "name": _option("-o", metavar="NAME", dest="name", help="name of both files (default: the kind, or the mesh's)"),
     "mesh": _option("--mesh", metavar="FILE", help="mesh of the object: .stl, .obj, .ply, .off, .glb, .gltf or .3mf"),
     "mesh unit": _option("--unit", choices=("mm", "cm", "m", "inch"), help="unit of the mesh (default of glTF: m)"),
@@ -236,10 +244,8 @@ class Parser(argparse.ArgumentParser):
             self.error(f"unknown command '{value}'{meant} '{self.prog} --help' lists all")
         if action.choices is not None and value not in action.choices:
             known = [str(choice) for choice in action.choices]
-            meant = _meant(str(value), known).rstrip(";")
-            if "mesh" in known and "." in value:
-                meant = f"; of a mesh, with its unit: 'init mesh --mesh {value} --unit mm'"
-            raise argparse.ArgumentError(action, f"found '{value}', expected {', '.join(known)}{meant}")
+            text = f"found '{value}', expected {', '.join(known)}{_meant(str(value), known)}"
+            raise argparse.ArgumentError(action, text.rstrip(";"))
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> tuple[Any, list[str]]:
         """Refuse what is left over here, where the options that exist are known."""

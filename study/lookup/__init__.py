@@ -14,7 +14,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from softjaw.study.case.candidates import first_touch
+from softjaw.study.case.candidates import touching_pads
 from softjaw.study.flags import Flag
 from softjaw.study.lookup.interpolation import (
     Corners,
@@ -220,7 +220,7 @@ class GraspMap:
             if self.status[case] == DONE and np.allclose(solved, (station, angle), rtol=1e-9, atol=1e-12):
                 pose = self.read("fingers/pose_rotation")[case], self.read("fingers/pose_origin")[case]
             else:
-                pose = first_touch(scene_of(self.data, self.index), station, angle)
+                pose = touching_pads(scene_of(self.data, self.index), station, angle)
             self._poses[station, angle] = pose
         return self._poses[station, angle]
 

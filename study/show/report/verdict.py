@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from softjaw.study.flags import HARM, Flag, flags_in
+from softjaw.study.flags import BORNE, flags_in
 from softjaw.study.quantities import MISSING, MODEL_NAMES, MODELS
 from softjaw.study.ranking import judge
 from softjaw.study.result.read import axes_of
@@ -73,7 +73,7 @@ def warnings(ds: xr.Dataset) -> list[str]:
         found.append(f"This study is unfinished: {missing} cases are not computed, so a better grasp may be found.")
     if index is None:
         return found
-    if reasons := [flag.sentence for flag in flags_in(int(ds.flags.values[index])) if flag & (HARM | Flag.TOO_WEAK)]:
+    if reasons := [flag.sentence for flag in flags_in(int(ds.flags.values[index])) if flag & BORNE]:
         found.append(f"Every grasp at this force carries a warning. Best one: {'; '.join(reasons)}.")
     if failed := flagged(ds, index):
         found.append(f"The best case does not pass its checks: {', '.join(failed)}.")
