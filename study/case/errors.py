@@ -57,7 +57,7 @@ def mesh_errors(
         value, size = fine_mesh[q.key], _size(q, fine_mesh[q.key])
         error = estimate(value, coarse_mesh[q.key], seen, q.error, q.name in PAYLOADS)
         # pressures alone give forces along the face by balance, with friction that acts back they do not
-        error += floor * WIDER.get(q.name, 1.0) * (2.0 if acts and q.name.startswith("f_") else 1.0) * size
+        error += floor * _wider(q, fine) * (2.0 if acts and q.name.startswith("f_") else 1.0) * size
         if q.error == "relative" and not np.all(coarse_mesh[q.key]):
             error = max(error, 1.0)  # a payload of which the coarse mesh has nothing
         apart = [s * distance(low[q.key], high[q.key], q.error, value) for low, high, s in compared if q.key in low]
@@ -76,6 +76,13 @@ def edge_floor(contacts: Sequence[Contact]) -> float:
     return EDGE / float(max(elements, 1.0) ** POWER)
 
 
+def _wider(q: Quantity, contacts: Sequence[Any]) -> float:
+    """How many times the floor: trilinear elements close less, the less the foam can be compressed."""
+    if q.name == "closing" and (pad := contacts[0].state.pad).shape.element == "hex8":
+        return 0.4 + 0.2 / (1.0 - 2.0 * pad.material.poisson_ratio)
+    return WIDER.get(q.name, 1.0)
+
+
 def coarse_errors(
     contacts: Sequence[Contact], values: Mapping[str, Any], views: Sequence[Sequence[Contact]],
     settings: EvaluationSettings, rounded: bool,
@@ -91,7 +98,7 @@ def coarse_errors(
     for q in (q for q in TABLE if q.error and q.key in viewed[0]):
         apart = max(distance(solved[q.key], view[q.key], q.error) for view in viewed)
         # friction that is left out here may move any of them as much
-        share = floor * max(WIDER.get(q.name, 1.3 if q.name in PAYLOADS else 1.0), 1.0)
+        share = floor * max(_wider(q, contacts), 1.3 if q.name in PAYLOADS else 1.0)
         doubt = DOUBTED * (EDGES_ROUNDED if rounded and q.name in PAYLOADS else 1.0)
         errors[q.of_error.key] = doubt * (apart + share * _size(q, solved[q.key]))
     return errors

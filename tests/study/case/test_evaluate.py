@@ -132,11 +132,18 @@ def test_every_quantity_with_an_error_gets_one_and_a_weight_between_the_pads_is_
     task = replace(SETTINGS, task=Task((fine[0].origin + fine[1].origin) / 2, mass=0.1))
     values, other = evaluate(fine, task)[0], {"maps/closing": 1.1e-3, "maps/opening_loaded": 0.049}
     values |= {"maps/closing": 1e-3, "maps/opening_loaded": 0.050}
+    pad = SimpleNamespace(shape=SimpleNamespace(element="hex8"), material=SimpleNamespace(poisson_ratio=0.25))
+    fine[0].state = SimpleNamespace(pad=pad)
     errors = mesh_errors(fine, coarse, values, other, task)
     assert set(errors) == {q.of_error.key for q in TABLE if q.error and "wall" not in q.needs}
     assert np.isfinite([*errors.values()]).all()
     assert errors["maps/closing_error"] == pytest.approx(weights.OF_FARTHEST * 0.1, rel=1e-9)
     assert errors["maps/opening_loaded_error"] == pytest.approx(weights.OF_FARTHEST * 0.1 * 2e-3, rel=1e-9)
+    # trilinear elements lock: of foam that is hardly compressed they close less than finer ones
+    floors = []
+    for pad.shape.element, pad.material.poisson_ratio in (("hex8", 0.25), ("hex8", 0.45), ("hex27", 0.45)):
+        floors.append(mesh_errors(fine, coarse, values, other, task, floor=0.01)["maps/closing_error"])
+    assert np.array(floors) - errors["maps/closing_error"] == pytest.approx([0.008, 0.024, 0.01], rel=1e-9)
     peaks = [contacts[0].patch.pressure.max() for contacts in (fine, coarse)]
     assert errors["maps/p_max_error"] == pytest.approx(weights.OF_FARTHEST * abs(peaks[1] / peaks[0] - 1), rel=1e-9)
     assert errors["maps/safety_factor_error"] == pytest.approx(errors["maps/payload_error"], rel=1e-9)
