@@ -159,7 +159,11 @@ class Scene(SceneSection):
         if self.accuracy.target is not None and walled and self.effects.object != "rigid":
             yield "accuracy.target refines cases on rigid objects alone: on a simulated wall there are two meshes"
         if g.poisson_ratio > 0.45 and g.element == "hex8":
-            yield f'gripper.poisson_ratio = {g.poisson_ratio:g} makes hex8 elements too stiff: use element = "hex27"'
+            half = [2 * math.ceil(g.elements[0] / 4), 2 * math.ceil(g.elements[1] / 4), math.ceil(g.elements[2] / 2)]
+            yield (
+                f"gripper.poisson_ratio = {g.poisson_ratio:g} makes hex8 elements too stiff: "
+                f'use element = "hex27" with elements = {half}'
+            )
 
     @property
     def axis_symmetry(self) -> int:
