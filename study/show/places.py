@@ -31,7 +31,7 @@ def folded_text(ds: xr.Dataset, place: Place) -> str:
         angles = [axis_text(ds, "angle", unravelled(i, ds.status.shape[:-1])[-1]) for i in place.images]
         parts.append(f"same at {', '.join(angles[:2])}{f' and {len(angles) - 2} more' * (len(angles) > 2)}")
     if place.near:
-        parts.append(f"and {len(place.near)} within {max(math.ceil(1e3 * place.within), 1)} mm")
+        parts.append(f"{len(place.near)} within {max(math.ceil(1e3 * place.within), 1)} mm")
     return ", ".join(parts)
 
 
