@@ -212,9 +212,12 @@ def _asked(
     if sum(given.values()) != 1:
         names = " and ".join(name for name in given if given[name]) or "none of them"
         raise ValueError(f"found {names}, expected one of station (with an angle), candidate and pose")
+    moves = {"roll_deg": scene.candidates.roll_deg, "shift_mm": scene.candidates.shift_mm}
+    if pose is not None and not isinstance(pose, Mapping):  # that of a pad, where it stands already
+        return _with_candidates(scene, {"poses": [grasp_pose(pose)]}), 0
     if pose is not None:
-        poses = [*scene.effective()["candidates"].get("poses", ()), grasp_pose(pose)]
-        return _with_candidates(scene, {"poses": poses}), len(poses) - 1
+        poses = [*scene.effective()["candidates"].get("poses", ()), pose]
+        return _with_candidates(scene, {"poses": poses} | moves), len(poses) - 1
     if candidate is not None:
         scene = with_sampled_grasps(scene)
         count = len(scene.candidates.poses)
@@ -222,7 +225,7 @@ def _asked(
             raise ValueError("the candidates of this scene are stations and angles: give station and angle")
         if candidate not in range(count):
             raise ValueError(f"candidate is {candidate}: expected a number from 0 to {count - 1}")
-        return _with_candidates(scene, {"poses": scene.effective()["candidates"]["poses"]}), int(candidate)
+        return _with_candidates(scene, {"poses": scene.effective()["candidates"]["poses"]} | moves), int(candidate)
     return _at_station(scene, _number("station", station, "m"), angle)
 
 
@@ -265,7 +268,7 @@ def _with_candidates(scene: Scene, table: dict[str, Any]) -> Scene:
 
 
 def grasp_pose(pose: Any) -> Mapping[str, Any]:
-    """A pose as a scene's ``[[candidates.poses]]`` has it: from one, a matrix ``(4, 4)``, or both pads' poses.
+    """A pose as a scene's ``[[candidates.poses]]`` has it: from a matrix ``(4, 4)``, or both pads' poses.
 
     Raises
     ------
@@ -274,8 +277,6 @@ def grasp_pose(pose: Any) -> Mapping[str, Any]:
     TypeError
         It is neither.
     """
-    if isinstance(pose, Mapping):
-        return pose
     if isinstance(pose, tuple) and [np.shape(part) for part in pose] == [(2, 3, 3), (2, 3)]:
         # as `GraspPoint.pose` gives them: finger 1's is enough, for the other one comes from the opposite side
         pose = np.vstack([np.column_stack([pose[0][0], pose[1][0]]), [0.0, 0.0, 0.0, 1.0]])

@@ -203,7 +203,7 @@ class ContactProblem(ABC):
         # makes a closing row a force like all others, so that one norm judges them
         self.closing_stiffness = sum(f.kappa * f.area.sum() for f in fingers)
         self._by_force: bool | None = None  # whether the last tangent was that under force control
-        self._tangent_set: NDArray[np.bool_]
+        self._tangent_set = np.zeros(0, dtype=bool)
         self.begin()
 
     # -- evaluation ---------------------------------------------------------------------------------------------------

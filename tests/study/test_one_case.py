@@ -10,7 +10,8 @@ from threadpoolctl import threadpool_limits
 
 import softjaw as sj
 from softjaw.study import pipeline
-from softjaw.study.one_case import CaseError
+from softjaw.study.case.candidates import candidates
+from softjaw.study.one_case import CaseError, _asked
 from softjaw.study.quantities import BY_KEY, MODELS
 from softjaw.study.result.store import open_result
 from softjaw.study.result.write import rounded
@@ -108,6 +109,20 @@ def test_what_the_scene_lacks_is_added_to_it(tmp_path):
     matrix = np.array([[0, 0, -1, 0], [0, -1, 0, 0], [-1, 0, 0, 0], [0, 0, 0, 1.0]])
     for pose in (matrix, across.pose):
         assert sj.press(SMOKE, pose=pose, force=1).e_n == pytest.approx(across.e_n, rel=1e-9)
+
+
+def test_poses_are_turned_and_shifted_as_the_scene_says_but_not_where_a_pad_stands_already():
+    moves = {"candidates.roll_deg": 30, "candidates.shift_mm": 8}
+    scene = BOXES.with_values(**moves)
+    here = candidates(scene)[1].poses[0]
+    for given in ({"candidate": 1}, {"pose": scene.effective()["candidates"]["poses"][1]}):
+        asked, number = _asked(scene, None, None, given.get("candidate"), given.get("pose"))
+        there = candidates(asked)[number].poses[0]
+        assert np.allclose([*there.rotation, there.origin], [*here.rotation, here.origin], atol=1e-12)
+    case = sj.press(scene, candidate=1, force=5)
+    again = sj.press(scene, pose=case.pose, force=5)
+    assert again.pose[0] == pytest.approx(case.pose[0], abs=1e-9)
+    assert again.e_n == pytest.approx(case.e_n, rel=1e-6)
 
 
 POSE = {"point_mm": [0, 0, 500], "approach": [1, 0, 0], "long_side": [0, 0, 1]}

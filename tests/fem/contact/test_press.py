@@ -4,6 +4,7 @@ from functools import cache, partial
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from softjaw.fem.contact.press import Press
 from softjaw.fem.errors import CheckError, ConvergenceError
@@ -49,6 +50,19 @@ def test_units_do_not_matter():
         assert other.closing * 1e-3 == pytest.approx(si.closing, rel=1e-9)
         assert relative(other.pressure * 1e6, si.pressure) < 1e-9
         assert other.iterations == si.iterations
+
+
+def test_a_uniform_column_has_the_state_of_its_law_also_where_no_newton_step_is_needed():
+    """Hyperfoam of one term without lateral strain between flat faces: nominal stress 2 mu (1/l - l^3) / 4.
+
+    The coarser mesh's state is that of the finer one already, so nothing is factorised before it is judged.
+    """
+    law = material("hyperfoam", poisson_ratio=0.0, shear_moduli=[20e3], exponents=[4.0])
+    coarse, fine = (Press(reference.pad_of(n, law=law), reference.plane) for n in ((6, 4, 2), (12, 6, 4)))
+    for force in (5.0, 30.0):
+        state = fine.at(force, [coarse.at(force)])
+        stretch = brentq(lambda x: 1e4 * (1.0 / x - x**3) - force / (SIZE[0] * SIZE[1]), 0.1, 1.0)
+        assert state.closing == pytest.approx((1.0 - stretch) * SIZE[2], rel=1e-6)
 
 
 def pulls(press, x):
