@@ -250,7 +250,7 @@ def distinct(ds: xr.Dataset, order: Sequence[int], score: np.ndarray, k: int, to
 def at_level(ds: Any, force: float | None = None) -> tuple[Any, int, str]:
     """The dataset at a force [N], the number of its level, and in words why it is that one.
 
-    Between two solved forces values lie on straight lines; without a force it is the one of `shown_level`.
+    Between two solved forces values are interpolated; without a force it is the one of `shown_level`.
 
     Raises `ValueError` for a force outside of the solved ones.
     """
@@ -262,7 +262,7 @@ def at_level(ds: Any, force: float | None = None) -> tuple[Any, int, str]:
         return ds, int(near[0]), ""
     found = at_force(ds, force)
     low, high = found.attrs["between"]
-    return found, 0, f"by straight lines from {low:g} to {high:g} N"
+    return found, 0, f"between solved ones, {low:g} and {high:g} N"
 
 
 def shown_level(ds: Any, flags: np.ndarray) -> tuple[int, str]:

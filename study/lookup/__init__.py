@@ -41,7 +41,8 @@ from softjaw.study.units import UNITS, in_si
 class GraspMap:
     """A result file as a function of station [m], angle [rad] and normal force [N].
 
-    Values lie on straight lines between the solved cases around a point. A point has no value (NaN) outside the map,
+    Values lie on straight lines between the solved cases around a point, along forces on power laws. A point has no
+    value (NaN) outside the map,
     beside a case that failed or is missing, between a case before and one after the wall has snapped in, and between
     cases whose contacts differ in kind: in pieces, in holes, or in whether a pad bears on both of its ends.
     `GraspPoint.nearest` is the nearest solved case. Angles repeat after the period that the object's symmetry gives;
@@ -65,8 +66,9 @@ class GraspMap:
     Notes
     -----
     The error of a value is that of a straight line through a curve with the largest second derivative that the cases
-    around show, with those beside them, added up over the three axes and times 1.75, along angles 5.25: a claim, below
-    which at least 95 % of the true errors of the main maps stay where that was measured. Between angles more than 25
+    around show, with those beside them, times 1.75 along stations and 5.25 along angles, and how far the power law is
+    from the straight line: a claim, below which at least 95 % of the true errors of the main maps stay where that was
+    measured. Between angles more than 25
     degrees apart there are no values: edges that come to bear between them would stay unseen. Errors that the cases
     around state themselves (``accuracy.meshes = 2``; in between as the values are) are added in squares.
     Along an axis of two values there is no second derivative, and half of their difference stands in. What is
@@ -191,7 +193,8 @@ class GraspMap:
         if key not in self._bends:
             bent = bends(self.table(name, model).reshape(self.shape), self.axes, self.snapped)
             self._bends[key] = claims(bent, self.shape)
-        return error(self._bends[key], at)
+        table = self.table(name, model)
+        return error(self._bends[key], at) + abs(blend(table, at) - blend(table, at, straight=True))
 
     def states(self, at: Corners) -> np.ndarray:
         """State of many points, as `GraspPoint.state` has it."""

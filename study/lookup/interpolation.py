@@ -1,6 +1,7 @@
-"""Values between the nodes of a grid of three axes: trilinear, with what the neighbours tell about the error.
+"""Values between the nodes of a grid of two axes and of forces, with what the neighbours tell about the error.
 
-Straight lines never overshoot and stay between the values of the nodes around a point. Between two nodes a distance
+Along forces they follow power laws, as contacts nearly do; how far these are from straight lines is their error. Along
+the other axes they lie on straight lines, which never overshoot. Between two nodes a distance
 ``h`` apart the line misses a smooth function by ``f'' / 2 (x - x_0) (x_1 - x)``; the second derivative is taken from
 the three-point differences at both nodes, whichever is larger, and the errors along the axes add up. Maps of contacts
 have kinks, which three nodes see or miss by chance: an estimate is the largest of a cell and those around it, times
@@ -19,6 +20,7 @@ from scipy.ndimage import maximum_filter
 
 from softjaw.fem.objects.gap import IntArray
 from softjaw.friction.patch import NEGLIGIBLE, FloatArray
+from softjaw.study.result.read import power_law
 
 CLAIM_FACTOR = 1.75  # between estimate and claim: with less, less than 95 % of the errors stay within it
 OF_ANGLES = 3.0  # times that along angles, where payload and edges of contacts have kinks
@@ -93,12 +95,14 @@ class Corners:
     """Where ``m`` points lie: flat indices of the eight nodes around each, their weights, and the share of the cell.
 
     The first corner is the cell's lower one; bit ``2 - a`` of a corner's number tells whether it is the upper one along
-    axis ``a``. ``swap`` tells which points see the fingers exchanged.
+    axis ``a``. ``power`` is the share of the cell along the logarithm of the force, the last axis. ``swap`` tells which
+    points see the fingers exchanged.
     """
 
     index: IntArray  # (m, 8)
     weight: FloatArray  # (m, 8)
     share: FloatArray  # (m, 3)
+    power: FloatArray  # (m,)
     inside: NDArray[np.bool_]  # (m, 3)
     swap: NDArray[np.bool_]  # (m,)
 
@@ -120,26 +124,38 @@ def corners(axes: Sequence[Nodes], points: FloatArray) -> Corners:
         s = np.where(s < NEGLIGIBLE, 0.0, np.where(s > 1 - NEGLIGIBLE, 1.0, s))
         inside[:, a] &= (s == 0) | (s == 1) | (x[i + 1] - x[i] <= nodes.most * (1 + NEGLIGIBLE))
         cell[:, a], share[:, a] = i, s
+    ends = np.stack([x[i] * (1 - s) + x[i + 1] * s, x[i + 1]]) / x[i]  # of the last axis: the force, and the next node
+    power = np.divide(*np.log(ends))
     at = cell[:, None] + UPPER
     index = (at[..., 0] * len(axes[1].x) + at[..., 1]) * len(axes[2].x) + at[..., 2]
-    return Corners(index, np.where(UPPER, share[:, None], 1 - share[:, None]).prod(-1), share, inside, swap)
+    return Corners(index, np.where(UPPER, share[:, None], 1 - share[:, None]).prod(-1), share, power, inside, swap)
 
 
-def blend(table: FloatArray, at: Corners) -> FloatArray:
-    """Trilinear values of ``table (nodes, ...)`` at ``m`` points, ``(m, ...)``; corners without weight do not count."""
+def blend(table: FloatArray, at: Corners, straight: bool = False) -> FloatArray:
+    """Values of ``table (nodes, ...)`` at ``m`` points, ``(m, ...)``; corners without weight do not count.
+
+    Along the force by a power law between positive values of cases and fingers, unless ``straight``.
+    """
     values = table[at.index]
     weight = at.weight.reshape(at.weight.shape + (1,) * (table.ndim - 1))
-    return np.where(weight > 0, values * weight, 0.0).sum(axis=1)
+    parts = np.where(weight > 0, values * weight, 0.0)
+    line = np.asarray(parts.sum(axis=1))
+    if straight or table.ndim > 2:  # coefficients of limit surfaces stay convex on straight lines
+        return line
+    share, power = (s.reshape(-1, *(1,) * (table.ndim - 1)) for s in (at.share[:, 2], at.power))
+    low, high = parts[:, ::2].sum(axis=1), parts[:, 1::2].sum(axis=1)  # times 1 - share, and share
+    ends = low / np.where(share < 1.0, 1.0 - share, 1.0), high / np.where(share > 0.0, share, 1.0)
+    return power_law(*ends, power, line)
 
 
 def bends(table: FloatArray, axes: Sequence[Nodes], side: NDArray[np.bool_]) -> FloatArray:
-    """``|f'' / 2| h^2`` of every cell along each axis, at the cell's lower node, ``(3, k_1, k_2, k_3)``.
+    """``|f'' / 2| h^2`` of every cell along the first two axes, at the cell's lower node, ``(2, nodes)``.
 
     Differences reach neither over missing values nor from one ``side (k_1, k_2, k_3)`` of a jump to the other. Where no
     three nodes are left, the difference of the cell's two values stands in: a guess; across a jump it is 0.
     """
-    bent = np.zeros((3, *table.shape))
-    for a, nodes in enumerate(axes):
+    bent = np.zeros((2, *table.shape))
+    for a, nodes in enumerate(axes[:2]):
         f, branch, x = np.moveaxis(table, a, -1), np.moveaxis(side, a, -1), nodes.x
         if closed := bool(nodes.period) and np.isclose(x[-1] - x[0], nodes.period, rtol=1e-6, atol=0):
             x = np.concatenate([[x[-2] - nodes.period], x, [x[1] + nodes.period]])
@@ -155,19 +171,19 @@ def bends(table: FloatArray, axes: Sequence[Nodes], side: NDArray[np.bool_]) -> 
         cell = np.where(np.isnan(cell), np.abs(np.diff(f)), cell)
         cell[branch[..., :-1] != branch[..., 1:]] = 0.0
         np.moveaxis(bent[a], a, -1)[..., :-1] = cell
-    return bent.reshape(3, -1)
+    return bent.reshape(2, -1)
 
 
 def claims(bend: FloatArray, shape: tuple[int, ...]) -> FloatArray:
-    """`bends` ``(3, nodes)`` of this shape of nodes as claims: the largest around."""
-    claimed = maximum_filter(np.nan_to_num(bend.reshape(3, *shape)), (1, 3, 3, 3), mode="constant")
-    return CLAIM_FACTOR * np.array([[1.0], [OF_ANGLES], [1.0]]) * claimed.reshape(3, -1)
+    """`bends` ``(2, nodes)`` of this shape of nodes as claims: the largest around."""
+    claimed = maximum_filter(np.nan_to_num(bend.reshape(2, *shape)), (1, 3, 3, 3), mode="constant")
+    return CLAIM_FACTOR * np.array([[1.0], [OF_ANGLES]]) * claimed.reshape(2, -1)
 
 
 def error(bend: FloatArray, at: Corners) -> FloatArray:
-    """Error of `blend` at ``m`` points from `bends` ``(3, nodes)``, ``(m,)``."""
+    """Error of `blend` along the first two axes at ``m`` points from `bends` ``(2, nodes)``, ``(m,)``."""
     total = np.zeros(len(at.index))
-    for a in range(3):
+    for a in range(2):
         lower, higher = np.flatnonzero(UPPER[:, a] == 0), np.flatnonzero(UPPER[:, a])
         weight = at.weight[:, lower] + at.weight[:, higher]
         lines = np.where(weight > 0, bend[a][at.index[:, lower]] * weight, 0.0).sum(axis=1)

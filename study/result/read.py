@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from softjaw.friction.patch import FloatArray
 from softjaw.study.flags import OF_FILE, Flag
 from softjaw.study.quantities import BOTH_ENDS, BY_KEY, FINGERS, MISSING, MODELS, REALISATION, TABLE, Axis, Quantity
 from softjaw.study.result.index import index_path, open_index
@@ -260,29 +261,44 @@ def contact_kinds(name: str, values: np.ndarray) -> NDArray[np.int64]:
 
 
 def at_force(ds: xr.Dataset, force: float) -> xr.Dataset:
-    """The dataset at one force [N] between two solved ones, by straight lines; flags of both. `ValueError` beyond them.
+    """The dataset at one force [N] between two solved ones, by power laws; flags of both. `ValueError` beyond them.
 
-    Both are in its attribute ``between``. A case beside one that is not solved has that one's state. Across a snap-in
-    of the wall, and between contacts that differ in kind, nothing is known: the state is "not computed".
+    Both are in its attribute ``between``. What has directions, or is not positive, lies on straight lines. The errors
+    hold how far power laws are from straight lines, too. A case beside one that is not solved has that one's state.
+    Across a snap-in of the wall, and between contacts that differ in kind, nothing is known: it is "not computed".
     """
     forces = ds["normal_force"].values
     if not forces[0] <= force <= forces[-1] or len(forces) < 2:
         solved = ", ".join(f"{f:g}" for f in forces)
         raise ValueError(f"{force:g} N was not solved, nor lies it between two forces that were: {solved} N")
     k = min(int(np.searchsorted(forces, force, side="right")) - 1, len(forces) - 2)
-    share = (force - forces[k]) / (forces[k + 1] - forces[k])
+    share, power = ((force - forces[k]) / np.diff(forces)[k], np.log(force / forces[k]) / np.diff(np.log(forces))[k])
     low, high = (ds.isel(normal_force=[i]).assign_coords(normal_force=[force]) for i in (k, k + 1))
-    between = low.assign_attrs(between=forces[k : k + 2].tolist())
+    between, line = (low.assign_attrs(between=forces[k : k + 2].tolist()) for _ in range(2))
     for name in (str(n) for n, v in ds.data_vars.items() if "normal_force" in v.dims):
+        dims, first, last = ds[name].dims, low[name].values, high[name].values
         if ds[name].dtype.kind == "f":
-            between[name] = (ds[name].dims, (1 - share) * low[name].values + share * high[name].values, ds[name].attrs)
+            values = line_values = (1 - share) * first + share * last
+            if not {"component", "monomial", "wrench"} & set(dims):
+                values = power_law(first, last, power, line_values)
+            between[name], line[name] = (dims, values, ds[name].attrs), (dims, line_values, ds[name].attrs)
         elif name == "flags":
-            between[name] = (ds[name].dims, low[name].values | high[name].values, ds[name].attrs)
+            between[name] = (dims, first | last, ds[name].attrs)
+    for q in (q for q in TABLE if q.error and q.of_error.name in between):
+        apart = abs(line[q.name] - between[q.name]) / (between[q.name] if q.error == "relative" else 1.0)
+        between[q.of_error.name] += apart.isel(model=0, drop=True) if "model" in apart.dims else apart
     states = np.where(low["status"].values == DONE, high["status"].values, low["status"].values)
     states = np.where((states == DONE) & _apart(low, high), MISSING, states)
     between["status"] = (ds["status"].dims, states, ds["status"].attrs)
     between["normal_force"].attrs.update(ds["normal_force"].attrs)
     return between
+
+
+def power_law(low: FloatArray, high: FloatArray, share: float | FloatArray, line: FloatArray) -> FloatArray:
+    """Values at a share of the logarithm of the force between two positive ones; elsewhere those of a straight line."""
+    both = np.minimum(low, high) > 0.0
+    first, last = (np.log(v, out=np.zeros(both.shape), where=both) for v in (low, high))
+    return np.where(both, np.exp((1.0 - share) * first + share * last), line)
 
 
 def other_levels(count: int, k: int) -> list[int]:

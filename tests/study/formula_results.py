@@ -19,8 +19,8 @@ STATIONS, ANGLES, FORCES = np.linspace(0, 0.04, 5), np.arange(6) * np.pi / 6, np
 
 
 def linear(station, angle, force):
-    """A map that straight lines hit: it does not depend on the angle."""
-    return 0.01 + 0.1 * station + 1e-3 * force + 0.05 * station * force
+    """A map that is hit between its cases: straight along stations, a power of the force, alike at all angles."""
+    return (0.01 + 0.1 * station) * force**0.4
 
 
 def grid_axes(stations=STATIONS, angles=ANGLES, forces=FORCES, sweep=(), poses=False):

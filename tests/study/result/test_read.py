@@ -1,6 +1,5 @@
 """A result file as a dataset: dimensions, coordinates and attributes; no value where a case has none."""
 
-
 import numpy as np
 import pytest
 import xarray as xr
@@ -9,10 +8,10 @@ import softjaw
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import DONE, FAILED, MISSING, STATES
 from softjaw.study.result.derived import first_crossing
-from softjaw.study.result.read import FIELDS, read_field
+from softjaw.study.result.read import FIELDS, at_force, read_field
 from softjaw.study.result.store import open_result
 from tests.study.fake_run import fake_plan, fake_result
-from tests.study.formula_results import ANGLES, FORCES, STATIONS, make, written
+from tests.study.formula_results import ANGLES, FORCES, STATIONS, linear, make, written
 from tests.study.launching import launch
 
 
@@ -22,6 +21,18 @@ def half(tmp_path_factory):
     cases = [*map(fake_result, range(10)), "no contact at this force"]
     rows = iter([*cases, *[None] * (plan.layout.rows - len(cases))])
     return written(tmp_path_factory.mktemp("read") / "half.hdf", plan.layout, lambda _: next(rows), plan.header)
+
+
+def test_between_two_forces_a_power_law_is_met_and_how_far_a_line_is_away_is_an_error(tmp_path):
+    errors = {"e_n__error": 0.02, "curvature_loss__error": 0.01}
+    ds = softjaw.open(make(tmp_path / "a.hdf", meshes=2, curvature_loss__curvature_loss=-0.1, **errors))
+    between = at_force(ds, 3.0)
+    law, line = linear(STATIONS, 0.0, 3.0), (linear(STATIONS, 0.0, 2.0) + linear(STATIONS, 0.0, 4.0)) / 2
+    assert between.e_n.sel(model="ccm", angle=0).values[:, 0] == pytest.approx(law, rel=1e-12)
+    assert between.e_n_error.sel(angle=0).values[:, 0] == pytest.approx(0.02 + (law - line) / law, rel=1e-9)
+    # what is not positive lies on a straight line, and has the cases' own error
+    assert between.curvature_loss.values == pytest.approx(-0.1)
+    assert between.curvature_loss_error.values == pytest.approx(0.01)
 
 
 def test_maps_stand_over_their_coordinates_with_units_and_definitions(tmp_path):

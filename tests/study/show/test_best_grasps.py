@@ -96,7 +96,7 @@ def stations(table):
     return [row["station"] for row in table.rows]
 
 
-def test_a_force_between_two_solved_ones_lies_on_straight_lines_needs_both_and_carries_their_flags():
+def test_a_force_between_two_solved_ones_needs_both_and_carries_their_flags():
     columns = best(rising()).columns
     for force, held in ((1.0, 0.2), (2.5, 0.5), (5.0, 1.0)):
         table = best(rising(), force=force, by="payload")
