@@ -41,6 +41,7 @@ UNITS = {  # by the suffix of a scene's key
     "deg": Unit("rad", math.pi, 180, "deg"),
     "rad": Unit("rad", 1, 1, "rad"),
     "n_per_mm": Unit("N/m", 1000, 1, "N/mm"),
+    "nm_per_rad": Unit("N m/rad", 1, 1, "N m/rad"),
 }
 SHOWN = {  # SI unit -> unit in tables and reports; other units are shown as they are
     "m": UNITS["mm"],

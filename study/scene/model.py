@@ -155,6 +155,12 @@ class Scene(SceneSection):
         if strain > 2:
             load = f"{force:g} N on {g.pad_length_mm * g.pad_width_mm:g} mm^2"
             yield f"load.normal_force_n = {load}: {strain:.2g} times the shear modulus may not converge"
+        if g.shear_modulus_kpa > 1e4:
+            yield f"gripper.shear_modulus_kpa = {g.shear_modulus_kpa:g} is more than rubber has; foam: 8 to 80 kPa"
+        usual = Gripper()
+        own_plate = (g.sheet_thickness_mm, g.sheet_modulus_gpa) != (usual.sheet_thickness_mm, usual.sheet_modulus_gpa)
+        if g.tilt_stiffness_nm_per_rad is not None and own_plate:
+            yield "gripper.tilt_stiffness_nm_per_rad: a backing plate that tilts is rigid, whatever sheet_* say"
         walled = getattr(self.object, "wall", None) is not None
         if self.accuracy.target is not None and walled and self.effects.object != "rigid":
             yield "accuracy.target refines cases on rigid objects alone: on a simulated wall there are two meshes"
@@ -311,10 +317,25 @@ def tables_of(data: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
 def put(data: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
     """The tables with the values of dotted keys put in, and without a sweep."""
     tables = {name: dict(table) for name, table in data.items() if isinstance(table, Mapping) and name != "sweep"}
-    for key, value in values.items():
+    for key, value in _matching_foam(tables.get("gripper", {}), values).items():
         section, _, name = key.partition(".")
         tables.setdefault(section, {})[name] = value
+        if value is None:
+            del tables[section][name]
     return {**data, **tables, "sweep": {}}
+
+
+def _matching_foam(gripper: Mapping[str, Any], values: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Values with hyperfoam's terms as a new modulus scales them, without the modulus or the terms of another foam."""
+    terms, modulus = gripper.get("terms_kpa"), values.get("gripper.shear_modulus_kpa")
+    if "gripper.terms_kpa" in values:
+        return {"gripper.shear_modulus_kpa": None, **values}
+    if values.get("gripper.material", "hyperfoam") != "hyperfoam":
+        return {"gripper.terms_kpa": None, **values}
+    if not terms or not isinstance(modulus, int | float):
+        return values
+    scale = modulus / gripper["shear_modulus_kpa"]
+    return {**values, "gripper.terms_kpa": [[exponent, scale * term] for exponent, term in terms]}
 
 
 def plain_tables(tables: Mapping[str, Any]) -> dict[str, Any]:

@@ -45,11 +45,14 @@ class Gripper(SceneSection):
     pad_width_mm: float = Field(22.0, ge=1, le=500, description="short side of the pad")
     pad_thickness_mm: float = Field(15.0, ge=0.5, le=200, description="thickness of the pad")
     material: Literal["blatz_ko", "hyperfoam", "neo_hookean", "linear"] = Field("blatz_ko", description="material law")
-    shear_modulus_kpa: float = Field(40.0, ge=0.01, le=1e6, description="initial shear modulus of the pad")
+    shear_modulus_kpa: float = Field(
+        40.0, ge=0.01, le=1e6, description="initial shear modulus of the pad, E / (2 (1 + nu))"
+    )
     poisson_ratio: float = Field(0.25, ge=0, le=0.4999, description="Poisson's ratio of the pad; Blatz-Ko foam: 0.25")
     terms_kpa: tuple[Point, ...] = Field(
-        (), max_length=6, description="terms of hyperfoam, pairs of exponent and shear modulus", examples=[[[-2, 40]]]
-    )
+        (), max_length=6, examples=[[[-2, 40]]],
+        description="terms of hyperfoam: exponent alpha and shear modulus mu of 2 mu / alpha^2 (...)",
+    )  # fmt: skip
     elements: tuple[Count, Count, Count] = Field(
         (20, 10, 6), description="elements of the whole pad along its length, width and thickness"
     )
@@ -77,7 +80,7 @@ class Gripper(SceneSection):
         """Fill in hyperfoam's terms from the modulus (one term, which is Blatz-Ko foam), or the modulus from them."""
         if not isinstance(data, dict) or data.get("material") != "hyperfoam":
             return data
-        if "terms_kpa" not in data:
+        if not data.get("terms_kpa"):
             return {**data, "terms_kpa": ((-2.0, data.get("shear_modulus_kpa", 40.0)),)}
         with suppress(TypeError, ValueError):  # of terms that are refused
             return {"shear_modulus_kpa": sum(modulus for _, modulus in data["terms_kpa"]), **data}

@@ -223,13 +223,29 @@ def test_overrides_replace_values_which_are_in_si_units_and_hyperfoam_fills_in_i
     assert one.gripper.hyperfoam_terms == ((-2,), (30e3,))
     two = parse_scene(BALL, overrides=["gripper.material=hyperfoam", "gripper.terms_kpa=[[8, 10], [-2, 20]]"])
     assert two.gripper.shear_modulus_kpa == 30
+    softer = two.with_values(**{"gripper.shear_modulus_kpa": 15})
+    assert softer.gripper.hyperfoam_terms == ((8, -2), (5e3, 10e3))
+    other = softer.with_values(**{"gripper.terms_kpa": [[4, 20]]})
+    assert (other.gripper.hyperfoam_terms, other.gripper.shear_modulus_kpa) == (((4,), (20e3,)), 20)
+    assert other.with_values(**{"gripper.material": "blatz_ko"}).gripper.terms_kpa == ()
+    assert scene.with_values(**{"gripper.material": "hyperfoam"}).gripper.hyperfoam_terms == ((-2,), (40e3,))
+    assert (
+        parse_scene(BALL, overrides=["sweep.gripper.material=['blatz_ko', 'hyperfoam']"]).cases == 2 * scene.cases / 2
+    )
+    assert scene.with_values(**{"gripper.shear_modulus_kpa": None}).gripper.shear_modulus_kpa == 40
     p = problem(BALL, "gripper.material=hyperfoam", "gripper.terms_kpa=[[-2, 10]]", "gripper.shear_modulus_kpa=40")
     assert (p.key, p.found) == ("gripper.shear_modulus_kpa", "40.0")
 
 
 @pytest.mark.parametrize(
     "overrides",
-    [["friction.mu=5"], ["load.normal_force_n=[500]"], ["gripper.material=linear", "gripper.poisson_ratio=0.49"]],
+    [
+        ["friction.mu=5"],
+        ["load.normal_force_n=[500]"],
+        ["gripper.material=linear", "gripper.poisson_ratio=0.49"],
+        ["gripper.shear_modulus_kpa=40000"],
+        ["gripper.tilt_stiffness_nm_per_rad=1", "gripper.sheet_thickness_mm=0.3"],
+    ],
 )
 def test_values_that_are_seldom_meant_are_allowed_with_a_warning(overrides):
     assert len(parse_scene(BALL, overrides=overrides).warnings) == 1
