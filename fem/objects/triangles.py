@@ -226,8 +226,11 @@ def _without_specks(points: FloatArray, triangles: IntArray) -> tuple[FloatArray
     return *_used(points, triangles[~speck[piece]]), [f"dropped {speck.sum()} specks of debris"]
 
 
-def neighbours(points: FloatArray, triangles: IntArray) -> Neighbours:
-    """Edges, and the two triangles at each that are neighbours."""
+def neighbours(points: FloatArray, triangles: IntArray, as_given: bool = False) -> Neighbours:
+    """Edges, and the two triangles at each that are neighbours: of many, the two that turn least into each other.
+
+    ``as_given``: two that are turned alike come first. Faces of solids that touch along an edge may lie in one plane.
+    """
     sides = edges_of(triangles)
     ordered = np.sort(sides, axis=1)
     key, first, edge, count = np.unique(
@@ -242,24 +245,24 @@ def neighbours(points: FloatArray, triangles: IntArray) -> Neighbours:
     normal = area / np.maximum(np.linalg.norm(area, axis=1), 1e-300)[:, None]
     for n in range(3, 9):  # triangles at one edge, among which neighbours are looked for
         if (many := np.flatnonzero(count == n)).size:
-            pair[many] = _smoothest(order[start[many][:, None] + np.arange(n)], sides, normal)
+            pair[many] = _smoothest(order[start[many][:, None] + np.arange(n)], sides, normal, as_given)
     return Neighbours(ordered[first], edge.reshape(-1, 3), pair, count)
 
 
-def _smoothest(at: IntArray, sides: IntArray, normal: FloatArray) -> IntArray:
-    """Of the sides ``(k, n)`` at each edge the two ``(k, 2)`` whose triangles turn least into each other."""
+def _smoothest(at: IntArray, sides: IntArray, normal: FloatArray, as_given: bool) -> IntArray:
+    """Of the sides ``(k, n)`` at each edge the two ``(k, 2)`` that are neighbours."""
     i, j = np.triu_indices(at.shape[1], 1)
     p, q = at[:, i], at[:, j]
+    cosine = np.einsum("knd,knd->kn", normal[p // 3], normal[q // 3])
     # two that run through the edge in opposite senses are turned alike
-    alike = np.where(sides[p, 0] != sides[q, 0], 1.0, -1.0)
-    best = (alike * np.einsum("knd,knd->kn", normal[p // 3], normal[q // 3])).argmax(axis=1)
+    best = np.where(sides[p, 0] != sides[q, 0], cosine, -cosine - 3.0 * as_given).argmax(axis=1)
     row = np.arange(len(at))
     return np.stack([p[row, best], q[row, best]], axis=1)
 
 
 def turned_alike(points: FloatArray, triangles: IntArray) -> tuple[IntArray, bool, list[str]]:
     """Triangles turned as their neighbours and outwards, whether all pieces are closed, and a note on those turned."""
-    joined, n = neighbours(points, triangles), len(triangles)
+    joined, n = neighbours(points, triangles, as_given=True), len(triangles)
     i, j = joined.sides[joined.paired].T
     sides = edges_of(triangles)
     clash = sides[i, 0] == sides[j, 0]
@@ -278,9 +281,13 @@ def turned_alike(points: FloatArray, triangles: IntArray) -> tuple[IntArray, boo
     flat = np.abs(volume) <= 1e-6 * np.bincount(piece, _areas(points, triangles)) * _sizes(points, triangles, piece)
     inverted = (volume < 0) & ~flat
     triangles = np.where(inverted[piece][:, None], triangles[:, ::-1], triangles)
-    turned = int(np.sum(flip != inverted[piece]))
-    closed = bool((joined.at_edge == 2).all() and not one_sided.any() and not flat.any())
-    return np.ascontiguousarray(triangles), closed, [f"turned {turned} of {n} triangles"] if turned else []
+    turned = flip != inverted[piece]
+    # as many triangles run through each edge in the one sense as in the other
+    up = (sides[:, 0] < sides[:, 1]) != np.repeat(turned, 3)
+    balanced = not np.bincount(joined.edge_of.ravel(), np.where(up, 1.0, -1.0)).any()
+    closed = bool(balanced and not one_sided.any() and not flat.any())
+    told = [f"turned {turned.sum()} of {n} triangles"] if turned.any() else []
+    return np.ascontiguousarray(triangles), closed, told
 
 
 def _without_shells(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray, list[str]]:

@@ -71,6 +71,20 @@ def test_triangles_are_turned_outwards_specks_dropped_separate_parts_kept_and_on
     assert not joint.paired[np.arange(len(joint.edges)) != edge].any()
 
 
+def test_solids_that_touch_along_one_edge_are_closed_and_keep_their_insides():
+    """Faces of both lie in one plane, one on either side of the edge."""
+    first, second = trimesh.creation.box([0.02, 0.02, 0.06]), trimesh.creation.box([0.02, 0.02, 0.06])
+    both = trimesh.util.concatenate([first, second.apply_translation([0.02, 0.02, 0])])
+    both.merge_vertices()
+    assert len(both.vertices) == 14
+    for faces in (both.faces, both.faces[:, ::-1]):
+        mesh = cleaned(np.array(both.vertices), np.array(faces))
+        assert mesh.closed
+        solid = trimesh.Trimesh(mesh.points, mesh.triangles, process=False)
+        assert solid.volume == pytest.approx(2 * 0.02 * 0.02 * 0.06)
+        assert solid.center_mass == pytest.approx([0.01, 0.01, 0], abs=1e-12)
+
+
 def with_holes(mesh):
     """A tenth of the triangles is missing, on the far side of the finger."""
     far = np.flatnonzero(mesh.triangles_center[:, 0] < -0.01)
