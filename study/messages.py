@@ -136,6 +136,15 @@ def with_ending(option: str, file: str | Path, *endings: str) -> Path:
 
 
 @contextmanager
+def fault_of(place: str, *kinds: type[Exception], code: int = USAGE, ending: str = "") -> Iterator[None]:
+    """Errors of these kinds become a `StudyError` that names what is at fault, and ends with ``ending``."""
+    try:
+        yield
+    except kinds as error:
+        raise StudyError(code, f"{place}: {error}{ending}") from error
+
+
+@contextmanager
 def beside(path: Path, folders: bool = False, part: Path | None = None) -> Iterator[Path]:
     """A place to write to, renamed to ``path`` when it is on disk; with ``folders`` those that are missing are made.
 

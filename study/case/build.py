@@ -15,7 +15,7 @@ from softjaw.fem.objects.gap import IN_PLACE, GapObject, Pose, cone_volumes, sol
 from softjaw.fem.objects.outer_surface import OuterSurface, Section, of_revolution, of_sections
 from softjaw.fem.pad.halving import refined
 from softjaw.fem.pad.shape import PadShape
-from softjaw.study.messages import USAGE, StudyError
+from softjaw.study.messages import USAGE, StudyError, fault_of
 from softjaw.study.quantities import LISTED_TARGET
 from softjaw.study.scene import Scene
 from softjaw.study.scene.grasps import listed
@@ -107,12 +107,10 @@ def with_mass(scene: Scene) -> Scene:
     if density is None:
         return scene
     check_object(scene)
-    try:
+    with fault_of("object.density", ValueError, ending="; write object.mass_g instead"):
         if any(key.startswith("object.") for key in scene.sweep):
             raise ValueError("the object changes along the sweep")
         mass = max(round(converted(density * volume(scene.object), "kg", "g"), 2), 0.01)
-    except ValueError as error:
-        raise StudyError(USAGE, f"object.density: {error}; write object.mass_g instead") from error
     return scene.model_copy(update={"object": scene.object.model_copy(update={"density": None, "mass_g": mass})})
 
 
@@ -163,12 +161,10 @@ def check_object(scene: Scene) -> None:
         key = {"revolution": "object.profile_mm", "sections": "object.sections", "mesh": "object.mesh"}.get(shape.shape)
         if key is None:
             return
-        try:
+        with fault_of(key, ValueError):
             build_object(shape)
             # An outline may be a good solid and still no wall.
             surface = None if shape.wall is None else outer_surface(shape)
-        except ValueError as error:
-            raise StudyError(USAGE, f"{key}: {error}") from error
         if surface is not None:
             geometry().check_wall(shape, surface)
         if shape.shape == "mesh":
@@ -183,10 +179,8 @@ def middle_of(scene: Scene) -> Any:
     shape = scene.object
     if shape.shape != "mesh" or not scene.candidates.station_values_mm:
         return None
-    try:
+    with fault_of("object.mesh", ValueError):
         return geometry().middle_of(shape, scene.gripper.pad_size[0])
-    except ValueError as error:
-        raise StudyError(USAGE, f"object.mesh: {error}") from error
 
 
 def _check_stations(scene: Scene, mesh: Any) -> None:

@@ -25,7 +25,7 @@ from softjaw.fem.shell.wall_material import WallMaterial, wall_material
 from softjaw.fem.shell.wall_mesh import MeshSize, along, around, body_mesh
 from softjaw.friction.patch import NEGLIGIBLE, FloatArray
 from softjaw.study.case.fit import extremes
-from softjaw.study.messages import USAGE, StudyError
+from softjaw.study.messages import fault_of
 from softjaw.study.scene.objects import Mesh, Walled
 from softjaw.study.scene.sections import Gripper
 
@@ -85,13 +85,11 @@ def check_wall(shape: Any, surface: OuterSurface) -> None:
     Raises `StudyError` with the key and what is wrong with it.
     """
     size = MeshSize(heights=surface.heights[:1] * 2, around=0.01, along=0.005, coarse=0.02)
-    try:
+    with fault_of("object.wall_mm", ValueError):
         body_mesh(
             surface, shape.wall, size,
             open_top=shape.open_top, open_bottom=shape.open_bottom, base_thickness=shape.base_wall,
         )  # fmt: skip
-    except ValueError as error:
-        raise StudyError(USAGE, f"object.wall_mm: {error}") from error
 
 
 def wall_lines(

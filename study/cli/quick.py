@@ -14,7 +14,7 @@ import numpy as np
 
 from softjaw.study.case.build import build_object, check_object, geometry, mesh_notes, told, with_mass
 from softjaw.study.case.candidates import check_candidates, with_sampled_grasps
-from softjaw.study.messages import USAGE, StudyError, with_ending
+from softjaw.study.messages import USAGE, StudyError, fault_of, with_ending
 from softjaw.study.run.estimate import START_S, estimated, scaling_text, slowness
 from softjaw.study.run.object_folder import ObjectFolder, folder_of
 from softjaw.study.run.plan import free_bytes, gigabytes, make_plan, memory, plan_text
@@ -45,15 +45,13 @@ def _measured(options: Namespace) -> start.Measured:
         made: Any = build_object(shape)
         return shape, made, (1e3 * np.ptp(made.bounds, axis=0)).tolist()
 
-    try:
+    with fault_of("--mesh", ValueError, OSError):
         axis = options.axis or start.longest(dict(zip("xyz", built("z")[2], strict=True)))
         shape, made, extents = built(axis)
         middle = geometry().middle_of(shape, in_si("pad_length_mm", start.PAD_LENGTH))
         half = in_si("half_mm", start.PAD_LENGTH / 2)
         stations = (s for s in start.heights(extents[2]) if not middle.remark(in_si("station_mm", s), half))
         return axis, tuple(extents), tuple(stations), mesh_notes(made)
-    except (ValueError, OSError) as error:
-        raise StudyError(USAGE, f"--mesh: {error}") from error
 
 
 def check(options: Namespace) -> str:

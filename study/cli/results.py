@@ -6,7 +6,7 @@ from argparse import Namespace
 from functools import partial
 from pathlib import Path
 
-from softjaw.study.messages import USAGE, StudyError, beside, with_ending, write_file
+from softjaw.study.messages import beside, fault_of, with_ending, write_file
 from softjaw.study.ranking import judge
 from softjaw.study.result.index import index_path
 from softjaw.study.result.read import open
@@ -33,12 +33,10 @@ def show(options: Namespace) -> str:
     if index := index_path(options.file):
         return rendered(objects.index_table(index, options.top), options.form)
     ds = open(options.file)
-    try:
+    with fault_of(options.file, ValueError):
         if options.form is None:
             return best_text(ds, terminal_width(), options.force, options.top, options.by)
         return rendered(best(ds, options.force, options.top, by=options.by), options.form)
-    except ValueError as error:
-        raise StudyError(USAGE, f"{options.file}: {error}") from error
 
 
 def compare(options: Namespace) -> str:

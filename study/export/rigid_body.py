@@ -16,7 +16,7 @@ from trimesh import Trimesh
 
 from softjaw.friction.patch import FloatArray
 from softjaw.study.case.build import build_object, centre_of_mass, own_frame, surface_triangles
-from softjaw.study.messages import OTHER_FILE, StudyError
+from softjaw.study.messages import OTHER_FILE, fault_of
 from softjaw.study.result.read import axes_of
 from softjaw.study.result.read import scene_of as scene_at
 from softjaw.study.scene import Scene, SceneError
@@ -48,10 +48,8 @@ def scene_of(ds: xr.Dataset, case: dict[str, Any]) -> Scene:
     Raises `StudyError`: the file's scene is none of this version.
     """
     index = [int(np.flatnonzero(axis.values == case["place"][axis.name])[0]) for axis in axes_of(ds)[:-3]]
-    try:
+    with fault_of(ds.attrs["file"], SceneError, code=OTHER_FILE):
         return scene_at(ds, index)
-    except SceneError as error:
-        raise StudyError(OTHER_FILE, f"{ds.attrs['file']}: {error}") from error
 
 
 def body_of(ds: xr.Dataset, case: dict[str, Any]) -> RigidBody:
@@ -61,11 +59,9 @@ def body_of(ds: xr.Dataset, case: dict[str, Any]) -> RigidBody:
     """
     scene = scene_of(ds, case)
     shape = scene.object
-    try:
+    with fault_of(f"{ds.attrs['file']}: its object cannot be built", ValueError, OSError, code=OTHER_FILE):
         built, frame = build_object(shape), own_frame(shape)
         points, triangles = surface_triangles(shape)
-    except (ValueError, OSError) as error:
-        raise StudyError(OTHER_FILE, f"{ds.attrs['file']}: its object cannot be built: {error}") from error
     centre = frame.to_object(centre_of_mass(scene, built)[None])[0]
     points = frame.to_object(np.asarray(points, float))
     surface = Trimesh(points, triangles, process=False)

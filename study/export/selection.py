@@ -29,7 +29,7 @@ from softjaw.study.export.cases import cases
 from softjaw.study.export.rigid_body import scene_of
 from softjaw.study.flags import LOST, flag_words, flags_in
 from softjaw.study.grippers import Hand
-from softjaw.study.messages import USAGE, StudyError
+from softjaw.study.messages import USAGE, StudyError, fault_of
 from softjaw.study.quantities import BY_KEY, FORCE_RANGE, LEAST_FORCE, MAIN
 from softjaw.study.ranking import at_level, index_of, judged, ranked, score_of
 from softjaw.study.result.read import axes_of, maps_in
@@ -156,10 +156,8 @@ def chosen(
 
     Raises `StudyError`: A force outside of the solved ones, or a map that the file does not have.
     """
-    try:
+    with fault_of("--force", ValueError):
         at, k, _ = at_level(ds, force)
-    except ValueError as error:
-        raise StudyError(USAGE, f"--force: {error}") from error
     units = maps_in(at)
     if unknown := [name for name in least if name not in units]:
         raise StudyError(USAGE, f"--min: found '{unknown[0]}', expected one of {', '.join(units)}")
@@ -201,11 +199,9 @@ def holds(ds: xr.Dataset, case: dict[str, Any], gripper: GripperFrame) -> dict[s
     joints, pad = (hand.values(wide + foam), hand.values(closed), depth), case["fingers"][0]["pose_rotation"]
     if gripper.approach:
         return dict.fromkeys(gripper.approach, Hold(*joints, tuple(beyond)))
-    try:
+    unknown = "the object cannot be built, so that no approach can be chosen"
+    with fault_of(unknown, ValueError, OSError, ending="; name one with --approach"):
         approach, room = clearest(scene, hand, gripper.hand.closing, pad, _middle(case), wide, depth)
-    except (ValueError, OSError) as error:
-        text = f"the object cannot be built, so that no approach can be chosen: {error}; name one with --approach"
-        raise StudyError(USAGE, text) from error
     beyond += ["the hand meets the object from every side"] * (room < FREE and not beyond)
     return {approach: Hold(*joints, tuple(beyond))}
 

@@ -18,7 +18,7 @@ from softjaw.study.case.evaluate import ECCENTRICITIES, exact_score, soft
 from softjaw.study.case.limit_surface import STANDS_IN, fit_surfaces
 from softjaw.study.case.result import UNDECIDED
 from softjaw.study.flags import Flag, flags_in, raised
-from softjaw.study.messages import USAGE, StudyError
+from softjaw.study.messages import USAGE, StudyError, fault_of
 from softjaw.study.patch.faces import ReadPatch
 from softjaw.study.patch.patch_reader import ENDINGS, Reading, checked_file, read_table
 from softjaw.study.quantities import MODELS, map_row
@@ -177,10 +177,8 @@ def grasp_record(
     """
     both = first, second or first
     contacts = first.contact, second.contact if second else opposite(first.contact, float(distance or 0.0))
-    try:
+    with fault_of("--other", ValueError):
         check_facing(contacts, [patch.read.file for patch in both])
-    except ValueError as error:
-        raise StudyError(USAGE, f"--other: {error}") from error
     d, *lengths = grasp_lengths(contacts, object_length, contact_length)
     score = {m: exact_score(soft(contacts, [p.surface(m, kind) for p in both]), *lengths) for m in MODELS}
     return {

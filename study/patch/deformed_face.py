@@ -18,7 +18,7 @@ from softjaw.fem.objects.gap import NoContactError
 from softjaw.fem.objects.measured_face import cell_of, measured_face
 from softjaw.friction.patch import NEGLIGIBLE, ContactPatch, FloatArray
 from softjaw.study.case.model import pads_of
-from softjaw.study.messages import SOME_FAILED, USAGE, Problem, StudyError
+from softjaw.study.messages import SOME_FAILED, USAGE, Problem, StudyError, fault_of
 from softjaw.study.patch.faces import ReadPatch, refuse
 from softjaw.study.patch.patch_reader import Reading, checked_file, refused, si_columns, split_header, table_rows
 from softjaw.study.scene import Scene
@@ -34,10 +34,8 @@ def solve_deformed(file: str, unit: str | None, scene: Scene) -> ReadPatch:
     deformed face, 6 if the pad has no such state.
     """
     points, notes = _points(checked_file(file, (".csv",)), unit, scene)
-    try:
+    with fault_of(file, ValueError, ending="; measure more of the face"):
         face = measured_face(points, cell_of(scene.gripper.pad_size, scene.gripper.elements))
-    except ValueError as error:
-        raise StudyError(USAGE, f"{file}: {error}; measure more of the face") from error
     wanted, *others = pads_of(scene, (False, False), coarser=False)
     try:
         state, judged = press_measured(face, wanted, others, dict(scene.petsc))
