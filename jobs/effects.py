@@ -14,6 +14,7 @@ import argparse
 import csv
 from collections.abc import Iterator
 from contextlib import suppress
+from functools import partial
 from itertools import chain, cycle
 from pathlib import Path
 
@@ -155,29 +156,16 @@ def named(label: str, n: int, force: float) -> str:
     return f"{label}, place {n}, {force:g} N"
 
 
-def friction_rows() -> Iterator[Row]:
-    """Friction that acts back, chosen at every force."""
+def chosen_rows(effect: str, name: str, cheap: str, dear: str, without: dict[str, str]) -> Iterator[Row]:
+    """An effect as it is chosen between two levels at every force, where those in ``without`` are left out."""
     for label, scene in rigid_scenes():
-        free, coupled = contacts_at(scene), contacts_at(scene, **{COUPLED: "tangential"})
-        for n, choice in enumerate(choices(at_levels(scene, sheet="rigid"))):
+        free, taking = contacts_at(scene), contacts_at(scene, **{effect: dear})
+        for n, choice in enumerate(choices(at_levels(scene, **without))):
             for k, force in enumerate(choice.solver.forces):
-                level = choice.level(COUPLED, k)
-                if (n, force) in free and (n, force) in coupled:
-                    error = off(e_n(free[n, force]), e_n(coupled[n, force]))
-                    taken = int(level.level != "none")
-                    yield COUPLING, named(label, n, force), level.indicator, level.change, taken, error
-
-
-def plate_rows() -> Iterator[Row]:
-    """Backing plates, chosen for all forces of a candidate."""
-    for label, scene in rigid_scenes():
-        free, plate = contacts_at(scene), contacts_at(scene, sheet="elastic")
-        for n, choice in enumerate(choices(at_levels(scene, **{COUPLED: "none"}))):
-            for k, force in enumerate(choice.solver.forces):
-                level = choice.level("sheet", k)
-                if (n, force) in free and (n, force) in plate:
-                    error, taken = off(e_n(free[n, force]), e_n(plate[n, force])), int(level.level != "rigid")
-                    yield "sheet", named(label, n, force), level.indicator, level.change, taken, error
+                level = choice.level(effect, k)
+                if (n, force) in free and (n, force) in taking:
+                    error, taken = off(e_n(free[n, force]), e_n(taking[n, force])), int(level.level != cheap)
+                    yield name, named(label, n, force), level.indicator, level.change, taken, error
 
 
 def patch_rows() -> Iterator[Row]:
@@ -288,8 +276,8 @@ def table(file: Path, parts: list[str]) -> None:
 
 
 PARTS = {  # with the effects that each has rows of
-    "friction": (friction_rows, (COUPLING,)),
-    "plates": (plate_rows, ("sheet",)),
+    "friction": (partial(chosen_rows, COUPLED, COUPLING, "none", "tangential", {"sheet": "rigid"}), (COUPLING,)),
+    "plates": (partial(chosen_rows, "sheet", "sheet", "rigid", "elastic", {COUPLED: "none"}), ("sheet",)),
     "patches": (patch_rows, ("friction", "limit surface", EXACT)),
     "walls": (wall_rows, (SHELL, SHELLS)),
 }

@@ -164,7 +164,7 @@ def test_no_effect_of_rigid_objects_is_skipped_wrongly(monkeypatch):
     monkeypatch.setitem(job.RIGID, "bottle", ("jobs/bottle-rigid.toml", "[60, 85]"))
     rows = list(job.patch_rows())
     assert max([row[5] for row in rows if row[0] == job.EXACT]) < 1e-6
-    for effect, own in (("friction", rows), (job.COUPLING, list(job.friction_rows()))):
+    for effect, own in (("friction", rows), (job.COUPLING, list(job.PARTS["friction"][0]()))):
         taken, error = judged(own, effect)
         assert error[taken].max() > job.TARGET  # something to be wrong about
     assert not taken.all()
