@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import trimesh
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parents[1]))
@@ -49,17 +50,5 @@ def _even_in_length_and_turn(curve, rows: int) -> np.ndarray:
     return np.interp(np.linspace(0, total[-1], rows), total, s)
 
 
-def write_stl(path: Path, points: np.ndarray, triangles: np.ndarray) -> None:
-    """Write a binary STL file."""
-    record = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-    facets = np.zeros(len(triangles), record)
-    facets["corners"] = points[triangles]
-    a, b, c = points[triangles].transpose(1, 0, 2)
-    n = np.cross(b - a, c - a)
-    facets["normal"] = n / np.linalg.norm(n, axis=1)[:, None]
-    header = b"waisted flask, millimetres".ljust(80)
-    path.write_bytes(header + np.uint32(len(facets)).tobytes() + facets.tobytes())
-
-
 if __name__ == "__main__":
-    write_stl(HERE / "flask.stl", *flask())
+    trimesh.Trimesh(*flask(), process=False).export(HERE / "flask.stl")

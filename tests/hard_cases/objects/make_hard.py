@@ -6,8 +6,8 @@ Run from the repository's root: ``python -m tests.hard_cases.objects.make_hard``
 from pathlib import Path
 
 import numpy as np
+import trimesh
 
-from jobs.objects.make_flask import write_stl
 from softjaw.fem.objects.gap import grid_triangles
 
 HERE = Path(__file__).resolve().parent
@@ -67,4 +67,4 @@ def meshes() -> dict[str, tuple[np.ndarray, np.ndarray]]:
 
 if __name__ == "__main__":
     for name, mesh in meshes().items():
-        write_stl(HERE / f"hard-{name}.stl", *mesh)
+        trimesh.Trimesh(*mesh, process=False).export(HERE / f"hard-{name}.stl")
