@@ -10,31 +10,26 @@ import pytest
 from softjaw.fem.errors import MeshError
 from softjaw.fem.objects.mesh_file import read_triangles
 from softjaw.fem.objects.mesh_object import MeshObject
-from softjaw.study.cli import main
 from softjaw.study.messages import OTHER_FILE, UNPRINTABLE, USAGE, StudyError
 from softjaw.study.result.store import open_result
 from softjaw.study.scene import SceneError, load_scene, parse_scene
 from tests.fuzz.lies import LIES
 from tests.fuzz.readers import QUICK, obj, ply, stl
 from tests.study.formula_results import make
+from tests.study.launching import softjaw
 from tests.study.sealing import sealed
 
 BALL = '[object]\nshape = "sphere"\nradius_mm = 30\n[candidates]\nstations_mm = [0]\n[load]\nnormal_force_n = [2]\n'
 MESH = BALL.replace('shape = "sphere"\nradius_mm = 30', 'shape = "mesh"\nmesh = "FILE"\nunit = "mm"')
 
 
-@pytest.fixture
-def told(capsys):
-    def ask(*words):
-        code = main([str(word) for word in words])
-        said = capsys.readouterr()
-        assert not UNPRINTABLE.search(said.out + said.err)
-        assert code != 70, said.err
-        assert (code == 0) == (not said.err), said.err
-        assert all(line.startswith("error: ") for line in said.err.splitlines())
-        return code, said.out + said.err
-
-    return ask
+def told(*words):
+    code, output, errors = softjaw(0, *words)
+    assert not UNPRINTABLE.search(output + errors)
+    assert code != 70, errors
+    assert (code == 0) == (not errors), errors
+    assert all(line.startswith("error: ") for line in errors.splitlines())
+    return code, output + errors
 
 
 @pytest.mark.parametrize(("name", "content"), [
@@ -58,7 +53,7 @@ def test_meshes_that_ended_the_program_once_are_refused(tmp_path, name, content)
         MeshObject.from_file(path, "mm")
 
 
-def test_a_pipe_is_no_mesh_table_or_result(tmp_path, told):
+def test_a_pipe_is_no_mesh_table_or_result(tmp_path):
     """It would be waited for without end."""
     for name in ("a.stl", "a.csv", "a.hdf"):
         os.mkfifo(tmp_path / name)
@@ -68,7 +63,7 @@ def test_a_pipe_is_no_mesh_table_or_result(tmp_path, told):
 
 
 @pytest.mark.long
-def test_a_mesh_elsewhere_is_read_and_its_place_is_shown_and_kept(tmp_path, told):
+def test_a_mesh_elsewhere_is_read_and_its_place_is_shown_and_kept(tmp_path):
     inner = tmp_path / "scenes"
     inner.mkdir()
     (tmp_path / "body.stl").write_bytes(stl(True))
@@ -101,7 +96,7 @@ TABLE = QUICK["table"].content
     (b"0.1", b"1e300", "a length of 1"), (b"0,0.1,1,7", b"1e-320,0,0,7", "a length of 1"), (b"1.25", b"1e308", "area"),
     (b"x_mm", b"x_mm\x1b[2J", "x_mm"),
 ])  # fmt: skip
-def test_tables_that_ended_the_program_once_are_refused(tmp_path, told, old, new, words):
+def test_tables_that_ended_the_program_once_are_refused(tmp_path, old, new, words):
     path = tmp_path / "patch.csv"
     path.write_bytes(TABLE.replace(old, new, 1))
     code, text = told("patch", path, "--distance", "60")
@@ -116,7 +111,7 @@ def commands(path, other, page):
 
 @pytest.mark.long
 @pytest.mark.parametrize("lie", LIES)
-def test_a_result_file_that_lies_is_read_or_refused(tmp_path, told, lie):
+def test_a_result_file_that_lies_is_read_or_refused(tmp_path, lie):
     path, other, page = make(tmp_path / "a.hdf"), tmp_path / "other.hdf", tmp_path / "page.html"
     shutil.copy(path, other)
     with h5py.File(path, "r+") as file:

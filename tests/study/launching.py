@@ -47,6 +47,13 @@ def softjaw(ranks, *words):
     return launch(ranks, "-m", "softjaw", *words) if ranks else here(main, *words)
 
 
+def answer(*words):
+    """The JSON that a command prints, below what it says on its way."""
+    code, output, errors = softjaw(0, *words, "--json")
+    assert code == 0, errors
+    return json.loads(output[output.index("{") :])
+
+
 def here(program, *words):
     output, errors = io.StringIO(), io.StringIO()
     with redirect_stdout(output), redirect_stderr(errors):

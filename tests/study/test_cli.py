@@ -3,7 +3,6 @@
 import argparse
 import csv
 import io
-import json
 import shlex
 import subprocess
 import sys
@@ -16,7 +15,7 @@ from softjaw.study.cli import main, program
 from softjaw.study.cli.quick import petsc_overrides
 from softjaw.study.doctor import launch_environment
 from softjaw.study.messages import StudyError
-from tests.study.launching import ROOT, launch
+from tests.study.launching import ROOT, answer, launch
 from tests.study.launching import study as run_fake
 from tests.study.scenes import BALL, text_of
 
@@ -94,8 +93,7 @@ def test_examples_are_words_that_the_program_takes_and_name_files_that_exist(exa
 
 
 def test_status_tells_programs_the_state_of_every_case(finished, capsys):
-    assert main(["status", str(finished), "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
+    told = answer("status", finished)
     assert [told[key] for key in ("complete", "failed", "not_computed", "running")] == [35, 1, 0, None]
     assert [case for case in told["cases"] if case["state"] == "failed"] == [
         {"row": 9, "state": "failed", "station": 0.02, "angle": np.pi / 2, "normal_force": 1.0,

@@ -1,6 +1,6 @@
 """``softjaw patch --deformed``: the pad of a scene from points of its face, and what is refused."""
 
-import json
+from functools import partial
 
 import numpy as np
 import pytest
@@ -10,9 +10,11 @@ from softjaw.study.case.contact import Contact
 from softjaw.study.cli import main
 from softjaw.study.messages import OTHER_FILE, USAGE
 from softjaw.study.scene import parse_scene
+from tests.study.launching import answer
 from tests.study.scenes import OVAL, QUICK, results_of, scene_of
 
 NOISE = 0.1  # mm
+told = partial(answer, "patch", "--deformed")
 CYLINDER = OVAL.replace("20", "25", 1)
 BOTTLE = 'shape = "revolution"\nprofile_mm = [[0, 26], [30, 33], [70, 31], [105, 24], [130, 22], [150, 20], [200, 12]]'
 
@@ -44,18 +46,7 @@ def table(file, face, contour, seed=0, noise=NOISE):
     return file
 
 
-@pytest.fixture
-def told(capsys):
-    def ask(*words):
-        code = main(["patch", "--deformed", *map(str, words), "--json"])
-        answer = capsys.readouterr()
-        assert code == 0, answer.err
-        return json.loads(answer.out[answer.out.index("{") :])
-
-    return ask
-
-
-def test_a_contour_gives_what_any_patch_gives(tmp_path, told):
+def test_a_contour_gives_what_any_patch_gives(tmp_path):
     """On a coarse mesh, so that it is fast; without noise."""
     text = scene_text(CYLINDER, 0, 5, (6, 6, 2))
     (tmp_path / "scene.toml").write_text(text)
@@ -108,7 +99,7 @@ def test_options_that_do_not_belong_together_are_refused(tmp_path, capsys, words
 @pytest.mark.parametrize(("shape", "station", "force", "contour"), [
     (CYLINDER, 0, 5, True), (BOTTLE, 60, 5, False), (BOTTLE, 100, 5, False), (BOTTLE, 130, 3, False),
 ])  # fmt: skip
-def test_a_camera_sees_e_n_within_5_percent_and_S_within_10(tmp_path, told, shape, station, force, contour):
+def test_a_camera_sees_e_n_within_5_percent_and_S_within_10(tmp_path, shape, station, force, contour):
     """The face of a case on a finer mesh, with 0.1 mm of noise, back through the command on the scene's own mesh."""
     S, e_n, face = face_of(scene_text(shape, station, force, (24, 14, 7)))
     (tmp_path / "scene.toml").write_text(scene_text(shape, station, force, (20, 10, 6)))

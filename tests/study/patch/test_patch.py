@@ -1,6 +1,5 @@
 """Pressure fields from elsewhere: closed forms, the same answer from every kind of file, units, scores."""
 
-import json
 import math
 from dataclasses import replace
 from types import SimpleNamespace
@@ -11,11 +10,10 @@ from scipy.spatial.transform import Rotation
 
 from softjaw.friction.frame import FrameFlag, principal_direction
 from softjaw.friction.patch import ContactPatch
-from softjaw.study.cli import main
 from softjaw.study.patch.answer import SURFACES, check_facing
 from softjaw.study.patch.faces import corner_geometry
 from tests.generators import cylinder_grid
-from tests.study.launching import ROOT
+from tests.study.launching import ROOT, answer
 from tests.study.patch_files import centres, corners, cylinder_mesh, vtk
 
 MU = 0.5
@@ -23,15 +21,8 @@ EXAMPLE = ROOT / "jobs" / "cylinder-pressure.csv"
 SAME = {"rel": 1e-9, "abs": 1e-12}
 
 
-@pytest.fixture
-def told(capsys):
-    def ask(*words):
-        code = main(["patch", *map(str, words), "--mu", str(MU), "--json"])
-        answer = capsys.readouterr()
-        assert code == 0, answer.err
-        return json.loads(answer.out)
-
-    return ask
+def told(*words):
+    return answer("patch", *words, "--mu", MU)
 
 
 def faceted(triangles=False, **shape):
@@ -49,7 +40,7 @@ def friction(answer):
 
 
 @pytest.mark.parametrize("triangles", [False, True], ids=["quadrilaterals", "triangles"])
-def test_every_kind_of_file_gives_the_same_friction(tmp_path, told, triangles):
+def test_every_kind_of_file_gives_the_same_friction(tmp_path, triangles):
     points, cells, patch = faceted(triangles)
     data = [("other", patch.pressure[::-1]), ("pressure", patch.pressure)]
     units = "--unit", "m", "--pressure-unit", "pa"
@@ -68,7 +59,7 @@ def test_every_kind_of_file_gives_the_same_friction(tmp_path, told, triangles):
         assert np.allclose(answer["patches"][0]["frame"]["origin"], by_corners["patches"][0]["frame"]["origin"])
 
 
-def test_pressure_at_points_is_averaged_over_each_face_and_triangles_leave_their_last_corner_empty(tmp_path, told):
+def test_pressure_at_points_is_averaged_over_each_face_and_triangles_leave_their_last_corner_empty(tmp_path):
     points, cells, patch = faceted(n=16)
     at_points = 1e4 + 1e5 * np.abs(points[:, 1])
     file = vtk(tmp_path / "p.vtu", points, cells, on_points=[("pressure", at_points)])
@@ -92,7 +83,7 @@ def test_pressure_at_points_is_averaged_over_each_face_and_triangles_leave_their
     ("x [mm],Y [mm],z (mm),area [mm^2],n_x,n_y,n_z,Pressure [kPa]", "1,2,3,100,0,0,2,5"),
     ("normal_x\tnormal_y\tnormal_z\tx_mm\ty_mm\tz_mm\tarea_cm2\tpressure_mpa", "0\t0\t1\t1\t2\t3\t1\t.005"),
 ])  # fmt: skip
-def test_spellings_of_names_units_and_separators(tmp_path, told, head, row):
+def test_spellings_of_names_units_and_separators(tmp_path, head, row):
     file = tmp_path / "one.csv"
     file.write_text(f"\ufeff# a comment\n{head}\n\n{row}\n", encoding="utf-8")
     patch = told(file, "--flip-normals")["patches"][0]
@@ -101,7 +92,7 @@ def test_spellings_of_names_units_and_separators(tmp_path, told, head, row):
     assert patch["frame"]["axes"][2] == pytest.approx([0, 0, -1])
 
 
-def test_unused_columns_are_named_pressure_and_x_can_be_chosen_and_surfaces_that_know_more_fit_better(tmp_path, told):
+def test_unused_columns_are_named_pressure_and_x_can_be_chosen_and_surfaces_that_know_more_fit_better(tmp_path):
     file = tmp_path / "abaqus.csv"
     file.write_text("node,x_m,y_m,z_m,area_m2,nx,ny,nz,CPRESS,pressure_pa\n7,0,0,0,1e-4,0,0,1,100,9\n")
     chosen = told(file, "--pressure-name", "CPRESS", "--pressure-unit", "kpa")
@@ -128,7 +119,7 @@ def test_unused_columns_are_named_pressure_and_x_can_be_chosen_and_surfaces_that
     assert ratio["quartic"] == pytest.approx(1.0, abs=0.01)
 
 
-def test_the_grasp_of_equal_ellipsoids_has_its_closed_form(told):
+def test_the_grasp_of_equal_ellipsoids_has_its_closed_form():
     """quality = 14/9 pi^2 d^2 f_x^2 f_y^2 tau_z per unit force; d over the object's, tau over the contact's length."""
     answer = told(EXAMPLE, "--distance", 60, "--object-length", 90, "--contact-length", 50,
                   "--surface", "three_motions")  # fmt: skip
@@ -148,7 +139,7 @@ def opposite(patch, distance):
     return replace(patch, centroid=patch.centroid @ turn + [0, 0, distance], normal=patch.normal @ turn)
 
 
-def test_two_files_score_as_one_whose_copy_faces_it_and_given_normals_outrank_the_corners(tmp_path, told):
+def test_two_files_score_as_one_whose_copy_faces_it_and_given_normals_outrank_the_corners(tmp_path):
     _, _, patch = faceted(n=9, m=8)
     patch = replace(patch, pressure=np.full(72, 1e4))
     one = centres(tmp_path / "one.csv", patch)
