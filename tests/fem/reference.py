@@ -61,6 +61,11 @@ def differences(function, F, h=1e-5):
     return out
 
 
+def slopes(f, x, h):
+    """Central differences of a function of places ``x (n, 3)`` by their coordinates, on the last axis."""
+    return np.stack([(f(x + e) - f(x - e)) / (2 * h) for e in h * np.eye(3)], axis=-1)
+
+
 def uniaxial_hyperfoam(stretch, nu, mu, alpha):
     """Lateral stretch ``l^-nu`` and Cauchy stress [Pa] of a one-term hyperfoam pulled or pressed to ``stretch``."""
     lateral = stretch**-nu

@@ -6,6 +6,7 @@ from scipy.spatial import cKDTree
 
 from softjaw.fem.objects.gap import NoContactError, Pose, first_touch
 from softjaw.fem.objects.shapes import Box, EllipticCylinder, Plane, Revolution, Sphere
+from tests.fem.reference import slopes
 
 MM = 1e-3
 BOTTLE = MM * np.array([
@@ -39,10 +40,6 @@ def around(shape, n=300, low=-3e-3, high=20e-3):
     return x[(g > low) & (g < high)][:n]
 
 
-def differences(f, x, h):
-    return np.stack([(f(x + e) - f(x - e)) / (2 * h) for e in h * np.eye(3)], axis=-1)
-
-
 def pose(origin, approach, long_side=Z_AXIS):
     z = np.asarray(approach, dtype=float)
     return Pose(np.stack([long_side, np.cross(z, long_side), z], axis=1), np.asarray(origin, dtype=float))
@@ -57,8 +54,8 @@ def test_normal_and_hessian_are_derivatives_of_the_gap_which_is_a_distance_and_z
     x, h = around(shape), 1e-7
     _, normal, H = shape.gap(x)
     assert np.abs(np.linalg.norm(normal, axis=1) - 1).max() < 1e-14
-    assert np.abs(differences(lambda y: shape.gap(y)[0], x, 1e-6) - normal).max() < 2e-6
-    error = np.abs(differences(lambda y: shape.gap(y)[1], x, h) - H).max(axis=(1, 2))
+    assert np.abs(slopes(lambda y: shape.gap(y)[0], x, 1e-6) - normal).max() < 2e-6
+    error = np.abs(slopes(lambda y: shape.gap(y)[1], x, h) - H).max(axis=(1, 2))
     # where a flat side meets its rounding, the curvature jumps between the two points of the difference
     assert np.mean(error > 1e-5 * np.abs(H).max() + 1e-4) < 0.01
     assert np.abs(H - H.transpose(0, 2, 1)).max() < 1e-12 * max(1, np.abs(H).max())
