@@ -106,11 +106,8 @@ def test_the_mirror_image_of_a_mesh_has_the_mirror_image_of_its_gap(axis):
 
 def test_the_back_of_a_plate_counts_for_nothing_and_behind_a_small_ball_the_gap_has_no_jump():
     """A plate of 3 mm, across the approach: behind its front everything is inside, and the gap is the way to it."""
-    half = np.array([0.0015, 0.03, 0.03])
-    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float) * half
-    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    plate = MeshObject(corners, np.array([t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))]))
-    region = plate.near(side(0.0, 0.0, 0.0015), *BOX, 0.002)
+    plate = trimesh.creation.box((0.003, 0.06, 0.06))
+    region = MeshObject(np.asarray(plate.vertices), np.asarray(plate.faces)).near(side(0.0, 0.0, 0.0015), *BOX, 0.002)
     y = in_box()
     assert region.gap(region.pose.to_object(y))[0] == pytest.approx(-y[:, 2], abs=1e-7)
     # A ball smaller than the pad is deep: beside it g is the distance, and no point beside it is inside.

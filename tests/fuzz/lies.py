@@ -18,10 +18,7 @@ def put(file, path, data):
 
 
 def options(**changed):
-    def spoil(file):
-        text("layout", json.dumps(json.loads(file["study/layout"][()]) | changed))(file)
-
-    return spoil
+    return lambda file: text("layout", json.dumps(json.loads(file["study/layout"][()]) | changed))(file)
 
 
 def attribute(path, name, value):
