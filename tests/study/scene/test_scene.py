@@ -125,17 +125,14 @@ def test_a_wrong_value_is_named_with_its_line_and_key(row):
     assert (p.line, p.key, p.found) == (line, key, found)
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "line"),
-    [("= 30", "= 30,5", 3), ("= 30", "= thirty", 3), ("= 30", "= 30\nradius_mm = 40", 4), ("[load]", "[object]", 8),
-     ("[load]", "[load", 8), ("= 30", "= " + "[" * 3000, None)],
-)  # fmt: skip
-def test_a_text_that_is_no_toml_is_named_by_its_line(old, new, line):
-    p = problem(BALL.replace(old, new, 1))
-    assert (p.line, p.key) == (line, "")
+NO_TOML = [
+    ("= 30", "= 30,5", 3), ("= 30", "= thirty", 3), ("= 30", "= 30\nradius_mm = 40", 4), ("[load]", "[object]", 8),
+    ("[load]", "[load", 8), ("= 30", "= " + "[" * 3000, None),
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(("text", "line", "key"), [
+    *((BALL.replace(old, new, 1), line, "") for old, new, line in NO_TOML),
     (BOTTLE.replace("[100, 20]", "[40, 20]"), 3, "object.profile_mm[2]"),
     (BOTTLE.replace("[100, 20]", "[50, 30]"), 3, "object.profile_mm[2]"),
     (BOTTLE.replace("[100, 20]", "[100, 0]"), 3, "object.profile_mm[2]"),
@@ -151,7 +148,7 @@ def test_a_text_that_is_no_toml_is_named_by_its_line(old, new, line):
     (BALL.replace("stations_mm = [0]", "angles_deg = [0, 30]\n[[candidates.poses]]\npoint_mm = [0, 0, 0]\n"
                   "approach = [1, 0, 0]\nlong_side = [0, 0, 1]"), 6, "candidates.angles_deg"),
 ])  # fmt: skip
-def test_an_object_that_makes_no_body_is_named_by_its_key(text, line, key):
+def test_what_is_no_toml_or_makes_no_body_is_named_by_its_line_and_key(text, line, key):
     p = problem(text)
     assert (p.key, p.line) == (key, line)
 
