@@ -1,7 +1,5 @@
 """``python -m softjaw`` and ``softjaw`` are the same program."""
 
-from __future__ import annotations
-
 import sys
 
 from softjaw.study.cli import main

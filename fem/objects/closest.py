@@ -1,7 +1,5 @@
 """Closest points on plane curves, compiled: an ellipse and a piecewise cubic."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
