@@ -7,6 +7,7 @@ along the pad.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,7 @@ from softjaw.fem.contact.measured import press_measured
 from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.fem.objects.gap import NoContactError
 from softjaw.fem.objects.measured_face import cell_of, measured_face
-from softjaw.friction.patch import NEGLIGIBLE, ContactPatch, FloatArray
+from softjaw.friction.patch import NEGLIGIBLE, FloatArray
 from softjaw.study.case.model import pads_of
 from softjaw.study.messages import SOME_FAILED, USAGE, Problem, StudyError, fault_of
 from softjaw.study.patch.faces import ReadPatch, refuse
@@ -48,10 +49,9 @@ def solve_deformed(file: str, unit: str | None, scene: Scene) -> ReadPatch:
     loaded = patch.pressure > NEGLIGIBLE * patch.pressure.max(initial=0.0)
     kept = np.flatnonzero(loaded).tolist()
     back = np.array([0.0, 0.0, state.closing])  # to where the backing plate stands
-    in_file = ContactPatch(
-        patch.centroid[loaded] - back, patch.area[loaded], patch.normal[loaded], patch.pressure[loaded],
-        None if patch.corners is None else patch.corners[loaded] - back,
-    )  # fmt: skip
+    patch = patch.only(loaded)
+    corners = None if patch.corners is None else patch.corners - back
+    in_file = replace(patch, centroid=patch.centroid - back, corners=corners)
     smooth = f"the points scatter by {1e3 * face.noise:.2g} mm round the smoothed face, whose error is"
     text = f"{smooth} {1e3 * face.doubt:.2g} mm; closed by {1e3 * state.closing:.3g} mm, {state.force:.3g} N"
     weak = "the face is pressed in by hardly more than its error: contact may be noise"
