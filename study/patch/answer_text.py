@@ -171,8 +171,7 @@ def write_picture(patches: Sequence[EvaluatedPatch], kind: str, path: Path) -> N
                 for name in dict.fromkeys(["exact", "three_motions", kind]):
                     curve = section(patch, name, plane) * [1e3 if k == 2 else 1.0 for k in plane]
                     place.plot(*curve.T, label=name.replace("_", " "), **LOOK[name])
-                place.set_xlabel(AXES[plane[0]])
-                place.set_ylabel(AXES[plane[1]])
+                place.set(xlabel=AXES[plane[0]], ylabel=AXES[plane[1]])
             row[0].set_title(f"{Path(patch.read.file).name}, ccm, mu = {patch.contact.mu:g}")
         axes[0, 0].legend(*axes[0, 0].get_legend_handles_labels(), frameon=False, fontsize=7.5, loc="center")
         data = {".png": pictures.as_png, ".svg": pictures.as_svg}[path.suffix.lower()](drawn)
