@@ -47,6 +47,14 @@ def softjaw(ranks, *words):
     return launch(ranks, "-m", "softjaw", *words) if ranks else here(main, *words)
 
 
+def solve(ranks, scene, path, *words):
+    """Run a scene into a file without an error, and without mpirun in silence; what was printed."""
+    code, output, errors = softjaw(ranks, "run", scene, "-o", path, *words)
+    assert code == 0, output + errors
+    assert ranks or not errors
+    return output
+
+
 def answer(*words):
     """The JSON that a command prints, below what it says on its way."""
     code, output, errors = softjaw(0, *words, "--json")

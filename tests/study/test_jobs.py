@@ -6,7 +6,7 @@ import pytest
 from softjaw.study.cli import main
 from softjaw.study.result.layout import DONE
 from softjaw.study.result.store import open_result
-from tests.study.launching import ROOT, softjaw
+from tests.study.launching import ROOT, solve
 
 JOBS = {path.stem: path for path in sorted((ROOT / "jobs").glob("*.toml"))}
 COARSE = ("--set", "gripper.elements=[8, 4, 2]")
@@ -33,15 +33,9 @@ def test_every_shipped_scene_passes_check(name, capsys):
     assert told.err == ""
 
 
-def run(name, path, *words):
-    return softjaw(0, "run", JOBS[name], "-o", path, *words)
-
-
 def test_the_smoke_scene_runs_as_it_is(tmp_path):
     path = tmp_path / "smoke.hdf"
-    code, output, errors = run("smoke", path)
-    assert (code, errors) == (0, "")
-    assert "4 of 4 cases complete, 0 failed, 0 not computed" in output
+    assert "4 of 4 cases complete, 0 failed, 0 not computed" in solve(0, JOBS["smoke"], path)
     with open_result(path) as result:
         assert (result.status == DONE).all()
         e_n = {model: result.read(f"e_n/{model}") for model in ("ccm", "pcm")}
@@ -56,9 +50,7 @@ def test_a_coarse_variant_of_every_scene_is_solved(tmp_path, name):
     path, (overrides, indentations) = tmp_path / f"{name}.hdf", ONE[name]
     coarse_wall = ("accuracy.wall_element_mm=4", "accuracy.meshes=1") if indentations else ()
     words = [word for value in (*coarse_wall, *overrides) for word in ("--set", value)]
-    code, output, errors = run(name, path, *COARSE, *words)
-    assert (code, errors) == (0, ""), output
-    assert ", 0 failed, 0 not computed" in output
+    assert ", 0 failed, 0 not computed" in solve(0, JOBS[name], path, *COARSE, *words)
     with open_result(path) as result:
         assert (result.status == DONE).all()
         assert result.read("checks/force_balance").max() < 1e-8

@@ -14,7 +14,7 @@ from softjaw.study.quantities import MISSING
 from softjaw.study.result.store import open_result
 from softjaw.study.run.plan import make_plan
 from softjaw.study.run.shares import shares
-from tests.study.launching import ROOT, begin, contents, differing, done, launch, softjaw, wait_for
+from tests.study.launching import ROOT, begin, contents, differing, done, launch, solve, wait_for
 from tests.study.scenes import BOX, NO_COUPLING, scene_of
 from tests.study.test_walls import CUP
 
@@ -57,13 +57,8 @@ def scene(tmp_path_factory):
 @pytest.fixture(scope="module")
 def alone(tmp_path_factory, scene):
     path = tmp_path_factory.mktemp("alone") / "alone.hdf"
-    code, output, errors = run(0, scene, path)
-    assert (code, errors) == (0, ""), output
+    solve(0, scene, path)
     return path
-
-
-def run(ranks, scene, path, *words):
-    return softjaw(ranks, "run", scene, "-o", path, *words)
 
 
 def test_two_ranks_divide_the_forces_of_a_candidate():
@@ -83,16 +78,14 @@ def test_one_candidate_of_many_forces_is_divided_to_the_same_bits(tmp_path, scen
     place = [word for change in changes for word in ("--set", change)]
     whole, path = tmp_path / "whole.hdf", tmp_path / "divided.hdf"
     for where, count in ((whole, 0), (path, ranks)):
-        code, _, errors = run(count, scene.with_stem(name), where, *place)
-        assert code == 0, errors
+        solve(count, scene.with_stem(name), where, *place)
     assert differing(path, contents(whole)) == []
 
 
 @pytest.mark.parametrize("ranks", [pytest.param(1, marks=pytest.mark.long), 2, pytest.param(3, marks=pytest.mark.long)])
 def test_any_number_of_ranks_writes_the_same_bits(tmp_path, scene, alone, ranks):
     path = tmp_path / "ranks.hdf"
-    code, _, errors = run(ranks, scene, path)
-    assert code == 0, errors
+    solve(ranks, scene, path)
     assert not list(tmp_path.glob("*.lock"))
     assert not list(tmp_path.glob("*.part"))
     expected = contents(alone)
@@ -121,8 +114,7 @@ def test_a_run_that_is_stopped_or_killed_goes_on_with_other_ranks_to_the_same_bi
     code, before = process.returncode, done(path)
     assert code == (75 if how == "SIGUSR1" else -signal.SIGKILL)
     assert 2 <= before < CASES
-    code, _, errors = run(ranks, scene, path)
-    assert code == 0, errors
+    solve(ranks, scene, path)
     assert differing(path, contents(alone)) == []
 
 

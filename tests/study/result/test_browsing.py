@@ -19,7 +19,7 @@ import pytest
 from matplotlib.image import imread
 
 from softjaw.study.result.store import open_result
-from tests.study.launching import ROOT, launch
+from tests.study.launching import ROOT, solve
 
 pytestmark = pytest.mark.long
 
@@ -60,8 +60,7 @@ def python():
 def result(tmp_path_factory):
     """A study of 3 stations x 2 angles x 2 forces, solved by the program."""
     path = tmp_path_factory.mktemp("browsing") / "cylinder.hdf"
-    code, output, errors = launch(0, "-m", "softjaw", "run", ROOT / "jobs/smoke.toml", "-o", path, *STATIONS)
-    assert code == 0, output + errors
+    solve(0, ROOT / "jobs/smoke.toml", path, *STATIONS)
     return path
 
 
