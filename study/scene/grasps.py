@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, PrivateAttr
 
-from softjaw.study.scene.objects import LARGEST_MM, Plate, Shape, Span, SphereShape
+from softjaw.study.scene.objects import Plate, Shape, Span, SphereShape
 from softjaw.study.scene.section import RISING, Direction, Errors, SceneSection, Text, Vector, wrong
 from softjaw.study.scene.sections import Gripper
 from softjaw.study.units import converted
@@ -35,12 +35,10 @@ class GraspPose(SceneSection):
     label: Text = Field("", max_length=100, description="name of the grasp")
 
     def rules(self) -> Errors:
-        """Directions that do not fix a frame, points far from any object."""
+        """Directions that do not fix a frame."""
         along = sum(a * b for a, b in zip(self.approach, self.long_side, strict=True))
         if abs(along) > 0.996 * math.hypot(*self.approach) * math.hypot(*self.long_side):  # parallel, to some 5 degrees
             yield wrong(self.long_side, "a direction across the approach, in the pad's face", "long_side")
-        if max(map(abs, self.point_mm)) > LARGEST_MM:
-            yield wrong(self.point_mm, f"a point within {LARGEST_MM:g} mm of the origin, in mm", "point_mm")
 
 
 def _budget(given: Any) -> Any:

@@ -15,6 +15,7 @@ from typing import Annotated, Any
 
 from pydantic import ConfigDict, Field, ValidationError, ValidationInfo, field_validator
 
+from softjaw.fem.pad.halving import halved
 from softjaw.study.grippers import filled_in
 from softjaw.study.messages import Problem, closest, shortened, shown
 from softjaw.study.scene.grasps import OF_EVERY_KIND, Candidates, GraspPose
@@ -165,11 +166,8 @@ class Scene(SceneSection):
         if self.accuracy.target is not None and walled and self.effects.object != "rigid":
             yield "accuracy.target refines cases on rigid objects alone: on a simulated wall there are two meshes"
         if g.poisson_ratio > 0.45 and g.element == "hex8":
-            half = [2 * math.ceil(g.elements[0] / 4), 2 * math.ceil(g.elements[1] / 4), math.ceil(g.elements[2] / 2)]
-            yield (
-                f"gripper.poisson_ratio = {g.poisson_ratio:g} makes hex8 elements too stiff: "
-                f'use element = "hex27" with elements = {half}'
-            )
+            instead = f'element = "hex27" with elements = {list(halved(g.elements))}'
+            yield f"gripper.poisson_ratio = {g.poisson_ratio:g} makes hex8 elements too stiff: use {instead}"
 
     @property
     def axis_symmetry(self) -> int:
