@@ -38,7 +38,7 @@ def press(
     Parameters
     ----------
     scene : Scene
-        Without a sweep and without a target of accuracy.
+        Without a sweep.
     station, angle : float
         Along the object's axis [m] and about it [rad]. The angle may be left out where the scene has one, or where the
         object looks the same from every side.
