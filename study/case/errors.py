@@ -20,15 +20,19 @@ from softjaw.study.case.task import payload_alone
 from softjaw.study.quantities import TABLE, Quantity
 
 # The error as a share of how far the coarser mesh, or a view of it, is away at most (`estimate`); the floor: a share
-# of the value that falls with the number of elements that bear, `DOUBTED` times as large where the mesh is coarse for
-# the contact. Fitted to random scenes with a reference of half the element size (docs/accuracy.md): there the floor
-# tells more than the distances do.
-OF_FARTHEST, DOUBTED, EDGE, POWER = 0.3, 2.0, 0.27, 0.75
+# of the value that falls with the number of elements that bear across the contact, `DOUBTED` times as large where the
+# mesh is coarse for it. Fitted to random scenes with a reference of half the element size (docs/accuracy.md): there the
+# floor tells more than the distances do.
+OF_FARTHEST, DOUBTED, EDGE, POWER = 0.3, 2.0, 0.16, 1.5
 # How many times the floor: shares that a model or the curvature takes off are small differences of large numbers, sums
 # over all faces tell less of single ones.
 WIDER = dict.fromkeys((q.name for q in TABLE if q.error == "absolute"), 10.0) | {
-    "f_x_max": 0.3, "f_y_max": 0.3, "quality": 1.3, "contact_area": 4.5, "p_max": 19.0,
-    "wall_stress": 4.5, "wall_strain": 4.5,
+    "f_x_max": 0.15, "f_y_max": 0.15, "contact_area": 4.5, "p_max": 19.0, "wall_stress": 4.5, "wall_strain": 4.5,
+}  # fmt: skip
+# Of the share of the load that edges of the object bear: where such an edge lies within an element tells no mesh.
+OF_EDGES = dict.fromkeys((q.name for q in TABLE), 0.08) | {
+    "payload": 0.02, "safety_factor": 0.02, "f_x_max": 0.04, "f_y_max": 0.04, "closing": 0.24, "contact_area": 1.0,
+    "p_max": 4.0,
 }  # fmt: skip
 EDGES_ROUNDED = 1.6  # times the error of a payload on the coarse mesh alone, where the object's edges are rounded
 OF_PAIRS = {"p_max": 3.0}  # of what pairs differ by: peaks that an effect makes at an edge grow as elements shrink
@@ -38,14 +42,15 @@ PAYLOADS = ("payload", "safety_factor")  # what arms and couples leave of the fr
 def mesh_errors(
     fine: Sequence[Contact], coarse: Sequence[Contact], values: Mapping[str, Any], other: Mapping[str, Any],
     settings: EvaluationSettings, views: Sequence[Sequence[Contact]] = (),
-    pairs: Sequence[tuple[Sequence[Any], Sequence[Any], float]] = (), floor: float = 0.0, left_out: float = 0.0,
+    pairs: Sequence[tuple[Sequence[Any], Sequence[Any], float]] = (), floor: float = 0.0, sharp: float = 0.0,
+    left_out: float = 0.0,
 ) -> dict[str, float]:  # fmt: skip
     """Errors of all quantities that have one, from the contacts on the mesh and on a coarser one.
 
     ``values`` are those of the fine mesh, ``other`` what the coarser one says beside its contacts; keyed alike.
     ``views`` are the coarse contacts with their pressures at Gauss points and at nodes, ``pairs`` are contacts on the
     coarse mesh that differ too, and which share of that counts; ``floor`` is a share of the value, `WIDER` for some,
-    and ``left_out`` one of every value.
+    ``sharp`` the share of the load on the object's edges, and ``left_out`` one of every value.
     """
     fine_mesh, coarse_mesh = _on_mesh(values, fine), _on_mesh(other, coarse) | grasp_values(tuple(coarse), settings)
     viewed = [_sums(view) | grasp_values(tuple(view), settings) for view in views]
@@ -57,7 +62,7 @@ def mesh_errors(
         value, size = fine_mesh[q.key], _size(q, fine_mesh[q.key])
         error = estimate(value, coarse_mesh[q.key], seen, q.error, q.name in PAYLOADS)
         # pressures alone give forces along the face by balance, with friction that acts back they do not
-        error += floor * _wider(q, fine) * (2.0 if acts and q.name.startswith("f_") else 1.0) * size
+        error += _unseen(q, floor * (2.0 if acts and q.name.startswith("f_") else 1.0), sharp, fine) * size
         if q.error == "relative" and not np.all(coarse_mesh[q.key]):
             error = max(error, 1.0)  # a payload of which the coarse mesh has nothing
         apart = [s * distance(low[q.key], high[q.key], q.error, value) for low, high, s in compared if q.key in low]
@@ -67,24 +72,22 @@ def mesh_errors(
     return errors
 
 
-def edge_floor(contacts: Sequence[Contact]) -> float:
-    """Share of a value that two meshes can agree on by luck [-]: less the more elements bear.
-
-    A trilinear element has four faces of the patch; nine of a triquadratic one tell as much as nine others.
-    """
-    elements = min(int(np.count_nonzero(c.loaded)) for c in contacts) / 4
-    return EDGE / float(max(elements, 1.0) ** POWER)
+def edge_floor(contacts: Sequence[Any]) -> float:
+    """Share of a value that two meshes can agree on by luck [-]: less the more elements bear across the contact."""
+    return EDGE / float(min(c.across for c in contacts) ** POWER)
 
 
-def _wider(q: Quantity, contacts: Sequence[Any]) -> float:
-    """How many times the floor: trilinear elements close less, the less the foam can be compressed."""
+def _unseen(q: Quantity, floor: float, sharp: float, contacts: Sequence[Any]) -> float:
+    """Share of a value that no difference of meshes shows; ``floor`` and ``sharp`` as in `mesh_errors`."""
+    wider = WIDER.get(q.name, 1.0)
     if q.name == "closing" and (pad := contacts[0].state.pad).shape.element == "hex8":
-        return 0.4 + 0.2 / (1.0 - 2.0 * pad.material.poisson_ratio)
-    return WIDER.get(q.name, 1.0)
+        # trilinear elements close less, the less the foam can be compressed
+        wider = 0.4 + 0.2 / (1.0 - 2.0 * pad.material.poisson_ratio)
+    return floor * wider + sharp * OF_EDGES[q.name]
 
 
 def coarse_errors(
-    contacts: Sequence[Contact], values: Mapping[str, Any], views: Sequence[Sequence[Contact]],
+    contacts: Sequence[Any], values: Mapping[str, Any], views: Sequence[Sequence[Contact]],
     settings: EvaluationSettings, rounded: bool,
 ) -> dict[str, float]:  # fmt: skip
     """Errors of quantities of a case that is solved on the coarse mesh alone, from the two ``views`` of its contacts.
@@ -94,11 +97,11 @@ def coarse_errors(
     """
     solved = _on_mesh(values, contacts)
     viewed = [_sums(view) | grasp_values(tuple(view), settings) for view in views]
-    floor, errors = edge_floor(contacts), {}
+    floor, sharp, errors = edge_floor(contacts), max(c.on_edges for c in contacts), {}
     for q in (q for q in TABLE if q.error and q.key in viewed[0]):
         apart = max(distance(solved[q.key], view[q.key], q.error) for view in viewed)
         # friction that is left out here may move any of them as much
-        share = floor * max(_wider(q, contacts), 1.3 if q.name in PAYLOADS else 1.0)
+        share = max(_unseen(q, floor, sharp, contacts), floor * (1.3 if q.name in PAYLOADS else 1.0))
         doubt = DOUBTED * (EDGES_ROUNDED if rounded and q.name in PAYLOADS else 1.0)
         errors[q.of_error.key] = doubt * (apart + share * _size(q, solved[q.key]))
     return errors

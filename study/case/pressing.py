@@ -30,6 +30,7 @@ from softjaw.study.quantities import MODELS
 from softjaw.study.scene import Scene
 
 OBLIQUE_EXCESS = 0.05  # of the commanded force: beyond it the force along the contact normal is another one
+SHARP = np.radians(20.0)  # by which normals of neighbouring faces turn more than usual, from which it is an edge
 BENT = np.radians(120.0)  # between the object's normals at neighbouring loaded faces, beyond which it is coarse too
 MESH_HOLE = 0.01  # of a pad's face before a hole of the mesh, beyond which that is flagged
 MAX_SLOPE = np.radians(60.0)  # of an approach against the planes across a thin-walled object's axis
@@ -119,6 +120,30 @@ class PressedContact(Contact):
         """Whether so few elements are loaded that the contact's shape is theirs."""
         # with fewer loaded elements the mesh is coarse too
         return bool(np.count_nonzero(self.loaded) < 6 * self.state.pad.shape.per_side**2)
+
+    @property
+    def across(self) -> float:
+        """Elements that bear across the longest extent of the contact, at least 1; those of two faces a side."""
+        loaded = self.loaded.reshape(self.state.pad.shape.patch_faces)
+        longest = max(np.count_nonzero(loaded.any(axis=axis)) for axis in (0, 1))
+        return max(np.count_nonzero(loaded) / (2.0 * longest), 1.0)
+
+    @property
+    def on_edges(self) -> float:
+        """Share of the load on elements in or beside which the object has an edge; round ones count in part."""
+        shape = self.state.pad.shape
+        (n, m), k = shape.patch_faces, shape.per_side
+        loaded, edges = self.loaded.reshape(n, m), np.zeros((n, m))
+        sides = (_neighbours(each) for each in (self.patch.normal.reshape(n, m, 3), loaded, edges))
+        for (a, b), (one, other), (here, there) in zip(*sides, strict=True):
+            turns = np.arccos(np.clip(np.einsum("ijc,ijc->ij", a, b), -1.0, 1.0))
+            usual = np.median(turns[one & other]) if (one & other).any() else 0.0
+            sharp = np.where(one | other, np.clip((turns - 2.0 * usual) / SHARP, 0.0, 1.0), 0.0)
+            for place in (here, there):
+                np.maximum(place, sharp, out=place)
+        share = np.where(loaded, edges, 0.0).reshape(n // k, k, m // k, k).max(axis=(1, 3))
+        load = self.patch.load.reshape(n // k, k, m // k, k).sum(axis=(1, 3))
+        return float((share * load).sum() / load.sum())
 
     @property
     def coarse(self) -> bool:

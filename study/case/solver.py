@@ -100,7 +100,8 @@ class Solved:
             # they are rounded over a part of an element, and what that does falls with it
             sizes = [mesh.contacts[0].state.pad.shape.elements[0] for mesh in (self.meshes[-2], self.fine)]
             pairs.append((*self.edges, sizes[0] / sizes[1]))
-        return mesh_errors(fine, coarse.contacts, values, other, settings, coarse.views, pairs, floor, left_out)
+        sharp = max(contact.on_edges for contact in fine)
+        return mesh_errors(fine, coarse.contacts, values, other, settings, coarse.views, pairs, floor, sharp, left_out)
 
 
 def followed(
