@@ -8,6 +8,7 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
+from softjaw.study.cli.options import refuse_for_folder
 from softjaw.study.export.cases import as_csv, as_json
 from softjaw.study.export.data_set import FORMS, write_data_set
 from softjaw.study.export.mjcf import as_mjcf
@@ -38,6 +39,7 @@ def export(options: Namespace) -> str:
     if options.output is None and (index or options.form == "vtk"):
         raise StudyError(USAGE, f"--format {options.form}: name what to write with -o")
     if index:
+        refuse_for_folder(options, "force", "by", "model", "most", "min")
         return write_data_set(index, Path(options.output), options.form, gripper_of(options))
     if options.form in DATA_SETS:
         raise StudyError(USAGE, f"--format {options.form}: found '{options.file}', expected a folder of objects")

@@ -10,8 +10,8 @@ from argparse import ArgumentTypeError
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from softjaw.study.messages import MEANING, closest, first_rank
-from softjaw.study.quantities import MODELS, RANKED_BY
+from softjaw.study.messages import MEANING, USAGE, StudyError, closest, first_rank
+from softjaw.study.quantities import LISTED, MODELS, RANKED_BY
 
 MILLION = 10**6
 KINDS = {
@@ -100,6 +100,14 @@ def candidate(text: str) -> int:
     return int(text.lstrip("ps"))
 
 
+def refuse_for_folder(options: argparse.Namespace, *names: str) -> None:
+    """Refuse those of these `OPTIONS` that were given: a folder of objects has no use for them."""
+    for (option, *_), settings in (OPTIONS[name] for name in names):
+        default = settings.get("default")
+        if getattr(options, settings.get("dest", option[2:])) != default:
+            raise StudyError(USAGE, f"{option}: is for one result file; '{options.file}' is a folder of objects")
+
+
 def _option(*names: str, **settings: Any) -> tuple[tuple[str, ...], dict[str, Any]]:
     """Names of an option, and its settings in argparse's words; those of the same ``dest`` exclude each other."""
     return names, settings
@@ -127,7 +135,7 @@ OPTIONS = {
     "force": _option("--force", type=POSITIVE, metavar="N", help=NORMAL_FORCE),
     "level": _option("--force", type=number(), metavar="N", help="force level nearest to N [N]"),
     "by": _option("--by", choices=RANKED_BY, help="what ranks grasps; force: the least that holds (default payload)"),
-    "top": _option("--top", type=whole(0), default=10, metavar="K", help="how many rows, 0: all (default 10)"),
+    "top": _option("--top", type=whole(0), metavar="K", help=f"how many rows, 0: all (default {LISTED})"),
     "most": _option("--top", type=whole(0), metavar="K",
                     help="how many grasps, 0: all (default: 1 for a simulator, which gets a file for each, else all)"),
     "compared": _option("--quantity", default="e_n", metavar="NAME", help="map that is listed by case (default e_n)"),

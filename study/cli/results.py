@@ -6,9 +6,11 @@ from argparse import Namespace
 from functools import partial
 from pathlib import Path
 
+from softjaw.study.cli.options import refuse_for_folder
 from softjaw.study.messages import beside, fault_of, with_ending, write_file
+from softjaw.study.quantities import LISTED
 from softjaw.study.ranking import judge
-from softjaw.study.result.index import index_path
+from softjaw.study.result.index import index_path, one_file
 from softjaw.study.result.read import open
 from softjaw.study.show import objects
 from softjaw.study.show.best_grasps import best, best_text
@@ -30,20 +32,23 @@ def watch(options: Namespace) -> int:
 
 def show(options: Namespace) -> str:
     """Print the best grasps, or the objects with theirs."""
+    top = LISTED if options.top is None else options.top
     if index := index_path(options.file):
-        return rendered(objects.index_table(index, options.top), options.form)
+        refuse_for_folder(options, "force", "by")
+        return rendered(objects.index_table(index, 0 if options.form and options.top is None else top), options.form)
     ds = open(options.file)
     with fault_of(options.file, ValueError):
         if options.form is None:
-            return best_text(ds, terminal_width(), options.force, options.top, options.by)
-        return rendered(best(ds, options.force, options.top, by=options.by), options.form)
+            return best_text(ds, terminal_width(), options.force, top, options.by)
+        return rendered(best(ds, options.force, top, by=options.by), options.form)
 
 
 def compare(options: Namespace) -> str:
     """Print two maps side by side."""
-    first, second = map(open, options.files)
+    first, second = (open(one_file(file)) for file in options.files)
     table = compared(first, second, options.quantity, options.model)
-    return rendered(table, options.form) if options.form else compare_text(table, options.top, terminal_width())
+    top = LISTED if options.top is None else options.top
+    return rendered(table, options.form) if options.form else compare_text(table, top, terminal_width())
 
 
 def choice(options: Namespace) -> tuple[int | None, tuple[float | None, float | None]]:
@@ -58,6 +63,7 @@ def report(options: Namespace) -> str:
     from softjaw.study.show.report import objects_page, writing
 
     if index := index_path(options.file):
+        refuse_for_folder(options, "candidate", "at")
         return f"written: {objects_page.write_objects_page(index, Path(options.output or index.with_suffix('.html')))}"
     page = Path(options.output or Path(options.file).with_suffix(".html"))
     return f"written: {writing.write_report(Path(options.file), page, *choice(options))}"
@@ -67,11 +73,12 @@ def view(options: Namespace) -> str:
     """Write a result in three dimensions: a page, a picture, or both; by default a page beside the file."""
     from softjaw.study.show.view import model, object3d, solids  # pyvista
 
+    file = one_file(options.file)
     if options.html is None and options.screenshot is None:
-        options.html = str(Path(options.file).with_suffix("")) + "-3d.html"
+        options.html = str(file.with_suffix("")) + "-3d.html"
     given = {name: getattr(options, name) for name in ENDINGS}
     paths = {name: with_ending(f"--{name}", file, *ENDINGS[name]) for name, file in given.items() if file is not None}
-    shown, index = model.view_of(judge(open(options.file)), *choice(options), options.force)
+    shown, index = model.view_of(judge(open(file)), *choice(options), options.force)
     quantity = model.quantity_of(shown.ds, options.quantity)
     if "screenshot" in paths:
         with beside(paths["screenshot"]) as part:

@@ -31,6 +31,7 @@ from softjaw.study.lookup.interpolation import (
 from softjaw.study.lookup.point import INSIDE, JUMP, NO_RESULT, OUTSIDE, SNAP, GraspPoint
 from softjaw.study.quantities import BY_KEY, DONE, checked_model
 from softjaw.study.ranking import judge, ranked
+from softjaw.study.result.index import one_file
 from softjaw.study.result.read import KINDS, axes_of, contact_kinds, maps_in, scene_of, values_of
 from softjaw.study.result.read import open as open_dataset
 from softjaw.study.result.store import place_text
@@ -82,7 +83,7 @@ class GraspMap:
     """
 
     def __init__(self, file: str | Path | xr.Dataset, where: Mapping[str, Any] | None = None) -> None:
-        ds = file if isinstance(file, xr.Dataset) else open_dataset(file)
+        ds = file if isinstance(file, xr.Dataset) else open_dataset(one_file(file))
         self.file_axes = axes_of(ds)
         station, angle, force = self.file_axes[-3:]
         self.index = _sweep_point(self.file_axes[:-3], dict(where or {}))

@@ -16,7 +16,7 @@ import h5py
 import numpy as np
 
 from softjaw.study import messages
-from softjaw.study.messages import beside
+from softjaw.study.messages import USAGE, StudyError, beside
 from softjaw.study.result.hdf5 import StoredFile, opened
 from softjaw.study.result.layout import PROGRAM
 from softjaw.study.table import Row
@@ -59,6 +59,13 @@ def index_path(file: str | Path) -> Path | None:
     if path.is_dir():
         return path / f"{INDEX}.hdf"
     return path if path.name == f"{INDEX}.hdf" else None
+
+
+def one_file(file: str | Path) -> Path:
+    """The path of a single result file; raises `StudyError` for a folder of objects."""
+    if index_path(file):
+        raise StudyError(USAGE, f"{file}: is a folder of objects; name one result file of it")
+    return Path(file)
 
 
 def blank_row(name: str, **values: Any) -> Row:

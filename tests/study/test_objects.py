@@ -9,7 +9,7 @@ import trimesh
 
 import softjaw
 from softjaw.study.messages import DONE, OTHER_FILE, SOME_FAILED, STOPPED, USAGE, StudyError
-from softjaw.study.result.index import open_index
+from softjaw.study.result.index import blank_row, open_index, write_index
 from softjaw.study.run.object_folder import folder_of
 from tests.study import fake_objects
 from tests.study.launching import contents, differing, here, launch
@@ -105,6 +105,26 @@ def test_every_object_is_a_row_of_the_index_and_its_page_and_none_stops_the_othe
     assert [name for name in (*NAMES, "empty") if f'"#object-{name}"' in html] == ["a", "grows", "longest"]
     assert html.count("<tr><td>") == len(NAMES) + 1
     assert html.count("<button") > 5
+
+
+def test_programs_get_every_row_and_people_the_number_of_the_others(tmp_path):
+    write_index(tmp_path / "index.hdf", [blank_row(f"object{i}") for i in range(12)], {})
+    for words, count in ((["--csv"], 13), (["--csv", "--top", 3], 4)):
+        assert len(command(0, "show", tmp_path, *words)[1].splitlines()) == count
+    assert "2 more" in command(0, "show", tmp_path)[1]
+    assert "more" not in command(0, "show", tmp_path, "--top", 12)[1]
+
+
+@pytest.mark.parametrize("words", [
+    "show F --force 2", "show F --by e_n", "report F --at 3", "compare F F", "view F",
+    *(f"export F --format graspgen -o F/set {more}" for more in ("--top 3", "--min payload=1", "--model pcm")),
+])  # fmt: skip
+def test_what_is_for_one_file_is_refused_for_a_folder(solved, words):
+    code, _, errors = command(0, *words.replace("F", str(solved)).split())
+    assert code == USAGE
+    assert all(word in errors for word in words.split() if word[:2] == "--" and word != "--format")
+    with pytest.raises(StudyError):
+        softjaw.GraspMap(solved)
 
 
 def test_again_nothing_is_solved_another_mesh_is_refused_and_a_signal_stops_in_order_and_the_run_resumes(scene, solved):
