@@ -1,8 +1,8 @@
 """A folder of objects as one data set to learn from: every grasp with its label, in three formats.
 
-A grasp is a candidate at one normal force. It is successful where it holds and does no harm (flags); the others, and
-those that are too wide, collide or slip before any solve, are the unsuccessful ones. So are the grasps that a sampler
-offered and rejected, which have no force. ``state`` says which is which. What did not converge is left out.
+A grasp is a candidate at one normal force. It is successful where it holds (a known mass with its safety) and does no
+harm (flags); the others, and those that are too wide, collide or slip before any solve, are the unsuccessful ones. So
+are grasps that a sampler offered and rejected, which have no force; ``state`` says which. Not converged is left out.
 All formats hold the same arrays, SI units, in the frame of the object's own file, whose coordinates times ``scale`` are
 metres. An object's name decides its split, so that a data set that grows keeps its splits.
 """
@@ -98,7 +98,7 @@ def write_data_set(index: Path, out: Path, form: str, gripper: GripperFrame) -> 
     about = {"format": form, "grasps": whole, "successful": good, "splits": {k: len(v) for k, v in listed.items()},
              "gripper": {"name": gripper.hand.frame, "approach_axis": "z", "closing_axis": gripper.hand.closing},
              "units": UNITS_OF, "meaning": MEANING, "states": STATES,
-             "object_in_gripper": "holds, does no harm, and this gripper can take it"}
+             "object_in_gripper": "holds (a known mass with task.safety), does no harm, and this gripper can take it"}
     write_file(out / "data-set.json", json.dumps(about, indent=1))
     counts = " and ".join(f"{len(files)} for {split}" for split, files in listed.items())
     return f"written: {out}: {counts}; {good} of {whole} grasps are successful"

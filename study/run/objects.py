@@ -23,9 +23,9 @@ import numpy as np
 
 from softjaw.study import messages, quantities
 from softjaw.study.case.result import TimeLimitError
-from softjaw.study.flags import LOST, flag_words
+from softjaw.study.flags import LOST, Flag, flag_words
 from softjaw.study.messages import NoGraspError, StudyError, shortened
-from softjaw.study.ranking import judge
+from softjaw.study.ranking import judge, largest, task_keys
 from softjaw.study.result import index
 from softjaw.study.result.read import dataset, values_of
 from softjaw.study.result.skeleton import rewrite
@@ -258,7 +258,7 @@ def _rows_of(folder: ObjectFolder, out: Path, retry_failed: bool) -> list[Row]:
             raise StudyError(messages.OTHER_FILE, f"{text}; choose another folder with -o, or move this one away")
         if before["key"] == key:
             row = before | ({"state": index.MISSING} if before["state"] in again else {})
-        rows.append(row | {"key": key, "mass": np.nan if mass is None else in_si("mass_g", mass)})
+        rows.append(row | {"key": key} | ({} if mass is None else {"mass": in_si("mass_g", mass)}))
     return rows
 
 
@@ -278,13 +278,19 @@ def row_of(result: Any) -> Row:
     status, flags = ds.status.values, ds.flags.values
     done, failed = (status == quantities.DONE), (status == quantities.FAILED)
     row: Row = {"cases": int(status.size), "done": int(done.sum()), "failed": int(failed.sum())}
-    row |= {"seconds": float(np.nansum(ds["work_seconds_total"].values)), "reason": _reason(ds, flags, done)}
+    row |= {"seconds": float(np.nansum(ds["work_seconds_total"].values))}
+    if mass := task_keys(ds, "object").get("mass_g"):  # also what the scene's density makes
+        row["mass"] = in_si("mass_g", mass)
     if (status == quantities.MISSING).any():
         return row | {"state": index.STOPPED, "reason": ""}
-    usable = done & (flags & LOST == 0)
-    if not usable.any():
+    usable, payload = done & (flags & LOST == 0), np.nan_to_num(values_of(ds, "payload"))
+    # A grasp that holds the object with less safety than is asked for is one.
+    held = usable if usable.any() else done & (flags & LOST == Flag.TOO_WEAK) & (payload > 0)
+    row["reason"] = _reason(ds, done, flags[held if held.any() else done] & LOST)
+    if not held.any():
         return row | {"state": index.FAILED if failed.any() and not done.any() else index.NO_GRASP}
-    at = ds.attrs["best"]
+    if not held[at := ds.attrs["best"]]:
+        at = tuple(map(int, np.unravel_index(largest(np.where(held, payload, -1.0)), held.shape)))
     k, best = at[-1], int(np.ravel_multi_index(at[:-1], status.shape[:-1]))
     maps = [name for name in ("payload", "opening", "e_n", "quality", "payload_error") if name in ds]
     row |= {name: float(values_of(ds, name)[at]) for name in maps}
@@ -292,11 +298,11 @@ def row_of(result: Any) -> Row:
     return row | {"state": index.SOME_FAILED if failed.any() else index.DONE}
 
 
-def _reason(ds: Any, flags: np.ndarray, done: np.ndarray) -> str:
-    """The most frequent message of what failed or is no grasp, or what speaks against all that is solved."""
+def _reason(ds: Any, done: np.ndarray, lost: np.ndarray) -> str:
+    """The flags ``lost`` in words, and the most frequent message of what failed or is no grasp."""
+    texts = [flag_words(int(np.bitwise_or.reduce(lost)))]
     messages_ = [str(text) for text in ds["message"].values[~done] if text]
     if messages_:
         text, count = Counter(messages_).most_common(1)[0]
-        return shortened(f"{count} of {done.size} cases: {text}", REASON_LETTERS)
-    lost = done.any() and not (done & (flags & LOST == 0)).any()
-    return flag_words(int(np.bitwise_or.reduce(flags[done])) & int(LOST)) if lost else ""
+        texts.append(f"{count} of {done.size} cases: {text}")
+    return shortened("; ".join(filter(None, texts)), REASON_LETTERS)

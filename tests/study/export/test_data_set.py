@@ -17,6 +17,7 @@ from softjaw.study.quantities import DONE, WIDE
 from softjaw.study.quantities import SLIPS as SLIPPING
 from softjaw.study.result.index import blank_row, write_index
 from softjaw.study.result.store import open_result
+from softjaw.study.run import objects
 from softjaw.study.run.objects import row_of
 from tests.study.export.grasp_results import FORCES, ROOT, STATIONS, geometry, opened, write
 
@@ -73,6 +74,23 @@ def test_arrays_are_those_of_the_file_and_what_the_sampler_rejected_is_unsuccess
     assert first[:3, 3] == pytest.approx([0.01, 0.02, 0.03])
     assert first[:3, 0] == pytest.approx([1, 0, 0])  # it closes along finger 1's approach
     assert first[:3, 2] == pytest.approx([0, 0, -1])
+
+
+def test_an_object_that_is_held_too_weakly_has_its_values_in_the_index_and_no_successful_grasp(folder, monkeypatch):
+    ds = opened(folder / "cup.hdf").copy(deep=True)
+    ds["flags"].values[-1] = Flag.SLIPS  # where most is held
+    ds = ds.assign(safety_factor=0.0 * ds.payload + 0.9, force_low=(ds.status.dims[:-1], np.full((5, 1), np.nan)))
+    ds.attrs["scene"] = ds.scene.replace("[object]", "[object]\nmass_g = 120")
+    monkeypatch.setattr(objects, "dataset", lambda _: ds)
+    with open_result(folder / "cup.hdf") as result:
+        row = row_of(result)
+        ds["flags"].values[:] = Flag.SLIPS
+        lost = row_of(result)
+    assert (row["state"], row["reason"], row["grasps"], row["mass"]) == ("complete", Flag.TOO_WEAK.word, 0, 0.12)
+    assert row["payload"] == pytest.approx(0.1 * FORCES[-1] * (1 + STATIONS[-2]))
+    assert lost["state"] == "no grasp"
+    assert "payload" not in lost
+    assert not grasp_arrays(ds, GripperFrame(Hand(closing="x"), ("x",)))["object_in_gripper"].any()
 
 
 def test_graspgen_has_its_fields_and_splits_acronym_its_datasets_and_shards_both_files_of_an_object(sets):
