@@ -14,13 +14,13 @@ import numpy as np
 
 from softjaw.study.case.build import build_object, check_object, geometry, mesh_notes, told, with_mass
 from softjaw.study.case.candidates import check_candidates, with_sampled_grasps
-from softjaw.study.messages import USAGE, StudyError, fault_of, with_ending
+from softjaw.study.messages import USAGE, NoGraspError, StudyError, fault_of, with_ending
 from softjaw.study.run.estimate import START_S, estimated, scaling_text, slowness
 from softjaw.study.run.object_folder import ObjectFolder, folder_of
 from softjaw.study.run.plan import free_bytes, gigabytes, make_plan, memory, plan_text
 from softjaw.study.run.progress import duration
 from softjaw.study.run.shares import makespan
-from softjaw.study.scene import Scene, load_scene, start
+from softjaw.study.scene import Scene, SceneError, load_scene, start
 from softjaw.study.scene.objects import Mesh
 from softjaw.study.show.overview import aligned, scene_text
 from softjaw.study.table import hanging, terminal_width
@@ -56,14 +56,30 @@ def _measured(options: Namespace) -> start.Measured:
 
 def check(options: Namespace) -> str:
     """Find every error of a scene, or say what would be run."""
-    if options.folder:
-        text, objects = scene_text(options.folder.check(), options.scene), options.folder.objects
-        text += f"\n  objects     {len(objects)}: {objects[0].name} to {objects[-1].name}; the mesh is one of them"
-        return hanging(text, terminal_width())
-    scene = with_mass(scene_of(options))
+    if not options.folder:
+        return hanging(scene_text(_checked(scene_of(options)), options.scene), terminal_width())
+    options.folder.check()  # what is wrong for all alike is said once
+    objects, scenes, wrong, none = options.folder.objects, list[Scene](), list[str](), list[str]()
+    for listed in objects:
+        try:
+            scenes.append(_checked(options.folder.scene(listed)))
+        except SceneError as error:
+            wrong += [str(p) if p.file == listed.place else f"{listed.place}: {p}" for p in error.problems]
+        except StudyError as error:
+            (none if isinstance(error, NoGraspError) else wrong).append(f"{listed.place}: {error.message}")
+    if wrong or not scenes:
+        raise StudyError(USAGE, "\n".join(wrong or none))
+    text = scene_text(scenes[0], options.scene)
+    text += f"\n  objects     {len(objects)}: {objects[0].name} to {objects[-1].name}; the mesh is one of them"
+    return hanging("\n".join([text, *(f"  no grasp    {reason}" for reason in none)]), terminal_width())
+
+
+def _checked(scene: Scene) -> Scene:
+    """A scene with its mass; raises `StudyError` with what is wrong with its object and grasps."""
+    scene = with_mass(scene)
     check_object(scene)
     check_candidates(scene)
-    return hanging(scene_text(scene, options.scene), terminal_width())
+    return scene
 
 
 def plan(options: Namespace) -> str:

@@ -1,7 +1,8 @@
 """Many objects in one scene: ``object.mesh`` names a pattern, as ``meshes/*.stl``, or a CSV file with a mesh a line.
 
 The columns of the CSV are keys of the scene, those of ``[object]`` without the section: ``mesh,unit,mass_g``. Every
-object is an ordinary scene, with its own mesh and what its line says put in.
+object is an ordinary scene, with its own mesh and what its line says put in. Its name follows from its own path or line
+alone, so that other objects may come and go: ``a-mug`` of ``a/mug.stl`` and ``*/*.stl``, or the column ``name``.
 """
 
 from __future__ import annotations
@@ -9,28 +10,31 @@ from __future__ import annotations
 import csv
 import hashlib
 import json
-from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path, PurePath
 from typing import Any
 
 from softjaw.fem.objects.mesh_file import ENDINGS
-from softjaw.study.messages import USAGE, StudyError
+from softjaw.study.messages import USAGE, StudyError, shortened, shown
 from softjaw.study.result.index import INDEX
 from softjaw.study.scene.model import Scene, file_digest, load_scene, put_overrides
 from softjaw.study.scene.objects import Mesh
+from softjaw.study.scene.section import SceneError
 from softjaw.study.scene.text import parse_toml, read_text
 
+Lines = list[tuple[str, dict[str, str]]]  # of each object where it is listed, and its cells, its name among them
+PATTERN = set("*?[")
 TEXTS = ("mesh", "name", "unit", "axis")  # columns whose cells are texts, whatever they look like
 EXPECTED = "expected a pattern that mesh files match, as `meshes/*.stl`, or a CSV file with a column `mesh`"
 
 
 @dataclass(frozen=True)
 class Listed:
-    """One object of a folder: its name, its mesh, and what makes its scene of the common one, as ``--set`` takes it."""
+    """One object of a folder: its name, where it is listed, its mesh, and what makes its scene, as for ``--set``."""
 
     name: str
+    place: str
     mesh: str
     overrides: tuple[str, ...]
 
@@ -47,82 +51,92 @@ class ObjectFolder:
         """All overrides of one object's scene."""
         return (*self.overrides, *listed.overrides)
 
-    def scene(self, listed: Listed) -> Scene:
+    def scene(self, listed: Listed, check_files: bool = True) -> Scene:
         """The scene of one object; raises `SceneError` with everything that is wrong with it."""
-        return load_scene(self.scene_file, self.overrides_of(listed))
+        try:
+            return load_scene(self.scene_file, self.overrides_of(listed), check_files)
+        except SceneError as error:
+            cells = {f"--set {shortened(text)}" for text in listed.overrides}
+            placed = [replace(p, file=listed.place) if p.file in cells else p for p in error.problems]
+            raise SceneError(placed) from None
 
     def check(self) -> Scene:
-        """The scene of the first object, whether its mesh is there or not; what is wrong with it is so for all.
+        """The scene of the first object that has one, whether its mesh is there or not.
 
-        Raises `SceneError` with everything that is wrong.
+        Raises `SceneError` with everything that is wrong with the first where none has.
         """
-        return load_scene(self.scene_file, self.overrides_of(self.objects[0]), check_files=False)
+        errors = []
+        for listed in self.objects:
+            try:
+                return self.scene(listed, check_files=False)
+            except SceneError as error:
+                errors.append(error)
+        raise errors[0]
 
 
 def folder_of(scene_file: str, overrides: Sequence[str]) -> ObjectFolder | None:
     """The objects of a scene that names many; None for a scene of one.
 
-    Raises `StudyError`: no mesh matches, the CSV file cannot be used, or the scene is no TOML.
+    Raises `StudyError`: no mesh matches, two have one name, the CSV file cannot be used, or the scene is no TOML.
     """
     path = Path(scene_file)
     data = parse_toml(read_text(path), scene_file)
     put_overrides(data, overrides, {})
     table = data.get("object")
     mesh = table.get("mesh") if isinstance(table, dict) else None
-    if not isinstance(mesh, str) or not (set("*?[") & set(mesh) or mesh.lower().endswith(".csv")):
+    if not isinstance(mesh, str):
         return None
-    lines = _of_table(path.parent / mesh) if mesh.lower().endswith(".csv") else _of_pattern(path.parent, mesh)
+    file, in_table = path.parent / mesh, mesh.lower().endswith(".csv")
+    if not in_table and (not PATTERN & set(mesh) or file.is_file()):
+        return None
+    lines = _of_table(file) if in_table else _of_pattern(path.parent, mesh)
     if not lines:
         raise StudyError(USAGE, f"{scene_file}: object.mesh: found '{mesh}', which names no mesh; {EXPECTED}")
-    objects = [
-        Listed(name, line["mesh"], tuple(_override(key, cell) for key, cell in ({"name": name} | line).items() if cell))
-        for name, line in zip(_names([line["mesh"] for line in lines]), lines, strict=True)
-    ]
+    objects: dict[str, Listed] = {}
+    for place, line in lines:
+        name = line["name"] + "-object" * (line["name"].lower() == INDEX)
+        listed = Listed(name, place, line["mesh"], tuple(_override(key, cell) for key, cell in line.items() if cell))
+        if (other := objects.setdefault(name.lower(), listed)) is not listed:
+            text = f"{other.place} and {place}: both objects have the name '{name}'; narrow the pattern, rename one,"
+            raise StudyError(USAGE, f"{text} or list them in a CSV file with a column `name`")
     common = tuple(text for text in overrides if text.partition("=")[0].strip() != "object.mesh")
-    return ObjectFolder(scene_file, common, tuple(objects))
+    return ObjectFolder(scene_file, common, tuple(objects.values()))
 
 
-def _of_pattern(folder: Path, pattern: str) -> list[dict[str, str]]:
-    root = Path(PurePath(pattern).anchor or folder)
-    paths = sorted(root.glob(str(PurePath(pattern).relative_to(PurePath(pattern).anchor))))
-    return [{"mesh": str(path.resolve())} for path in paths if path.suffix.lower() in ENDINGS]
+def _of_pattern(root: Path, pattern: str) -> Lines:
+    parts = list(PurePath(pattern).parts)
+    while len(parts) > 1 and (not PATTERN & set(parts[0]) or (root / parts[0]).exists()):
+        root /= parts.pop(0)
+    paths = [path for path in sorted(root.glob("/".join(parts))) if path.suffix.lower() in ENDINGS]
+    places = [path.relative_to(root) for path in paths]
+    names = ["-".join(place.with_suffix("").parts) for place in places]
+    return [(str(p), {"name": n, "mesh": str(m.resolve())}) for p, n, m in zip(places, names, paths, strict=True)]
 
 
-def _of_table(path: Path) -> list[dict[str, str]]:
+def _of_table(path: Path) -> Lines:
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
-            lines: list[dict[Any, Any]] = list(csv.DictReader(file, skipinitialspace=True))
+            reader = csv.DictReader(file, skipinitialspace=True)
+            lines: list[tuple[str, dict[Any, Any]]] = [(f"{path}:{reader.line_num}", line) for line in reader]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise StudyError(USAGE, f"{path}: cannot be read ({error}); {EXPECTED}") from error
-    for number, line in enumerate(lines, start=2):
-        if None in line or not line.get("mesh"):
+    columns = [name for name in reader.fieldnames or () if name]
+    if "mesh" not in columns or len(set(columns)) < len(columns):
+        text = f"{path}:1: found {shown(', '.join(columns))}, expected columns with commas between them"
+        raise StudyError(USAGE, f"{text}, each once and one of them `mesh`")
+    for place, line in lines:
+        if None in line or not line["mesh"]:
             what = "more cells than columns" if None in line else "no mesh"
-            raise StudyError(USAGE, f"{path}:{number}: found {what}, expected one cell for each column, a mesh in each")
+            raise StudyError(USAGE, f"{place}: found {what}, expected one cell for each column, a mesh in each")
+        line["name"] = line.get("name") or PurePath(line["mesh"]).stem
+        if PurePath(line["name"]).name != line["name"]:
+            raise StudyError(USAGE, f"{place}: found the name {shown(line['name'])}, expected one of a file")
         line["mesh"] = str((path.parent / line["mesh"]).resolve())
     return lines
 
 
 def _override(key: str, cell: str) -> str:
     return f"{key if '.' in key else f'object.{key}'}={json.dumps(cell) if key in TEXTS else cell}"
-
-
-def _names(meshes: Sequence[str]) -> list[str]:
-    """A name for each mesh: its file's, with its folder where others have the same, with its ending at last.
-
-    >>> _names(["/a/mug.stl", "/a/cup.stl", "/b/cup.stl", "/b/index.obj"])
-    ['mug', 'a-cup', 'b-cup', 'b-index']
-    """
-    paths = [PurePath(mesh) for mesh in meshes]
-    names = [path.stem for path in paths]
-    for longer in (lambda p: f"{p.parent.name}-{p.stem}", lambda p: f"{p.parent.name}-{p.stem}-{p.suffix[1:]}"):
-        seen = Counter(name.lower() for name in names)
-        clashes = [seen[name.lower()] > 1 or name.lower() == INDEX for name in names]
-        names = [longer(path) if clash else name for clash, path, name in zip(clashes, paths, names, strict=True)]
-    seen = Counter()
-    for i, name in enumerate(names):
-        seen[name.lower()] += 1
-        names[i] = f"{name}-{seen[name.lower()]}" if seen[name.lower()] > 1 else name
-    return names
 
 
 def key_of(scene: Scene) -> str:

@@ -1,6 +1,7 @@
 """A folder of objects: which there are, one run over all of them, and what the index says."""
 
 import re
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -55,12 +56,14 @@ def same(out, expected):
 def test_a_pattern_and_a_table_list_objects_with_a_name_of_their_own(scene):
     assert [listed.name for listed in folder_of(str(scene), []).objects] == sorted([*NAMES, "empty"])
     table = scene.parent / "some.csv"
-    table.write_text("mesh, unit, mass_g\nmeshes/a.stl, m, 120\nmeshes/longest.stl, cm,\n")
+    table.write_text("mesh, unit, mass_g, name\nmeshes/a.stl, m, 120, rod\nmeshes/longest.stl, cm,,\n")
     folder = folder_of(str(scene), [f"object.mesh={table}"])
     first, second = (folder.scene(listed).object for listed in folder.objects)
-    assert (first.name, first.unit, first.mass_g) == ("a", "m", 120.0)
+    assert (first.name, first.unit, first.mass_g) == ("rod", "m", 120.0)
     assert (second.name, second.unit, second.mass_g) == ("longest", "cm", None)
     assert folder_of(str(scene), ["object.mesh=meshes/a.stl"]) is None
+    names = [listed.name for listed in folder_of(str(scene), ["object.mesh=*/[al]*.stl"]).objects]
+    assert names == ["meshes-a", "meshes-late", "meshes-longest"]
 
 
 @pytest.mark.parametrize("mesh", ["nothing/*.stl", "missing.csv", "scene.toml*"])
@@ -70,16 +73,36 @@ def test_a_pattern_without_meshes_is_refused(scene, mesh):
     assert refusal.value.code == USAGE
 
 
-@pytest.mark.parametrize("objects", ["meshes", "meshes/*.stl", "some.csv"])
-def test_the_command_line_names_meshes_from_where_it_is(scene, objects, monkeypatch):
+@pytest.mark.parametrize("table", [
+    "mesh\nmeshes/a.stl\nmeshes/a.stl\n", "mesh,name\nmeshes/a.stl,x\nmeshes/bug.stl,X\n",
+    "mesh;unit\nmeshes/a.stl;m\n", "mesh,unit,unit\nmeshes/a.stl,m,m\n", "mesh,name\nmeshes/a.stl,../a\n",
+])  # fmt: skip
+def test_a_table_with_a_name_or_a_column_twice_is_refused(scene, table):
+    (scene.parent / "wrong.csv").write_text(table)
+    with pytest.raises(StudyError):
+        folder_of(str(scene), ["object.mesh=wrong.csv"])
+
+
+def test_check_reports_every_object_with_its_line_and_a_wrong_first_one_stops_no_other(scene):
+    table = scene.parent / "wrong.csv"
+    table.write_text("mesh,unit\nmeshes/a.stl,MM\nmeshes/longest.stl,m\n\nmeshes/empty.stl,m\n")
+    code, _, errors = command(0, "check", scene, "--objects", table)
+    assert (code, re.findall(r"wrong.csv:(\d+)", errors)) == (USAGE, ["2", "5"])
+    assert folder_of(str(scene), ["object.mesh=wrong.csv"]).check().object.name == "longest"
+
+
+@pytest.mark.parametrize(("objects", "count"), [("meshes/[al]*.stl", 3), ("odd [1]", 1), ("some.csv", 2)])
+def test_the_command_line_names_meshes_from_where_it_is(scene, objects, count, monkeypatch):
     """A folder, a pattern or a table; not from the scene's folder, as a key of the scene would be."""
     (scene.parent / "sub").mkdir(exist_ok=True)
     (scene.parent / "sub/scene.toml").write_text(SCENE)
+    (scene.parent / "odd [1]").mkdir(exist_ok=True)
+    shutil.copy(scene.parent / "meshes/a.stl", scene.parent / "odd [1]")
     (scene.parent / "some.csv").write_text("mesh\nmeshes/a.stl\nmeshes/longest.stl\n")
     monkeypatch.chdir(scene.parent)
     code, text, _ = command(0, "check", "sub/scene.toml", "--objects", objects)
     assert code == DONE
-    assert f"{2 if objects.endswith('.csv') else len(NAMES) + 1}: a" in text
+    assert f"{count}: a" in text
     assert command(0, "check", "sub/scene.toml", "--objects", "nothing/*.stl")[0] == USAGE
 
 
@@ -109,10 +132,9 @@ def test_every_object_is_a_row_of_the_index_and_its_page_and_none_stops_the_othe
 
 def test_programs_get_every_row_and_people_the_number_of_the_others(tmp_path):
     write_index(tmp_path / "index.hdf", [blank_row(f"object{i}") for i in range(12)], {})
-    for words, count in ((["--csv"], 13), (["--csv", "--top", 3], 4)):
-        assert len(command(0, "show", tmp_path, *words)[1].splitlines()) == count
-    assert "2 more" in command(0, "show", tmp_path)[1]
-    assert "more" not in command(0, "show", tmp_path, "--top", 12)[1]
+    texts = [command(0, "show", tmp_path, *words)[1] for words in (["--csv"], ["--csv", "--top", 3], [])]
+    assert [len(text.splitlines()) for text in texts[:2]] == [13, 4]
+    assert "2 more" in texts[2]
 
 
 @pytest.mark.parametrize("words", [
