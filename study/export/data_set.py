@@ -78,6 +78,7 @@ def write_data_set(index: Path, out: Path, form: str, gripper: GripperFrame) -> 
     """
     if out.resolve() == index.parent.resolve():
         raise StudyError(USAGE, f"-o: found '{out}', expected another folder than that of the results")
+    before = {path: path.stat().st_mtime_ns for path in out.rglob("*") if path.is_file()}
     listed: dict[str, list[str]] = {split: [] for split in SPLITS}
     good = whole = 0
     with ExitStack() as stack:
@@ -101,7 +102,9 @@ def write_data_set(index: Path, out: Path, form: str, gripper: GripperFrame) -> 
              "object_in_gripper": "holds (a known mass with task.safety), does no harm, and this gripper can take it"}
     write_file(out / "data-set.json", json.dumps(about, indent=1))
     counts = " and ".join(f"{len(files)} for {split}" for split, files in listed.items())
-    return f"written: {out}: {counts}; {good} of {whole} grasps are successful"
+    left = sum(path.stat().st_mtime_ns == stamp for path, stamp in before.items())
+    others = f"\nnote: {left} files in {out} are from before and of other objects or formats" * bool(left)
+    return f"written: {out}: {counts}; {good} of {whole} grasps are successful{others}"
 
 
 def _add(files: Files, out: Path, shard: tarfile.TarFile | None) -> None:

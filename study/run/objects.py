@@ -15,6 +15,7 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -22,6 +23,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from softjaw.study import messages, quantities
+from softjaw.study.case.build import listed_accuracy, with_mass
 from softjaw.study.case.result import TimeLimitError
 from softjaw.study.flags import LOST, Flag, flag_words
 from softjaw.study.messages import NoGraspError, StudyError, shortened
@@ -37,7 +39,8 @@ from softjaw.study.run.object_folder import ObjectFolder, key_of
 from softjaw.study.run.plan import Plan
 from softjaw.study.run.schedule import Claims
 from softjaw.study.run.session import Session, Work, file_of, finish_alone, locked, on_rank0, pack, rounds_in
-from softjaw.study.scene import Scene, SceneError
+from softjaw.study.scene import Scene, SceneError, parse_scene
+from softjaw.study.scene.text import differences
 from softjaw.study.table import Row
 from softjaw.study.units import in_si
 
@@ -243,6 +246,8 @@ def _rows_of(folder: ObjectFolder, out: Path, retry_failed: bool) -> list[Row]:
     path = out / f"{index.INDEX}.hdf"
     known = {row["object"]: row for row in index.read_index(path)[0]} if path.exists() else {}
     again = {index.FAILED, index.REFUSED, index.NO_GRASP, index.SOME_FAILED} if retry_failed else set()
+    if gone := known.keys() - {listed.name for listed in folder.objects}:
+        print(f"note: {len(gone)} of {len(known)} objects in {path} are not in this run; their files stay", flush=True)
     rows = []
     for listed in folder.objects:
         row = index.blank_row(listed.name, file=f"{listed.name}.hdf", mesh=os.path.relpath(listed.mesh, out))
@@ -254,12 +259,26 @@ def _rows_of(folder: ObjectFolder, out: Path, retry_failed: bool) -> list[Row]:
             continue
         key, mass = key_of(scene), scene.object.mass_g
         if before["key"] not in ("", key) and (out / row["file"]).exists():
-            text = f"{path}: object '{listed.name}' was solved from another scene or mesh"
+            change = _change(out / row["file"], scene)
+            text = f"{path}: object '{listed.name}' was solved from another scene or mesh ({change})"
             raise StudyError(messages.OTHER_FILE, f"{text}; choose another folder with -o, or move this one away")
         if before["key"] == key:
             row = before | ({"state": index.MISSING} if before["state"] in again else {})
         rows.append(row | {"key": key} | ({} if mass is None else {"mass": in_si("mass_g", mass)}))
     return rows
+
+
+def _change(path: Path, scene: Scene) -> str:
+    """What differs between the scene that an object's file was made from and its scene now."""
+    with open_result(path) as result:
+        with suppress(StudyError):  # the mesh cannot be read now, or the file is of another version
+            scene = with_mass(scene)
+            if scene.candidates.sampled:  # a file has what was sampled in its place
+                poses = parse_scene(result.scene, check_files=False).candidates.poses
+                where = scene.candidates.model_copy(update={"sampled": None, "poses": poses})
+                scene = scene.model_copy(update={"candidates": where, "accuracy": listed_accuracy(scene)})
+        alike = scene.digest == result.digest
+        return "candidates.sampled or refine" if alike else differences(result.scene, scene.effective_toml())
 
 
 def _why(error: BaseException, limit: float) -> Row:

@@ -114,7 +114,7 @@ def test_nothing_is_replaced_unasked(tmp_path, there, capsys):
     ([], "{bottle,cup,cylinder,mesh}"), (["botle"], "did you mean 'bottle'?"),
     (["mesh"], "a mesh needs --mesh FILE and --unit"), (["mesh", "--mesh", str(FLASK)], "a mesh needs --unit"),
     (["mesh", "--mesh", str(FLASK), "--unit", "inch"], 'the unit may be "mm"'),
-    (["mesh", "--mesh", "no.stl", "--unit", "mm"], "no.stl"),
+    (["mesh", "--mesh", "no.stl", "--unit", "mm"], "no.stl"), (["mesh", "--mesh", "."], "--objects ."),
     (["cup", "--mesh", str(FLASK)], "--mesh: found beside 'cup'"), (["cup", "-o", "$(rm -r .)"], "expected letters"),
     (["cup", "-o", 'a"b'], "expected letters"),
 ])  # fmt: skip
