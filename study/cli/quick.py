@@ -59,19 +59,19 @@ def check(options: Namespace) -> str:
     if not options.folder:
         return hanging(scene_text(_checked(scene_of(options)), options.scene), terminal_width())
     options.folder.check()  # what is wrong for all alike is said once
-    objects, scenes, wrong, none = options.folder.objects, list[Scene](), list[str](), list[str]()
+    objects, scenes, wrong, ungrasped = options.folder.objects, list[Scene](), list[str](), list[str]()
     for listed in objects:
         try:
             scenes.append(_checked(options.folder.scene(listed)))
         except SceneError as error:
             wrong += [str(p) if p.file == listed.place else f"{listed.place}: {p}" for p in error.problems]
         except StudyError as error:
-            (none if isinstance(error, NoGraspError) else wrong).append(f"{listed.place}: {error.message}")
+            (ungrasped if isinstance(error, NoGraspError) else wrong).append(f"{listed.place}: {error.message}")
     if wrong or not scenes:
-        raise StudyError(USAGE, "\n".join(wrong or none))
+        raise StudyError(USAGE, "\n".join(wrong or ungrasped))
     text = scene_text(scenes[0], options.scene)
     text += f"\n  objects     {len(objects)}: {objects[0].name} to {objects[-1].name}; the mesh is one of them"
-    return hanging("\n".join([text, *(f"  no grasp    {reason}" for reason in none)]), terminal_width())
+    return hanging("\n".join([text, *(f"  no grasp    {reason}" for reason in ungrasped)]), terminal_width())
 
 
 def _checked(scene: Scene) -> Scene:

@@ -102,8 +102,8 @@ def write_data_set(index: Path, out: Path, form: str, gripper: GripperFrame) -> 
              "object_in_gripper": "holds (a known mass with task.safety), does no harm, and this gripper can take it"}
     write_file(out / "data-set.json", json.dumps(about, indent=1))
     counts = " and ".join(f"{len(files)} for {split}" for split, files in listed.items())
-    left = sum(path.stat().st_mtime_ns == stamp for path, stamp in before.items())
-    others = f"\nnote: {left} files in {out} are from before and of other objects or formats" * bool(left)
+    stale = sum(path.stat().st_mtime_ns == stamp for path, stamp in before.items())
+    others = f"\nnote: {stale} files in {out} are from before and of other objects or formats" * bool(stale)
     return f"written: {out}: {counts}; {good} of {whole} grasps are successful{others}"
 
 

@@ -304,12 +304,12 @@ def row_of(result: Any) -> Row:
         return row | {"state": index.STOPPED, "reason": ""}
     usable, payload = done & (flags & LOST == 0), np.nan_to_num(values_of(ds, "payload"))
     # A grasp that holds the object with less safety than is asked for is one.
-    held = usable if usable.any() else done & (flags & LOST == Flag.TOO_WEAK) & (payload > 0)
-    row["reason"] = _reason(ds, done, flags[held if held.any() else done] & LOST)
-    if not held.any():
+    holding = usable if usable.any() else done & (flags & LOST == Flag.TOO_WEAK) & (payload > 0)
+    row["reason"] = _reason(ds, done, flags[holding if holding.any() else done] & LOST)
+    if not holding.any():
         return row | {"state": index.FAILED if failed.any() and not done.any() else index.NO_GRASP}
-    if not held[at := ds.attrs["best"]]:
-        at = tuple(map(int, np.unravel_index(largest(np.where(held, payload, -1.0)), held.shape)))
+    if not holding[at := ds.attrs["best"]]:
+        at = tuple(map(int, np.unravel_index(largest(np.where(holding, payload, -1.0)), holding.shape)))
     k, best = at[-1], int(np.ravel_multi_index(at[:-1], status.shape[:-1]))
     maps = [name for name in ("payload", "opening", "e_n", "quality", "payload_error") if name in ds]
     row |= {name: float(values_of(ds, name)[at]) for name in maps}

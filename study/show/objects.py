@@ -36,8 +36,8 @@ def index_table(path: Path, top: int = 0) -> Table:
     order = sorted(rows, key=lambda row: (-np.nan_to_num(row["payload"], nan=-1.0), row["object"]))
     facts = {"folder": str(path.parent), "scene_file": about.get("scene_file", "")}
     facts |= {state.replace(" ", "_"): count for state, count in _counts(rows).items()}
-    left = len(order[top:]) if top else 0
-    notes = [f"and {left} more: 'softjaw show {path.parent} --top 0' lists all"] * bool(left)
+    more = len(order[top:]) if top else 0
+    notes = [f"and {more} more: 'softjaw show {path.parent} --top 0' lists all"] * bool(more)
     return Table(f"{path.parent}: {counts_text(rows)}", SHOWN, order[: top or None], notes, facts, "objects")
 
 
