@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,18 +19,18 @@ from softjaw.study.case.evaluate import LIMITS, EvaluationSettings, overestimate
 from softjaw.study.case.task import payload_alone
 from softjaw.study.quantities import TABLE, Quantity
 
-# The error as a share of how far the coarser mesh, or a view of it, is away at most (`estimate`); the floor: a share
-# of the value that falls with the number of elements that bear across the contact, `DOUBTED` times as large where the
-# mesh is coarse for it. Fitted to random scenes with a reference of half the element size (docs/accuracy.md): there the
-# floor tells more than the distances do.
-OF_FARTHEST, DOUBTED, EDGE, POWER = 0.3, 2.0, 0.16, 1.5
-# How many times the floor: shares that a model or the curvature takes off are small differences of large numbers, sums
-# over all faces tell less of single ones.
+# The error as a share of how far the coarser mesh, or a view of it, is away at most (`estimate`), and what meshes do not
+# show (`Unseen`): a floor that falls with the number of elements that bear, or that bear across the contact, `DOUBTED`
+# times as large where the mesh is coarse for it. Fitted to random scenes with a reference of half the element size
+# (docs/accuracy.md): there the floor tells more than the distances do.
+OF_FARTHEST, DOUBTED, FLOOR, POWER = 0.3, 2.0, 0.22, 0.75
+# How many times the floor: shares that a model or the curvature takes off are small differences of large numbers.
 WIDER = dict.fromkeys((q.name for q in TABLE if q.error == "absolute"), 10.0) | {
-    "f_x_max": 0.15, "f_y_max": 0.15, "contact_area": 4.5, "p_max": 19.0, "wall_stress": 4.5, "wall_strain": 4.5,
+    "f_x_max": 0.15, "f_y_max": 0.15, "wall_stress": 5.5, "wall_strain": 5.5,
 }  # fmt: skip
+OF_WIDTH = {"closing": 0.75, "contact_area": 3.3, "p_max": 14.0}  # the same, of what depends on the contact's width
 # Of the share of the load that edges of the object bear: where such an edge lies within an element tells no mesh.
-OF_EDGES = dict.fromkeys((q.name for q in TABLE), 0.08) | {
+OF_EDGES = dict.fromkeys((q.name for q in TABLE), 0.12) | {
     "payload": 0.02, "safety_factor": 0.02, "f_x_max": 0.04, "f_y_max": 0.04, "closing": 0.24, "contact_area": 1.0,
     "p_max": 4.0,
 }  # fmt: skip
@@ -42,15 +42,14 @@ PAYLOADS = ("payload", "safety_factor")  # what arms and couples leave of the fr
 def mesh_errors(
     fine: Sequence[Contact], coarse: Sequence[Contact], values: Mapping[str, Any], other: Mapping[str, Any],
     settings: EvaluationSettings, views: Sequence[Sequence[Contact]] = (),
-    pairs: Sequence[tuple[Sequence[Any], Sequence[Any], float]] = (), floor: float = 0.0, sharp: float = 0.0,
+    pairs: Sequence[tuple[Sequence[Any], Sequence[Any], float]] = (), unseen: Unseen | None = None,
     left_out: float = 0.0,
 ) -> dict[str, float]:  # fmt: skip
     """Errors of all quantities that have one, from the contacts on the mesh and on a coarser one.
 
     ``values`` are those of the fine mesh, ``other`` what the coarser one says beside its contacts; keyed alike.
     ``views`` are the coarse contacts with their pressures at Gauss points and at nodes, ``pairs`` are contacts on the
-    coarse mesh that differ too, and which share of that counts; ``floor`` is a share of the value, `WIDER` for some,
-    ``sharp`` the share of the load on the object's edges, and ``left_out`` one of every value.
+    coarse mesh that differ too, and which share of that counts; ``left_out`` is a share of every value.
     """
     fine_mesh, coarse_mesh = _on_mesh(values, fine), _on_mesh(other, coarse) | grasp_values(tuple(coarse), settings)
     viewed = [_sums(view) | grasp_values(tuple(view), settings) for view in views]
@@ -61,8 +60,7 @@ def mesh_errors(
         seen = [view[q.key] for view in viewed if q.key in view]
         value, size = fine_mesh[q.key], _size(q, fine_mesh[q.key])
         error = estimate(value, coarse_mesh[q.key], seen, q.error, q.name in PAYLOADS)
-        # pressures alone give forces along the face by balance, with friction that acts back they do not
-        error += _unseen(q, floor * (2.0 if acts and q.name.startswith("f_") else 1.0), sharp, fine) * size
+        error += (unseen.share(q, fine, acts) if unseen else 0.0) * size
         if q.error == "relative" and not np.all(coarse_mesh[q.key]):
             error = max(error, 1.0)  # a payload of which the coarse mesh has nothing
         apart = [s * distance(low[q.key], high[q.key], q.error, value) for low, high, s in compared if q.key in low]
@@ -72,18 +70,28 @@ def mesh_errors(
     return errors
 
 
-def edge_floor(contacts: Sequence[Any]) -> float:
-    """Share of a value that two meshes can agree on by luck [-]: less the more elements bear across the contact."""
-    return EDGE / float(min(c.across for c in contacts) ** POWER)
+class Unseen(NamedTuple):
+    """Shares that no difference of two meshes shows: floors of sums over a contact and of widths; load on edges."""
 
+    floor: float
+    of_width: float
+    on_edges: float
 
-def _unseen(q: Quantity, floor: float, sharp: float, contacts: Sequence[Any]) -> float:
-    """Share of a value that no difference of meshes shows; ``floor`` and ``sharp`` as in `mesh_errors`."""
-    wider = WIDER.get(q.name, 1.0)
-    if q.name == "closing" and (pad := contacts[0].state.pad).shape.element == "hex8":
-        # trilinear elements close less, the less the foam can be compressed
-        wider = 0.4 + 0.2 / (1.0 - 2.0 * pad.material.poisson_ratio)
-    return floor * wider + sharp * OF_EDGES[q.name]
+    @classmethod
+    def of(cls, contacts: Sequence[Any], doubt: float = 1.0) -> Unseen:
+        """On these contacts; floors, at which meshes agree by luck, are ``doubt`` times what the elements tell."""
+        floor = doubt * FLOOR / min(c.elements for c in contacts) ** POWER
+        of_width = doubt * FLOOR / min(c.across for c in contacts) ** (2 * POWER)
+        return cls(floor, of_width, max(c.on_edges for c in contacts))
+
+    def share(self, q: Quantity, contacts: Sequence[Any], acts: bool = False) -> float:
+        """Of a quantity's value; ``acts``: whether friction acts back."""
+        floor = self.of_width * OF_WIDTH[q.name] if q.name in OF_WIDTH else self.floor * WIDER.get(q.name, 1.0)
+        if q.name == "closing" and (pad := contacts[0].state.pad).shape.element == "hex8":
+            # trilinear elements close less, the less the foam can be compressed
+            floor *= 0.4 + 0.2 / (1.0 - 2.0 * pad.material.poisson_ratio)
+        # pressures alone give forces along the face by balance, with friction that acts back they do not
+        return floor * (2.0 if acts and q.name.startswith("f_") else 1.0) + self.on_edges * OF_EDGES[q.name]
 
 
 def coarse_errors(
@@ -97,11 +105,11 @@ def coarse_errors(
     """
     solved = _on_mesh(values, contacts)
     viewed = [_sums(view) | grasp_values(tuple(view), settings) for view in views]
-    floor, sharp, errors = edge_floor(contacts), max(c.on_edges for c in contacts), {}
+    unseen, errors = Unseen.of(contacts), {}
     for q in (q for q in TABLE if q.error and q.key in viewed[0]):
         apart = max(distance(solved[q.key], view[q.key], q.error) for view in viewed)
         # friction that is left out here may move any of them as much
-        share = max(_unseen(q, floor, sharp, contacts), floor * (1.3 if q.name in PAYLOADS else 1.0))
+        share = max(unseen.share(q, contacts), unseen.floor * (1.3 if q.name in PAYLOADS else 1.0))
         doubt = DOUBTED * (EDGES_ROUNDED if rounded and q.name in PAYLOADS else 1.0)
         errors[q.of_error.key] = doubt * (apart + share * _size(q, solved[q.key]))
     return errors

@@ -122,8 +122,13 @@ class PressedContact(Contact):
         return bool(np.count_nonzero(self.loaded) < 6 * self.state.pad.shape.per_side**2)
 
     @property
+    def elements(self) -> float:
+        """Elements that bear, at least 1; those of two faces a side, as a triquadratic one tells more."""
+        return max(np.count_nonzero(self.loaded) / 4.0, 1.0)
+
+    @property
     def across(self) -> float:
-        """Elements that bear across the longest extent of the contact, at least 1; those of two faces a side."""
+        """Elements that bear across the longest extent of the contact, at least 1; two faces make a side."""
         loaded = self.loaded.reshape(self.state.pad.shape.patch_faces)
         longest = max(np.count_nonzero(loaded.any(axis=axis)) for axis in (0, 1))
         return max(np.count_nonzero(loaded) / (2.0 * longest), 1.0)

@@ -21,7 +21,7 @@ from softjaw.fem.objects.gap import Pose
 from softjaw.fem.petsc import Seconds
 from softjaw.study.case.build import build_object, forces_apart, has_wall, pad_elements
 from softjaw.study.case.contact import Contact
-from softjaw.study.case.errors import DOUBTED, edge_floor, grasp_values, mesh_errors
+from softjaw.study.case.errors import DOUBTED, Unseen, grasp_values, mesh_errors
 from softjaw.study.case.evaluate import EvaluationSettings, settings_of
 from softjaw.study.case.geometry import Finger, approach
 from softjaw.study.case.pressing import OnRigid, OnWall, PressedContact, pressing, refuse_along_axis
@@ -94,14 +94,13 @@ class Solved:
     ) -> dict[str, float]:
         """Errors of the values of a case that has a coarser mesh; see `mesh_errors`."""
         fine, coarse = self.fine.contacts, self.meshes[1]
-        floor = edge_floor(fine) * (DOUBTED if any(contact.coarse for contact in fine) else 1.0)
         pairs = list(self.pairs)
         if self.edges:
             # they are rounded over a part of an element, and what that does falls with it
             sizes = [mesh.contacts[0].state.pad.shape.elements[0] for mesh in (self.meshes[-2], self.fine)]
             pairs.append((*self.edges, sizes[0] / sizes[1]))
-        sharp = max(contact.on_edges for contact in fine)
-        return mesh_errors(fine, coarse.contacts, values, other, settings, coarse.views, pairs, floor, sharp, left_out)
+        unseen = Unseen.of(fine, DOUBTED if any(contact.coarse for contact in fine) else 1.0)
+        return mesh_errors(fine, coarse.contacts, values, other, settings, coarse.views, pairs, unseen, left_out)
 
 
 def followed(

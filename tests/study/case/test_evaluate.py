@@ -14,7 +14,7 @@ from softjaw.scoring.pose import pose_volume
 from softjaw.study.case import errors as weights
 from softjaw.study.case.build import build_object, centre_of_volume
 from softjaw.study.case.contact import Contact, topology
-from softjaw.study.case.errors import coarse_errors, distance, edge_floor, estimate, mesh_errors
+from softjaw.study.case.errors import Unseen, coarse_errors, distance, estimate, mesh_errors
 from softjaw.study.case.evaluate import FACING, EvaluationSettings, evaluate, lengths, quality
 from softjaw.study.case.task import Task
 from softjaw.study.flags import Flag
@@ -95,7 +95,7 @@ def test_extents_scale_arms_contacts_that_lean_are_flagged_and_errors_are_differ
         assert found[1] == pytest.approx(torques, rel=1e-12)
     fine, coarse = pair(math.radians(8.0)), pair(math.radians(8.0), strips=17)
     for contact, elements in ((fine[0], 8.0), (fine[1], 9.0), (coarse[0], 2.0), (coarse[1], 2.0)):
-        contact.across, contact.on_edges = elements, 0.0
+        contact.elements, contact.across, contact.on_edges = elements**2, elements, 0.0
     values, _ = evaluate(fine, SETTINGS)
     assert values["maps/flags"] & Flag.NOT_ANTIPODAL
     assert values["maps/misalignment"] == pytest.approx(math.radians(8.0), rel=1e-9)
@@ -105,16 +105,17 @@ def test_extents_scale_arms_contacts_that_lean_are_flagged_and_errors_are_differ
         expected = weights.OF_FARTHEST * abs(other[f"maps/{name}"][0] / values[f"maps/{name}"][0] - 1)
         assert errors[f"maps/{name}_error"] == pytest.approx(expected, rel=1e-9, abs=1e-12)
     assert not any(mesh_errors(fine, fine, values, {}, SETTINGS).values())
-    floor = mesh_errors(fine, fine, values, {}, SETTINGS, floor=0.01)
-    found = [floor[f"maps/{name}_error"] for name in ("e_n", "tau_z_max", "p_max")]
-    assert found == pytest.approx([0.01, 0.01, 0.01 * weights.WIDER["p_max"]])
+    floor = mesh_errors(fine, fine, values, {}, SETTINGS, unseen=Unseen(0.01, 0.02, 0.5))
+    found = [floor[f"maps/{name}_error"] for name in ("e_n", "f_x_max", "p_max")]
+    edges = [0.5 * weights.OF_EDGES[name] for name in ("e_n", "f_x_max", "p_max")]
+    shares = [0.01, 0.01 * weights.WIDER["f_x_max"], 0.02 * weights.OF_WIDTH["p_max"]]
+    assert found == pytest.approx(np.add(shares, edges))
     # of a coarse mesh alone all is in doubt, that of f_x no less: friction that is left out would move it
     alone = coarse_errors(fine, values, [fine, coarse], SETTINGS, rounded=False)
-    assert alone["maps/f_x_max_error"] == pytest.approx(weights.DOUBTED * edge_floor(fine), rel=1e-6)
-    # the more elements bear across a contact, the less they agree by luck; where edges bear they do all the same
-    assert edge_floor(fine) == pytest.approx(0.25**weights.POWER * edge_floor(coarse), rel=1e-9)
-    edges = mesh_errors(fine, fine, values, {}, SETTINGS, sharp=0.5)
-    assert edges["maps/contact_area_error"] == pytest.approx(0.5 * weights.OF_EDGES["contact_area"])
+    assert alone["maps/f_x_max_error"] == pytest.approx(weights.DOUBTED * Unseen.of(fine).floor, rel=1e-6)
+    # the more elements bear, the less they agree by luck
+    few, many = Unseen.of(coarse), Unseen.of(fine, doubt=2.0)
+    assert np.divide(many[:2], few[:2]) == pytest.approx([2 * (1 / 16) ** weights.POWER] * 2, rel=1e-9)
     task = replace(SETTINGS, task=Task((fine[0].origin + fine[1].origin) / 2))
     held, less = (evaluate(contacts, task)[0]["maps/payload"][0] for contacts in (fine, coarse))
     error = mesh_errors(fine, coarse, {**values, "maps/payload": [held]}, {}, task)["maps/payload_error"]
@@ -145,8 +146,10 @@ def test_every_quantity_with_an_error_gets_one_and_a_weight_between_the_pads_is_
     # trilinear elements lock: of foam that is hardly compressed they close less than finer ones
     floors = []
     for pad.shape.element, pad.material.poisson_ratio in (("hex8", 0.25), ("hex8", 0.45), ("hex27", 0.45)):
-        floors.append(mesh_errors(fine, coarse, values, other, task, floor=0.01)["maps/closing_error"])
-    assert np.array(floors) - errors["maps/closing_error"] == pytest.approx([0.008, 0.024, 0.01], rel=1e-9)
+        unseen = Unseen(0.0, 0.01, 0.0)
+        floors.append(mesh_errors(fine, coarse, values, other, task, unseen=unseen)["maps/closing_error"])
+    expected = 0.01 * weights.OF_WIDTH["closing"] * np.array([0.8, 2.4, 1.0])
+    assert np.array(floors) - errors["maps/closing_error"] == pytest.approx(expected, rel=1e-9)
     peaks = [contacts[0].patch.pressure.max() for contacts in (fine, coarse)]
     assert errors["maps/p_max_error"] == pytest.approx(weights.OF_FARTHEST * abs(peaks[1] / peaks[0] - 1), rel=1e-9)
     assert errors["maps/safety_factor_error"] == pytest.approx(errors["maps/payload_error"], rel=1e-9)
