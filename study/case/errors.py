@@ -19,9 +19,9 @@ from softjaw.study.case.evaluate import LIMITS, EvaluationSettings, overestimate
 from softjaw.study.case.task import payload_alone
 from softjaw.study.quantities import TABLE, Quantity
 
-# The error as a share of how far the coarser mesh, or a view of it, is away at most (`estimate`), and what meshes do not
-# show (`Unseen`): a floor that falls with the number of elements that bear, or that bear across the contact, `DOUBTED`
-# times as large where the mesh is coarse for it. Fitted to random scenes with a reference of half the element size
+# The error as a share of how far the coarser mesh, or a view of it, is away at most (`estimate`), and what no mesh has
+# (`Unseen`): a floor that falls with the number of elements that bear, or that bear across the contact, `DOUBTED` times
+# as large where the mesh is coarse for it. Fitted to random scenes with a reference of half the element size
 # (docs/accuracy.md): there the floor tells more than the distances do.
 OF_FARTHEST, DOUBTED, FLOOR, POWER = 0.3, 2.0, 0.22, 0.75
 # How many times the floor: shares that a model or the curvature takes off are small differences of large numbers.
