@@ -60,7 +60,7 @@ def test_values_of_a_scene_are_rounded_once(key, value, si):
 
 def test_all_units_of_a_kind_share_their_si_unit_and_what_people_read_comes_back():
     for unit in UNITS.values():
-        assert unit.si in ("m", "kg", "N", "Pa", "rad", "N/m")
+        assert unit.si in ("m", "kg", "N", "Pa", "rad", "N/m", "N m/rad")
     for si, unit in SHOWN.items():
         assert unit.si == si
         assert shown(unit.size, si) == pytest.approx(1.0, rel=1e-15)
