@@ -286,7 +286,8 @@ def at_force(ds: xr.Dataset, force: float) -> xr.Dataset:
             between[name] = (dims, first | last, ds[name].attrs)
     for q in (q for q in TABLE if q.error and q.of_error.name in between):
         apart = abs(line[q.name] - between[q.name]) / (between[q.name] if q.error == "relative" else 1.0)
-        between[q.of_error.name] += apart.isel(model=0, drop=True) if "model" in apart.dims else apart
+        # a payload of nothing at both forces lies nowhere else
+        between[q.of_error.name] += (apart.isel(model=0, drop=True) if "model" in apart.dims else apart).fillna(0.0)
     states = np.where(low["status"].values == DONE, high["status"].values, low["status"].values)
     states = np.where((states == DONE) & _apart(low, high), MISSING, states)
     between["status"] = (ds["status"].dims, states, ds["status"].attrs)
