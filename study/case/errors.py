@@ -28,11 +28,10 @@ OF_FARTHEST, DOUBTED, FLOOR, POWER = 0.3, 2.0, 0.22, 0.75
 WIDER = dict.fromkeys((q.name for q in TABLE if q.error == "absolute"), 10.0) | {
     "f_x_max": 0.15, "f_y_max": 0.15, "indentation": 4.0, "wall_stress": 5.5, "wall_strain": 5.5,
 }  # fmt: skip
-OF_WIDTH = {"closing": 0.75, "contact_area": 3.3, "p_max": 14.0}  # the same, of what depends on the contact's width
+OF_WIDTH = {"closing": 0.28, "contact_area": 1.4, "p_max": 5.0}  # the same, of what depends on the contact's width
 # Of the share of the load that edges of the object bear: where such an edge lies within an element tells no mesh.
 OF_EDGES = dict.fromkeys((q.name for q in TABLE), 0.12) | {
-    "payload": 0.02, "safety_factor": 0.02, "f_x_max": 0.04, "f_y_max": 0.04, "closing": 0.24, "contact_area": 1.0,
-    "p_max": 4.0,
+    "payload": 0.02, "safety_factor": 0.02, "f_x_max": 0.04, "f_y_max": 0.04, "contact_area": 0.7, "p_max": 3.0,
 }  # fmt: skip
 EDGES_ROUNDED = 1.6  # times the error of a payload on the coarse mesh alone, where the object's edges are rounded
 OF_PAIRS = {"p_max": 3.0}  # of what pairs differ by: peaks that an effect makes at an edge grow as elements shrink
@@ -83,7 +82,7 @@ class Unseen(NamedTuple):
     def of(cls, contacts: Sequence[Any], doubt: float = 1.0) -> Unseen:
         """On these contacts; floors, at which meshes agree by luck, are ``doubt`` times what the elements tell."""
         floor = doubt * FLOOR / min(c.elements for c in contacts) ** POWER
-        of_width = doubt * FLOOR / min(c.across for c in contacts) ** (2 * POWER)
+        of_width = doubt * FLOOR / min(c.across for c in contacts) ** POWER
         return cls(floor, of_width, max(c.on_edges for c in contacts))
 
     def share(self, q: Quantity, contacts: Sequence[Any], acts: bool = False) -> float:
