@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -43,11 +44,10 @@ class GraspMap:
     """A result file as a function of station [m], angle [rad] and normal force [N].
 
     Values lie on straight lines between the solved cases around a point, along forces on power laws. A point has no
-    value (NaN) outside the map,
-    beside a case that failed or is missing, between a case before and one after the wall has snapped in, and between
-    cases whose contacts differ in kind: in pieces, in holes, or in whether a pad bears on both of its ends.
-    `GraspPoint.nearest` is the nearest solved case. Angles repeat after the period that the object's symmetry gives;
-    half a turn exchanges the fingers.
+    value (NaN) outside the map, beside a case that failed or is missing, between a case before and one after the wall
+    has snapped in, and between cases whose contacts differ in kind: in pieces, in holes, or in whether a pad bears on
+    both of its ends. `GraspPoint.nearest` is the nearest solved case. Angles repeat after the period that the object's
+    symmetry gives; half a turn exchanges the fingers.
 
     Parameters
     ----------
@@ -67,9 +67,8 @@ class GraspMap:
     Notes
     -----
     The error of a value is that of a straight line through a curve with the largest second derivative that the cases
-    around show, with those beside them, times 1.75 along stations and 5.25 along angles, and how far the power law is
-    from the straight line: a claim, below which at least 95 % of the true errors of the main maps stay where that was
-    measured. Between angles more than 25
+    around show, with those beside them, added up over the three axes and times 1.75, along angles 5.25: a claim, below
+    which at least 95 % of the true errors of the main maps stay where that was measured. Between angles more than 25
     degrees apart there are no values: edges that come to bear between them would stay unseen. Errors that the cases
     around state themselves (``accuracy.meshes = 2``; in between as the values are) are added in squares.
     Along an axis of two values there is no second derivative, and half of their difference stands in. What is
@@ -190,12 +189,20 @@ class GraspMap:
 
     def errors(self, name: str, model: str, at: Corners) -> FloatArray:
         """Error of `interpolated` for a quantity of the case, at many points."""
-        key = name, model
+        key, grid = (name, model), self.table(name, model).reshape(self.shape)
+        powers = not (grid <= 0.0).any()  # NaN, where nothing is solved, is not
         if key not in self._bends:
-            bent = bends(self.table(name, model).reshape(self.shape), self.axes, self.snapped)
+            bent = bends(grid, self.axes, self.snapped)
+            if powers:
+                forces = replace(self.axes[2], x=np.log(self.axes[2].x))
+                bent[2] = bends(np.log(grid), (*self.axes[:2], forces), self.snapped)[2]
             self._bends[key] = claims(bent, self.shape)
-        table = self.table(name, model)
-        return error(self._bends[key], at) + abs(blend(table, at) - blend(table, at, straight=True))
+        along, bend = error(self._bends[key], at, (0, 1)), self._bends[key]
+        if not powers:
+            return along + error(bend, at, (2,))
+        share = at.share.copy()
+        share[:, 2] = at.power
+        return along + error(bend, replace(at, share=share), (2,)) * self.interpolated(name, model, at)
 
     def states(self, at: Corners) -> np.ndarray:
         """State of many points, as `GraspPoint.state` has it."""

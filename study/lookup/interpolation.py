@@ -1,7 +1,7 @@
 """Values between the nodes of a grid of two axes and of forces, with what the neighbours tell about the error.
 
-Along forces they follow power laws, as contacts nearly do; how far these are from straight lines is their error. Along
-the other axes they lie on straight lines, which never overshoot. Between two nodes a distance
+Along forces they follow power laws, as contacts nearly do, which are straight lines between logarithms. Along the other
+axes they lie on straight lines, which never overshoot. Between two nodes a distance
 ``h`` apart the line misses a smooth function by ``f'' / 2 (x - x_0) (x_1 - x)``; the second derivative is taken from
 the three-point differences at both nodes, whichever is larger, and the errors along the axes add up. Maps of contacts
 have kinks, which three nodes see or miss by chance: an estimate is the largest of a cell and those around it, times
@@ -131,16 +131,16 @@ def corners(axes: Sequence[Nodes], points: FloatArray) -> Corners:
     return Corners(index, np.where(UPPER, share[:, None], 1 - share[:, None]).prod(-1), share, power, inside, swap)
 
 
-def blend(table: FloatArray, at: Corners, straight: bool = False) -> FloatArray:
+def blend(table: FloatArray, at: Corners) -> FloatArray:
     """Values of ``table (nodes, ...)`` at ``m`` points, ``(m, ...)``; corners without weight do not count.
 
-    Along the force by a power law between positive values of cases and fingers, unless ``straight``.
+    Along the force by a power law between positive values of cases and fingers.
     """
     values = table[at.index]
     weight = at.weight.reshape(at.weight.shape + (1,) * (table.ndim - 1))
     parts = np.where(weight > 0, values * weight, 0.0)
     line = np.asarray(parts.sum(axis=1))
-    if straight or table.ndim > 2:  # coefficients of limit surfaces stay convex on straight lines
+    if table.ndim > 2:  # coefficients of limit surfaces stay convex on straight lines
         return line
     share, power = (s.reshape(-1, *(1,) * (table.ndim - 1)) for s in (at.share[:, 2], at.power))
     low, high = parts[:, ::2].sum(axis=1), parts[:, 1::2].sum(axis=1)  # times 1 - share, and share
@@ -149,13 +149,13 @@ def blend(table: FloatArray, at: Corners, straight: bool = False) -> FloatArray:
 
 
 def bends(table: FloatArray, axes: Sequence[Nodes], side: NDArray[np.bool_]) -> FloatArray:
-    """``|f'' / 2| h^2`` of every cell along the first two axes, at the cell's lower node, ``(2, nodes)``.
+    """``|f'' / 2| h^2`` of every cell along each axis, at the cell's lower node, ``(3, k_1, k_2, k_3)``.
 
     Differences reach neither over missing values nor from one ``side (k_1, k_2, k_3)`` of a jump to the other. Where no
     three nodes are left, the difference of the cell's two values stands in: a guess; across a jump it is 0.
     """
-    bent = np.zeros((2, *table.shape))
-    for a, nodes in enumerate(axes[:2]):
+    bent = np.zeros((3, *table.shape))
+    for a, nodes in enumerate(axes):
         f, branch, x = np.moveaxis(table, a, -1), np.moveaxis(side, a, -1), nodes.x
         if closed := bool(nodes.period) and np.isclose(x[-1] - x[0], nodes.period, rtol=1e-6, atol=0):
             x = np.concatenate([[x[-2] - nodes.period], x, [x[1] + nodes.period]])
@@ -171,19 +171,19 @@ def bends(table: FloatArray, axes: Sequence[Nodes], side: NDArray[np.bool_]) -> 
         cell = np.where(np.isnan(cell), np.abs(np.diff(f)), cell)
         cell[branch[..., :-1] != branch[..., 1:]] = 0.0
         np.moveaxis(bent[a], a, -1)[..., :-1] = cell
-    return bent.reshape(2, -1)
+    return bent.reshape(3, -1)
 
 
 def claims(bend: FloatArray, shape: tuple[int, ...]) -> FloatArray:
-    """`bends` ``(2, nodes)`` of this shape of nodes as claims: the largest around."""
-    claimed = maximum_filter(np.nan_to_num(bend.reshape(2, *shape)), (1, 3, 3, 3), mode="constant")
-    return CLAIM_FACTOR * np.array([[1.0], [OF_ANGLES]]) * claimed.reshape(2, -1)
+    """`bends` ``(3, nodes)`` of this shape of nodes as claims: the largest around."""
+    claimed = maximum_filter(np.nan_to_num(bend.reshape(3, *shape)), (1, 3, 3, 3), mode="constant")
+    return CLAIM_FACTOR * np.array([[1.0], [OF_ANGLES], [1.0]]) * claimed.reshape(3, -1)
 
 
-def error(bend: FloatArray, at: Corners) -> FloatArray:
-    """Error of `blend` along the first two axes at ``m`` points from `bends` ``(2, nodes)``, ``(m,)``."""
+def error(bend: FloatArray, at: Corners, axes: Sequence[int]) -> FloatArray:
+    """Error of straight lines along some of the axes at ``m`` points from `bends` ``(3, nodes)``, ``(m,)``."""
     total = np.zeros(len(at.index))
-    for a in range(2):
+    for a in axes:
         lower, higher = np.flatnonzero(UPPER[:, a] == 0), np.flatnonzero(UPPER[:, a])
         weight = at.weight[:, lower] + at.weight[:, higher]
         lines = np.where(weight > 0, bend[a][at.index[:, lower]] * weight, 0.0).sum(axis=1)

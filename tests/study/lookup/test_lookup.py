@@ -46,14 +46,10 @@ def test_lines_and_power_laws_are_met_and_the_error_of_a_point_holds_that_of_the
     found = straight.at(station, angle, force)
     assert found.ok.all()
     assert found.e_n == pytest.approx(linear(station, angle, force), rel=1e-12)
-    # how far a straight line would be away, which at the cases' own forces is nowhere
-    lines = np.interp(force, FORCES, linear(0.0, 0.0, FORCES)) * (1 + 10 * station)
-    assert found.error("e_n") == pytest.approx(found.e_n - lines, rel=1e-9)
-    assert straight.error("e_n", station, angle, 4.0) == pytest.approx(np.zeros(300), abs=1e-15)
-    assert found.value("e_n", "pcm") == pytest.approx(1.1 * found.e_n, rel=1e-12)
+    assert found.error("e_n") == pytest.approx(np.zeros(300), abs=1e-15)
     errors = {"e_n__error": 0.02, "opening_loaded__error": 1e-4}
     path = make(tmp_path / "two.hdf", meshes=2, opening_loaded__opening_loaded=0.03, **errors)
-    point = GraspMap(path).at(0.02, 0.0, 4.0)
+    point = GraspMap(path).at(0.02, 0.0, 3.0)
     assert point.error("e_n") == pytest.approx(0.02 * point.e_n, rel=1e-12)
     assert point.error("opening_loaded") == pytest.approx(1e-4, rel=1e-12)
     assert "0.1 mm" in str(point)
@@ -149,7 +145,7 @@ def test_nothing_is_interpolated_across_a_snap_in(tmp_path):
         point = there.at(0.011, 0.1, force)
         assert (point.state, point.flags) == (INSIDE, sign)
         assert point.e_n == pytest.approx(jump(0.011, 0.1, force))
-        assert point.error("e_n") < 0.01 * point.e_n
+        assert point.error("e_n") == pytest.approx(0, abs=1e-15)
 
 
 def test_where_the_contact_changes_its_kind_there_is_no_smooth_value(tmp_path):
