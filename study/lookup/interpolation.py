@@ -23,7 +23,7 @@ from softjaw.friction.patch import NEGLIGIBLE, FloatArray
 from softjaw.study.result.read import power_law
 
 CLAIM_FACTOR = 1.75  # between estimate and claim: with less, less than 95 % of the errors stay within it
-OF_ANGLES = 3.0  # times that along angles, where payload and edges of contacts have kinks
+OF_ANGLES, OF_FORCES = 3.0, 2.0  # times that along these: along angles payload and edges of contacts have kinks
 MOST_TURN = math.radians(25)  # between angles farther apart even such claims hold for half of the points
 CLOSING_GAP_RATIO = 1.5  # a gap that closes a circle may be this much wider than the others
 UPPER = np.array(list(np.ndindex(2, 2, 2)))  # which corners of a cell are its upper ones, along each axis
@@ -177,7 +177,7 @@ def bends(table: FloatArray, axes: Sequence[Nodes], side: NDArray[np.bool_]) -> 
 def claims(bend: FloatArray, shape: tuple[int, ...]) -> FloatArray:
     """`bends` ``(3, nodes)`` of this shape of nodes as claims: the largest around."""
     claimed = maximum_filter(np.nan_to_num(bend.reshape(3, *shape)), (1, 3, 3, 3), mode="constant")
-    return CLAIM_FACTOR * np.array([[1.0], [OF_ANGLES], [1.0]]) * claimed.reshape(3, -1)
+    return CLAIM_FACTOR * np.array([[1.0], [OF_ANGLES], [OF_FORCES]]) * claimed.reshape(3, -1)
 
 
 def error(bend: FloatArray, at: Corners, axes: Sequence[int]) -> FloatArray:

@@ -75,7 +75,8 @@ class GraspPoint(GraspNumbers):
         See `study.lookup.GraspMap`.
         """
         errors, values = (of(name, model, self.corners) for of in (self.map.errors, self.map.interpolated))
-        q = BY_KEY.get(f"maps/{name}")
+        # what meshes leave in a contact they leave in the quality of surfaces that are fitted to it, too
+        q = BY_KEY.get(f"maps/{name.removesuffix('_fitted')}")
         if q is not None and q.error and self.map.has(q.of_error.name):
             cases = q.error_in_unit(self.map.interpolated(q.of_error.name, "ccm", self.corners), values)
             # one does not know of the other

@@ -46,6 +46,7 @@ def test_claims_of_the_lookup_hold(tmp_path):
     import softjaw
     from softjaw.study.lookup import GraspMap
     from softjaw.study.quantities import MAIN
+
     own = np.linspace(25, 175, 35)
     between = ((own[1:] + own[:-1]) / 2).round(6).tolist()
     text = re.sub(r"\n(stations_mm|refine|normal_force_n) .*", "", pathlib.Path(BOTTLE).read_text())
@@ -74,6 +75,6 @@ def test_claims_of_the_lookup_hold(tmp_path):
         middle, most, worst = np.quantile(error, [0.5, 0.9, 1.0])
         times = (error / np.maximum(claim, 1e-12)).max()
         print(f"{name}: median {middle:.2%}, 90 % {most:.2%}, worst {worst:.1%} ({times:.1f} times the claim), "
-              f"claims {np.median(claim):.1%}; {(error <= claim).mean():.1%} within")  # fmt: skip
-        assert (error <= claim).mean() >= 0.95, name
+              f"claims {np.median(claim):.1%}; {(error <= claim + 1e-12).mean():.1%} within")  # fmt: skip
+        assert (error <= claim + 1e-12).mean() >= 0.95, name  # rounding of what is the same on a straight body
         assert times <= 3.5, name
