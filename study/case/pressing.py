@@ -140,12 +140,12 @@ class PressedContact(Contact):
         (n, m), k = shape.patch_faces, shape.per_side
         loaded, edges = self.loaded.reshape(n, m), np.zeros((n, m))
         sides = (_neighbours(each) for each in (self.patch.normal.reshape(n, m, 3), loaded, edges))
-        for (a, b), (one, other), (here, there) in zip(*sides, strict=True):
-            turns = np.arccos(np.clip(np.einsum("ijc,ijc->ij", a, b), -1.0, 1.0))
-            usual = np.median(turns[one & other]) if (one & other).any() else 0.0
-            sharp = np.where(one | other, np.clip((turns - 2.0 * usual) / SHARP, 0.0, 1.0), 0.0)
-            for place in (here, there):
-                np.maximum(place, sharp, out=place)
+        for (a, b), (first, second), pair in zip(*sides, strict=True):
+            turns, inside = np.arccos(np.clip(np.einsum("ijc,ijc->ij", a, b), -1.0, 1.0)), first & second
+            usual = np.median(turns[inside]) if inside.any() else 0.0
+            sharp = np.where(first | second, np.clip((turns - 2.0 * usual) / SHARP, 0.0, 1.0), 0.0)
+            for faces in pair:  # of the edge, on both of its sides
+                np.maximum(faces, sharp, out=faces)
         share = np.where(loaded, edges, 0.0).reshape(n // k, k, m // k, k).max(axis=(1, 3))
         load = self.patch.load.reshape(n // k, k, m // k, k).sum(axis=(1, 3))
         return float((share * load).sum() / load.sum())
