@@ -117,9 +117,9 @@ def first_rank() -> bool:
     return next((os.environ[name] == "0" for name in RANK if name in os.environ), True)
 
 
-def complain(error: StudyError) -> int:
-    """Say what went wrong, once, and give the exit code."""
-    if first_rank():
+def complain(error: StudyError, speaks: bool | None = None) -> int:
+    """Say what went wrong, once unless it is known that this process ``speaks``, and give the exit code."""
+    if first_rank() if speaks is None else speaks:
         for line in error.message.splitlines():
             print(f"error: {printable(line)}", file=sys.stderr, flush=True)
     return error.code

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 import os
-import sys
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable
@@ -26,7 +25,7 @@ from softjaw.study import messages, quantities
 from softjaw.study.case.build import listed_accuracy, with_mass
 from softjaw.study.case.result import TimeLimitError
 from softjaw.study.flags import LOST, Flag, flag_words
-from softjaw.study.messages import NoGraspError, StudyError, shortened
+from softjaw.study.messages import NoGraspError, StudyError, complain, shortened
 from softjaw.study.ranking import judge, largest, task_keys
 from softjaw.study.result import index
 from softjaw.study.result.read import dataset, values_of
@@ -198,8 +197,7 @@ class _ObjectsRun:
         except Exception as error:
             if isinstance(error, StudyError) and error.code in FATAL:
                 if self._comm.size > 1:  # the others wait for this rank
-                    print(f"error: {error.message}", file=sys.stderr, flush=True)
-                    self._comm.Abort(error.code)
+                    self._comm.Abort(complain(error, speaks=True))
                 raise
             self._failed.append((n, self.rows[n] | _why(error, self._work.time_limit)))
             return None

@@ -19,7 +19,7 @@ from typing import Any, TypeVar
 import numpy as np
 from mpi4py import MPI
 
-from softjaw.study.messages import CANNOT_WRITE, STOPPED, StudyError, launched, make_folders
+from softjaw.study.messages import CANNOT_WRITE, STOPPED, StudyError, complain, launched, make_folders
 from softjaw.study.quantities import DONE, FAILED, MISSING
 from softjaw.study.result import provenance
 from softjaw.study.result.lock import Lock, OpenedFile
@@ -324,10 +324,7 @@ def print_summary(work: Work, path: Path) -> None:
 def _end_all(comm: Any, claims: Claims, error: StudyError) -> None:
     """End all ranks, if there are others, because this one cannot write; the first to notice speaks."""
     if comm.size > 1:
-        if claims.first_to_speak():
-            for line in error.message.splitlines():
-                print(f"error: {line}", file=sys.stderr, flush=True)
-        comm.Abort(error.code)
+        comm.Abort(complain(error, claims.first_to_speak()))
 
 
 def _progress(objects: Iterable[Iterable[Any]], codes: np.ndarray, ranks: int) -> Progress:
