@@ -302,7 +302,8 @@ def _limit(ds: xr.Dataset, index: Index) -> str:
     if better:
         top = f"{short_name(ds, int(done[better[0]]))} with {shown_text(values[better[0]], ds[name].units, 3)}"
         parts.append(f"{len(better)} with more {name} cannot be used ({top}): {lacks}")
-    return "; ".join(parts)
+    faults = flags_in(int(ds["flags"].values[index]) & (Flag.SLIPS | Flag.COLLISION | Flag.NOT_BORNE))
+    return "; ".join([*(fault.sentence for fault in faults), *parts])
 
 
 def _beyond(ds: xr.Dataset, index: Index) -> str:

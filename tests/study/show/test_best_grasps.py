@@ -243,6 +243,9 @@ def test_the_answer_says_what_is_held_and_which_force_holds_a_mass():
     told = best(rising()).facts["answer"]
     assert "1000 g" in told["holds"]
     assert "200 g at 1 N" in told["force"]
+    colliding = rising()
+    colliding.flags.values[:] = Flag.COLLISION
+    assert Flag.COLLISION.sentence in best(colliding).facts["answer"]["limit"]
     low, error = force_to_use(rising(0.3), (1, 0, 1))
     assert low == pytest.approx(3.0)
     assert error == pytest.approx(np.hypot(0.03, 0.3))  # of the curve, and 10 % of mu
