@@ -38,45 +38,12 @@ OF_PAIRS = {"p_max": 3.0}  # of what pairs differ by: peaks that an effect makes
 PAYLOADS = ("payload", "safety_factor")  # what arms and couples leave of the friction: little of it moves all of them
 
 
-def mesh_errors(
-    fine: Sequence[Contact], coarse: Sequence[Contact], values: Mapping[str, Any], other: Mapping[str, Any],
-    settings: EvaluationSettings, views: Sequence[Sequence[Contact]] = (),
-    pairs: Sequence[tuple[Sequence[Any], Sequence[Any], float]] = (), unseen: Unseen | None = None,
-    left_out: float = 0.0,
-) -> dict[str, float]:  # fmt: skip
-    """Errors of all quantities that have one, from the contacts on the mesh and on a coarser one.
-
-    ``values`` are those of the fine mesh, ``other`` what the coarser one says beside its contacts; keyed alike.
-    ``views`` are the coarse contacts with their pressures at Gauss points and at nodes, ``pairs`` are contacts on the
-    coarse mesh that differ too, and which share of that counts; ``left_out`` is a share of every value.
-    """
-    fine_mesh, coarse_mesh = _on_mesh(values, fine), _on_mesh(other, coarse) | grasp_values(tuple(coarse), settings)
-    viewed = [_sums(view) | grasp_values(tuple(view), settings) for view in views]
-    compared = [(_all(low, settings), _all(high, settings), share) for low, high, share in pairs]
-    acts = any(contact.state.points.friction is not None for _, high, _ in pairs for contact in high)
-    errors = {}
-    for q in (q for q in TABLE if q.error and q.key in coarse_mesh and q.name != "opening_loaded"):
-        seen = [view[q.key] for view in viewed if q.key in view]
-        value, size = fine_mesh[q.key], _size(q, fine_mesh[q.key])
-        error = estimate(value, coarse_mesh[q.key], seen, q.error, q.name in PAYLOADS)
-        if "wall" in q.needs:  # dents converge with first order: as far as the coarser mesh's is away, it is off
-            error /= OF_FARTHEST
-        error += (unseen.share(q, fine, acts) if unseen else 0.0) * size
-        if q.error == "relative" and not np.all(coarse_mesh[q.key]):
-            error = max(error, 1.0)  # a payload of which the coarse mesh has nothing
-        apart = [s * distance(low[q.key], high[q.key], q.error, value) for low, high, s in compared if q.key in low]
-        errors[q.of_error.key] = error + OF_PAIRS.get(q.name, 1.0) * sum(apart) + left_out * size
-    if "maps/closing_error" in errors:  # the opening is less by what both pads close
-        errors["maps/opening_loaded_error"] = 2.0 * errors["maps/closing_error"] * float(fine_mesh["maps/closing"][0])
-    return errors
-
-
 class Unseen(NamedTuple):
     """Shares that no difference of two meshes shows: floors of sums over a contact and of widths; load on edges."""
 
-    floor: float
-    of_width: float
-    on_edges: float
+    floor: float = 0.0
+    of_width: float = 0.0
+    on_edges: float = 0.0
 
     @classmethod
     def of(cls, contacts: Sequence[Any], doubt: float = 1.0) -> Unseen:
@@ -93,6 +60,42 @@ class Unseen(NamedTuple):
             floor *= 0.4 + 0.2 / (1.0 - 2.0 * pad.material.poisson_ratio)
         # pressures alone give forces along the face by balance, with friction that acts back they do not
         return floor * (2.0 if acts and q.name.startswith("f_") else 1.0) + self.on_edges * OF_EDGES[q.name]
+
+
+ALL_SEEN = Unseen()
+
+
+def mesh_errors(
+    fine: Sequence[Contact], coarse: Sequence[Contact], values: Mapping[str, Any], other: Mapping[str, Any],
+    settings: EvaluationSettings, views: Sequence[Sequence[Contact]] = (),
+    pairs: Sequence[tuple[Sequence[Any], Sequence[Any], float]] = (), unseen: Unseen = ALL_SEEN,
+    left_out: float = 0.0,
+) -> dict[str, float]:  # fmt: skip
+    """Errors of all quantities that have one, from the contacts on the mesh and on a coarser one.
+
+    ``values`` are those of the fine mesh, ``other`` what the coarser one says beside its contacts; keyed alike.
+    ``views`` are the coarse contacts with their pressures at Gauss points and at nodes, ``pairs`` are contacts on the
+    coarse mesh that differ too, and which share of that counts; ``left_out`` is a share of every value.
+    """
+    fine_mesh, coarse_mesh = _on_mesh(values, fine), _on_mesh(other, coarse) | grasp_values(tuple(coarse), settings)
+    viewed = [_sums(view) | grasp_values(tuple(view), settings) for view in views]
+    compared = [(_all(low, settings), _all(high, settings), share) for low, high, share in pairs]
+    acts = any(contact.state.points.friction is not None for _, high, _ in pairs for contact in high)
+    errors = {}
+    for q in (q for q in TABLE if q.error and q.key in coarse_mesh and q.name != "opening_loaded"):
+        seen = [view[q.key] for view in viewed if q.key in view]
+        value, size = fine_mesh[q.key], _size(q, fine_mesh[q.key])
+        # dents of walls converge with first order: as far as the coarser mesh's is away, they are off
+        share = 1.0 if "wall" in q.needs else OF_FARTHEST
+        error = estimate(value, coarse_mesh[q.key], seen, q.error, q.name in PAYLOADS, share)
+        error += unseen.share(q, fine, acts) * size
+        if q.error == "relative" and not np.all(coarse_mesh[q.key]):
+            error = max(error, 1.0)  # a payload of which the coarse mesh has nothing
+        apart = [s * distance(low[q.key], high[q.key], q.error, value) for low, high, s in compared if q.key in low]
+        errors[q.of_error.key] = error + OF_PAIRS.get(q.name, 1.0) * sum(apart) + left_out * size
+    if "maps/closing_error" in errors:  # the opening is less by what both pads close
+        errors["maps/opening_loaded_error"] = 2.0 * errors["maps/closing_error"] * float(fine_mesh["maps/closing"][0])
+    return errors
 
 
 def coarse_errors(
@@ -122,16 +125,17 @@ def _size(q: Quantity, value: ArrayLike) -> float:
 
 
 def estimate(
-    fine: ArrayLike, coarse: ArrayLike, views: Sequence[ArrayLike], kind: str, remainder: bool = False
-) -> float:
-    """Error of a number on the finer mesh: a share of the farthest of the coarser one and of its ``views``.
+    fine: ArrayLike, coarse: ArrayLike, views: Sequence[ArrayLike], kind: str, remainder: bool = False,
+    share: float = OF_FARTHEST,
+) -> float:  # fmt: skip
+    """Error of a number on the finer mesh: a ``share`` of the way to the farthest of the coarser one and its ``views``.
 
     The difference of two meshes alone passes through zero where the contact's edge lies alike on both; those to the
     views of the coarse contact do not. A ``remainder`` of larger numbers is in doubt more than in proportion, twice
     as much where one is a whole value away.
     """
     farthest = max(distance(fine, other, kind) for other in (coarse, *views))
-    return OF_FARTHEST * farthest * (1.0 + remainder * min(farthest, 1.0))
+    return share * farthest * (1.0 + remainder * min(farthest, 1.0))
 
 
 def distance(value: ArrayLike, other: ArrayLike, kind: str, of: ArrayLike | None = None) -> float:

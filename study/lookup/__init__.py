@@ -70,10 +70,10 @@ class GraspMap:
     around show, with those beside them, added up over the three axes and times 1.75, along angles 5.25, along forces
     (whose power laws are straight lines of logarithms) 3.5: a claim, below which at least 95 % of the true errors of
     the main maps stay where that was measured. Between angles more than 25 degrees apart there are no values: edges
-    that come to bear between them would stay unseen. Errors that the cases
-    around state themselves (``accuracy.meshes = 2``; in between as the values are) are added in squares.
-    Along an axis of two values there is no second derivative, and half of their difference stands in. What is
-    narrower than the spacing of the candidates stays unseen.
+    that come to bear between them would stay unseen. Errors that the cases around state themselves
+    (``accuracy.meshes = 2``; in between as the values are) are added in squares. Along an axis of two values there is
+    no second derivative, and half of their difference stands in. What is narrower than the spacing of the candidates
+    stays unseen.
 
     Examples
     --------
@@ -101,7 +101,7 @@ class GraspMap:
         self.done = self._grid(self.status == DONE)
         self.snapped = self.done & (self._grid(self.read("flags")) & Flag.SNAPPED > 0)
         self._tables: dict[tuple[str, str], FloatArray] = {}
-        self._bends: dict[tuple[str, str], FloatArray] = {}
+        self._bends: dict[tuple[str, str], tuple[FloatArray, bool]] = {}  # and whether those along forces are relative
         self._poses: dict[tuple[float, float], tuple[FloatArray, FloatArray]] = {}
         self.kind = self._kinds()
 
@@ -190,20 +190,20 @@ class GraspMap:
 
     def errors(self, name: str, model: str, at: Corners) -> FloatArray:
         """Error of `interpolated` for a quantity of the case, at many points."""
-        key, grid = (name, model), self.table(name, model).reshape(self.shape)
-        powers = not (grid <= 0.0).any()  # NaN, where nothing is solved, is not
+        key = name, model
         if key not in self._bends:
-            bent = bends(grid, self.axes, self.snapped)
+            grid = self.table(name, model).reshape(self.shape)
+            bent, powers = bends(grid, self.axes, self.snapped), not (grid <= 0.0).any()  # NaN, of no case, is not
             if powers:
                 forces = replace(self.axes[2], x=np.log(self.axes[2].x))
                 bent[2] = bends(np.log(grid), (*self.axes[:2], forces), self.snapped)[2]
-            self._bends[key] = claims(bent, self.shape)
-        along, bend = error(self._bends[key], at, (0, 1)), self._bends[key]
+            self._bends[key] = claims(bent, self.shape), powers
+        bend, powers = self._bends[key]
         if not powers:
-            return along + error(bend, at, (2,))
-        share = at.share.copy()
-        share[:, 2] = at.power
-        return along + error(bend, replace(at, share=share), (2,)) * self.interpolated(name, model, at)
+            return error(bend, at, (0, 1, 2))
+        share = np.column_stack([at.share[:, :2], at.power])
+        relative = error(bend, replace(at, share=share), (2,))
+        return error(bend, at, (0, 1)) + relative * self.interpolated(name, model, at)
 
     def states(self, at: Corners) -> np.ndarray:
         """State of many points, as `GraspPoint.state` has it."""

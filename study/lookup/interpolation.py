@@ -1,10 +1,10 @@
 """Values between the nodes of a grid of two axes and of forces, with what the neighbours tell about the error.
 
 Along forces they follow power laws, as contacts nearly do, which are straight lines between logarithms. Along the other
-axes they lie on straight lines, which never overshoot. Between two nodes a distance
-``h`` apart the line misses a smooth function by ``f'' / 2 (x - x_0) (x_1 - x)``; the second derivative is taken from
-the three-point differences at both nodes, whichever is larger, and the errors along the axes add up. Maps of contacts
-have kinks, which three nodes see or miss by chance: an estimate is the largest of a cell and those around it, times
+axes they lie on straight lines, which never overshoot. Between two nodes a distance ``h`` apart the line misses a
+smooth function by ``f'' / 2 (x - x_0) (x_1 - x)``; the second derivative is taken from the three-point differences at
+both nodes, whichever is larger, and the errors along the axes add up. Maps of contacts have kinks, which three nodes
+see or miss by chance: an estimate is the largest of a cell and those around it, times
 `CLAIM_FACTOR`, which was measured on cases that a map does not hold.
 """
 

@@ -274,18 +274,19 @@ def at_force(ds: xr.Dataset, force: float) -> xr.Dataset:
     k = min(int(np.searchsorted(forces, force, side="right")) - 1, len(forces) - 2)
     share, power = ((force - forces[k]) / np.diff(forces)[k], np.log(force / forces[k]) / np.diff(np.log(forces))[k])
     low, high = (ds.isel(normal_force=[i]).assign_coords(normal_force=[force]) for i in (k, k + 1))
-    between, line = (low.assign_attrs(between=forces[k : k + 2].tolist()) for _ in range(2))
+    between = low.assign_attrs(between=forces[k : k + 2].tolist())
     for name in (str(n) for n, v in ds.data_vars.items() if "normal_force" in v.dims):
         dims, first, last = ds[name].dims, low[name].values, high[name].values
         if ds[name].dtype.kind == "f":
-            values = line_values = (1 - share) * first + share * last
+            values = (1 - share) * first + share * last
             if not {"component", "monomial", "wrench"} & set(dims):
-                values = power_law(first, last, power, line_values)
-            between[name], line[name] = (dims, values, ds[name].attrs), (dims, line_values, ds[name].attrs)
+                values = power_law(first, last, power, values)
+            between[name] = (dims, values, ds[name].attrs)
         elif name == "flags":
             between[name] = (dims, first | last, ds[name].attrs)
     for q in (q for q in TABLE if q.error and q.of_error.name in between):
-        apart = abs(line[q.name] - between[q.name]) / (between[q.name] if q.error == "relative" else 1.0)
+        line = (1 - share) * low[q.name] + share * high[q.name]
+        apart = abs(line - between[q.name]) / (between[q.name] if q.error == "relative" else 1.0)
         # a payload of nothing at both forces lies nowhere else
         between[q.of_error.name] += (apart.isel(model=0, drop=True) if "model" in apart.dims else apart).fillna(0.0)
     states = np.where(low["status"].values == DONE, high["status"].values, low["status"].values)

@@ -136,11 +136,11 @@ def test_every_quantity_with_an_error_gets_one_and_a_weight_between_the_pads_is_
     task = replace(SETTINGS, task=Task((fine[0].origin + fine[1].origin) / 2, mass=0.1))
     values, other = evaluate(fine, task)[0], {"maps/closing": 1.1e-3, "maps/opening_loaded": 0.049}
     values |= {"maps/closing": 1e-3, "maps/opening_loaded": 0.050}
+    pad = SimpleNamespace(shape=SimpleNamespace(element="hex8"), material=SimpleNamespace(poisson_ratio=0.25))
+    fine[0].state = SimpleNamespace(pad=pad)
     # of a wall all of the distance is left
     dents = [mine | {"maps/indentation": dent} for mine, dent in ((values, 1e-3), (other, 1.1e-3))]
     assert mesh_errors(fine, coarse, *dents, task)["maps/indentation_error"] == pytest.approx(0.1, rel=1e-9)
-    pad = SimpleNamespace(shape=SimpleNamespace(element="hex8"), material=SimpleNamespace(poisson_ratio=0.25))
-    fine[0].state = SimpleNamespace(pad=pad)
     errors = mesh_errors(fine, coarse, values, other, task)
     assert set(errors) == {q.of_error.key for q in TABLE if q.error and "wall" not in q.needs}
     assert np.isfinite([*errors.values()]).all()
