@@ -86,7 +86,7 @@ def plan(options: Namespace) -> str:
     """Say what a run will take."""
     if options.folder:
         options.folder.check()
-        return hanging(objects_text(options.folder, results_folder(options), options.ranks[0]), terminal_width())
+        return hanging(objects_text(options.folder, results_folder(options), options.ranks), terminal_width())
     scene = with_sampled_grasps(scene_of(options))
     path = target(options)
     made = make_plan(scene, options.scene, options.overrides)
@@ -96,8 +96,8 @@ def plan(options: Namespace) -> str:
     return hanging("\n".join(lines), terminal_width())
 
 
-def objects_text(folder: ObjectFolder, out: Path, ranks: int) -> str:
-    """Objects, cases, disk, memory and time on so many ranks."""
+def objects_text(folder: ObjectFolder, out: Path, ranks: Sequence[int]) -> str:
+    """Objects, cases, disk, memory and time on each of these numbers of ranks."""
     objects, planned = folder.objects, []
     some = objects[:: -(-len(objects) // PLANNED)]
     scale, begin = len(objects) / len(some), time.perf_counter()
@@ -105,20 +105,21 @@ def objects_text(folder: ObjectFolder, out: Path, ranks: int) -> str:
         with suppress(StudyError):
             scene = with_sampled_grasps(folder.scene(one))
             planned.append((make_plan(scene, folder.scene_file, folder.overrides_of(one)), memory(scene)))
-    preparing = scale * (time.perf_counter() - begin) / ranks
+    preparing = scale * (time.perf_counter() - begin)
     rows = {"objects": f"{len(objects)}, of which {len(some)} were looked at"}
     if planned:
         paths = [seconds for made, _ in planned for seconds in estimated(made.tried)]
         many = paths * max(1, round(scale))
-        solving = slowness() * makespan(many, ranks) * scale * len(paths) / len(many)
+        solving = slowness() * scale * len(paths) / len(many)
+        on = {f"{n} rank{'s' * (n > 1)}": (solving * makespan(many, n), preparing / n) for n in ranks}
         cases, space = (scale * sum(getattr(made.layout, name) for made, _ in planned) for name in ("rows", "nbytes"))
         need, free = max(needs for _, needs in planned), free_bytes(out / "index.hdf")
         rows |= {
             "cases": f"about {cases:.0f}",
             "disk": f"about {space / 1e6:.3g} MB in {out}, {free / 1e9:.1f} GB free",
-            "memory": f"roughly {gigabytes(need, 1)} on each rank, {gigabytes(need * ranks, 2)} on {ranks}",
-            "time": f"about {duration(START_S + preparing + solving)} on {ranks} rank{'s' * (ranks > 1)}, "
-            f"{duration(preparing)} of it for sampling grasps; estimated on a bed of springs",
+            "memory": f"roughly {gigabytes(need, 1)} on each rank, {gigabytes(need * ranks[0], 2)} on {ranks[0]}",
+            "time": "; ".join(f"about {duration(START_S + sum(t))} on {name}, {duration(t[1])} of it for sampling grasps"
+                              for name, t in on.items()) + "; estimated on a bed of springs",
         }
     if len(planned) < len(some):
         rows["no grasp"] = f"{len(some) - len(planned)} of {len(some)}: they are rows of the index, with the reason"

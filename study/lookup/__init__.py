@@ -83,7 +83,8 @@ class GraspMap:
     """
 
     def __init__(self, file: str | Path | xr.Dataset, where: Mapping[str, Any] | None = None) -> None:
-        ds = file if isinstance(file, xr.Dataset) else open_dataset(one_file(file))
+        ds = file if isinstance(file, xr.Dataset) else open_dataset(file)
+        one_file(ds.attrs["file"])
         self.file_axes = axes_of(ds)
         station, angle, force = self.file_axes[-3:]
         self.index = _sweep_point(self.file_axes[:-3], dict(where or {}))

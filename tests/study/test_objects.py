@@ -99,6 +99,8 @@ def test_the_command_line_names_meshes_from_where_it_is(scene, objects, count, m
     code, text, _ = command(0, "check", "sub/scene.toml", "--objects", objects)
     assert code == DONE
     assert f"{count}: a" in text
+    on = re.findall(r"on (\d) rank", command(0, "plan", "sub/scene.toml", "--objects", objects, "-n", "2,4")[1])
+    assert on == ["2", "4"]
     assert command(0, "check", "sub/scene.toml", "--objects", "nothing/*.stl")[0] == USAGE
 
 
@@ -138,8 +140,9 @@ def test_programs_get_every_row_and_what_is_for_one_file_is_refused(tmp_path, so
         code, _, errors = command(0, *words, option, value)
         assert (code, str(option) in errors) == (USAGE, True)
     assert command(0, "view", tmp_path)[0] == USAGE
-    with pytest.raises(StudyError):
-        softjaw.GraspMap(tmp_path)
+    for index in (tmp_path, softjaw.open(tmp_path)):
+        with pytest.raises(StudyError):
+            softjaw.GraspMap(index)
 
 
 def test_again_nothing_is_solved_another_mesh_is_refused_and_a_signal_stops_in_order_and_the_run_resumes(scene, solved):
