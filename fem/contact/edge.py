@@ -7,9 +7,15 @@ so the moments of a stretch of loaded faces tell its length ``2 a``. With ``t`` 
     p = p_0 sqrt(1 - t^2) (1 + c t^2)
     <y^2> = a^2 (2 + c) / (8 + 2 c),   <y^4> / <y^2>^2 = (8 + 5 c) (4 + c) / (4 (2 + c)^2)
 
-``c = 0`` is Hertz's pressure. The fourth moment is noisy on few faces, so it counts as far as the mesh resolves it. A
-stretch that such edges would lead beyond a rim of the pad, where pressure need not vanish, ends there; to its free edge
-at the distance ``b`` it has ``p = sqrt(1 - s / b) (c_0 + c_1 s)``.
+``c = 0`` is Hertz's pressure. At an edge of the object pressure rises before it falls, and the fourth moment is small. A
+mesh that does not resolve how the edge is rounded meets it as a sharp one, with::
+
+    p = p_0 (1 - t^2)^q
+    <y^2> = a^2 / (2 q + 3),   <y^4> / <y^2>^2 = 3 (2 q + 3) / (2 q + 5)
+
+``q = 0`` is an even pressure, ``q = -1/2`` that of a punch. The fourth moment is noisy on few faces, so it counts as far
+as the mesh resolves it. A stretch that such edges would lead to a rim of the pad or beyond, where pressure need not
+vanish, ends there; to its free edge at the distance ``b`` it has ``p = sqrt(1 - s / b) (c_0 + c_1 s)``.
 """
 
 from __future__ import annotations
@@ -19,8 +25,10 @@ from numpy.typing import NDArray
 
 from softjaw.friction.patch import NEGLIGIBLE, ContactPatch, FloatArray
 
-RESOLVED = 0.24  # node spacing over half length at which half of the fourth moment counts (Hertz's cylinder)
-FLATTEST, STEEPEST = 1.8, 2.4  # of <y^4> / <y^2>^2: an even pressure, and more than any contact has that ends smoothly
+# Node spacing over half length at which half of the fourth moment counts: of Hertz's cylinder, and of a box's face; and
+# at which an edge of the object is half a sharp one, half a round one.
+RESOLVED, EDGE_RESOLVED, ROUND = 0.24, 0.5, 0.1
+FLATTEST, STEEPEST = 1.5, 2.4  # of <y^4> / <y^2>^2: a punch's, and more than any contact has that ends smoothly
 EVEN, POINTED = 7.0 / 6.0, 14.0 / 9.0  # bounds of <s^2> / <s>^2 from a rim on: c_0 = 0, and c_1 = -c_0 / b
 
 
@@ -130,7 +138,8 @@ def _edges(
     z = s - np.repeat(mean, ends - starts + 1)
     variance, fourth = (np.add.reduceat(load * z**k, starts) / force for k in (2, 4))
     half = 0.5 * _between_edges(variance, fourth, spacing)
-    low, high = at_rims[0] & (mean < half), at_rims[1] & (whole - mean < half)
+    # a quarter of the spacing from a rim: an even pressure on few faces ends a little before it
+    low, high = (rim & (to - half < 0.25 * spacing) for rim, to in zip(at_rims, (mean, whole - mean), strict=True))
     # the first idle node is not in contact; beside a rim, where pressure may be singular, all but the last ones are
     b = np.maximum(_from_rim(mean, variance + mean**2, spacing), s[np.maximum(ends - 1, starts)] - 0.5 * spacing)
     from_other = _from_rim(whole - mean, variance + (whole - mean) ** 2, spacing)
@@ -143,12 +152,15 @@ def _between_edges(variance: FloatArray, fourth: FloatArray, spacing: FloatArray
     """Length of stretches with two free edges [m], from the central moments of their loads [m^2, m^4]."""
     # the load of one node alone is spread over the node's share of the face
     variance = np.maximum(variance, spacing**2 / 12.0)
-    kurtosis = fourth / variance**2
-    trust = 1.0 / (1.0 + (spacing / (2.0 * np.sqrt(variance)) / RESOLVED) ** 4)
-    k = 2.0 + trust * (np.clip(kurtosis, FLATTEST, STEEPEST) - 2.0)
+    coarse = spacing / (2.0 * np.sqrt(variance))
+    beyond = np.clip(fourth / variance**2, FLATTEST, STEEPEST) - 2.0  # what Hertz's pressure has
+    edged = beyond < 0.0
+    k = 2.0 + beyond / (1.0 + (coarse / np.where(edged, EDGE_RESOLVED, RESOLVED)) ** 4)
     a, b, c = 4.0 * k - 5.0, 16.0 * k - 28.0, 16.0 * k - 32.0
     shape = (-b + np.sqrt(np.maximum(b**2 - 4.0 * a * c, 0.0))) / (2.0 * a)
-    return 2.0 * np.sqrt(variance * (8.0 + 2.0 * shape) / (2.0 + shape))
+    smooth = (8.0 + 2.0 * shape) / (2.0 + shape)  # a^2 / <y^2>
+    sharp = edged / (1.0 + (ROUND / coarse) ** 4)
+    return 2.0 * np.sqrt(variance * (smooth + sharp * (2.0 * k / (3.0 - k) - smooth)))
 
 
 def _from_rim(mean: FloatArray, square: FloatArray, spacing: FloatArray) -> FloatArray:

@@ -31,7 +31,8 @@ WIDER = dict.fromkeys((q.name for q in TABLE if q.error == "absolute"), 10.0) | 
 OF_WIDTH = {"closing": 0.33, "contact_area": 1.4, "p_max": 5.0}  # the same, of what depends on the contact's width
 # Of the share of the load that edges of the object bear: where such an edge lies within an element tells no mesh.
 OF_EDGES = dict.fromkeys((q.name for q in TABLE), 0.12) | {
-    "payload": 0.02, "safety_factor": 0.02, "f_x_max": 0.04, "f_y_max": 0.04, "contact_area": 0.7, "p_max": 3.0,
+    "payload": 0.02, "safety_factor": 0.02, "f_x_max": 0.04, "f_y_max": 0.04, "closing": 0.25, "contact_area": 0.2,
+    "p_max": 3.0,
 }  # fmt: skip
 EDGES_ROUNDED = 1.6  # times the error of a payload on the coarse mesh alone, where the object's edges are rounded
 OF_PAIRS = {"p_max": 3.0}  # of what pairs differ by: peaks that an effect makes at an edge grow as elements shrink

@@ -51,6 +51,15 @@ def test_area_and_peak_of_an_elliptic_contact_converge_and_a_line_contact_ends_a
         assert area < 0.02
         assert peak < 0.04
         assert counted > area
+    # a face of the object that ends under the pad: an even pressure, and a punch's, half of whose edge is not resolved
+    for power, half in ((0.0, 0.0053), (0.0, 0.0081), (-0.5, 0.0053), (-0.5, 0.0081)):
+
+        def ended(x, y, power=power, half=half):
+            return np.where(np.abs(y) < half, np.maximum(1.0 - (y / half) ** 2, 1e-3) ** power, 0.0)
+
+        area, _, counted = errors(ended, 2 * half * LENGTH, (10, 10))
+        assert area < 0.06
+        assert counted > area
     # p = sqrt(1 - s / b) (1 + s / (2 b)) from the end of the pad on, exact but for the integration over the faces.
     for b in (0.013, 0.0215):
 
