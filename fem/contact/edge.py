@@ -7,14 +7,14 @@ so the moments of a stretch of loaded faces tell its length ``2 a``. With ``t`` 
     p = p_0 sqrt(1 - t^2) (1 + c t^2)
     <y^2> = a^2 (2 + c) / (8 + 2 c),   <y^4> / <y^2>^2 = (8 + 5 c) (4 + c) / (4 (2 + c)^2)
 
-``c = 0`` is Hertz's pressure. At an edge of the object pressure rises before it falls, and the fourth moment is small. A
-mesh that does not resolve how the edge is rounded meets it as a sharp one, with::
+``c = 0`` is Hertz's pressure. At an edge of the object pressure rises before it falls, and the fourth moment is small.
+A mesh that does not resolve how the edge is rounded meets it as a sharp one, with::
 
     p = p_0 (1 - t^2)^q
     <y^2> = a^2 / (2 q + 3),   <y^4> / <y^2>^2 = 3 (2 q + 3) / (2 q + 5)
 
-``q = 0`` is an even pressure, ``q = -1/2`` that of a punch. The fourth moment is noisy on few faces, so it counts as far
-as the mesh resolves it. A stretch that such edges would lead to a rim of the pad or beyond, where pressure need not
+``q = 0`` is an even pressure, ``q = -1/2`` that of a punch. The fourth moment is noisy on few faces, so it counts as
+far as the mesh resolves it. A stretch that such edges would lead to a rim of the pad or beyond, where pressure need not
 vanish, ends there; to its free edge at the distance ``b`` it has ``p = sqrt(1 - s / b) (c_0 + c_1 s)``.
 """
 

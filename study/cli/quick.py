@@ -111,15 +111,15 @@ def objects_text(folder: ObjectFolder, out: Path, ranks: Sequence[int]) -> str:
         paths = [seconds for made, _ in planned for seconds in estimated(made.tried)]
         many = paths * max(1, round(scale))
         solving = slowness() * scale * len(paths) / len(many)
-        on = {f"{n} rank{'s' * (n > 1)}": (solving * makespan(many, n), preparing / n) for n in ranks}
+        on = {f"{n} rank{'s' * (n > 1)}": (preparing / n, solving * makespan(many, n)) for n in ranks}
         cases, space = (scale * sum(getattr(made.layout, name) for made, _ in planned) for name in ("rows", "nbytes"))
         need, free = max(needs for _, needs in planned), free_bytes(out / "index.hdf")
         rows |= {
             "cases": f"about {cases:.0f}",
             "disk": f"about {space / 1e6:.3g} MB in {out}, {free / 1e9:.1f} GB free",
             "memory": f"roughly {gigabytes(need, 1)} on each rank, {gigabytes(need * ranks[0], 2)} on {ranks[0]}",
-            "time": "; ".join(f"about {duration(START_S + sum(t))} on {name}, {duration(t[1])} of it for sampling grasps"
-                              for name, t in on.items()) + "; estimated on a bed of springs",
+            "time": "; ".join(f"about {duration(START_S + sum(t))} on {name}" for name, t in on.items())
+            + f"; {duration(preparing)} for sampling grasps on one; estimated on a bed of springs",
         }
     if len(planned) < len(some):
         rows["no grasp"] = f"{len(some) - len(planned)} of {len(some)}: they are rows of the index, with the reason"
