@@ -41,13 +41,12 @@ def surface_points(shape: Any, spacing: float = SPACING) -> FloatArray:
     return np.unique(np.round(finer, 7), axis=0)
 
 
-def boxes(hand: Hand, along: str, pad: FloatArray, opening: float, depth: float) -> FloatArray:
+def boxes(hand: Hand, pad: FloatArray, opening: float, depth: float) -> FloatArray:
     """Corners ``(k, 2, 3)`` [m] of palm, fingers and foam in the hand's frame, prolonged by `WAY` against z.
 
-    ``along`` is the closing axis, ``pad (3,)`` the pad's extents along the approach and across both axes, and its
-    thickness [m], ``opening`` the distance of the faces of the foam, and ``depth`` the pads' distance from the frame.
+    ``pad (3,)`` are the pad's extents along the approach and across both axes, and its thickness [m], ``opening`` the distance of the faces of the foam, and ``depth`` the pads' distance from the frame.
     """
-    closing = "xy".index(along)
+    closing = "xy".index(hand.closing)
     across = 1 - closing
     width, thickness = (pad[1], FINGER_THICKNESS) if hand.finger_mm is None else np.array(hand.finger_mm) / 1e3
     tip, root = depth + pad[0] / 2, depth - pad[0] / 2
@@ -62,9 +61,7 @@ def boxes(hand: Hand, along: str, pad: FloatArray, opening: float, depth: float)
         box[:, 2] = start - WAY, tip
         made.append(box)
     if hand.palm_mm is not None:
-        palm = np.array(hand.palm_mm) / 1e3
-        palm[:, :2] = palm[:, :2] if along == hand.closing else palm[:, 1::-1]
-        made.append(palm - [[0.0, 0.0, WAY], [0.0, 0.0, 0.0]])
+        made.append(np.array(hand.palm_mm) / 1e3 - [[0.0, 0.0, WAY], [0.0, 0.0, 0.0]])
     return np.stack(made)
 
 
@@ -77,18 +74,17 @@ def hand_axes(pad: FloatArray, approach: str, closing: str) -> FloatArray:
 
 
 def rooms(
-    points: FloatArray, hand: Hand, along: str, pad: FloatArray, middle: FloatArray, size: Sequence[float], wide: float,
-    depth: float,
-) -> dict[str, float]:  # fmt: skip
+    points: FloatArray, hand: Hand, pad: FloatArray, middle: FloatArray, size: Sequence[float], wide: float, depth: float
+) -> dict[str, float]:
     """By approach the clearance [m] of a hand that comes to pads ``wide`` apart round ``middle (3,)`` [m].
 
     ``pad``: axes of finger 1's as columns ``(3, 3)``. ``size``: of a pad, along its axes. Others as for `boxes`.
     """
     found = {}
     for approach in hand.approaches:
-        R = hand_axes(pad, approach, along)
+        R = hand_axes(pad, approach, hand.closing)
         sides = size[:2] if approach.endswith("x") else size[1::-1]
-        parts = boxes(hand, along, np.array([*sides, size[2]]), wide, depth)
+        parts = boxes(hand, np.array([*sides, size[2]]), wide, depth)
         found[approach] = clearance((points - middle) @ R + [0.0, 0.0, depth], parts)
     return found
 
@@ -121,13 +117,13 @@ def clearance(points: FloatArray, corners: FloatArray) -> float:
 
 
 def clearest(
-    scene: Any, hand: Hand, along: str, pad: FloatArray, middle: FloatArray, wide: float, depth: float
+    scene: Any, hand: Hand, pad: FloatArray, middle: FloatArray, wide: float, depth: float
 ) -> tuple[str, float]:
     """The approach of a hand, and its clearance [m]; parameters as for `rooms`.
 
     It is the one from above, if the hand is `FREE` there, else the clearest. `ValueError, OSError`: no object is there.
     """
-    room = rooms(surface_points(scene.object), hand, along, pad, middle, scene.gripper.pad_size, wide, depth)
+    room = rooms(surface_points(scene.object), hand, pad, middle, scene.gripper.pad_size, wide, depth)
     weight = np.array(scene.task.direction or (0.0, 0.0, -1.0))
     down = {name: float(hand_axes(pad, name, "x")[:, 2] @ weight / np.linalg.norm(weight)) for name in room}
     approach = chosen_approach(room, down)

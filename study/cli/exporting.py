@@ -79,7 +79,7 @@ def gripper_of(options: Namespace, preset: str | None = None) -> GripperFrame:
     name = options.gripper or preset
     hand = gripper_file(name)[1] if name else Hand()
     approaches = tuple(options.approaches or (("x",) if options.form in SIMULATORS else ()))
-    hand = hand.model_copy(update={"closing": CLOSING.get(options.form, hand.closing)})
+    hand = hand.closing_along(CLOSING.get(options.form, hand.closing))
     return GripperFrame(hand, approaches, in_si("wider_mm", options.wider), options.frame)
 
 

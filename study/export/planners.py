@@ -25,7 +25,7 @@ import math
 import os
 import re
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal
 
 import xarray as xr
 
@@ -38,7 +38,7 @@ from softjaw.study.templates import template
 from softjaw.study.units import UNITS
 
 # of every gripper of the format; others have the hand's own
-CLOSING = {"graspgen": "x", "acronym": "x", "webdataset": "x"}
+CLOSING: dict[str, Literal["x", "y"]] = {"graspgen": "x", "acronym": "x", "webdataset": "x"}
 
 
 def as_graspgen(grasps: Sequence[RankedGrasp], gripper: GripperFrame, ds: xr.Dataset, folder: str = ".") -> str:

@@ -89,6 +89,18 @@ class Hand(BaseModel):
         angle = max(0.0, min(self.linkage_mm.angle(mm), self.largest_angle))
         return {name: factor * angle for name, factor in self.joints.items()}
 
+    def closing_along(self, axis: Literal["x", "y"]) -> Hand:
+        """The same hand in a frame that is turned about the approach, so that it closes along ``axis``.
+
+        >>> Hand(palm_mm=((-3, -10, -50), (2, 10, 0))).closing_along("x").palm_mm
+        ((-10.0, -2.0, -50.0), (10.0, 3.0, 0.0))
+        """
+        palm = self.palm_mm
+        if palm and axis != self.closing:
+            (x, y, z), (X, Y, Z) = palm
+            palm = ((y, -X, z), (Y, -x, Z)) if axis == "x" else ((-Y, x, z), (-y, X, Z))
+        return self.model_copy(update={"closing": axis, "palm_mm": palm})
+
     def depth(self, gap: float) -> float:
         """Distance [m] from the hand's frame to the middle of the pads at a gap [m]."""
         return in_si("depth_mm", self.linkage_mm.depth(1e3 * gap) if self.linkage_mm else self.depth_mm)

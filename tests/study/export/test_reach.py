@@ -76,15 +76,19 @@ def test_boxes_clear_a_sphere_and_stand_beside_the_pads_and_the_gripper_of_the_s
     assert np.abs(points[:, 2]).max() == pytest.approx(TOP)
     grid = np.array([[0.025, 0.0, z] for z in np.linspace(-TOP, TOP, 50)])
     assert np.linalg.norm(points[None] - grid[:, None], axis=-1).min(axis=1).max() < 2e-3
-    parts = boxes(FRANKA, "y", np.array([0.02, 0.018, 0.005]), 0.06, 0.10365)
+    hold = np.array([0.02, 0.018, 0.005]), 0.06, 0.10365
+    parts = boxes(FRANKA, *hold)
     foam, fingers, palm = parts[:2], parts[2:4], parts[4]
     assert foam[1] == pytest.approx(np.array([[-0.009, 0.030, 0.09365 - WAY], [0.009, 0.035, 0.11365]]))
     assert fingers[0] == pytest.approx(np.array([[-0.011, -0.061, -WAY], [0.011, -0.035, 0.11365]]))
     assert palm[:, 2] == pytest.approx([-0.0259 - WAY, 0.066])
-    turned = boxes(FRANKA, "x", np.array([0.02, 0.018, 0.005]), 0.06, 0.10365)
+    turned = boxes(FRANKA.closing_along("x"), *hold)
     assert turned == pytest.approx(parts[:, :, [1, 0, 2]])
     options = Namespace(gripper=None, approaches=None, form="isaac_grasp", wider=20.0, frame="object")
     assert gripper_of(options, "franka_hand").hand == FRANKA
+    options.form = "graspgen"  # which closes along x: the palm goes with it
+    assert np.abs(boxes(gripper_of(options, "franka_hand").hand, *hold)) == pytest.approx(np.abs(turned))
+    options.form = "isaac_grasp"
     assert gripper_of(options).hand == Hand()
     options.gripper = "wsg50"
     assert gripper_of(options, "franka_hand").hand == gripper_file("wsg50")[1]
