@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,9 +26,10 @@ from softjaw.study.case.limit_surface import finger_surface
 from softjaw.study.case.model import check_petsc
 from softjaw.study.case.result import CaseFailure, CaseResult, GraspNumbers
 from softjaw.study.flags import Flag, flags_in
-from softjaw.study.messages import SOME_FAILED, StudyError
+from softjaw.study.messages import SOME_FAILED, StudyError, shown
 from softjaw.study.quantities import BY_KEY, MAIN, MODELS, STATES, TABLE, checked_model
 from softjaw.study.scene import Scene
+from softjaw.study.scene.model import plain_tables
 from softjaw.study.units import converted, shown_text
 
 READY = 4  # candidates whose matrices are kept for further forces: 10 to 100 MB each
@@ -161,7 +163,7 @@ def solved_case(
 ) -> Case:
     """Solve one case; arguments and errors as for `softjaw.press`."""
     _refuse_open_questions(scene)
-    scene, number = _asked(with_mass(scene), station, angle, candidate, pose)
+    scene, number = _asked(with_mass(scene.reread()), station, angle, candidate, pose)
     forces, k = _joined(scene.load.normal_force_n, _number("force", force, "N"))
     scene = scene.with_values({"load.normal_force_n": forces})
     try:
@@ -216,7 +218,7 @@ def _asked(
     if pose is not None and not isinstance(pose, Mapping):  # that of a pad, where it stands already
         return _with_candidates(scene, {"poses": [grasp_pose(pose)]}), 0
     if pose is not None:
-        poses = [*scene.effective()["candidates"].get("poses", ()), pose]
+        poses = [*scene.effective()["candidates"].get("poses", ()), plain_tables(pose)]
         return _with_candidates(scene, {"poses": poses} | moves), len(poses) - 1
     if candidate is not None:
         scene = with_sampled_grasps(scene)
@@ -280,11 +282,16 @@ def grasp_pose(pose: Any) -> Mapping[str, Any]:
     if isinstance(pose, tuple) and [np.shape(part) for part in pose] == [(2, 3, 3), (2, 3)]:
         # as `GraspPoint.pose` gives them: finger 1's is enough, for the other one comes from the opposite side
         pose = np.vstack([np.column_stack([pose[0][0], pose[1][0]]), [0.0, 0.0, 0.0, 1.0]])
-    matrix = np.asarray(pose, dtype=float) if not isinstance(pose, str) else np.zeros(0)
+    matrix = np.zeros(0)
+    with suppress(TypeError, ValueError):  # of a text, or of parts of different shapes
+        matrix = np.asarray(pose, dtype=float)
     if matrix.shape != (4, 4):
-        text = "a mapping with point_mm, approach and long_side, or a matrix (4, 4) with the translation in m"
-        raise TypeError(f"pose has the shape {matrix.shape}: expected {text}")
-    R = matrix[:3, :3]
+        text = "a mapping with point_mm, approach and long_side, a matrix (4, 4) with the translation in m, or a pair"
+        raise TypeError(f"pose is {shown(pose)}: expected {text} of both pads' rotations and origins")
+    R, last = matrix[:3, :3], matrix[3] - [0.0, 0.0, 0.0, 1.0]
+    if not np.abs(last).max() <= 1e-6:
+        raise ValueError(f"pose has the last row {matrix[3].tolist()}: expected 0, 0, 0, 1; is it transposed?")
     if not np.isfinite(matrix).all() or np.abs(R @ R.T - np.eye(3)).max() > 1e-6 or np.linalg.det(R) < 0:
-        raise ValueError(f"pose has the rotation {R.tolist()}: expected columns long side, short side and approach")
+        text = "right-handed unit columns: long side, short side, approach"
+        raise ValueError(f"pose has the rotation {R.tolist()}: expected {text}")
     return {"point_mm": (1e3 * matrix[:3, 3]).tolist(), "approach": R[:, 2].tolist(), "long_side": R[:, 0].tolist()}

@@ -218,18 +218,20 @@ def distinct(ds: xr.Dataset, order: Sequence[int], score: np.ndarray, k: int, to
     """The first ``top`` distinct places (0: all) of a ranking at a force level.
 
     Grasps are neighbours where both pads touch less than half a pad apart, rolled by at most 30 degrees. Stations and
-    angles have images too, which have neighbours of their own: grasps at one station with the same ``score``.
+    angles have images too, which have neighbours of their own: grasps at one station with the same ``score`` and
+    opening.
     """
     shape, rest, places = ds.status.shape[:-1], np.asarray(order, int), list[Place]()
     count = int(np.prod(shape))
     index = np.array(np.unravel_index(np.arange(count), shape)).T
     origin, turn = (ds[name].values if name in ds else None for name in ("finger_pose_origin", "finger_pose_rotation"))
     pad = task_keys(ds, "gripper")
+    opening = values_of(ds, "opening")[..., k].ravel() if "opening" in ds else score
     half = 0.5e-3 * np.array([pad.get(f"pad_{side}_mm", 0.0) for side in ("length", "width", "width")])
     while len(rest) and not 0 < top <= len(places):
         head = rest[0]
         here = (index[rest, :-2] == index[head, :-2]).all(axis=1)
-        alike = np.abs(score[rest] - score[head]) <= TIE * abs(score[head])
+        alike = np.all([np.abs(v[rest] - v[head]) <= TIE * abs(v[head]) for v in (score, opening)], axis=0)
         images = here & (index[rest, -2] == index[head, -2]) & alike & (not ds.attrs["poses"])
         near, far = np.zeros(len(rest), bool), np.zeros(len(rest))
         if origin is not None and turn is not None:

@@ -134,4 +134,4 @@ def run(scene: Scene, file: str | Path, comm: Any = None, *, retry_failed: bool 
     except ImportError as error:
         raise ImportError(MISSING.format(what="run", error=error), name=error.name) from error
     with threadpool_limits(1):
-        return solve_scene(scene, path, MPI.COMM_WORLD if comm is None else comm, retry_failed=retry_failed)
+        return solve_scene(scene.reread(), path, MPI.COMM_WORLD if comm is None else comm, retry_failed=retry_failed)

@@ -31,7 +31,7 @@ from softjaw.study.case.build import (
 )
 from softjaw.study.case.fit import doubt, extremes, fit_of, jaws_of
 from softjaw.study.case.poses import axis_poses, explicit_poses, moved, turn_of_pose
-from softjaw.study.messages import USAGE, StudyError, first_of
+from softjaw.study.messages import USAGE, StudyError, first_of, shown
 from softjaw.study.quantities import MISSING, REALISATION, Axis
 from softjaw.study.scene import Scene
 from softjaw.study.units import UNITS, in_si, split_unit
@@ -105,10 +105,10 @@ def check_candidates(scene: Scene) -> None:
             pose = place.poses[0]  # finger 2 comes along the same line
             low, _ = extremes((points - pose.origin) @ pose.rotation, triangles, scene.gripper.pad_size[:2])
             if not math.isfinite(low):
-                labels[number] = place.label
+                labels[number] = f"{shown([*scene.candidates.poses[number].point_mm])} of '{place.label}'"
     if labels:
         remedy = "expected a line of approach that meets it; point_mm is in mm, in the frame of the object's own file"
-        found = [f"candidates.poses[{i}].point_mm: found '{label}', where the pads miss the object; {remedy}"
+        found = [f"candidates.poses[{i}].point_mm: found {label}, where the pads miss the object; {remedy}"
                  for i, label in labels.items()]  # fmt: skip
         raise StudyError(USAGE, "\n".join(first_of(found, MOST_NAMED, " poses miss it")))
 

@@ -44,7 +44,8 @@ def surface_points(shape: Any, spacing: float = SPACING) -> FloatArray:
 def boxes(hand: Hand, pad: FloatArray, opening: float, depth: float) -> FloatArray:
     """Corners ``(k, 2, 3)`` [m] of palm, fingers and foam in the hand's frame, prolonged by `WAY` against z.
 
-    ``pad (3,)`` are the pad's extents along the approach and across both axes, and its thickness [m], ``opening`` the distance of the faces of the foam, and ``depth`` the pads' distance from the frame.
+    ``pad (3,)`` are the pad's extents along the approach and across both axes, and its thickness [m], ``opening`` is
+    the distance of the faces of the foam, and ``depth`` the pads' distance from the frame.
     """
     closing = "xy".index(hand.closing)
     across = 1 - closing
@@ -74,8 +75,9 @@ def hand_axes(pad: FloatArray, approach: str, closing: str) -> FloatArray:
 
 
 def rooms(
-    points: FloatArray, hand: Hand, pad: FloatArray, middle: FloatArray, size: Sequence[float], wide: float, depth: float
-) -> dict[str, float]:
+    points: FloatArray, hand: Hand, pad: FloatArray, middle: FloatArray, size: Sequence[float], wide: float,
+    depth: float,
+) -> dict[str, float]:  # fmt: skip
     """By approach the clearance [m] of a hand that comes to pads ``wide`` apart round ``middle (3,)`` [m].
 
     ``pad``: axes of finger 1's as columns ``(3, 3)``. ``size``: of a pad, along its axes. Others as for `boxes`.

@@ -283,6 +283,11 @@ class Scene(SceneSection):
             given.setdefault("candidates.stations", None)
         return Scene.of_tables(put(self.effective(), plain_tables(given)))
 
+    def reread(self) -> Scene:
+        """The scene with its object's file as it is now."""
+        now = type(self.object).model_validate(self.object.model_dump())
+        return self.model_copy(update={"object": now})
+
     @classmethod
     def of_tables(cls, tables: Mapping[str, Any]) -> Scene:
         """The scene of tables in which everything is filled in, as `effective` gives them, and without a sweep."""

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal, get_args
+from typing import Annotated, Any, ClassVar, Literal, get_args
 
-from pydantic import Field, ValidationInfo, field_validator
+from pydantic import Field, PrivateAttr, ValidationInfo, field_validator
 
 from softjaw.fem.objects.mesh_file import ENDINGS, lacking
 from softjaw.study.scene.section import Errors, Point, SceneSection, Text, numbers_text, refusal, wrong
@@ -253,6 +254,15 @@ class Mesh(Walled):
     crease_angle_deg: Annotated[float, Field(ge=0, le=180)] = Field(
         30.0, description="edges that turn by less are facets of a smooth surface, others stay edges; 0: all stay"
     )
+
+    # time and size of the file: what is kept of a mesh is not taken for another one in its place
+    _stamp: tuple[int, int] = PrivateAttr((0, 0))
+
+    def model_post_init(self, context: Any) -> None:
+        """Note which file it is."""
+        with suppress(OSError):
+            status = Path(self.mesh).stat()
+            self._stamp = status.st_mtime_ns, status.st_size
 
     @field_validator("mesh")
     @classmethod

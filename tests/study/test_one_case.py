@@ -5,6 +5,7 @@ import io
 
 import numpy as np
 import pytest
+import trimesh
 from mpi4py import MPI
 from threadpoolctl import threadpool_limits
 
@@ -111,6 +112,22 @@ def test_what_the_scene_lacks_is_added_to_it(tmp_path):
         assert sj.press(SMOKE, pose=pose, force=1).e_n == pytest.approx(across.e_n, rel=1e-9)
 
 
+def test_a_mesh_that_another_one_has_taken_the_place_of_is_read_again(tmp_path):
+    """By a scene that was made before, too."""
+    path = tmp_path / "ball.stl"
+    trimesh.creation.icosphere(3, 20.0).export(path)
+    pose = {"point_mm": [0, 0, 0], "approach": [1, 0, 0], "long_side": [0, 0, 1]}
+    scene = sj.Scene.from_dict({
+        "object": {"shape": "mesh", "mesh": str(path), "unit": "mm"}, "gripper": {"elements": [8, 4, 2]},
+        "candidates": {"poses": [pose]}, "load": {"normal_force_n": [2]}, "accuracy": {"meshes": 1},
+    })  # fmt: skip
+    for radius in (20.0, 26.0):
+        trimesh.creation.icosphere(3, radius).export(path)
+        assert sj.press(scene, candidate=0, force=2.0).value("opening") == pytest.approx(2e-3 * radius, rel=1e-3)
+    ds = sj.open(run(scene, tmp_path / "ball.hdf"))
+    assert float(ds.opening.max()) == pytest.approx(2e-3 * radius, rel=1e-3)
+
+
 def test_poses_are_turned_and_shifted_as_the_scene_says_but_not_where_a_pad_stands_already():
     moves = {"candidates.roll_deg": 30, "candidates.shift_mm": 8}
     scene = BOXES.with_values(**moves)
@@ -125,7 +142,8 @@ def test_poses_are_turned_and_shifted_as_the_scene_says_but_not_where_a_pad_stan
     assert again.e_n == pytest.approx(case.e_n, rel=1e-6)
 
 
-POSE = {"point_mm": [0, 0, 500], "approach": [1, 0, 0], "long_side": [0, 0, 1]}
+POSE = {"point_mm": np.array([0, 0, 500]), "approach": [1, 0, 0], "long_side": np.array([0, 0, 1])}
+ROTATED = np.array([[0.0, 0, 1, 0.1], [0, -1, 0, 0], [1, 0, 0, 0.2], [0, 0, 0, 1]])
 
 
 @pytest.mark.parametrize(
@@ -141,9 +159,12 @@ POSE = {"point_mm": [0, 0, 500], "approach": [1, 0, 0], "long_side": [0, 0, 1]}
         (SMOKE, {"station": 0, "candidate": 1}, ValueError, "station and candidate"),
         (SMOKE, {"candidate": 0}, ValueError, "give station and angle"),
         (SMOKE, {"station": 0, "angle": 0, "force": -1}, ValueError, r"load\.normal_force_n.*-1"),
-        (SMOKE, {"pose": np.eye(3)}, TypeError, r"\(3, 3\).*\(4, 4\)"),
+        (SMOKE, {"pose": np.eye(3)}, TypeError, r"\(4, 4\)"),
         (SMOKE, {"pose": "x"}, TypeError, r"\(4, 4\)"),
-        (SMOKE, {"pose": np.ones((4, 4))}, ValueError, "approach"),
+        (SMOKE, {"pose": np.ones((4, 4))}, ValueError, "last row"),
+        (SMOKE, {"pose": ROTATED.T}, ValueError, "transposed"),
+        (SMOKE, {"pose": ROTATED * [1, -1, 1, 1]}, ValueError, "approach"),
+        (SMOKE, {"pose": ([0, 0, 0], [0, 0, 0, 1])}, TypeError, "rotations and origins"),
         (SMOKE, {"pose": POSE}, ValueError, r"poses\[0\]\.point_mm"),
         (SMOKE, {"pose": {"point_mm": [0, 0, 0]}}, ValueError, r"approach: found nothing"),
         (BOXES, {"station": 0.0, "angle": 0.0}, ValueError, "candidate=0"),

@@ -56,6 +56,8 @@ def test_images_of_a_grasp_share_a_line_and_count_as_one(top):
     assert cells(table, "name") == ["s00", "s02", "s04", "s05"][: top or 4]
     assert "90" in cells(table, "others")[0]
     assert len(as_csv(best(pairs, top=top)).splitlines()) == 1 + (top or 6)
+    sides = pairs.assign(opening=pairs.opening * (1 + pairs.angle))  # a box holds as well on its other sides
+    assert len(best(sides, top=top, lines=True).rows) == (top or 6)
 
 
 def test_flags_are_counted_words_or_bits_and_messages_that_differ_in_numbers_are_one_kind():
