@@ -91,10 +91,12 @@ def read_triangles(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
 def lacking(path: Path) -> str:
     """What is expected of a file that cannot be a mesh: a known ending, content, a size; empty of one that can be."""
     endings = ", ".join(ENDINGS)
+    if not path.exists():
+        return "a file that is there; the path in a scene is relative to the scene file"
     if path.suffix.lower() not in ENDINGS:
         return f"a triangle mesh in a {endings} file; convert it to .stl"
     if not path.is_file() or not (size := path.stat().st_size):  # a device or a pipe may have no end
-        return f"the {endings} file of a triangle mesh, not empty; the path in a scene is relative to the scene file"
+        return "a file that is not empty"
     return f"at most {LARGEST_FILE >> 20} MiB; decimate the mesh, or save it as binary .stl" * (size > LARGEST_FILE)
 
 

@@ -72,9 +72,11 @@ def run_objects(
     Raises `StudyError` on every rank: what is wrong for all objects alike, ``out`` is in use, of another
     scene, or cannot be written.
     """
-    with locked(out / f"{index.INDEX}.hdf", comm):
+    with locked(path := out / f"{index.INDEX}.hdf", comm):
         run = _ObjectsRun(folder, out, study, work, comm, retry_failed)
         batch = min(max(BATCH_PER_RANK * comm.size, BATCH_PER_RANK), MOST_OPEN_FILES)
+        if not run.todo() and not on_rank0(comm, path.exists):  # all are refused
+            run.store()
         while todo := run.todo()[:batch]:
             if not run.solve(todo):
                 break
@@ -105,7 +107,7 @@ class _ObjectsRun:
             known = {name: row[name] for name in ("file", "mesh", "key", "mass")}
             self.rows[n] = index.blank_row(row["object"], state=index.STOPPED, **known)
         ended = sum(row["state"] in index.ENDED for row in self.rows)
-        self._store(f"objects {ended + 1} to {ended + len(batch)} of {len(self.rows)}")
+        self.store(f"objects {ended + 1} to {ended + len(batch)} of {len(self.rows)}")
         answers, stopped = self._divide(batch, self._prepared)
         for n, answer in answers.items():
             self.rows[n] |= {} if isinstance(answer, Part) else answer
@@ -121,7 +123,7 @@ class _ObjectsRun:
             self.rows[n] = row
         self._mine.clear()
         self._failed.clear()
-        self._store()
+        self.store()
         return not stopped
 
     # --- planning -----------------------------------------------------------------------------------------------------
@@ -232,7 +234,8 @@ class _ObjectsRun:
 
     # --- the index ----------------------------------------------------------------------------------------------------
 
-    def _store(self, text: str = "") -> None:
+    def store(self, text: str = "") -> None:
+        """Write the index, by one rank, which prints a text."""
         if text and self._comm.rank == 0:
             print(text, flush=True)
         about = {"scene_file": self._folder.scene_file, "overrides": "\n".join(self._folder.overrides)}

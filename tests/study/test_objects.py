@@ -173,6 +173,16 @@ def test_a_scene_that_is_wrong_for_all_objects_ends_every_rank(scene, tmp_path):
     assert "friction.mu" in errors
 
 
+def test_a_folder_of_which_nothing_can_be_read_has_its_index_with_the_reasons(scene, tmp_path):
+    out = tmp_path / "out"
+    (tmp_path / "scene.toml").write_text(SCENE.replace("meshes/", f"{scene.parent}/meshes/em"))
+    code, _, errors = here(fake_objects.main, tmp_path / "scene.toml", out)
+    assert code == SOME_FAILED, errors
+    [row] = rows(out).values()
+    assert str(row.state.values) == "refused"
+    assert "empty" in str(row.reason.values)
+
+
 @pytest.mark.ranks
 def test_two_ranks_give_the_same_bits(scene, solved):
     out = scene.parent / "two"
