@@ -43,7 +43,9 @@ class Column:
     label : str
         Head for people; the name where it is empty.
     error : str
-        Key that holds the error of this quantity: relative, or in the unit where that column has one other than 1.
+        Key that holds the error of this quantity.
+    relative : bool
+        Whether that is a share of the value; else it is in the unit.
     digits : int
         Significant digits where no error says how many there are.
     people, programs : bool
@@ -58,6 +60,7 @@ class Column:
     unit: str = ""
     label: str = ""
     error: str = ""
+    relative: bool = True
     digits: int = 4
     people: bool = True
     programs: bool = True
@@ -90,8 +93,7 @@ class Table:
             return "-"
         value, error = float(shown(value, column.unit)), row.get(column.error, math.nan)
         if math.isfinite(error):
-            unit = next(c.unit for c in self.columns if c.name == column.error)
-            return with_error(value, abs(value * error) if unit in ("", "1") else shown(error, unit))
+            return with_error(value, abs(value * error) if column.relative else shown(error, column.unit))
         return number(value, column.digits)
 
     def records(self) -> list[Row]:

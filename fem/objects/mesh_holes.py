@@ -154,6 +154,7 @@ def solid(points: FloatArray, triangles: IntArray, closed: bool) -> tuple[float,
     # lines along an axis know the places of both ends on it; what they do not decide others tell, and what none does
     # counts half in one estimate and not at all in the other
     sure, soft = (inside > 0.5).astype(float), np.where(count > 0, inside, 0.5)
+    lines[(lines == 0) & (sure > 0)] = np.nan  # in at one open end and out at the other
     first, second = (
         np.array([_mean_along(np.where(np.isnan(line), share, line), d) for d, line in enumerate(lines)])
         for share in (sure, soft)

@@ -144,7 +144,8 @@ def _map_columns(ds: xr.Dataset, maps: Collection[str]) -> list[Column]:
     for name in (name for name in maps if name in ds):
         q, least = map_row(name), list(maps).index(name)
         error = next((e for e in (f"{name}_interval", q.of_error.name) if e in ds), "")
-        columns.append(Column(name, q.unit, q.symbol, error, drop=least * (least > 1)))
+        relative = error == q.of_error.name and q.error == "relative"
+        columns.append(Column(name, q.unit, q.symbol, error, relative, drop=least * (least > 1)))
         columns += [Column(error, ds[error].units, people=False)] if error else []
         if name == "e_n" and maps is not BRIEF:
             columns.append(Column(PLANAR_E_N, q.unit, drop=len(maps)))
