@@ -1,4 +1,4 @@
-"""The elastic backing plate behind the pad: beams in closed form, limits, symmetry, tangent."""
+"""The elastic backing plate behind the pad: beams in closed form, limits, symmetry; its tangent and a mount's."""
 
 import numpy as np
 import pytest
@@ -7,8 +7,9 @@ from softjaw.fem.contact.press import Press
 from softjaw.fem.contact.problem import Control, SpringBed
 from softjaw.fem.contact.rigid import RigidProblem
 from softjaw.fem.pad.backing_plate import back_stiffness, relative_compliance
-from softjaw.fem.pad.shape import BackingPlate
+from softjaw.fem.pad.shape import BackingPlate, TiltingMount
 from tests.fem import reference
+from tests.fem.pad.test_mount import GLUE, beside
 from tests.fem.reference import BALL, FOAM, OVAL, SIZE, pad_of
 
 PLASTIC = BackingPlate(0.001, 2e9, 0.35, (0.02, 0.011))
@@ -65,12 +66,16 @@ def test_quarter_and_full_pads_on_a_sheet_are_the_same(gap):
         assert np.abs(one.pressure - other.pressure[same]).max() < 1e-9 * other.pressure.max()
 
 
-@pytest.mark.parametrize("control", [Control(force=3.0), Control(closing=0.002)], ids=["force", "closing"])
-def test_tangent_by_finite_differences(control):
-    pad = pad_of((4, 2, 2), (True, False), back=PLASTIC)
-    problem = RigidProblem(pad, BALL)
+@pytest.mark.parametrize(("control", "back", "symmetry", "gap", "start"), [
+    (Control(force=3.0), PLASTIC, (True, False), BALL, 0.003),
+    (Control(closing=0.002), PLASTIC, (True, False), BALL, 0.003),
+    (Control(force=2.0), TiltingMount(0.5, GLUE), WHOLE, beside(0.002), 0.002),
+], ids=["force", "closing", "mount"])  # fmt: skip
+def test_tangent_by_finite_differences(control, back, symmetry, gap, start):
+    pad = pad_of((4, 2, 2), symmetry, back=back)
+    problem = RigidProblem(pad, gap)
     problem.control = control
-    x = SpringBed(pad, BALL).guess(0.003)
+    x = SpringBed(pad, gap).guess(start)
     d = np.random.default_rng(1).normal(size=pad.size) * 1e-4
     assert reference.tangent_error(problem, x, d, 1e-3) < 1e-6
 
