@@ -8,8 +8,6 @@ from softjaw.fem.materials import material
 from softjaw.fem.objects.gap import Pose
 from softjaw.fem.objects.outer_surface import of_revolution
 from softjaw.fem.objects.revolution import Revolution
-from softjaw.fem.pad.mesh import Pad
-from softjaw.fem.pad.shape import PadShape
 from softjaw.fem.shell.grip import Grip
 from softjaw.fem.shell.thin_walled import ThinWalled, grasp, wall_between
 from softjaw.fem.shell.wall_material import WallMaterial, wall_material
@@ -54,7 +52,7 @@ def grip(
     poses = pose(theta, z, radius), pose(theta + np.pi, z, radius)
     held = grasp(body, poses, allowed)
     model, walls = wall_between(body, held, SIZE, mesh, linear=level == "linear")
-    pad = Pad(PadShape(SIZE, elements), material("blatz_ko", FOAM), held.pad_symmetry)
+    pad = reference.pad_of(elements, held.pad_symmetry, law=material("blatz_ko", FOAM), size=SIZE)
     pads = [(pad, gap_at(p), p, wall) for p, wall in zip(held.poses, walls, strict=True)]
     return Grip([lambda: WallProblem(model, pads, mu)])
 

@@ -150,7 +150,8 @@ SIZE, FOAM = (0.050, 0.022, 0.015), material("blatz_ko", 0.040e6)  # of the usua
 
 
 def pad_of(elements=(8, 4, 3), symmetry=(True, True), contact="weighted", element="hex8", law=FOAM, size=SIZE, **more):
-    return Pad(PadShape(size, elements, element=element), law, symmetry, contact, more.get("back"))
+    shape = PadShape(size, elements, more.get("grading", (1.0, 1.0, 1.0)), element)
+    return Pad(shape, law, symmetry, contact, more.get("back"))
 
 
 OVAL = placed(EllipticCylinder(0.025, 0.020, 0.1), facing(0.025))

@@ -11,8 +11,6 @@ from softjaw.fem.contact.problem import SpringBed
 from softjaw.fem.errors import ConvergenceError, NotReachedError
 from softjaw.fem.materials import material
 from softjaw.fem.objects.shapes import Sphere
-from softjaw.fem.pad.mesh import Pad
-from softjaw.fem.pad.shape import PadShape
 from tests.fem import reference
 from tests.hard_cases.conftest import ROW, row
 from tests.hard_cases.hard_case import CASES, TOLERANCES, HardCase, Outcome, Source, outcome, scene_of
@@ -102,7 +100,7 @@ def test_only_nearly_incompressible_pads_start_unsqueezed():
     gap = reference.placed(Sphere(0.02), reference.facing(0.02))
     spread = []
     for nu in (0.25, 0.499):
-        pad = Pad(PadShape((0.05, 0.022, 0.015), (4, 2, 2)), material("neo_hookean", 4e4, nu), (True, True), "weighted")
+        pad = reference.pad_of((4, 2, 2), law=material("neo_hookean", 4e4, nu))
         spread.append(np.ptp(pad.displacement(SpringBed(pad, gap).guess(1e-3))[:, 2]))
     assert spread[0] > 5e-4
     assert spread[1] < 1e-12  # of strokes of 1 mm; the guess is the same everywhere

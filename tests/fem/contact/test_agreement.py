@@ -13,8 +13,6 @@ from softjaw.fem.contact.extract import extract
 from softjaw.fem.contact.press import Press
 from softjaw.fem.materials import material
 from softjaw.fem.objects.shapes import EllipticCylinder
-from softjaw.fem.pad.mesh import Pad
-from softjaw.fem.pad.shape import PadShape
 from softjaw.friction.frame import contact_frame, in_frame
 from softjaw.friction.wrench import friction_limits
 from tests.fem import reference
@@ -29,7 +27,7 @@ MU = 0.8
 
 
 def pressed_states(ratio, elements, forces, symmetry=(True, True), contact="weighted", element="hex8"):
-    pad = Pad(PadShape(SIZE, elements, element=element), FOAM, symmetry, contact)
+    pad = reference.pad_of(elements, symmetry, contact, element, FOAM, SIZE)
     gap = reference.placed(EllipticCylinder(A, ratio * A, 0.2), reference.facing(A))
     return pad, list(Press(pad, gap).load_path(forces))
 

@@ -7,8 +7,7 @@ from softjaw.fem.contact.problem import Control
 from softjaw.fem.contact.rigid import RigidProblem
 from softjaw.fem.materials import material
 from softjaw.fem.objects.shapes import EllipticCylinder, Sphere
-from softjaw.fem.pad.mesh import Pad
-from softjaw.fem.pad.shape import BackingPlate, PadShape
+from softjaw.fem.pad.shape import BackingPlate
 from tests.fem import reference
 
 G = 0.020e6
@@ -22,8 +21,8 @@ OBJECTS = {
 
 
 def problem_of(gap, contact="weighted", element="hex8", symmetry=(True, False), law="blatz_ko", plate=None):
-    pad = Pad(PadShape(SIZE, (4, 4, 2), (2.0, 1.0, 1.5), element), material(law, G), symmetry, contact, plate)
-    return RigidProblem(pad, gap)
+    own = {"law": material(law, G), "size": SIZE, "grading": (2.0, 1.0, 1.5), "back": plate}
+    return RigidProblem(reference.pad_of((4, 4, 2), symmetry, contact, element, **own), gap)
 
 
 def contacting_state(problem, closing=1.2e-3):
@@ -96,9 +95,8 @@ def test_the_condensed_tangent_is_symmetric_and_gives_the_same_step(contact, con
 @pytest.mark.parametrize("element", ["hex8", "hex27"])
 def test_a_confined_pad_pressed_flat(element, symmetry):
     """``F = diag(1, 1, l)`` has the nominal stress ``P33 = G (1 - l^-3)``."""
-    pad = Pad(PadShape(SIZE, (4, 4, 2), (2.0, 1.0, 1.5), element), material("blatz_ko", G), symmetry)
-    problem = RigidProblem(pad, reference.plane)
-    squeeze = 2e-3
+    problem = problem_of(reference.plane, element=element, symmetry=symmetry)
+    pad, squeeze = problem.pad, 2e-3
     stretch = 1 - squeeze / SIZE[2]
     pressure = -G * (1 - stretch**-3)
     problem.control = Control(force=pressure * SIZE[0] * SIZE[1])
@@ -132,12 +130,10 @@ def test_a_row_switches_between_pressure_and_gap_and_steps_are_shortened_by_clos
         x[pressures] = 0.3e-3
         expected = pad.node_area * (0.3e-3 if closing < 0 else -closing)
         assert problem.residual(x)[pressures] == pytest.approx(problem.finger.kappa * expected, rel=1e-12)
-    problem = problem_of(reference.plane)
     x = np.zeros(problem.size)
-    x[problem.pad.dofs[problem.pad.contact_nodes, 2]] = -1.5 * SIZE[2]
+    x[pad.dofs[pad.contact_nodes, 2]] = -1.5 * SIZE[2]
     assert np.isnan(problem.residual(x)).all()
-    pad, step = problem.pad, np.zeros(problem.size)
-    x = np.zeros(problem.size)
+    x, step = np.zeros((2, problem.size))
     assert problem.shorten(x, step) == 1
     step[pad.dofs[:, 2]] = -SIZE[2]  # the whole pad moves: no element is squeezed, but the closing is too long
     assert problem.shorten(x, step) == pytest.approx(0.1)

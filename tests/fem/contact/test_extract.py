@@ -5,17 +5,15 @@ import pytest
 
 from softjaw.fem.contact.extract import extract
 from softjaw.fem.contact.press import Press
-from softjaw.fem.pad.mesh import Pad
-from softjaw.fem.pad.shape import PadShape
 from tests.fem import reference
-from tests.fem.reference import FOAM, OVAL, SIZE
+from tests.fem.reference import OVAL, SIZE
 
 WHOLE = (False, False)
 PARTS = [(True, False), (False, True), (True, True)]
 
 
 def patch_of(symmetry=(True, True), element="hex8", gap=OVAL, elements=(8, 4, 2), force=10.0, contact="weighted"):
-    pad = Pad(PadShape(SIZE, elements, (1.5, 0.7, 1.0), element), FOAM, symmetry, contact)
+    pad = reference.pad_of(elements, symmetry, contact, element, grading=(1.5, 0.7, 1.0))
     (pressed,) = Press(pad, gap).load_path([force])
     return pad, pressed, extract(pad, pressed)
 

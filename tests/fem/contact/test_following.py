@@ -11,21 +11,17 @@ from softjaw.fem.contact.problem import Control
 from softjaw.fem.errors import ConvergenceError, NotReachedError
 from softjaw.fem.materials import material
 from softjaw.fem.objects.shapes import EllipticCylinder, Sphere
-from softjaw.fem.pad.mesh import Pad
-from softjaw.fem.pad.shape import PadShape
 from tests.fem import reference
 from tests.fem.falling_force import MM, Crossings, Curve, crossings, force
 
-SIZE, G = (0.050, 0.022, 0.015), 0.040e6
-NEO = material("neo_hookean", G, 0.25)
+NEO = material("neo_hookean", 0.040e6, 0.25)
 ROUND = reference.placed(EllipticCylinder(0.025, 0.025, 0.2), reference.facing(0.025))
 BALL = reference.placed(Sphere(0.02), reference.facing(0.02))
 
 
 def press_of(law=NEO, gap=ROUND, symmetry=(True, True), elements=(12, 6, 4), **choices):
-    shape = PadShape(SIZE, elements)
-    nodal = Pad(shape, law, symmetry, "nodal")
-    return Press(Pad(shape, law, symmetry), gap, fallbacks=(nodal,), **choices)
+    pad, nodal = (reference.pad_of(elements, symmetry, contact, law=law) for contact in ("weighted", "nodal"))
+    return Press(pad, gap, fallbacks=(nodal,), **choices)
 
 
 def last(press, forces):

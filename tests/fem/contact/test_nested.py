@@ -14,20 +14,18 @@ from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.pad.shape import PadShape
 from softjaw.fem.petsc import NonlinearSolver, unknown_options
 from tests.fem.contact.test_press import relative
-from tests.fem.reference import BALL, FOAM, OVAL, SIZE, pad_of
+from tests.fem.reference import BALL, FOAM, OVAL, pad_of
 
 FORCES = [1.0, 3.0, 10.0]
 
 
 def pair(element, symmetry=(True, True), grading=(1.0, 1.0, 1.0)):
     """A pad and the one half as fine; its width has an odd number of elements, so it is no half across."""
-    shape = PadShape(SIZE, {"hex8": (12, 6, 4), "hex27": (8, 4, 2)}[element], grading, element)
     contact = "nodal" if element == "hex8" else "weighted"
-    coarse, even = shape.halved(), [n % 2 == 0 for n in shape.halved().elements]
-    return (
-        Pad(shape, FOAM, symmetry, contact),
-        Pad(coarse, FOAM, (symmetry[0] and even[0], symmetry[1] and even[1]), contact),
-    )
+    pad = pad_of({"hex8": (12, 6, 4), "hex27": (8, 4, 2)}[element], symmetry, contact, element, grading=grading)
+    coarse = pad.shape.halved()
+    even = [n % 2 == 0 for n in coarse.elements]
+    return pad, Pad(coarse, FOAM, (symmetry[0] and even[0], symmetry[1] and even[1]), contact)
 
 
 @cache
@@ -156,4 +154,3 @@ def test_pressures_are_never_interpolated_below_zero():
     pressure = interpolated(coarse, x, pad)[pad.closing_dof + 1 :]
     assert pressure.min() >= 0.0
     assert pressure.max() >= 1.0 - 1e-12
-
