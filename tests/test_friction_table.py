@@ -30,17 +30,6 @@ from softjaw.scoring.epsilon import epsilon
 from softjaw.scoring.pose import pose_volume
 from softjaw.scoring.quality import score
 from tests import generators as made
-from tests.generators import (
-    build,
-    cor_grid,
-    cor_twists,
-    lcg_patch,
-    lcg_sphere,
-    mesh_patch,
-    moved,
-    points_patch,
-    screw_twist,
-)
 from tests.lsfit.test_zhou import as_they_are, objective
 from tests.oracles import body_volume, least_squares_quartic
 from tests.scoring.grasps import contact_axes
@@ -52,7 +41,7 @@ X_HINT = np.array([0.0, 0.0, 1.0])  # of the contacts of a grasp, to be projecte
 
 
 def maxima(inputs, names, patch=None):
-    patch, mu = build(inputs["patch"]) if patch is None else patch, inputs["mu"]
+    patch, mu = made.build(inputs["patch"]) if patch is None else patch, inputs["mu"]
     found = {}
     for model in inputs.get("models", ["ccm"]):
         limits = friction_limits(patch, mu, MODEL[model])
@@ -65,12 +54,12 @@ def maxima(inputs, names, patch=None):
 
 
 def wrenches(inputs, _):
-    planar = [cor_twists(inputs["cors"]), *[[[*v, 0.0]] for v in inputs["translations"]]]
+    planar = [made.cor_twists(inputs["cors"]), *[[[*v, 0.0]] for v in inputs["translations"]]]
     twists = np.zeros((sum(map(len, planar)), 6))
     twists[:, [0, 1, 5]] = np.vstack(planar)
-    screws = [screw_twist(s["axis"], s["point"], float(s["pitch"])) for s in inputs["screws"]]
+    screws = [made.screw_twist(s["axis"], s["point"], float(s["pitch"])) for s in inputs["screws"]]
     twists = np.vstack([twists, *screws])
-    patch, mu = build(inputs["patch"]), inputs["mu"]
+    patch, mu = made.build(inputs["patch"]), inputs["mu"]
     patch = replace(patch, centroid=patch.centroid - np.array(inputs["reference_point"], float))
     return {"W": friction_wrench(patch, twists, mu), "H": friction_support(patch, twists, mu)}
 
@@ -86,13 +75,13 @@ def mesh_of(inputs):
     mesh, pressure = dict(inputs["mesh"]), FIELDS[inputs.get("pressure")]
     kind = mesh.pop("gen")
     if kind == "cyl_mesh":
-        return mesh_patch(made.cyl_mesh(**mesh), pressure)
+        return made.mesh_patch(made.cyl_mesh(**mesh), pressure)
     if kind == "bumpy":
-        return mesh_patch(made.grid_mesh(mesh["n"], mesh["n"], 1, 1, made.bump), pressure)
+        return made.mesh_patch(made.grid_mesh(mesh["n"], mesh["n"], 1, 1, made.bump), pressure)
     corners = made.grid_mesh(mesh["n"], mesh["m"], mesh["halfx"], mesh["halfy"])
     axis = np.array(mesh["rotation_axis"]) / np.linalg.norm(mesh["rotation_axis"])
     turn = Rotation.from_rotvec(mesh["angle"] * axis)
-    return mesh_patch(turn.apply(corners.reshape(-1, 3)).reshape(corners.shape) + mesh["translation"], pressure)
+    return made.mesh_patch(turn.apply(corners.reshape(-1, 3)).reshape(corners.shape) + mesh["translation"], pressure)
 
 
 def frames(inputs, _):
@@ -105,9 +94,9 @@ def frames(inputs, _):
 
 
 def samples(inputs):
-    patch, mu, rho, sampling = build(inputs["patch"]), inputs["mu"], inputs["rho"], inputs["sampling"]
-    model = MODEL[inputs.get("model", "ccm")]
-    twist = cor_grid(sampling["n"], rho) if sampling["scheme"] == "cor_grid" else fibonacci_twists(sampling["K"], rho)
+    patch, mu, rho, sampling = made.build(inputs["patch"]), inputs["mu"], inputs["rho"], inputs["sampling"]
+    model, grid = MODEL[inputs.get("model", "ccm")], sampling["scheme"] == "cor_grid"
+    twist = made.cor_grid(sampling["n"], rho) if grid else fibonacci_twists(sampling["K"], rho)
     limits = friction_limits(patch, mu, model)
     W, T = normalised_samples(friction_wrench(patch, twist, mu, model), twist, mu * limits.S, rho)
     if "noise" in inputs:
@@ -152,11 +141,11 @@ def zhou_fits(inputs, W, T):
 
 
 def fits_in_six_dimensions(inputs, _):
-    patch, mu, rho, sampling = build(inputs["patch"]), inputs["mu"], inputs["rho"], inputs["sampling"]
-    unit = lcg_sphere(sampling["d"], sampling["K"], sampling["seed"])
+    patch, mu, rho, sampling = made.build(inputs["patch"]), inputs["mu"], inputs["rho"], inputs["sampling"]
+    unit = made.lcg_sphere(sampling["d"], sampling["K"], sampling["seed"])
     point = np.array(inputs["ref_point"], float)
     twist = unit / [1, 1, 1, rho, rho, rho]
-    about = moved(patch, np.eye(3), -point)  # motions are those of the reference point
+    about = made.moved(patch, np.eye(3), -point)  # motions are those of the reference point
     W, T = normalised_samples(friction_wrench(about, twist, mu), twist, mu * friction_limits(patch, mu).S, rho)
     full = full_ellipsoid(W)
     E = exponents(6, 4)
@@ -219,7 +208,7 @@ def any_pose(inputs, names):
 
 
 def end_to_end(inputs, _):
-    patch, mu, rho = build(inputs["patch"]), inputs["mu"], inputs["contact_length"]
+    patch, mu, rho = made.build(inputs["patch"]), inputs["mu"], inputs["contact_length"]
     sizes = inputs["d"], inputs["object_length"], rho
     found = {}
     for name, model in MODEL.items():
@@ -237,14 +226,14 @@ def end_to_end(inputs, _):
 
 def hard(inputs, names, description):
     if "raises" in names:
-        return {"raises": refused(build(inputs["patch"]), inputs["corruption"])}
+        return {"raises": refused(made.build(inputs["patch"]), inputs["corruption"])}
     if "rank" in names:
         return colinear(inputs, description)
     if "zero-pressure" in description:
         other = re.search(r"plus lcg_patch\((\d+),(\d+)\)", description)
-        empty_faces_change_nothing(build(inputs["patch"]), lcg_patch(int(other[1]), int(other[2])))
+        empty_faces_change_nothing(made.build(inputs["patch"]), made.lcg_patch(int(other[1]), int(other[2])))
     if "units" in description:
-        units_change_no_sample(build(inputs["patch"]))
+        units_change_no_sample(made.build(inputs["patch"]))
     return maxima(inputs, names)
 
 
@@ -261,8 +250,8 @@ def refused(patch, corruption):
 def colinear(inputs, description):
     count, low, high = re.search(r"\((\d+) on the x axis in \[(-?\d+),(-?\d+)\]", description).groups()
     x = np.linspace(float(low), float(high), int(count))
-    patch = build(inputs["patch"])
-    twist = cor_twists(np.column_stack([x, 0 * x]))
+    patch = made.build(inputs["patch"])
+    twist = made.cor_twists(np.column_stack([x, 0 * x]))
     S = friction_limits(patch, inputs["mu"]).S
     W, T = normalised_samples(friction_wrench(patch, twist, inputs["mu"]), twist, inputs["mu"] * S, 2.0)
     surfaces = [axis_aligned_ellipsoid(W), full_ellipsoid(W), least_squares_quartic(W, T), convex_quartic(W, T)[0]]
@@ -326,7 +315,7 @@ def test_the_cases_are_those_of_the_file_each_once():
 
 
 def test_pressures_over_twelve_decades_keep_their_digits_and_qhull_may_fail():
-    wide = replace(lcg_patch(9, 300), pressure=10 ** np.linspace(-6, 6, 300))
+    wide = replace(made.lcg_patch(9, 300), pressure=10 ** np.linspace(-6, 6, 300))
     exact = math.fsum(math.hypot(*np.cross(n, np.eye(3)[0])) * f for n, f in zip(wide.normal, wide.load, strict=True))
     assert friction_limits(wide, 1.0).f_x == pytest.approx(exact, rel=1e-15)
     weak = replace(wide, pressure=np.where(np.arange(300) < 150, wide.pressure, 0.0))
@@ -335,7 +324,7 @@ def test_pressures_over_twelve_decades_keep_their_digits_and_qhull_may_fail():
         offset = np.array([[0.6, 0.8]]) * distance
         place = np.array([[0.25, -0.5]])
         exact_offset = (place + offset) - place
-        W = friction_wrench(points_patch(place, [2.0]), cor_twists(place + offset), 0.5)[0]
+        W = friction_wrench(made.points_patch(place, [2.0]), made.cor_twists(place + offset), 0.5)[0]
         direction = np.array([exact_offset[0, 1], -exact_offset[0, 0]]) / np.linalg.norm(exact_offset)
         np.testing.assert_allclose(W[:2], direction, atol=1e-14)
     # A hull that Qhull refuses is joggled; its volume is right to 1e-4.

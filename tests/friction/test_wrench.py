@@ -15,34 +15,24 @@ from softjaw.friction import wrench
 from softjaw.friction.motion import SLIDE_X, SLIDE_Y, fibonacci_twists
 from softjaw.friction.patch import ContactPatch
 from softjaw.friction.wrench import friction_limits, friction_sums, friction_support, friction_wrench, pure_torque
-from tests.generators import (
-    cap_polar,
-    cor_twists,
-    cylinder_grid,
-    disc_polar,
-    friction_sums_reference,
-    lcg_patch,
-    moved,
-    points_patch,
-    rect_grid,
-    wedge,
-)
+from tests import generators as made
 
 SEEDS = range(1, 21)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_the_compiled_kernel_is_the_textbook_formula(seed):
-    patch = lcg_patch(seed, 101)
+    patch = made.lcg_patch(seed, 101)
     twist = np.vstack([np.random.default_rng(seed).normal(size=(20, 6)), np.eye(6)])
     columns = patch.centroid.T.copy(), patch.normal.T.copy(), patch.load
     out = np.empty((len(twist), 7))
     friction_sums(*columns, twist, out)
-    np.testing.assert_allclose(out, friction_sums_reference(*columns, twist), rtol=0, atol=1e-12 * patch.load.sum())
+    expected = made.friction_sums_reference(*columns, twist)
+    np.testing.assert_allclose(out, expected, rtol=0, atol=1e-12 * patch.load.sum())
 
 
 def test_the_wrench_is_odd_and_deaf_to_speed_a_translation_turns_about_infinity_and_e_n_is_free_of_mu():
-    patch, twist = lcg_patch(5, 80), np.random.default_rng(0).normal(size=(50, 6))
+    patch, twist = made.lcg_patch(5, 80), np.random.default_rng(0).normal(size=(50, 6))
     W = friction_wrench(patch, twist, 0.4)
     rounding = {"rtol": 0, "atol": 1e-14 * patch.load.sum()}  # of the sum over faces
     np.testing.assert_allclose(friction_wrench(patch, -twist, 0.4), -W, **rounding)
@@ -50,19 +40,19 @@ def test_the_wrench_is_odd_and_deaf_to_speed_a_translation_turns_about_infinity_
         np.testing.assert_allclose(friction_wrench(patch, speed * twist, 0.4), W, **rounding)
     np.testing.assert_allclose(friction_wrench(patch, 1e-200 * twist, 0.4), W, rtol=1e-9, atol=1e-13)
     np.testing.assert_allclose(friction_support(patch, 1e3 * twist, 0.4), 1e3 * friction_support(patch, twist, 0.4))
-    W = friction_wrench(lcg_patch(3, 30), np.random.default_rng(1).normal(size=(9, 6)), 0.5, "pcm")
+    W = friction_wrench(made.lcg_patch(3, 30), np.random.default_rng(1).normal(size=(9, 6)), 0.5, "pcm")
     np.testing.assert_allclose(W[:, [2, 3, 4]], 0, atol=1e-15)
     # Forces approach with order 2 in the distance, moments with order 1.
-    patch = cylinder_grid(1.0, np.pi / 3, 2.0, 16, 16)
+    patch = made.cylinder_grid(1.0, np.pi / 3, 2.0, 16, 16)
     exact = friction_wrench(patch, SLIDE_Y, 1.0)[0]
     force, moment = [], []
     for D in (10.0, 20.0, 40.0, 80.0):
-        W = friction_wrench(patch, cor_twists([[-D, 0.3]]), 1.0)[0]
+        W = friction_wrench(patch, made.cor_twists([[-D, 0.3]]), 1.0)[0]
         force.append(abs(W[1] - exact[1]))
         moment.append(abs(W[5] - exact[5]))
     np.testing.assert_allclose(np.log2(np.divide(force[:-1], force[1:])), 2, atol=0.1)
     np.testing.assert_allclose(np.log2(np.divide(moment[:-1], moment[1:])), 1, atol=0.1)
-    patch = cylinder_grid(0.02, 0.7, 0.05, 12, 12)
+    patch = made.cylinder_grid(0.02, 0.7, 0.05, 12, 12)
     with_friction, without = friction_limits(patch, 0.8), friction_limits(patch, 0.0)
     assert with_friction.e_n == without.e_n == pytest.approx(with_friction.tau_z / (0.8 * with_friction.S), rel=1e-14)
     assert with_friction.e_n_projected == pytest.approx(with_friction.tau_z / (0.8 * with_friction.F_N), rel=1e-14)
@@ -73,7 +63,7 @@ def test_the_wrench_is_odd_and_deaf_to_speed_a_translation_turns_about_infinity_
 
 def test_the_largest_force_lies_along_the_ridge_of_a_wedge_and_in_every_direction_on_a_cap():
     """Eq. (11): along the ridge a wedge resists with mu S, whichever way it lies; in the planar models all ways."""
-    upright = wedge(0.6, 0.03, 0.05, 8, 8)
+    upright = made.wedge(0.6, 0.03, 0.05, 8, 8)
     for angle in (0.0, 0.3, 0.5, math.pi / 4, 2.5):
         c, s = math.cos(angle), math.sin(angle)
         turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1.0]])
@@ -83,7 +73,7 @@ def test_the_largest_force_lies_along_the_ridge_of_a_wedge_and_in_every_directio
         assert planar.e_n_ratio == pytest.approx(planar.tau_z / (0.7 * planar.F_N), rel=1e-12)
         assert friction_limits(patch, 0.0).e_n_ratio == pytest.approx(limits.e_n_ratio, rel=1e-12)
     # Eq. (11) on a spherical cap, where it differs from Eq. (12): max f_t = 4 R^2 int E(sin^2 t) sin t dt.
-    limits = friction_limits(cap_polar(0.02, 1.0, 40, 160), 1.0)
+    limits = friction_limits(made.cap_polar(0.02, 1.0, 40, 160), 1.0)
     t = (np.arange(4000) + 0.5) / 4000
     force = 4 * 0.02**2 * np.mean(ellipe(np.sin(t) ** 2) * np.sin(t))
     torque = np.pi * 0.02**3 * (1.0 - np.sin(1.0) * np.cos(1.0))
@@ -99,13 +89,13 @@ def test_the_largest_force_lies_along_the_ridge_of_a_wedge_and_in_every_directio
 ])  # fmt: skip
 def test_bad_arguments_are_named(call, match):
     with pytest.raises(ValueError, match=match):
-        call(lcg_patch(1, 10))
+        call(made.lcg_patch(1, 10))
 
 
 @pytest.mark.parametrize(("alpha", "left"), [(0.0, 1.0), (0.2, 1.0 - np.tan(0.2) / 0.5), (0.6, 0.0)])
 def test_what_pressing_a_wedge_has_used_is_not_there_for_holding(alpha, left):
     """Friction alone keeps a wedge of half angle alpha from sliding out of two fingers: it uses F_N tan(alpha)."""
-    patch = cylinder_grid(1e3, 1e-5, 0.02, 8, 4)  # as good as flat
+    patch = made.cylinder_grid(1e3, 1e-5, 0.02, 8, 4)  # as good as flat
     limits = friction_limits(patch, 0.5)
     held = limits.less([limits.F_N * np.tan(alpha), 0.0, 0.0])
     assert held.f_x == pytest.approx(left * limits.f_x, rel=1e-9, abs=1e-12)
@@ -169,8 +159,8 @@ def test_three_motions_give_the_largest_force_and_torque(patch):
 def test_another_reference_point_turns_motions_and_wrenches_by_the_adjoint(seed):
     """About c: ``v' = v + omega x c``, ``tau' = tau - c x f``; forces and dissipated power stay."""
     rng = np.random.default_rng(seed)
-    patch, c, twist = lcg_patch(seed, 50), rng.normal(size=3), rng.normal(size=(40, 6))
-    there = moved(patch, np.eye(3), -c)
+    patch, c, twist = made.lcg_patch(seed, 50), rng.normal(size=3), rng.normal(size=(40, 6))
+    there = made.moved(patch, np.eye(3), -c)
     twist_there = np.hstack([twist[:, :3] + np.cross(twist[:, 3:], c), twist[:, 3:]])
     W, W_there = friction_wrench(patch, twist, 0.7), friction_wrench(there, twist_there, 0.7)
     np.testing.assert_allclose(W_there[:, :3], W[:, :3], atol=1e-12)
@@ -181,8 +171,8 @@ def test_another_reference_point_turns_motions_and_wrenches_by_the_adjoint(seed)
 
 
 @pytest.mark.parametrize(("patch", "rank"), [
-    (rect_grid(2, 1, 8, 4), 3), (disc_polar(1, 4, 12), 3), (cylinder_grid(1, 1, 2, 8, 8), 6),
-    (cap_polar(1, 1, 6, 12), 6), (wedge(0.6, 1, 2, 4, 8), 5),
+    (made.rect_grid(2, 1, 8, 4), 3), (made.disc_polar(1, 4, 12), 3), (made.cylinder_grid(1, 1, 2, 8, 8), 6),
+    (made.cap_polar(1, 1, 6, 12), 6), (made.wedge(0.6, 1, 2, 4, 8), 5),
 ], ids=["rectangle", "disc", "cylinder", "cap", "wedge"])  # fmt: skip
 def test_how_many_motions_a_patch_feels(patch, rank):
     """Lifting and tilting rub nowhere on a plane patch; a wedge does not feel its own turn about the ridge; a smoothly
@@ -203,22 +193,22 @@ TRIANGLE = [[1, 0], [-0.5, math.sqrt(0.75)], [-0.5, -math.sqrt(0.75)]]
 
 
 def centred(patch):
-    return moved(patch, np.eye(3), -(patch.load @ patch.centroid) / patch.load.sum())
+    return made.moved(patch, np.eye(3), -(patch.load @ patch.centroid) / patch.load.sum())
 
 
 def test_pure_torque_turns_about_the_support_that_carries_most():
     """Loads 1:1:8 at an equilateral triangle: the median is the heavy support, 2 sqrt(3) is left of the torque."""
-    patch = points_patch(TRIANGLE, [1.0, 1.0, 8.0])
+    patch = made.points_patch(TRIANGLE, [1.0, 1.0, 8.0])
     assert pure_torque(patch, 0.5) == pytest.approx(0.5 * 2 * math.sqrt(3), rel=1e-9)
     assert pure_torque(centred(patch), 0.5) == pytest.approx(0.5 * 2 * math.sqrt(3), rel=1e-9)
     # ``mu F_2 d`` about the heavier point and ``2 mu d F_1 F_2 / (F_1 + F_2)`` about the centre of pressure.
     for heavy in (0.5, 0.6, 0.9, 0.999):
-        patch = centred(points_patch([[-0.02, 0], [0.03, 0]], [heavy, 1 - heavy]))
+        patch = centred(made.points_patch([[-0.02, 0], [0.03, 0]], [heavy, 1 - heavy]))
         about_cop = friction_limits(patch, 0.8).tau_z
         assert about_cop == pytest.approx(0.8 * 2 * 0.05 * heavy * (1 - heavy), rel=1e-12)
         assert about_cop / pure_torque(patch, 0.8) == pytest.approx(2 * heavy, rel=1e-8)
     for seed in range(20):
-        patch = lcg_patch(seed, 12)
+        patch = made.lcg_patch(seed, 12)
         flat = centred(replace(patch, pressure=patch.pressure**8, normal=np.tile([0.0, 0, 1], (12, 1))))
         ratio = friction_limits(flat, 1.0).tau_z / pure_torque(flat, 1.0)
         assert 1 <= ratio <= 2
@@ -230,12 +220,12 @@ def test_three_equal_supports_turn_about_the_point_of_fermat(corner):
     r = np.array([[0, 0], [1, 0], corner])
     squares = sum(np.sum((r[i] - r[i - 1]) ** 2) for i in range(3))
     exact = math.sqrt(squares / 2 + 2 * math.sqrt(3) * corner[1] / 2)
-    assert pure_torque(points_patch(r, [2.0, 2.0, 2.0]), 0.4) == pytest.approx(0.4 * 2 * exact, rel=1e-9)
+    assert pure_torque(made.points_patch(r, [2.0, 2.0, 2.0]), 0.4) == pytest.approx(0.4 * 2 * exact, rel=1e-9)
 
 
 @pytest.mark.parametrize("model", ["ccm", "pcm", "pcm_projected"])
 def test_the_share_does_not_depend_on_units_or_on_friction(model):
-    patch = lcg_patch(3, 40)
+    patch = made.lcg_patch(3, 40)
     one = pure_torque(patch, 1.0, model)
     for unit in (1e3, 1e-6, 1e150):
         other = replace(patch, centroid=unit * patch.centroid)
@@ -245,7 +235,7 @@ def test_the_share_does_not_depend_on_units_or_on_friction(model):
 @pytest.mark.parametrize("seed", range(1, 6))
 def test_at_pure_torque_the_net_force_vanishes(seed):
     """Smooth case: minimise over the velocity with another method, where the gradient (f_x, f_y) must be zero."""
-    patch = lcg_patch(seed, 30)
+    patch = made.lcg_patch(seed, 30)
 
     def torque(v):
         twist = [[*v, 1.0]]
