@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from softjaw.friction.frame import FrameFlag, contact_frame, contact_length, in_frame
+from tests.friction.test_decisions import strip
 from tests.generators import cyl_mesh, cylinder_grid, disc_polar, grid_mesh, lcg, mesh_patch, rect_grid
 
 X = [1.0, 0.0, 0.0]
@@ -22,9 +23,6 @@ def test_the_patch_in_its_frame_has_its_pressure_on_the_normal_and_a_cycle_ends_
     np.testing.assert_allclose(frame.origin, 0, atol=1e-15)
     np.testing.assert_allclose(frame.axes, np.eye(3), atol=1e-15)
     # A roof between two raised shelves, pressed above its ridge: each side's normal leads to the other side.
-    def strip(x0, z0, x1, z1):
-        return [[x0, -1, z0], [x1, -1, z1], [x1, 1, z1], [x0, 1, z0]]
-
     roof = [strip(-1, -0.5, 0, 0), strip(0, 0, 1, -0.5)]
     shelves = [strip(-3, 1, -2, 1), strip(2, 1, 3, 1)]
     patch = replace(mesh_patch(roof + shelves), pressure=np.array([1.0, 1.01, 1.0, 1.0]))
