@@ -6,11 +6,9 @@ from collections.abc import Callable
 import numpy as np
 
 from softjaw.friction.frame import contact_frame
-from softjaw.friction.motion import fibonacci_twists
 from softjaw.friction.wrench import friction_limits, friction_wrench, pure_torque
 from softjaw.lsfit.ellipsoid import Ellipsoid, full_ellipsoid
 from softjaw.lsfit.quartic_fit import convex_quartic
-from softjaw.lsfit.samples import normalised_samples
 from softjaw.lsfit.span import span_quartic, span_samples, zhou_quartic
 from softjaw.scoring.contact import SoftContact
 from softjaw.scoring.epsilon import epsilon
@@ -18,15 +16,12 @@ from softjaw.scoring.pose import pose_volume
 from softjaw.scoring.quality import score
 from tests.benchmark.table import fastest, line, span, title
 from tests.generators import cor_grid, cyl_mesh, cylinder_grid, disc_polar, lcg_noise, lcg_patch, lcg_sphere, mesh_patch
+from tests.oracles import samples
 from tests.scoring.grasps import contact_axes
 
 FACES, MOTIONS = 2400, 441
 
 Work = Callable[[], object]
-
-
-def samples(patch, twist):
-    return normalised_samples(friction_wrench(patch, twist, 1.0), twist, patch.load.sum(), 2.0)
 
 
 def friction() -> dict[str, tuple[Work, str]]:
@@ -43,11 +38,10 @@ def friction() -> dict[str, tuple[Work, str]]:
 def limit_surfaces() -> dict[str, tuple[Work, str]]:
     """Fits to a cylinder, to noisy samples where convexity binds, and in six dimensions."""
     cylinder, disc = cylinder_grid(1.0, math.pi / 3, 2.0, 48, 48), disc_polar(1.0, 40, 96)
-    W, T = samples(cylinder, fibonacci_twists(MOTIONS, 2.0))
-    few, many = (samples(disc, fibonacci_twists(K, 2.0)) for K in (20, 100))
+    W, T = samples(cylinder, MOTIONS)
+    few, many = (samples(disc, K) for K in (20, 100))
     noisy = few[0] * lcg_noise(20, 0.3, 11)[:, None]
-    motions = lcg_sphere(6, 1024, 5) / [1, 1, 1, 2, 2, 2]
-    six = normalised_samples(friction_wrench(cylinder, motions, 1.0), motions, cylinder.load.sum(), 2.0)
+    six = samples(cylinder, twist=lcg_sphere(6, 1024, 5) / [1, 1, 1, 2, 2, 2])
     return {
         "ellipsoid of any orientation": (lambda: full_ellipsoid(W), "at most 0.1 ms"),
         "convex quartic with its certificate": (lambda: convex_quartic(W, T, gamma=0.0), "at most 1 ms"),

@@ -13,21 +13,16 @@ from trimesh.creation import annulus, box, capsule, cylinder, icosphere
 
 from softjaw.study.result.store import open_result
 from tests.benchmark.table import line, title
+from tests.objects.bad_meshes import joined, moved
 from tests.objects.bodies import hollow_bottle, mug, revolved, scan
 
 
-def _at(mesh: trimesh.Trimesh, *place: float) -> trimesh.Trimesh:
-    mesh.apply_translation(place)
-    return mesh
-
-
 def bracket() -> trimesh.Trimesh:
-    return trimesh.util.concatenate([box((0.06, 0.03, 0.012)), _at(box((0.012, 0.03, 0.07)), -0.024, 0.0, 0.03)])
+    return joined(box((0.06, 0.03, 0.012)), moved(box((0.012, 0.03, 0.07)), -0.024, 0.0, 0.03))
 
 
 def hammer() -> trimesh.Trimesh:
-    handle = cylinder(0.014, 0.22, sections=24)
-    return trimesh.util.concatenate([handle, _at(box((0.09, 0.028, 0.028)), 0.0, 0.0, 0.11)])
+    return joined(cylinder(0.014, 0.22, sections=24), moved(box((0.09, 0.028, 0.028)), 0.0, 0.0, 0.11))
 
 
 def screwdriver() -> trimesh.Trimesh:
