@@ -24,17 +24,8 @@ class Curve:
     control, friction = Control(closing=0.0), None
     thickness, share, rounding = 20 * MM, 1.0, 0.0
 
-    def begin(self):
-        """Nothing has touched yet."""
-
-    def accept(self, x):
-        """Without friction the path does not matter."""
-
     def force_scale(self, closing):
         return 1.0
-
-    def closing_of_bed(self, force):
-        return 0.1 * MM
 
     def normal_force(self, x):
         return float(force(x[0] / MM))
