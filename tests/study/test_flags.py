@@ -37,11 +37,6 @@ def test_flags_of_lower_packages_have_rows_of_the_same_names_and_words_fit_where
         assert (f" {int(flag)} {flag.sentence}" in text) == bool(flag & OF_FILE)
 
 
-def test_taking_a_flag_away_leaves_all_others():
-    for flag in Flag:
-        assert (sum(Flag) & ~flag) == sum(other for other in Flag if other != flag)
-
-
 @pytest.mark.parametrize("value", [0, *map(int, Flag), OF_FILE, TABLE, 8 + 256])
 def test_a_value_is_told_bit_by_bit(value):
     assert sum(flags_in(value)) == value
