@@ -35,8 +35,9 @@ def browser(tmp_path):
 
 
 def test_the_page_opens_without_a_complaint_runs_no_script_from_elsewhere_and_answers_choices(browser, page, tmp_path):
+    said = "document.querySelector('.controls p').textContent"
     browser.open(page)
-    assert browser.wait("document.querySelector('.controls p').textContent")
+    assert browser.wait(said)
     browser.ask("plots.forEach(drawn)")
     browser.wait("plots.every((div) => div.querySelector('.main-svg'))")
     assert not {"Runtime.consoleAPICalled", "Runtime.exceptionThrown"} & {event for event, _ in browser.told}
@@ -49,14 +50,11 @@ def test_the_page_opens_without_a_complaint_runs_no_script_from_elsewhere_and_an
     assert browser.ask("document.title") != "ran"
     assert any("Content Security Policy" in text for _, text in browser.told)
     browser.open(page)
-    browser.wait("document.querySelector('.controls p').textContent")
+    browser.wait(said)
     assert browser.ask("document.querySelector('#maps').textContent").count(REASON) == 1  # why cases failed
     assert REASON in browser.ask("document.querySelector('#cases table').textContent")
     assert browser.ask("document.querySelector('h1').textContent").startswith("<b>thing</b>")
     assert browser.ask("document.querySelectorAll('b').length") == 0
-    browser.open(page)
-    said = "document.querySelector('.controls p').textContent"
-    browser.wait(said)
     shown = "document.querySelector('.plot').data[0].intensity.reduce((m, v) => Math.max(m, v), 0)"
     assert browser.ask(shown) == 2.0  # quality of the best grasp at 5 N
     browser.ask("document.querySelector('select').value = 'e_n'")
