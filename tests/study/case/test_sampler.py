@@ -5,16 +5,9 @@ import pytest
 import trimesh
 
 from softjaw.study.case.bed import CRUSHED, GRID, JawsOnSurface, height_fields, held
+from softjaw.study.case.candidates import with_sampled_grasps
 from softjaw.study.case.fit import Jaws, fit_of
-from softjaw.study.case.sampler import (
-    SampledGrasp,
-    antipodal_grasps,
-    axes_of,
-    reached_by_hand,
-    same_grasp,
-    state_of,
-    with_sampled_grasps,
-)
+from softjaw.study.case.sampler import SampledGrasp, antipodal_grasps, axes_of, reached_by_hand, same_grasp, state_of
 from softjaw.study.case.task import Task
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.quantities import COLLIDES, MISSING, WIDE
