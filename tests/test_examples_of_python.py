@@ -65,14 +65,11 @@ def blocks(page):
     return "\n".join(re.findall(r"^```python\n(.*?)^```$", (ROOT / page).read_text(), re.M | re.S))
 
 
-PAGE = blocks("docs/python.md")
-
-
 @pytest.mark.long
 def test_the_page_on_python_runs_as_it_stands(here, capsys):
     (here / "jobs").symlink_to(ROOT / "jobs")
     found = {}
-    exec(compile(PAGE, "docs/python.md", "exec"), found)
+    exec(compile(blocks("docs/python.md"), "docs/python.md", "exec"), found)
     assert found["code"] == 0
     assert found["case"].e_n == float(found["ds"]["e_n"].sel(model="ccm", angle=0, normal_force=2).item())
     assert "payload" in capsys.readouterr().out

@@ -142,7 +142,7 @@ def test_the_centroid_of_an_open_box_is_within_its_stated_error(roll):
 
 
 @pytest.mark.long
-def test_a_mesh_of_very_many_triangles_is_decimated(tmp_path):
+def test_a_mesh_of_very_many_triangles_is_decimated():
     fine = trimesh.creation.icosphere(8, 0.03)  # 1.3 million
     mesh = cleaned(np.array(fine.vertices), np.array(fine.faces))
     assert len(mesh.triangles) <= 210_000

@@ -18,8 +18,6 @@ from tests.hard_cases.sources import FORMULAS, second
 from tests.hard_cases.verdict import FINITE, judge
 
 GOOD = {"force_balance": 0.0, "adhesion": 0.0, "penetration": 0.0, "min_det_f": 0.9, "ellipticity": 0.9}
-
-
 NAMES = [pytest.param(case.name, marks=() if case.quick else pytest.mark.long) for case in CASES.values()]
 
 

@@ -34,8 +34,6 @@ BODIES = {
     "bowl": lambda: hollow_bowl(0.06, 0.004, 0.05),
     **{path.stem[8:]: (lambda path=path: trimesh.load(path)) for path in SCANS.glob("*.stl")},
 }
-
-
 FORCE = "load.normal_force_n=[10]"
 
 

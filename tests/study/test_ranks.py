@@ -22,8 +22,7 @@ pytestmark = pytest.mark.ranks
 
 # Two stations x three angles: 205 degrees is the image of 25, so there are four load paths of two forces.
 ROUNDED = BOX.replace("edge_radius_mm = 4", "edge_radius_mm = 8")
-CHANGES = ("limit_surface.samples=80", "accuracy.target=0.01",
-           "accuracy.target_of='e_n'", NO_COUPLING)  # fmt: skip
+CHANGES = ("limit_surface.samples=80", "accuracy.target=0.01", "accuracy.target_of='e_n'", NO_COUPLING)
 PLACES = {"stations": "[0, 30]", "angles": "[0, 5, 185]", "forces": "[1, 3]"}
 SCENE = scene_of(ROUNDED, *CHANGES, **PLACES)
 CASES = 12
@@ -128,7 +127,6 @@ def nodes():
 
 
 @pytest.mark.long
-@pytest.mark.ranks
 @pytest.mark.usefixtures("nodes")
 def test_two_nodes_write_the_file_of_one_process(tmp_path):
     scene = ROOT / "jobs" / "smoke.toml"

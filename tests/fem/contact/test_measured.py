@@ -13,8 +13,6 @@ from tests.fem import reference
 from tests.fem.reference import slopes
 
 NOISE = 1e-4
-
-
 pad_of = partial(reference.pad_of, symmetry=(False, False), contact="blended")
 
 

@@ -35,4 +35,3 @@ def test_a_station_that_moves_by_two_micrometres_changes_nothing():
     assert np.abs(closing[1] / closing[0] - 1).max() < 5e-3
     assert closing[1, 2] == pytest.approx(5.434, rel=0.01)
     assert iterations.max() <= 45
-

@@ -16,8 +16,6 @@ from tests.fem.reference import BALL, OVAL, SIZE
 G = 0.040e6
 FORCES = [1.0, 3.0, 10.0, 20.0]
 VI = {"contact_snes_type": "vinewtonrsls"}
-
-
 pad_of = partial(reference.pad_of, (12, 6, 4))
 
 

@@ -16,20 +16,15 @@ from softjaw.fem.shell.wall_material import WallMaterial, wall_material
 from softjaw.fem.shell.wall_mesh import MeshSize
 from tests.fem.grips import check_tangent, e_n, gap_at, grip, pose, stirred, thin
 
-FORCES = (0.5, 2.0)
+FORCES, MU = (0.5, 2.0), 0.4
+FORCE = Control(force=2.0)
 FINE = MeshSize(0.00085, 0.0025, 0.005)
-
-
-MU = 0.4
 
 
 @cache
 def states(allowed=(True, True), level="nonlinear", thickness=4e-4, z=0.075, support="standing", theta=0.0, mu=None):
     body = thin(thickness, support=support)
     return tuple(grip(body, z, allowed=allowed, level=level, theta=theta, mu=mu).load_path(FORCES))
-
-
-FORCE = Control(force=2.0)
 
 
 @pytest.mark.parametrize(("allowed", "level", "control"), [
