@@ -12,18 +12,19 @@ from softjaw.fem.objects.gap import Pose
 from softjaw.scoring.contact import SoftContact
 from softjaw.scoring.pose import pose_volume
 from softjaw.study.case import errors as weights
-from softjaw.study.case.build import build_object, centre_of_volume
+from softjaw.study.case.build import build_object, centre_of_volume, volume
+from softjaw.study.case.candidates import with_sampled_grasps
 from softjaw.study.case.contact import Contact, topology
 from softjaw.study.case.errors import Unseen, coarse_errors, distance, estimate, mesh_errors
 from softjaw.study.case.evaluate import FACING, EvaluationSettings, evaluate, lengths, quality
 from softjaw.study.case.task import Task
 from softjaw.study.flags import Flag
+from softjaw.study.messages import StudyError
 from softjaw.study.quantities import MODELS, TABLE, misses
-from softjaw.study.scene.objects import SphereShape
 from softjaw.study.units import GRAVITY
 from tests.friction.closed_forms import cylinder_torque
 from tests.generators import cylinder_grid
-from tests.study.scenes import BOX, scene_of
+from tests.study.scenes import BALL, BOX, OVAL, scene_of
 
 MU, R, ANGLE, LENGTH, PRESSURE, DISTANCE = 0.5, 0.03, math.pi / 3, 0.04, 2e4, 0.06
 S, F_N = 2 * R * ANGLE * LENGTH * PRESSURE, 2 * R * math.sin(ANGLE) * LENGTH * PRESSURE
@@ -193,8 +194,21 @@ def test_the_centre_of_mass_is_that_of_the_volume_in_its_own_frame():
     faces = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
     body = SimpleNamespace(surface=lambda: (corners, faces))
     assert centre_of_volume(body) == pytest.approx(corners.mean(axis=0), rel=1e-12)
-    ball = build_object(SphereShape(shape="sphere", radius_mm=30))
-    assert centre_of_volume(ball) == pytest.approx([0, 0, 0], abs=1e-15)
+    assert centre_of_volume(build_object(scene_of(BALL).object)) == pytest.approx([0, 0, 0], abs=1e-15)
+
+
+def test_a_mass_is_density_times_volume_and_what_has_no_volume_or_several_is_refused():
+    ball = with_sampled_grasps(scene_of(BALL, "object.density=1000"))
+    assert ball.object.mass == pytest.approx(1000 * 4 / 3 * math.pi * 0.03**3, rel=1e-4)
+    assert ball.object.density is None
+    tube = with_sampled_grasps(scene_of(OVAL, "object.density=500"))
+    assert tube.object.mass == pytest.approx(500 * math.pi * 0.025 * 0.02 * 0.12, rel=1e-4)
+    a, r = 0.03, 0.02  # at both ends of a frustum of 100 mm
+    cone = scene_of('shape = "revolution"\nprofile_mm = [[0, 30], [40, 26], [50, 25], [100, 20]]', stations="[50]")
+    assert volume(cone.object) == pytest.approx(math.pi * 0.1 / 3 * (a * a + a * r + r * r), rel=1e-9)
+    for shape, *change in (['shape = "plane"\nthickness_mm = 30'], [BALL, "sweep.object.radius_mm=[20, 30]"]):
+        with pytest.raises(StudyError, match="mass_g"):
+            with_sampled_grasps(scene_of(shape, "object.density=1000", *change))
 
 
 RING = np.array([[0, 0, 0, 0, 0], [0, 1, 1, 1, 0], [0, 1, 0, 1, 0], [0, 1, 1, 1, 0], [0, 0, 0, 0, 0]])
