@@ -42,6 +42,13 @@ def study(ranks, *words):
     return here(fake_run.main, *words)
 
 
+def ended(ranks, *words, code=0):
+    """What the fake study says of errors when it is run to an end with this exit code."""
+    found, _, errors = study(ranks, *words)
+    assert found == code, errors
+    return errors
+
+
 def softjaw(ranks, *words):
     """Run a command of the program to its end; without mpirun in this process."""
     return launch(ranks, "-m", "softjaw", *words) if ranks else here(main, *words)

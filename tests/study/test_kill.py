@@ -17,7 +17,7 @@ from softjaw.study.messages import CANNOT_WRITE, SOME_FAILED, STOPPED
 from softjaw.study.quantities import DONE, FAILED, MISSING
 from softjaw.study.result.lock import holder
 from softjaw.study.result.store import open_result, torn_rows
-from tests.study.launching import contents, differing, done, start, states, study, wait_for
+from tests.study.launching import contents, differing, done, ended, start, states, wait_for
 
 pytestmark = [pytest.mark.long, pytest.mark.ranks]
 VICTIMS = ("one rank", "all ranks", "mpirun")
@@ -66,8 +66,7 @@ def killed_again_and_again(path, number, chance, options):
         met += kill(process, VICTIMS[(number + k) % 3], chance)
         wait_for(lambda: not holder(path))  # ranks outlive their mpirun
         progress.append(done_rows(path))
-    code, _, errors = study(0, path, *options)
-    assert code == 0, errors
+    ended(0, path, *options)
     return met, progress
 
 
@@ -92,7 +91,7 @@ def test_no_kill_loses_a_result(tmp_path, options, kills):
 
 
 def whole(folder, *words):
-    assert study(0, folder / "whole.hdf", *words)[0] == 0
+    ended(0, folder / "whole.hdf", *words)
     return contents(folder / "whole.hdf")
 
 
@@ -103,38 +102,35 @@ def whole(folder, *words):
 ])  # fmt: skip
 def test_one_case_fails_with_its_reason_and_the_others_go_on(tmp_path, how, ranks, text):
     path = tmp_path / f"{how}.hdf"
-    code, _, errors = study(ranks, path, f"--{how}", 13, *([] if how == "greedy" else ["--limit", 3]))
-    assert code == SOME_FAILED, errors
+    ended(ranks, path, f"--{how}", 13, *([] if how == "greedy" else ["--limit", 3]), code=SOME_FAILED)
     with open_result(path) as result:
         codes, messages = result.status.ravel(), result.messages.ravel()
     # the case, the force above it, and both for the other candidate of the unit
     assert [row for row, code in enumerate(codes) if code == FAILED] == [13, 14, 16, 17]
     assert (codes[[row for row in range(36) if row not in (13, 14, 16, 17)]] == DONE).all()
     assert messages[13].startswith(text)
-    assert study(0, path, "--retry-failed")[0] == 0
+    ended(0, path, "--retry-failed")
     assert differing(path, whole(tmp_path)) == []
 
 
 def test_a_single_process_that_hangs_ends_itself_and_gives_the_case_up_the_third_time(tmp_path):
     path = tmp_path / "alone.hdf"
     for _ in range(2):
-        code, _, errors = study(0, path, "--stuck", 13, "--limit", 1)
-        assert code == 1
+        errors = ended(0, path, "--stuck", 13, "--limit", 1, code=1)
         assert "Timeout (0:00:02)!" in errors  # and where it was in Python
-    assert study(0, path, "--stuck", 13, "--limit", 1)[0] == SOME_FAILED
+    ended(0, path, "--stuck", 13, "--limit", 1, code=SOME_FAILED)
     assert [row for row, code in enumerate(states(path)) if code == FAILED] == [13, 14, 16, 17]
 
 
 @pytest.mark.parametrize(("how", "ranks"), [("unplug", 0), ("unplug", 3), ("remove", 0), ("remove", 2)])
 def test_a_place_that_gets_lost_ends_the_run_with_one_sentence(tmp_path, how, ranks):
     path = tmp_path / "lost.hdf"
-    code, _, errors = study(ranks, path, f"--{how}", 13)
-    assert code == CANNOT_WRITE, errors
+    errors = ended(ranks, path, f"--{how}", 13, code=CANNOT_WRITE)
     assert errors.count("error: ") == 1  # Open MPI adds lines of its own
     assert "Traceback" not in errors
     if how == "unplug":
         assert done(path)
-    assert study(2, path)[0] == 0
+    ended(2, path)
     assert differing(path, whole(tmp_path)) == []
 
 
@@ -156,5 +152,5 @@ def test_ranks_leave_in_order_when_mpirun_is_told_to_stop(tmp_path, name):
         assert result.sessions[0]["reason"].startswith("stopped by SIG")
         missing = result.status.ravel() == MISSING
         assert not result.read("status/attempts").ravel()[missing].any()
-    assert study(0, path)[0] == 0
+    ended(0, path)
     assert differing(path, whole(tmp_path)) == []

@@ -10,7 +10,7 @@ import pytest
 
 from softjaw.study.quantities import DONE, FAILED, MISSING, WIDE
 from softjaw.study.result.store import open_result, torn_rows
-from tests.study.launching import contents, differing, done, softjaw, start, states, study, wait_for
+from tests.study.launching import contents, differing, done, ended, softjaw, start, states, study, wait_for
 
 pytestmark = pytest.mark.ranks
 
@@ -22,7 +22,7 @@ def begun(path):
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
     path = tmp_path_factory.mktemp("whole") / "whole.hdf"
-    assert study(0, path)[0] == 0
+    ended(0, path)
     return path
 
 
@@ -37,22 +37,20 @@ def test_a_killed_rank_loses_nothing_others_go_on_and_what_is_no_grasp_is_never_
     assert code not in (0, 6, 75)
     before = contents(path)
     assert 0 < done(path) < 36
-    code, _, errors = study(0, path)
-    assert code == 0, errors
+    ended(0, path)
     assert before != uninterrupted
     assert differing(path, uninterrupted) == []
     assert not list(tmp_path.glob("*.lock"))
     assert not list(tmp_path.glob("*.part"))
     # A unit of two candidates: alike on any number of ranks, when it is resumed, and when failures are tried again.
     path = tmp_path / "wide.hdf"
-    code, _, errors = study(2, path, "--wide", 3)
-    assert code == 0, errors
+    ended(2, path, "--wide", 3)
     wide = [i for i, s in enumerate(states(path)) if s == WIDE]
     assert len(wide) == 6
     alone = tmp_path / "wide-alone.hdf"
-    assert study(0, alone, "--wide", 3)[0] == 0
+    ended(0, alone, "--wide", 3)
     assert differing(path, contents(alone)) == []
-    assert study(0, path, "--wide", 3, "--retry-failed")[0] == 0
+    ended(0, path, "--wide", 3, "--retry-failed")
     assert [i for i, s in enumerate(states(path)) if s != DONE] == wide
     with open_result(path) as result:
         assert set(result.messages.ravel()[wide]) == {"needs more"}
@@ -65,33 +63,30 @@ def test_a_killed_rank_loses_nothing_others_go_on_and_what_is_no_grasp_is_never_
 @pytest.mark.parametrize(("apart", "lost"), [((), [13, 14, 16, 17]), (("--apart",), [13, 16])])
 def test_a_case_that_kills_the_process_twice_is_given_up(tmp_path, uninterrupted, apart, lost):
     path = tmp_path / "deadly.hdf"
-    assert study(0, path, "--kill", 13, *apart)[0] == -signal.SIGKILL
-    assert study(0, path, "--kill", 13, *apart)[0] == -signal.SIGKILL
-    code, _, _ = study(0, path, "--kill", 13, *apart)
-    assert code == 6
+    ended(0, path, "--kill", 13, *apart, code=-signal.SIGKILL)
+    ended(0, path, "--kill", 13, *apart, code=-signal.SIGKILL)
+    ended(0, path, "--kill", 13, *apart, code=6)
     # Row 13 and the force above it that depends on it, for both candidates of the unit; everything else is solved.
     assert [i for i, s in enumerate(states(path)) if s == FAILED] == lost
-    assert study(0, path, "--retry-failed")[0] == 0
+    ended(0, path, "--retry-failed")
     assert differing(path, uninterrupted) == []
 
 
 def test_a_failed_case_has_its_reason_and_stops_nobody_nor_other_forces_that_are_apart(tmp_path, uninterrupted):
     path = tmp_path / "failed.hdf"
-    code, _, errors = study(2, path, "--fail", 9, "--raises", 25)
-    assert code == 6, errors
+    ended(2, path, "--fail", 9, "--raises", 25, code=6)
     # The exception ends the load path: its row and the one above, for both candidates.
     assert (states(path) == FAILED).sum() == 5
     with open_result(path) as result:
         assert result.messages.ravel()[9] == "no contact at this force"
         assert np.isnan(result.read("e_n/ccm").ravel()[[9, 25, 26]]).all()
         assert result.read("e_n/ccm").ravel()[10] > 0
-    assert study(0, path)[0] == 6
-    assert study(0, path, "--retry-failed")[0] == 0
+    ended(0, path, code=6)
+    ended(0, path, "--retry-failed")
     assert differing(path, uninterrupted) == []
     # Divided among ranks; the exception is that of one force, for both candidates of its unit.
     path = tmp_path / "apart.hdf"
-    code, _, errors = study(2, path, "--apart", "--fail", 9, "--raises", 25)
-    assert code == 6, errors
+    ended(2, path, "--apart", "--fail", 9, "--raises", 25, code=6)
     assert [i for i, s in enumerate(states(path)) if s == FAILED] == [9, 25, 28]
     assert done(path) == 33
 
@@ -108,7 +103,7 @@ def test_a_signal_stops_in_order_and_the_same_command_goes_on(tmp_path, uninterr
     with open_result(path) as result:
         assert result.sessions[0]["reason"].startswith(f"stopped by {name}")
         assert not result.read("status/attempts")[result.status == MISSING].any()
-    assert study(0, path)[0] == 0
+    ended(0, path)
     assert differing(path, uninterrupted) == []
 
 
@@ -126,8 +121,7 @@ def test_a_case_that_takes_too_long_is_abandoned_without_time_and_another_scene_
         assert result.read("status/attempts").ravel()[14] == 0
     path = tmp_path / "scene.hdf"
     shutil.copy(whole, path)
-    code, _, errors = study(0, path, "--digest", "other")
-    assert code == 3
+    errors = ended(0, path, "--digest", "other", code=3)
     assert errors.count("error: ") == 1
     assert differing(path, uninterrupted) == []
 
@@ -150,14 +144,12 @@ def test_a_second_run_at_the_same_time_is_refused_and_status_can_be_asked(tmp_pa
 ])  # fmt: skip
 def test_a_place_that_cannot_be_written_is_told_once_on_all_ranks(tmp_path, place, ranks):
     (tmp_path / "a_file").write_text("")
-    code, _, errors = study(ranks, tmp_path / place)
-    assert code == 5, errors
+    errors = ended(ranks, tmp_path / place, code=5)
     assert errors.count("error: ") == 1
 
 
 def test_too_little_space_is_noticed_before_anything_is_solved(tmp_path):
-    code, _, errors = study(0, tmp_path / "x.hdf", "--file-limit", 300_000)
-    assert code == 5, errors
+    ended(0, tmp_path / "x.hdf", "--file-limit", 300_000, code=5)
     assert not (tmp_path / "x.hdf.part").exists()
 
 
@@ -168,22 +160,19 @@ def test_a_torn_row_is_solved_again(tmp_path, whole, uninterrupted, ranks):
     with h5py.File(path, "r+") as file:
         file["study/fingers/f_x_max"][2, 1, 0, 1, 2] += 1e-12
         file["study/patch/normal"][5, 0, 0, 0, 3, 1] = 0.0
-    code, _, _ = study(ranks, path)
-    assert code == 0
+    ended(ranks, path)
     assert differing(path, uninterrupted) == []
 
 
 def test_a_bug_outside_a_case_ends_all_ranks_what_is_done_stays_and_a_finished_file_too(tmp_path, uninterrupted, whole):
     path = tmp_path / "bug.hdf"
-    code, _, errors = study(2, path, "--bug", 2)
-    assert code == 70
+    errors = ended(2, path, "--bug", 2, code=70)
     assert "ZeroDivisionError" in errors
-    assert study(0, path)[0] == 0
+    ended(0, path)
     assert differing(path, uninterrupted) == []
     path = tmp_path / "twice.hdf"
     shutil.copy(whole, path)
-    code, _, _ = study(0, path, "--fail", 3)
-    assert code == 0
+    ended(0, path, "--fail", 3)
     assert path.read_bytes() == whole.read_bytes()
     assert differing(path, uninterrupted) == []
     with open_result(path) as result:
