@@ -29,11 +29,9 @@ from tests.benchmark.table import fastest, line, title
 ROOT = Path(__file__).parents[2]
 SIZE = (0.060, 0.030, 0.015)  # pad [m]
 FOAMS = (
-    material("blatz_ko", 20e3),
-    material("hyperfoam", shear_moduli=[20e3], exponents=[-2.0]),
-    material("neo_hookean", 20e3, 0.4),
-    material("linear", 20e3, 0.3),
-)
+    material("blatz_ko", 20e3), material("hyperfoam", shear_moduli=[20e3], exponents=[-2.0]),
+    material("neo_hookean", 20e3, 0.4), material("linear", 20e3, 0.3),
+)  # fmt: skip
 
 
 def element_routine() -> None:
@@ -61,14 +59,10 @@ def contact_solve() -> None:
     for elements, forces, goal in (((24, 12, 6), (3.0, 10.0, 30.0), 40), ((48, 24, 12), (3.0,), 25)):
         press = Press(Pad(PadShape(SIZE, elements), FOAMS[0]), finger.gap)
         states = list(press.load_path(forces))
-        total, factor, assembly = (
-            sum(getattr(s.seconds, k) for s in states) for k in ("total", "factorisation", "assembly")
-        )
-        name = "x".join(map(str, elements))
-        line(
-            f"contact solve {name}, {press.problem.size} unknowns, {sum(s.iterations for s in states)} iterations",
-            f"{total:.2f} s",
-        )
+        parts = ("total", "factorisation", "assembly")
+        total, factor, assembly = (sum(getattr(s.seconds, part) for s in states) for part in parts)
+        name, size, count = "x".join(map(str, elements)), press.problem.size, sum(s.iterations for s in states)
+        line(f"contact solve {name}, {size} unknowns, {count} iterations", f"{total:.2f} s")
         line("  assembly", f"{100 * assembly / total:.1f} %")
         line("  everything that is not factorisation", f"{100 * (1 - factor / total):.1f} %", f"at most {goal} %")
         press.destroy()
@@ -90,13 +84,9 @@ def whole_map(scene: Path) -> None:
 
 def main() -> None:
     parts = {
-        "kernels": kernels.every_kernel,
-        "element": element_routine,
-        "contact": contact_solve,
-        "getfem": other_code.compare,
-        "map": lambda: whole_map(options.scene),
-        "users": users.every_mesh,
-    }
+        "kernels": kernels.every_kernel, "element": element_routine, "contact": contact_solve,
+        "getfem": other_code.compare, "map": lambda: whole_map(options.scene), "users": users.every_mesh,
+    }  # fmt: skip
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("part", nargs="*", choices=[*parts, []], help="default: all")
     parser.add_argument("--scene", type=Path, default=ROOT / "jobs" / "bottle-rigid.toml", help="scene of the map")
