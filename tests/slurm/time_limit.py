@@ -65,25 +65,22 @@ def main() -> int:
     file = Path("results") / f"{SCENE.stem}.hdf"
     for name in ("whole", "stopped", "killed"):
         shutil.rmtree(top / name, ignore_errors=True)
-    whole = submitted(top / "whole", "--time=60")
-    states = [ended(whole)]
-    report("whole", whole)
-    stopped = submitted(top / "stopped", "--time=3", "--signal=B:USR1@100")
-    states.append(ended(stopped))
-    report("stopped", stopped)
-    killed = submitted(top / "killed", "--time=1", "--signal=B:CONT@1")
-    states.append(ended(killed))
-    report("killed", killed)
-    again = submitted(top / "killed", "--time=60")
-    states.append(ended(again))
-    report("again", again)
+    jobs, states = {}, []
+    for name, folder, *options in (
+        ("whole", "whole", "--time=60"), ("stopped", "stopped", "--time=3", "--signal=B:USR1@100"),
+        ("killed", "killed", "--time=1", "--signal=B:CONT@1"), ("again", "killed", "--time=60"),
+    ):  # fmt: skip
+        jobs[name] = submitted(top / folder, *options)
+        states.append(ended(jobs[name]))
+        report(name, jobs[name])
     expected = contents(top / "whole" / file)
     unlike = {name: differing(top / name / file, expected) for name in ("stopped", "killed")}
     for name, found in unlike.items():
         equal = f"{len(expected) - len(found)} of {len(expected)} datasets"
         print(f"{name}: {equal} equal those of the whole run, byte for byte")
         print("".join(f"  differs: {dataset}\n" for dataset in found), end="")
-    as_meant = states == ["COMPLETED", "COMPLETED", "TIMEOUT", "COMPLETED"] and int(job_field(stopped, "Restarts")) > 0
+    restarts = int(job_field(jobs["stopped"], "Restarts"))
+    as_meant = states == ["COMPLETED", "COMPLETED", "TIMEOUT", "COMPLETED"] and restarts > 0
     return int(any(unlike.values()) or not as_meant)
 
 
