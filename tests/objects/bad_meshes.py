@@ -147,10 +147,6 @@ def fine(mesh: Mesh, faces: int = 520_000) -> Mesh:
     return mesh
 
 
-def spoilt(mesh: Mesh, seed: int) -> Mesh:
-    return spoiled(mesh, 0.05, seed)
-
-
 def of(change: Callable[..., Mesh], names: str, **options) -> dict[str, Maker]:
     return {name: lambda name=name: change(SHAPES[name](), **options) for name in names.split()}
 
@@ -178,10 +174,6 @@ def convex_parts() -> dict[str, Maker]:
         "bottle": lambda: joined(*(moved(cylinder(r, 0.05, sections=24), z=z)
                                    for r, z in ((0.03, 0.025), (0.03, 0.07), (0.022, 0.1), (0.014, 0.13)))),
     }  # fmt: skip
-
-
-def non_manifold() -> dict[str, Maker]:
-    return {"bottle with a cap": capped, "bricks": bricks, **of(partitioned, "box L bottle bowl")}
 
 
 def open_surfaces() -> dict[str, Maker]:
@@ -226,9 +218,10 @@ def bad_meshes(seed: int) -> dict[str, tuple[str, Maker]]:
         "convex parts that overlap": convex_parts(),
         "doubled or inner walls": of(doubled, "box bottle mug") | {
             f"lined {name}": make for name, make in of(lined, "box L bottle hammer").items()},
-        "edges of three triangles": non_manifold(),
+        "edges of three triangles": {
+            "bottle with a cap": capped, "bricks": bricks, **of(partitioned, "box L bottle bowl")},
         "mixed winding": of(turned, "box plate bottle mug bowl handle", seed=seed),
-        "doubled and degenerate triangles": of(spoilt, "plate L bottle mug bowl hammer", seed=seed),
+        "doubled and degenerate triangles": of(spoiled, "plate L bottle mug bowl hammer", share=0.05, seed=seed),
         "open surfaces": open_surfaces(),
         "holes": of(pierced, "box plate bottle mug bowl hammer", seed=seed),
         "low poly": low_poly(),
