@@ -75,7 +75,7 @@ def annulus(around=80, across=10):
 
 
 def hemisphere(n=16, P=400.0):
-    """Quarter with a hole of 18 degrees; half of each point load."""
+    """Quarter with a hole of 18 degrees; half of each point load. Linear: 0.0940 under forces of 2."""
     t, s = np.meshgrid(np.linspace(0, np.pi / 2, n + 1), np.radians(np.linspace(0, 72, n + 1)), indexing="ij")
     e = np.stack([np.cos(s) * np.cos(t), np.cos(s) * np.sin(t), np.sin(s)], -1)
     c = case(10 * e, e, 0.04, 6.825e7, 0.3)
@@ -145,8 +145,3 @@ def pinched_half_cylinder(n=40):
     c.load[k[0, -1]] = -2000 / 2 * UZ
     c.probes = [(k[0, -1], 2, -1)]
     return c
-
-
-def linear_hemisphere(n):
-    """0.0940 under forces of 2, of which the quarter carries half."""
-    return hemisphere(n, 2.0)
