@@ -22,6 +22,7 @@ from tests.study.launching import ROOT
 
 SECONDS, ROOM = 30, 2**30  # of CPU, three times what the slowest takes, and bytes beyond what the tests have already
 CHECKS = {"deadline": None, "database": None, "suppress_health_check": list(HealthCheck)}
+EVERY = pytest.mark.parametrize("reader", QUICK.values(), ids=QUICK)
 
 
 def complaint(reader, path):
@@ -61,20 +62,18 @@ def complaint_apart(reader, path):
     return told[1:].decode() if told else f"it ended by signal {os.WTERMSIG(status)}"
 
 
-@pytest.mark.parametrize("kind", QUICK)
+@EVERY
 @settings(max_examples=6, derandomize=True, **CHECKS)
 @given(data=st.data())
-def test_a_spoilt_file_is_read_or_refused(tmp_path, kind, data):
-    reader = QUICK[kind]
+def test_a_spoilt_file_is_read_or_refused(tmp_path, reader, data):
     path = tmp_path / reader.name
     path.write_bytes(edited(reader.content, data.draw(edits(reader.kinds))))
     wrong = complaint(reader, path)
     assert not wrong, wrong
 
 
-@pytest.mark.parametrize("kind", QUICK)
-def test_the_file_that_is_spoilt_is_a_good_one(tmp_path, kind):
-    reader = QUICK[kind]
+@EVERY
+def test_the_file_that_is_spoilt_is_a_good_one(tmp_path, reader):
     path = tmp_path / reader.name
     path.write_bytes(reader.content)
     found = reader.read(path)
@@ -84,9 +83,8 @@ def test_the_file_that_is_spoilt_is_a_good_one(tmp_path, kind):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("kind", QUICK)
-def test_many_spoilt_files_are_read_or_refused_in_time_and_in_little_memory(tmp_path, kind):
-    reader = QUICK[kind]
+@EVERY
+def test_many_spoilt_files_are_read_or_refused_in_time_and_in_little_memory(tmp_path, reader):
     path = tmp_path / reader.name
     path.write_bytes(reader.content)
     reader.read(path)  # and everything is imported
