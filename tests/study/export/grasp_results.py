@@ -48,21 +48,13 @@ def write(path, **more):
         return np.broadcast_to(values[:, None, None], (*shape, *values.shape[1:]))
 
     datasets = {
-        "fingers/F_N": two,
-        "fingers/S": 1.1 * two,
-        "fingers/f_x_max": each(MU_X),
-        "fingers/f_y_max": each(MU_Y),
-        "fingers/tau_z_max": each(E_N * np.minimum(MU_X, MU_Y)),
-        "fingers/pose_rotation": placed(R),
-        "fingers/pose_origin": placed(o),
-        "fingers/frame_axes": placed(frames),
-        "fingers/frame_origin": np.broadcast_to([0.0, 0.0, 0.001], (*shape, 2, 3)),
-        "opening/opening": np.full(shape, 2 * RADIUS),
-        "opening_loaded/opening_loaded": np.full(shape, 2 * RADIUS - 0.002),
-        "payload/ccm": 0.1 * over * (1 + STATIONS[:, None, None]),
+        "fingers/F_N": two, "fingers/S": 1.1 * two, "fingers/f_x_max": each(MU_X), "fingers/f_y_max": each(MU_Y),
+        "fingers/tau_z_max": each(E_N * np.minimum(MU_X, MU_Y)), "fingers/pose_rotation": placed(R),
+        "fingers/pose_origin": placed(o), "fingers/frame_axes": placed(frames),
+        "fingers/frame_origin": np.array([0.0, 0.0, 0.001]), "opening/opening": 2 * RADIUS,
+        "opening_loaded/opening_loaded": 2 * RADIUS - 0.002, "payload/ccm": 0.1 * over * (1 + STATIONS[:, None, None]),
         "quality/ccm": 0.3 + STATIONS[:, None, None] + 0.0 * over,
-    }
-    datasets |= more
+    } | more  # fmt: skip
     return make(path, axes=grid_axes(STATIONS, [0.0], FORCES), **{k.replace("/", "__"): v for k, v in datasets.items()})
 
 

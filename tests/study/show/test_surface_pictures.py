@@ -28,24 +28,18 @@ def file(tmp_path_factory):
     scale = np.array([1.0, 1.0, RHO])
     values = {
         "limit_surface/semi_axes": np.broadcast_to(MU * SEMI * scale, (2, 3, 3)),
-        "limit_surface/rho": [RHO, RHO],
+        "limit_surface/rho": [RHO, RHO], "fingers/S": [S, S], "fingers/f_x_max": np.full((2, 3), MU * S),
         "limit_surface/coefficients": np.broadcast_to(BODY.coefficients, (2, 3, 15)),
-        "fingers/S": [S, S],
-        "fingers/f_x_max": np.full((2, 3), MU * S),
-        "fingers/tau_z_max": np.full((2, 3), 0.01),
-        "maps/overclaim": 0.002,
-        "maps/overclaim_ellipsoid": 0.013,
-    }
+        "fingers/tau_z_max": np.full((2, 3), 0.01), "maps/overclaim": 0.002, "maps/overclaim_ellipsoid": 0.013,
+    }  # fmt: skip
     layout = Layout(axes(stations=(0.0, 0.01), angles=(0.0,), forces=(1.0,)), 24)
     return make(tmp_path_factory.mktemp("surface") / "s.hdf", layout, **values)
 
 
 def test_monomials_are_named_in_the_order_of_the_fits():
-    w = np.array([[2.0, 3.0, 5.0]])
-    named = [
-        np.prod([{"x": 2.0, "y": 3.0, "t": 5.0}[f[0]] ** int(f[2:] or 1) for f in name.split()]) for name in MONOMIALS
-    ]
-    assert monomials(w, exponents(3, 4))[0] == pytest.approx(named)
+    w = {"x": 2.0, "y": 3.0, "t": 5.0}
+    named = [np.prod([w[f[0]] ** int(f[2:] or 1) for f in name.split()]) for name in MONOMIALS]
+    assert monomials(np.array([[*w.values()]]), exponents(3, 4))[0] == pytest.approx(named)
 
 
 @pytest.mark.parametrize(("i", "j"), [(0, 1), (0, 2), (1, 2)])
