@@ -12,14 +12,13 @@ from softjaw.lsfit.quartic_fit import convex_quartic, normal_equations, round_sa
 from softjaw.lsfit.samples import normalised_samples, sphere_motions
 from softjaw.lsfit.sos import ball_gram
 
+SIX = np.array([1, 1, 1, 2, 2, 2])  # units of the components of a motion
+
 
 def samples(patch, K=500, rho=2.0, twist=None):
     """Wrenches of evenly spread motions, or of those given, over the load, and the unit motions."""
     twist = fibonacci_twists(K, rho) if twist is None else twist
     return normalised_samples(friction_wrench(patch, twist, 1.0), twist, friction_limits(patch, 1.0).S, rho)
-
-
-SIX = np.array([1, 1, 1, 2, 2, 2])  # units of the components of a motion
 
 
 def six_samples(patch, K):

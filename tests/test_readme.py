@@ -26,6 +26,8 @@ SOLVES = re.compile(r"softjaw cost ")
 PLAIN = re.compile(r"(mpirun -n 2 )?softjaw run jobs/smoke.toml -o \S+")
 SOLVED: dict[str, bytes] = {}  # what a run has made
 LONG_RUNS = ("results/bottle.hdf",)  # files of runs of many minutes; a small one of the same name stands for them
+MADE = sorted(set(re.findall(r"^make [a-z].*?(?=  +#|$)|(?<=`)make [^`]+(?=`)", TEXT, re.M)))
+PYTEST = sorted(set(re.findall(r"(?<=`)pytest [^`]+(?=`)", TEXT)))
 
 
 def slow(block: list[str]) -> bool:
@@ -103,9 +105,6 @@ def test_commands_that_take_longer(block, folder):
     run_in(folder, block)
 
 
-MADE = sorted(set(re.findall(r"^make [a-z].*?(?=  +#|$)|(?<=`)make [^`]+(?=`)", TEXT, re.M)))
-
-
 @pytest.mark.parametrize("command", MADE)
 def test_make_knows_the_target(command):
     done = subprocess.run(
@@ -113,9 +112,6 @@ def test_make_knows_the_target(command):
         check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
-
-
-PYTEST = sorted(set(re.findall(r"(?<=`)pytest [^`]+(?=`)", TEXT)))
 
 
 def test_every_path_that_it_names_exists():

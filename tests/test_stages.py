@@ -11,6 +11,12 @@ from tests.blas import STANDS_IN, loaded
 from tests.stages import CANNOT_RUN, Stage, fast, report, run, thorough
 from tests.tools.mutate import FOLDERS, KINDS, ROOT, Mutation, mutated, mutations, sample
 
+ASKED = os.environ.get("OPENBLAS_CORETYPE", "")
+SOURCE = """def area(a, b):
+    if a < 0 and b[1]:
+        return -a * 2.5
+"""
+
 
 def ends(code, **keys):
     return Stage("it", (sys.executable, "-c", f"raise SystemExit({code})"), 1, **keys)
@@ -30,12 +36,6 @@ def test_a_test_has_one_stage():
     names = [stage.name for stage in (*fast(), *thorough())]
     assert len(set(names)) == len(names)
     assert {"serial", "ranks", "long", "long-ranks", "slurm"} <= set(names)
-
-
-SOURCE = """def area(a, b):
-    if a < 0 and b[1]:
-        return -a * 2.5
-"""
 
 
 def test_every_kind_of_mutation_changes_the_place_that_it_names(tmp_path):
@@ -60,9 +60,6 @@ def test_a_sample_of_mutations_depends_on_its_seed_alone_and_holds_every_kind():
     for m in mutants:
         assert m.file.startswith(FOLDERS)
         compile(mutated((ROOT / m.file).read_text(), m), m.file, "exec")
-
-
-ASKED = os.environ.get("OPENBLAS_CORETYPE", "")
 
 
 @pytest.mark.skipif(not ASKED, reason="no kernel is asked for")

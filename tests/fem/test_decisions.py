@@ -24,6 +24,8 @@ from softjaw.fem.pad.shape import BackingPlate
 from softjaw.fem.shell.thin_walled import ThinWalled, grasp
 from tests.turns import ULPS, seeded, seeds, tries
 
+BODY = ThinWalled(of_sections([Section(z, 0.03) for z in (0.0, 0.05, 0.1)]), 1e-3, None)
+
 
 def moved(values, seed):
     x = np.asarray(values, float)
@@ -190,9 +192,6 @@ def test_nodes_on_the_rim_of_the_support_are_held(seed):
         held = ~back.free.any(axis=-1)
         assert held.sum() == (6 if all(symmetry) else 15)
         assert (~back.free).sum() == 3 * held.sum() + (4 if all(symmetry) else 0)  # of nodes on a plane of symmetry
-
-
-BODY = ThinWalled(of_sections([Section(z, 0.03) for z in (0.0, 0.05, 0.1)]), 1e-3, None)
 
 
 @seeded

@@ -81,14 +81,12 @@ def test_small_strain_is_hooke(name):
     P, A = respond(law, np.eye(3))
     delta = np.eye(3)
     shear, lam = law.shear_modulus, reference.lame(law.shear_modulus, law.poisson_ratio)
-    hooke = lam * np.einsum("ij,kl->ijkl", delta, delta) + shear * (
-        np.einsum("ik,jl->ijkl", delta, delta) + np.einsum("il,jk->ijkl", delta, delta)
-    )
+    straight, crossed = (np.einsum(f"{pairs}->ijkl", delta, delta) for pairs in ("ik,jl", "il,jk"))
+    hooke = lam * np.einsum("ij,kl->ijkl", delta, delta) + shear * (straight + crossed)
     assert np.abs(P).max() < 1e-12 * shear
     assert np.abs(A - hooke).max() < 1e-12 * (lam + shear)
-    compliance = np.linalg.inv(
-        hooke.reshape(9, 9) + shear * np.eye(9) - shear * np.einsum("il,jk->ijkl", delta, delta).reshape(9, 9)
-    )  # the antisymmetric part is made regular and does not couple
+    # the antisymmetric part is made regular and does not couple
+    compliance = np.linalg.inv(hooke.reshape(9, 9) + shear * np.eye(9) - shear * crossed.reshape(9, 9))
     assert 1 / compliance[0, 0] == pytest.approx(law.young_modulus, rel=1e-12)
     assert -compliance[4, 0] / compliance[0, 0] == pytest.approx(law.poisson_ratio, rel=1e-12)
 

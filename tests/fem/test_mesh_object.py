@@ -19,6 +19,9 @@ FLASK = Path(__file__).parents[2] / "jobs" / "objects" / "flask.stl"
 RADIUS = 0.03
 # looking along -x, turned about the approach so that no grid line is parallel to an axis of the object
 TILT = np.array([[0, np.sin(0.3), np.cos(0.3)], [0, np.cos(0.3), -np.sin(0.3)], [-1, 0, 0]]).T
+BLOCK = 0.01 * np.array([(x, y, z) for z in (0, 1) for x, y in ((0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2))])
+RING = [(0, 1, 2, 3), (3, 4, 5, 0)]  # of an L-shaped block; the six corners at once are not convex
+SIDES = [(k, (k + 1) % 6, 6 + (k + 1) % 6, 6 + k) for k in range(6)]
 
 
 def ball(level, radii=(RADIUS, RADIUS, RADIUS), centre=(0, 0, 0)):
@@ -126,11 +129,6 @@ def test_chosen_axis_becomes_z_without_mirroring(tmp_path, axis):
 def off(path, points, faces):
     rows = [*(" ".join(map(repr, map(float, x))) for x in points), *(" ".join(map(str, (len(f), *f))) for f in faces)]
     path.write_text("\n".join(["OFF", f"{len(points)} {len(faces)} 0", *rows, ""]))
-
-
-BLOCK = 0.01 * np.array([(x, y, z) for z in (0, 1) for x, y in ((0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2))])
-RING = [(0, 1, 2, 3), (3, 4, 5, 0)]  # of an L-shaped block; the six corners at once are not convex
-SIDES = [(k, (k + 1) % 6, 6 + (k + 1) % 6, 6 + k) for k in range(6)]
 
 
 def obj(path, points, faces):

@@ -171,9 +171,7 @@ def test_a_profile_passes_its_points_with_continuous_curvature_and_that_of_a_cir
         assert np.abs(np.abs(shape.gap(x)[0]) - brute).max() < 1e-8
 
 
-@pytest.mark.parametrize(
-    "ratio", [0.6, pytest.param(0.2, marks=pytest.mark.long), pytest.param(3.0, marks=pytest.mark.long)]
-)
+@pytest.mark.parametrize("ratio", [0.6, *(pytest.param(ratio, marks=pytest.mark.long) for ratio in (0.2, 3.0))])
 def test_elliptic_cylinder_ends_in_a_rounded_edge_and_a_flat_cap(ratio):
     """Against the distance to points all over its surface, which are at most 0.15 mm apart."""
     body = EllipticCylinder(0.015, 0.015 * ratio, 0.01)

@@ -118,9 +118,8 @@ def test_a_leaning_body_is_followed_and_the_noise_of_a_scan_smoothed():
     noise = 1e-4 * np.random.default_rng(4).normal(size=len(mesh.points))
     noise *= np.hypot(mesh.points[:, 0], mesh.points[:, 1]) > 0.011
     out = mesh.points * [1, 1, 0]
-    mesh = MeshObject(
-        mesh.points + noise[:, None] * out / np.maximum(np.linalg.norm(out, axis=1), 1e-3)[:, None], mesh.triangles
-    )
+    shift = noise[:, None] * out / np.maximum(np.linalg.norm(out, axis=1), 1e-3)[:, None]
+    mesh = MeshObject(mesh.points + shift, mesh.triangles)
     surface, report = traced(mesh)
     assert 0.3e-4 < report.rms < 0.9e-4
     assert (surface.symmetric, surface.round) == ((False, False), False)
@@ -151,9 +150,8 @@ def test_the_surface_of_the_flask_its_derivatives_normals_and_symmetry():
     assert np.abs(np.einsum("nki,ni->nk", D[:, 1:3], n)).max() < 1e-15
     wall = (s > surface.wall[0]) & (s < surface.wall[1])
     assert (np.einsum("ni,ni->n", n[wall, :2], D[wall, 0, :2]) > 0).all()
-    assert surface.normals(np.zeros(2), np.array([0.0, surface.end])) == pytest.approx(
-        np.array([[0, 0, -1], [0, 0, 1]]), abs=1e-12
-    )
+    poles = surface.normals(np.zeros(2), np.array([0.0, surface.end]))
+    assert poles == pytest.approx(np.array([[0, 0, -1], [0, 0, 1]]), abs=1e-12)
     assert surface.symmetric == (True, True)
     assert not surface.round
     assert report.largest < 3e-4
@@ -191,9 +189,8 @@ def test_a_handle_is_refused_with_its_place_so_is_what_does_not_fit_and_prisms_c
     for top, place in ((0.07, r"0.030\d* m and 0.0[67]\d* m .* (8|9)\d deg"), (0.1, r"0.030\d* m and 0.0[89]\d* m")):
         with pytest.raises(MeshError, match=place):  # also where it reaches up to the edge: it is no top
             traced(cup_with_handle(top))
-    ledge = rings(
-        lambda t, z: np.where(z < 0.05, 0.03, 0.022), np.r_[np.linspace(0, 0.0499, 20), np.linspace(0.05, 0.1, 20)]
-    )
+    heights = np.r_[np.linspace(0, 0.0499, 20), np.linspace(0.05, 0.1, 20)]
+    ledge = rings(lambda t, z: np.where(z < 0.05, 0.03, 0.022), heights)
     with pytest.raises(MeshError, match=r"0.0[45]\d* m"):
         traced(ledge)
     flat = rings(lambda t, z: 0.002 + 4 * z, np.linspace(0, 0.02, 20))

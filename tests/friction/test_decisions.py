@@ -44,10 +44,8 @@ def with_a_sliver():
     patch = mesh_patch(cyl_mesh(1, 0.6, 2, 12, 12))
     a, b = patch.corners[70, 0], patch.corners[70, 1]
     line = np.stack([a, a + (b - a) / 3, b, a + (b - a) / 1.7])
-    sliver = ContactPatch(
-        line.mean(axis=0)[None], [1e-12], patch.normal[70][None], patch.pressure[70][None], line[None]
-    )
-    return joined(patch, sliver)
+    normal, pressure = patch.normal[70][None], patch.pressure[70][None]
+    return joined(patch, ContactPatch(line.mean(axis=0)[None], [1e-12], normal, pressure, line[None]))
 
 
 def wound_the_other_way():

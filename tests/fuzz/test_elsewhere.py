@@ -21,6 +21,7 @@ from tests.study.sealing import sealed
 
 BALL = '[object]\nshape = "sphere"\nradius_mm = 30\n[candidates]\nstations_mm = [0]\n[load]\nnormal_force_n = [2]\n'
 MESH = BALL.replace('shape = "sphere"\nradius_mm = 30', 'shape = "mesh"\nmesh = "FILE"\nunit = "mm"')
+TABLE = QUICK["table"].content
 
 
 def told(*words):
@@ -85,9 +86,6 @@ def test_nothing_of_a_scene_is_run():
             parse_scene(BALL + f'[petsc]\n{option} = "python:os.system"\n')
     with pytest.raises(SceneError, match="found"):
         parse_scene(BALL.replace("30", "__import__('os')"))
-
-
-TABLE = QUICK["table"].content
 
 
 @pytest.mark.parametrize(("old", "new", "words"), [

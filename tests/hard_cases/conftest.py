@@ -33,9 +33,8 @@ def row(case: HardCase, outcome: Outcome, verdict: Verdict) -> list[str]:
 def table_text(rows: dict[str, list[str]]) -> str:
     lines = [HEAD, ["---"] * len(HEAD), *(rows[name] for name in CASES if name in rows)]
     words = Counter(cells[OUTCOME].rpartition("; ")[2] if ";" in cells[OUTCOME] else OK for cells in rows.values())
-    count = f"{len(rows)} cases in {len({CASES[name].kind for name in rows})} classes: " + ", ".join(
-        f"{words[word]} {word}" for word in (OK, "no number", "gap", "WRONG")
-    )
+    each = ", ".join(f"{words[word]} {word}" for word in (OK, "no number", "gap", "WRONG"))
+    count = f"{len(rows)} cases in {len({CASES[name].kind for name in rows})} classes: {each}"
     shown = [case for name, case in CASES.items() if name in rows]
     failures = [f"* {case.name}: {case.because}" for case in shown if case.because]
     gaps = [f"* {case.name}: {case.gap}" for case in shown if case.gap]

@@ -18,6 +18,7 @@ from tests.hard_cases.sources import FORMULAS, second
 from tests.hard_cases.verdict import FINITE, judge
 
 GOOD = {"force_balance": 0.0, "adhesion": 0.0, "penetration": 0.0, "min_det_f": 0.9, "ellipticity": 0.9}
+STUCK = ConvergenceError("stuck at 3 N")
 NAMES = [pytest.param(case.name, marks=() if case.quick else pytest.mark.long) for case in CASES.values()]
 
 
@@ -75,9 +76,6 @@ def judged(found, other=None, **keys):
 ])  # fmt: skip
 def test_what_is_wrong_is_found_once(found, keys):
     assert len(judged(found, **keys).wrong) == 1
-
-
-STUCK = ConvergenceError("stuck at 3 N")
 
 
 def foam(det, strain, ellipticity):

@@ -28,9 +28,8 @@ def squared(A):
 
 def fourth_powers(axes=AXES):
     """``sum (w_i / a_i)^4``: flat where it meets the axes, so that its second derivative is singular there."""
-    return Quartic.of_coefficients(
-        np.sum([(4 * np.eye(3)[i] == E).all(axis=1) / axes[i] ** 4 for i in range(3)], axis=0)
-    )
+    each = [(4 * np.eye(3)[i] == E).all(axis=1) / axes[i] ** 4 for i in range(3)]
+    return Quartic.of_coefficients(np.sum(each, axis=0))
 
 
 def rounded_box():

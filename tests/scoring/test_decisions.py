@@ -82,9 +82,8 @@ def test_volumes_do_not_depend_on_the_unit_of_length(unit, one, two):
     20 % short of its L1 volume, and a polytope had 5000 times its volume."""
     length = np.array([1, 1, unit])
     metre = pose_volume(*pair(one, two, 0.3), *LENGTHS)
-    other = pose_volume(
-        *pair(np.multiply(one, length), np.multiply(two, length), 0.3, 0.06 * unit), *np.multiply(LENGTHS, unit)
-    )
+    contacts = pair(np.multiply(one, length), np.multiply(two, length), 0.3, 0.06 * unit)
+    other = pose_volume(*contacts, *np.multiply(LENGTHS, unit))
     assert (other.linf, other.l1) == pytest.approx((metre.linf, metre.l1), rel=1e-9)
 
 

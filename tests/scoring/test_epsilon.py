@@ -18,9 +18,8 @@ def ring(n, rng, tilt, scale=(1, 1, 0.4)):
     for phi in 2 * np.pi * np.arange(n) / n:
         out = np.array([np.cos(phi), np.sin(phi), 0])
         position, N = out / 2 + tilt / 2 * rng.normal(size=3), tilt * rng.normal(size=3) - out
-        contacts.append(
-            SoftContact(position, contact_axes(N, np.eye(3)[2]), Ellipsoid.of_axes(rng.uniform(0.2, 1, 3) * scale))
-        )
+        body = Ellipsoid.of_axes(rng.uniform(0.2, 1, 3) * scale)
+        contacts.append(SoftContact(position, contact_axes(N, np.eye(3)[2]), body))
     return contacts
 
 

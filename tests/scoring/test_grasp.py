@@ -58,9 +58,8 @@ def test_equal_contacts_have_closed_forms_one_without_torque_scores_nothing_line
     """14/9 pi^2 d^2 f_x^2 f_y^2 tau / rho^3."""
     f_x, f_y, tau = grasps.A
     found = score(grasps.A, grasps.A, distance=1.3, object_length=0.7, contact_length=0.7)
-    assert found.quality == pytest.approx(
-        14 / 9 * math.pi**2 * (1.3 / 0.7) ** 2 * f_x**2 * f_y**2 * tau / 0.7, rel=1e-14
-    )
+    expected = 14 / 9 * math.pi**2 * (1.3 / 0.7) ** 2 * f_x**2 * f_y**2 * tau / 0.7
+    assert found.quality == pytest.approx(expected, rel=1e-14)
     assert found.quality / found.quality_l1 == pytest.approx(17.5, rel=1e-14)
     # min(1, 2 t / sqrt(1 + t^2), 2 f L / sqrt(1 + L^2 + 4 f^2 L^2)) with the centre of mass in the middle.
     for f_x, f_y, t, L in [(0.8, 0.6, 0.1, 0.5), (0.3, 0.6, 0.9, 0.1), (0.9, 0.2, 0.9, 0.7), (5, 5, 5, 5)]:

@@ -148,10 +148,9 @@ def test_friction_of_points_that_face_each_other_is_scored_within_the_stated_err
     np.testing.assert_allclose([found.quality, found.quality_l1], exact, rtol=found.error)
 
 
-@pytest.mark.parametrize(
-    ("axes1", "flat"),
-    [((0.8, 0.6, 0), False), ((0, 0.6, 0.1), False), ((0, 0, 0.1), False), ((0.5, 0, 0), False), ((0, 0, 0), True)],
-)
+@pytest.mark.parametrize(("axes1", "flat"), [
+    ((0.8, 0.6, 0), False), ((0, 0.6, 0.1), False), ((0, 0, 0.1), False), ((0.5, 0, 0), False), ((0, 0, 0), True),
+])  # fmt: skip
 def test_contacts_that_do_not_carry_every_load(axes1, flat):
     """The limit of thin bodies; a point without friction leaves fewer than 6 dimensions."""
     pose = (30, -20, (0.1, 0.3, 0.2))

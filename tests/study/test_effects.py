@@ -14,12 +14,19 @@ from softjaw.study.case.solver import COARSE, Solved
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import REASONS
 from tests.study.launching import ROOT
-from tests.study.scenes import CONE, OVAL, scene_of
+from tests.study.scenes import CONE, NO_COUPLING, OVAL, scene_of
 from tests.study.test_pipeline import PLATE, cases, e_n, solved
 from tests.study.test_walls import CUP
 from tests.study.test_walls import solved as on_wall
 
 COUPLED = 'effects.friction_pressure_coupling="tangential"'
+AUTO = 'effects.friction_pressure_coupling="auto"'
+STEEL = ("gripper.sheet_thickness_mm=2",)
+PLASTIC = ("gripper.sheet_thickness_mm=1", "gripper.sheet_modulus_gpa=2")
+RIGID = 'effects.sheet="rigid"'
+SLOPE = 'shape = "revolution"\nprofile_mm = [[0, 21], [20, 23.7], [40, 26.3], [60, 29]]'  # 7.6 degrees
+FREE, TAKEN = "none", "tangential traction"
+COUPLING = "friction_pressure_coupling"
 
 
 def pressed(moved, pressure):
@@ -38,10 +45,6 @@ def test_neglected_traction_is_that_of_sheared_columns_until_they_slide():
         found = neglected_traction(pressed(np.array([0.6 * d, 0.8 * d, 3e-3]), p), mu)
         assert found == pytest.approx(min(mu, stiffness * d / p), rel=1e-12)
     assert neglected_traction(pressed(np.array([0.0, 0.0, 3e-3]), 5e3), 0.8) == pytest.approx(0.0, abs=1e-12)
-
-
-FREE, TAKEN = "none", "tangential traction"
-COUPLING = "friction_pressure_coupling"
 
 
 @pytest.mark.parametrize(("indicator", "changes", "target", "level", "reason"), [
@@ -181,11 +184,6 @@ def test_no_shell_is_skipped_wrongly(monkeypatch):
         assert not taken.all()
 
 
-STEEL = ("gripper.sheet_thickness_mm=2",)
-PLASTIC = ("gripper.sheet_thickness_mm=1", "gripper.sheet_modulus_gpa=2")
-RIGID = 'effects.sheet="rigid"'
-
-
 def sheet_level(*overrides):
     (found,) = {result.effects["sheet"][:3] for _, path in solved(OVAL, *overrides) for result in path}
     return found[0], found[1], REASONS[found[2]]
@@ -225,18 +223,12 @@ def test_sheets_behind_the_pads_on_a_thin_wall():
 
 
 def test_a_mount_that_tilts_spreads_the_contact_on_a_slope_and_a_stiff_one_changes_nothing():
-    place = dict(stations="[75]", forces="[3]")
-    rigid, stiff, soft = (
-        cases(CONE, *([f"gripper.tilt_stiffness_nm_per_rad={k}"] if k else []), **place)[0] for k in (None, 1e4, 0.2)
-    )
+    mounts = ([], *([f"gripper.tilt_stiffness_nm_per_rad={k}"] for k in (1e4, 0.2)))
+    rigid, stiff, soft = (cases(CONE, *mount, stations="[75]", forces="[3]")[0] for mount in mounts)
     assert stiff["maps/e_n"] == pytest.approx(rigid["maps/e_n"], rel=2e-3)
     # turned to the slope the pad bears on more of its length
     assert soft["maps/contact_area"] > 1.05 * rigid["maps/contact_area"]
     assert soft["maps/e_n"][0] > 1.02 * rigid["maps/e_n"][0]
-
-
-UNCOUPLED = 'effects.friction_pressure_coupling="none"'
-AUTO = 'effects.friction_pressure_coupling="auto"'
 
 
 def coupling_levels(*overrides):
@@ -246,28 +238,25 @@ def coupling_levels(*overrides):
 
 def test_levels_what_they_change_and_that_auto_takes_or_leaves_what_the_scene_could_ask_for():
     """A pad that cannot slide freely is stiffer; without friction nothing changes; e_n moves by a few per cent."""
-    assert set(coupling_levels(UNCOUPLED)) == {("none", FORCED)}
+    assert set(coupling_levels(NO_COUPLING)) == {("none", FORCED)}
     assert set(coupling_levels(COUPLED)) == {("tangential traction", FORCED)}
-    off = e_n(OVAL, COUPLED) / e_n(OVAL, UNCOUPLED) - 1.0
+    off = e_n(OVAL, COUPLED) / e_n(OVAL, NO_COUPLING) - 1.0
     assert (np.abs(off) < 0.05).all()
     assert (np.abs(off) > 1e-3).all()
-    for one, other in zip(cases(OVAL, COUPLED), cases(OVAL, UNCOUPLED), strict=True):
+    for one, other in zip(cases(OVAL, COUPLED), cases(OVAL, NO_COUPLING), strict=True):
         assert one["maps/closing"] < other["maps/closing"]
         assert one["work/load_steps"][0] > other["work/load_steps"][0]
     smooth = ("friction.mu=0", COUPLED)
-    closing = [[v["maps/closing"] for v in cases(OVAL, *own)] for own in (smooth, ("friction.mu=0", UNCOUPLED))]
+    closing = [[v["maps/closing"] for v in cases(OVAL, *own)] for own in (smooth, ("friction.mu=0", NO_COUPLING))]
     np.testing.assert_allclose(*closing, rtol=1e-9)
     # At every force by itself, to the solver's tolerance; which cases take it follows from the measured change.
-    auto, taken, free = (e_n(OVAL, *own) for own in ((AUTO,), (COUPLED,), (UNCOUPLED,)))
+    auto, taken, free = (e_n(OVAL, *own) for own in ((AUTO,), (COUPLED,), (NO_COUPLING,)))
     found = [result.effects[COUPLING] for _, path in solved(OVAL, AUTO) for result in path]
     with_it = np.array([own.level == "tangential traction" for own in found]).reshape(auto.shape)
     np.testing.assert_allclose(auto, np.where(with_it, taken, free), rtol=1e-9)
     for own, true in zip(found, (taken / free - 1.0).ravel(), strict=True):
         assert own.reason in (LITTLE, MUCH, UNDECIDED)
         assert own.change == pytest.approx(true, abs=0.01)
-
-
-SLOPE = 'shape = "revolution"\nprofile_mm = [[0, 21], [20, 23.7], [40, 26.3], [60, 29]]'  # 7.6 degrees
 
 
 def test_what_pressing_has_used_is_missing_for_holding():

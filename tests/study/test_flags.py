@@ -44,11 +44,10 @@ def test_a_value_is_told_bit_by_bit(value):
     assert [part for part in flag_sentences(value).split("; ") if part] == [flag.sentence for flag in flags_in(value)]
 
 
-@pytest.mark.parametrize(
-    ("key", "value", "si"),
-    [("a_mm", 25, 0.025), ("a_inch", 1, 0.0254), ("a_cm", 3, 0.03), ("e_gpa", 2, 2e9), ("p_kpa", 40, 4e4),
-     ("m_g", 50, 0.05), ("t_deg", 180, math.pi), ("mu", 0.8, 0.8), ("springs_n_per_mm", 2, 2000)],
-)  # fmt: skip
+@pytest.mark.parametrize(("key", "value", "si"), [
+    ("a_mm", 25, 0.025), ("a_inch", 1, 0.0254), ("a_cm", 3, 0.03), ("e_gpa", 2, 2e9), ("p_kpa", 40, 4e4),
+    ("m_g", 50, 0.05), ("t_deg", 180, math.pi), ("mu", 0.8, 0.8), ("springs_n_per_mm", 2, 2000),
+])  # fmt: skip
 def test_values_of_a_scene_are_rounded_once(key, value, si):
     assert in_si(key, value) == si
 

@@ -25,6 +25,7 @@ WALL = ("object.wall_mm=0.8", "effects.object='nonlinear_shell'", "accuracy.wall
         "load.normal_force_n=[1, 2, 3]", "gripper.elements=[6, 4, 2]")  # fmt: skip
 BOTH = pytest.mark.parametrize("overrides", [(), WALL], ids=["rigid", "wall"])
 ROUGH = ("effects.friction_pressure_coupling='tangential'",)
+OWN, FINER, FINEST = (8, 4, 2), (10, 6, 3), (12, 8, 4)
 
 
 @pytest.fixture(autouse=True)
@@ -105,9 +106,6 @@ def test_where_the_coarse_path_ends_the_fine_mesh_is_solved_and_its_error_is_unk
         for name in ("maps/e_n", "maps/quality", "maps/closing"):
             assert found[k].values[name] == pytest.approx(expected[k].values[name], rel=1e-8), name
         assert not found[k].values["maps/flags"] & Flag.JUMPED
-
-
-OWN, FINER, FINEST = (8, 4, 2), (10, 6, 3), (12, 8, 4)
 
 
 def aim(target, of="e_n"):

@@ -112,9 +112,8 @@ def test_errors_hold_what_the_rounding_of_edges_does_to_a_pad_over_the_rim_of_a_
         "effects": {"friction_pressure_coupling": "none"}, "limit_surface": {"model": "three_motions"},
     }  # fmt: skip
     scene = Scene.of_tables(tables)
-    default, same, sharper = (
-        results_of(scene.with_values(**{"object.grid_step_mm": step}))[0].values for step in ("auto", 0.75, 0.375)
-    )
+    scenes = (scene.with_values(**{"object.grid_step_mm": step}) for step in ("auto", 0.75, 0.375))
+    default, same, sharper = (results_of(each)[0].values for each in scenes)
     for name in ("f_x_max", "tau_z_max"):
         value, error = f"maps/{name}", f"maps/{name}_error"
         assert same[value][0] == pytest.approx(default[value][0], rel=1e-9)

@@ -23,6 +23,8 @@ COARSE = "gripper.elements=[8, 4, 2]"
 SMOKE = sj.Scene.from_file(JOBS / "smoke.toml", [COARSE])
 BOXES = sj.Scene.from_file(JOBS / "box-poses.toml", [COARSE])
 FLASK = sj.Scene.from_file(JOBS / "flask-mesh.toml", [COARSE])
+POSE = {"point_mm": np.array([0, 0, 500]), "approach": [1, 0, 0], "long_side": np.array([0, 0, 1])}
+ROTATED = np.array([[0.0, 0, 1, 0.1], [0, -1, 0, 0], [1, 0, 0, 0.2], [0, 0, 0, 1]])
 
 
 def run(scene, path):
@@ -142,41 +144,34 @@ def test_poses_are_turned_and_shifted_as_the_scene_says_but_not_where_a_pad_stan
     assert again.e_n == pytest.approx(case.e_n, rel=1e-6)
 
 
-POSE = {"point_mm": np.array([0, 0, 500]), "approach": [1, 0, 0], "long_side": np.array([0, 0, 1])}
-ROTATED = np.array([[0.0, 0, 1, 0.1], [0, -1, 0, 0], [1, 0, 0, 0.2], [0, 0, 0, 1]])
-
-
-@pytest.mark.parametrize(
-    ("scene", "asked", "error", "words"),
-    [
-        ("smoke.toml", {}, TypeError, "expected a Scene"),
-        (SMOKE, {"station": 0.5, "angle": 0}, ValueError, r"candidates\.stations_mm.*500"),
-        (SMOKE, {"station": "0"}, TypeError, r"station is '0'.*\[m\]"),
-        (SMOKE, {"station": np.nan}, ValueError, r"station is nan.*\[m\]"),
-        (SMOKE, {"station": 0, "angle": [0.0, 1.0]}, TypeError, r"angle is .*\[rad\]"),
-        (SMOKE, {"station": 0}, ValueError, "angle is missing"),
-        (SMOKE, {}, ValueError, "station .*candidate and pose"),
-        (SMOKE, {"station": 0, "candidate": 1}, ValueError, "station and candidate"),
-        (SMOKE, {"candidate": 0}, ValueError, "give station and angle"),
-        (SMOKE, {"station": 0, "angle": 0, "force": -1}, ValueError, r"load\.normal_force_n.*-1"),
-        (SMOKE, {"pose": np.eye(3)}, TypeError, r"\(4, 4\)"),
-        (SMOKE, {"pose": "x"}, TypeError, r"\(4, 4\)"),
-        (SMOKE, {"pose": np.ones((4, 4))}, ValueError, "last row"),
-        (SMOKE, {"pose": ROTATED.T}, ValueError, "transposed"),
-        (SMOKE, {"pose": ROTATED * [1, -1, 1, 1]}, ValueError, "approach"),
-        (SMOKE, {"pose": ([0, 0, 0], [0, 0, 0, 1])}, TypeError, "rotations and origins"),
-        (SMOKE, {"pose": POSE}, ValueError, r"poses\[0\]\.point_mm"),
-        (SMOKE, {"pose": {"point_mm": [0, 0, 0]}}, ValueError, r"approach: found nothing"),
-        (BOXES, {"station": 0.0, "angle": 0.0}, ValueError, "candidate=0"),
-        (BOXES, {"candidate": 3}, ValueError, "candidate is 3.*0 to 2"),
-        (FLASK, {"station": 5.0, "angle": 0}, ValueError, "5000 mm.*0 to 120 mm"),
-        (SMOKE.with_values(**{"gripper.max_opening_mm": 20.0}), {"station": 0, "angle": 0}, CaseError, "to 20 mm"),
-        (sj.Scene.from_file(JOBS / "smoke.toml", ["sweep.friction.mu=[0.3, 0.8]"]),
-         {"station": 0, "angle": 0}, ValueError, r"sweep of friction\.mu.*with_values"),
-        (SMOKE.with_values(**{"petsc.contact_snes_tpye": "x"}), {"station": 0, "angle": 0}, sj.StudyError, "tpye"),
-        (SMOKE.with_values(**{"petsc.contact_snes_max_it": 1}), {"station": 0, "angle": 0}, CaseError, "MAX_IT"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("scene", "asked", "error", "words"), [
+    ("smoke.toml", {}, TypeError, "expected a Scene"),
+    (SMOKE, {"station": 0.5, "angle": 0}, ValueError, r"candidates\.stations_mm.*500"),
+    (SMOKE, {"station": "0"}, TypeError, r"station is '0'.*\[m\]"),
+    (SMOKE, {"station": np.nan}, ValueError, r"station is nan.*\[m\]"),
+    (SMOKE, {"station": 0, "angle": [0.0, 1.0]}, TypeError, r"angle is .*\[rad\]"),
+    (SMOKE, {"station": 0}, ValueError, "angle is missing"),
+    (SMOKE, {}, ValueError, "station .*candidate and pose"),
+    (SMOKE, {"station": 0, "candidate": 1}, ValueError, "station and candidate"),
+    (SMOKE, {"candidate": 0}, ValueError, "give station and angle"),
+    (SMOKE, {"station": 0, "angle": 0, "force": -1}, ValueError, r"load\.normal_force_n.*-1"),
+    (SMOKE, {"pose": np.eye(3)}, TypeError, r"\(4, 4\)"),
+    (SMOKE, {"pose": "x"}, TypeError, r"\(4, 4\)"),
+    (SMOKE, {"pose": np.ones((4, 4))}, ValueError, "last row"),
+    (SMOKE, {"pose": ROTATED.T}, ValueError, "transposed"),
+    (SMOKE, {"pose": ROTATED * [1, -1, 1, 1]}, ValueError, "approach"),
+    (SMOKE, {"pose": ([0, 0, 0], [0, 0, 0, 1])}, TypeError, "rotations and origins"),
+    (SMOKE, {"pose": POSE}, ValueError, r"poses\[0\]\.point_mm"),
+    (SMOKE, {"pose": {"point_mm": [0, 0, 0]}}, ValueError, r"approach: found nothing"),
+    (BOXES, {"station": 0.0, "angle": 0.0}, ValueError, "candidate=0"),
+    (BOXES, {"candidate": 3}, ValueError, "candidate is 3.*0 to 2"),
+    (FLASK, {"station": 5.0, "angle": 0}, ValueError, "5000 mm.*0 to 120 mm"),
+    (SMOKE.with_values(**{"gripper.max_opening_mm": 20.0}), {"station": 0, "angle": 0}, CaseError, "to 20 mm"),
+    (sj.Scene.from_file(JOBS / "smoke.toml", ["sweep.friction.mu=[0.3, 0.8]"]),
+     {"station": 0, "angle": 0}, ValueError, r"sweep of friction\.mu.*with_values"),
+    (SMOKE.with_values(**{"petsc.contact_snes_tpye": "x"}), {"station": 0, "angle": 0}, sj.StudyError, "tpye"),
+    (SMOKE.with_values(**{"petsc.contact_snes_max_it": 1}), {"station": 0, "angle": 0}, CaseError, "MAX_IT"),
+])  # fmt: skip
 def test_what_names_no_case_is_refused(scene, asked, error, words):
     with pytest.raises(error, match=words):
         sj.press(scene, **{"force": 1.0, **asked})

@@ -25,6 +25,7 @@ from tests.study.scenes import BALL, CONE, OVAL, QUICK, results_of, scene_of, un
 CURVED, FLAT, PROJECTED = range(len(MODELS))
 MU = 0.8
 PLATE = 'shape = "plane"\nthickness_mm = 40'
+TILTED = 2 * np.hypot(25e-3 * np.cos(np.pi / 6), 20e-3 * np.sin(np.pi / 6))  # between two tangents of the ellipse
 
 
 @lru_cache(maxsize=64)
@@ -110,9 +111,8 @@ def test_definitions_of_e_n_say_the_same_torque_and_on_a_slope_the_force_is_the_
         assert values["maps/e_n"] == pytest.approx((tau / (MU * S[:, None])).min(axis=0), rel=1e-12)
         assert values["maps/e_n_projected"] == pytest.approx((tau / (MU * F_N[:, None])).min(axis=0), rel=1e-12)
         # both fingers are alike here, so the products of the maps agree as well
-        assert values["maps/e_n"] * values["maps/S"] == pytest.approx(
-            values["maps/e_n_projected"] * values["maps/F_N"], rel=1e-9
-        )
+        projected = values["maps/e_n_projected"] * values["maps/F_N"]
+        assert values["maps/e_n"] * values["maps/S"] == pytest.approx(projected, rel=1e-9)
         # Eqs. (11) and (12) as the paper prints them, the latter with the force that the gripper commands
         largest = tau / values["fingers/e_n_ratio"]
         along_axes = np.maximum(values["fingers/f_x_max"], values["fingers/f_y_max"])[:, CURVED]
@@ -169,10 +169,8 @@ def test_the_part_of_the_pad_that_is_meshed_does_not_matter_and_without_friction
             names = [name for name in expected if name.startswith(("maps/", "fingers/"))]
             pick = [{name: values[name] for name in names} for values in (found, expected)]
             assert differing(*pick, 1e-8, SCALES) == []
-    [(_, path)] = solved(OVAL)
-    assert [path[0].effects["model_size"][0], solved(BALL, stations="[5]")[0][1][0].effects["model_size"][0]] == [
-        "quarter", "half",
-    ]
+    (_, [middle, _]), (_, [beside, _]) = *solved(OVAL), *solved(BALL, stations="[5]")
+    assert [result.effects["model_size"][0] for result in (middle, beside)] == ["quarter", "half"]
     [(_, path)] = solved(OVAL, "friction.mu=0")
     for result, held in zip(path, cases(OVAL), strict=True):
         values = result.values
@@ -350,13 +348,9 @@ def test_a_state_that_depends_on_the_load_path_is_flagged_from_the_jump_on(monke
         assert [Flag.JUMPED.sentence in result.message for result in path] == [False, True, True]
 
 
-TILTED = 2 * np.hypot(25e-3 * np.cos(np.pi / 6), 20e-3 * np.sin(np.pi / 6))  # between two tangents of the ellipse
-
-
-@pytest.mark.parametrize(
-    ("shape", "angle", "width", "rounding"),
-    [(BALL, 0, 60e-3, 1e-8), (OVAL, 0, 50e-3, 1e-8), (OVAL, 90, 40e-3, 1e-8), (OVAL, 30, TILTED, 2e-5)],
-)
+@pytest.mark.parametrize(("shape", "angle", "width", "rounding"), [
+    (BALL, 0, 60e-3, 1e-8), (OVAL, 0, 50e-3, 1e-8), (OVAL, 90, 40e-3, 1e-8), (OVAL, 30, TILTED, 2e-5),
+])  # fmt: skip
 def test_the_opening_is_the_width_of_the_object_and_both_pads_close_it(shape, angle, width, rounding):
     """At 30 degrees the place of first touch lies between the points that look for it, 1.1 mm apart."""
     for values in cases(shape, angles=f"[{angle}]", forces="[2]"):

@@ -24,6 +24,12 @@ from tests.study.scenes import mesh_of, pose_of, text_of
 
 GIVEN = np.linspace(25.0, 175.0, 35)
 BEST_WITHIN = 0.02
+PAD = (0.05, 0.02, 0.015)
+BODY = 'shape = "box"\nsize_mm = [60, 40, 120]\nedge_radius_mm = 6'
+VASE = 'shape = "revolution"\nprofile_mm = [[0, 30], [20, 30], [40, 26], [50, 25], [60, 26], [80, 30], [100, 30]]'
+PLACES = "stations_mm = [28, 38, 46, 54, 64]\nangles_deg = [0, 90]\nrefine = 12\n"
+SAMPLES = "[limit_surface]\nsamples = 80\n"
+SCENE = text_of(VASE, PLACES, forces="[1, 2]") + SAMPLES
 
 
 def tent(x, peak, width):
@@ -72,12 +78,6 @@ def test_nothing_is_added_where_nothing_can_be_gained_a_jump_is_followed_and_a_b
     assert found[2] == 0  # both ends cannot be used
 
 
-VASE = 'shape = "revolution"\nprofile_mm = [[0, 30], [20, 30], [40, 26], [50, 25], [60, 26], [80, 30], [100, 30]]'
-PLACES = "stations_mm = [28, 38, 46, 54, 64]\nangles_deg = [0, 90]\nrefine = 12\n"
-SAMPLES = "[limit_surface]\nsamples = 80\n"
-SCENE = text_of(VASE, PLACES, forces="[1, 2]") + SAMPLES
-
-
 def test_a_grown_file_keeps_every_row(tmp_path):
     scene, path = parse_scene(SCENE), tmp_path / "a.hdf"
     small, big = (make_plan(scene, rounds=rounds) for rounds in ((), ((50.0,), (33.0, 42.0))))
@@ -111,10 +111,6 @@ def filled(path, plan):
         return CaseResult(values, {"pressure": random.random((2, plan.layout.faces))})
 
     written(path, plan.layout, case, plan.header)
-
-
-PAD = (0.05, 0.02, 0.015)
-BODY = 'shape = "box"\nsize_mm = [60, 40, 120]\nedge_radius_mm = 6'
 
 
 def posed(budget, shape=BODY):

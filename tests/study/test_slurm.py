@@ -37,9 +37,8 @@ def slurm(tmp_path):
 
 
 def started(script, folder, env, *words, **more):
-    return subprocess.Popen(
-        ["bash", str(script), *words], cwd=folder, env={**env, **more}, stdout=subprocess.PIPE, text=True
-    )
+    words = ["bash", str(script), *words]
+    return subprocess.Popen(words, cwd=folder, env={**env, **more}, stdout=subprocess.PIPE, text=True)
 
 
 def finished(*words, **more):

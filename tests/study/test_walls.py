@@ -25,6 +25,7 @@ OVAL = 'shape = "sections"\nwall_mm = 0.5\n' + "".join(
 )
 COARSE = ("accuracy.wall_element_mm=4", *QUICK)
 WHERE = "stations_mm = [40]\nangles_deg = [0]"
+LONG = pytest.mark.long
 
 
 def walled(shape, *changes, where=WHERE, forces="[1, 2]", elements="[6, 4, 2]"):
@@ -53,9 +54,6 @@ def test_the_level_follows_the_indentation_and_compression_is_a_strain_too(monke
         monkeypatch.setattr(wall, name, lambda *_, value=value: value)
     state = SimpleNamespace(wall=SimpleNamespace(q=np.zeros(6), reaction=np.zeros(3)))
     assert wall.wall_values(None, state, None)["maps/wall_strain"] == pytest.approx(3e-3)
-
-
-LONG = pytest.mark.long
 
 
 @LONG

@@ -92,10 +92,8 @@ def test_tangent_is_the_derivative_of_the_force(pad, name):
     _, K, det = assembled(pad, law, u, tangent=True)
     assert 0 < det < np.linalg.det(AFFINE)
     expected = np.einsum("eiakb,ebk->eia", K, du[pad.element_nodes])
-    h = 3e-4
-    difference = sum(w * assembled(pad, law, u + s * h * du)[0] for s, w in ((1, 8), (-1, -8), (2, -1), (-2, 1))) / (
-        12 * h
-    )
+    h, weights = 3e-4, ((1, 8), (-1, -8), (2, -1), (-2, 1))
+    difference = sum(w * assembled(pad, law, u + s * h * du)[0] for s, w in weights) / (12 * h)
     assert np.abs(difference - expected).max() < 1e-9 * np.abs(expected).max()
     assert np.abs(K - K.transpose(0, 3, 4, 1, 2)).max() < 1e-12 * np.abs(K).max()
 

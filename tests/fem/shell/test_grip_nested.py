@@ -88,11 +88,9 @@ def test_a_start_that_does_not_serve_is_replaced_by_one_below_or_by_first_contac
 @pytest.mark.long
 def test_a_wall_that_gives_way_is_found_where_its_own_load_path_leads():
     """The finer mesh gives way earlier than the coarser one, and levels between start on the other side of that."""
-    forces, thickness = (0.5, 1.5, 2.5, 3.0), 3e-4
-    coarse, expected = (
-        list(pressed(coarser, thickness=thickness, z=0.075).load_path(forces)) for coarser in (True, False)
-    )
-    fine = pressed(thickness=thickness, z=0.075)
+    forces, where = (0.5, 1.5, 2.5, 3.0), {"thickness": 3e-4, "z": 0.075}
+    coarse, expected = (list(pressed(coarser, **where).load_path(forces)) for coarser in (True, False))
+    fine = pressed(**where)
     assert expected[-1].wall.snapped
     for k, own in enumerate(expected):
         found = fine.at(own.force, coarse[k::-1][:3])

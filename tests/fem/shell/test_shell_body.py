@@ -110,9 +110,8 @@ def test_grid_lines_are_fine_where_asked_miss_no_step_of_the_thickness_and_value
     nodes, N = mesh.locate(theta, s)
     at = np.full((len(mesh.X), 2), np.nan)
     at[mesh.number[:-1]] = np.stack(np.meshgrid(np.cos(mesh.theta[:-1]), mesh.s, indexing="ij"), -1)
-    assert np.einsum("ni,nik->nk", N, at[nodes]) == pytest.approx(
-        np.column_stack([np.interp(theta % (2 * np.pi), mesh.theta, np.cos(mesh.theta)), s]), rel=1e-12, abs=1e-12
-    )
+    expected = np.column_stack([np.interp(theta % (2 * np.pi), mesh.theta, np.cos(mesh.theta)), s])
+    assert np.einsum("ni,nik->nk", N, at[nodes]) == pytest.approx(expected, rel=1e-12, abs=1e-12)
 
 
 def pinched(symmetry, support="standing", surface="flask"):

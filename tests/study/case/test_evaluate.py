@@ -29,6 +29,7 @@ from tests.study.scenes import BALL, BOX, OVAL, scene_of
 MU, R, ANGLE, LENGTH, PRESSURE, DISTANCE = 0.5, 0.03, math.pi / 3, 0.04, 2e4, 0.06
 S, F_N = 2 * R * ANGLE * LENGTH * PRESSURE, 2 * R * math.sin(ANGLE) * LENGTH * PRESSURE
 SETTINGS = EvaluationSettings(arms=0.09, torques=0.05, task=Task(np.zeros(3)))
+RING = np.array([[0, 0, 0, 0, 0], [0, 1, 1, 1, 0], [0, 1, 0, 1, 0], [0, 1, 1, 1, 0], [0, 0, 0, 0, 0]])
 
 
 def pair(tilt=0.0, strips=65):
@@ -209,9 +210,6 @@ def test_a_mass_is_density_times_volume_and_what_has_no_volume_or_several_is_ref
     for shape, *change in (['shape = "plane"\nthickness_mm = 30'], [BALL, "sweep.object.radius_mm=[20, 30]"]):
         with pytest.raises(StudyError, match="mass_g"):
             with_sampled_grasps(scene_of(shape, "object.density=1000", *change))
-
-
-RING = np.array([[0, 0, 0, 0, 0], [0, 1, 1, 1, 0], [0, 1, 0, 1, 0], [0, 1, 1, 1, 0], [0, 0, 0, 0, 0]])
 
 
 @pytest.mark.parametrize(("loaded", "pieces", "holes", "rims"), [

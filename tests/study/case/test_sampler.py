@@ -143,11 +143,8 @@ def test_no_pad_is_put_over_a_hole_and_grasps_are_spread_over_the_places_of_an_o
     assert max(np.diff(heights)) < 0.05
 
 
-SLAB = BOX.replace("50, 40", "40, 60")
-
-
 def sampled_scene(opening=50):
-    text = text_of(SLAB, "sampled = 3\n", forces="[2, 5]")
+    text = text_of(BOX.replace("50, 40", "40, 60"), "sampled = 3\n", forces="[2, 5]")
     return with_sampled_grasps(parse_scene(text, overrides=[f"gripper.max_opening_mm={opening}"]))
 
 

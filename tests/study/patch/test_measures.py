@@ -14,6 +14,7 @@ from tests.study.launching import ROOT
 EXAMPLE = ROOT / "jobs" / "cylinder-pressure.csv"
 PATCH = sj.read_pressure(EXAMPLE)
 FLAT = sj.ContactPatch([[0.01, 0, 0], [-0.01, 0, 0]], [1e-4] * 2, [[0, 0, 1]] * 2, [1e4] * 2)
+OPPOSED = replace(FLAT, normal=np.array([[0, 0, 1.0], [0, 0.3, -1.0]]), pressure=np.array([1e4, 5e3]))
 
 
 def test_they_are_the_numbers_of_the_command_and_do_not_depend_on_the_coordinates():
@@ -47,9 +48,6 @@ def test_the_quality_is_that_of_the_command_with_every_surface():
             found = sj.grasp_quality(PATCH, mu=0.8, distance=0.06, surface=kind, model=model)
             assert found.quality == pytest.approx(score["quality"], rel=1e-12)
             assert found.epsilon == pytest.approx(score["epsilon"][0], rel=1e-2)
-
-
-OPPOSED = replace(FLAT, normal=np.array([[0, 0, 1.0], [0, 0.3, -1.0]]), pressure=np.array([1e4, 5e3]))
 
 
 @pytest.mark.parametrize(("call", "error", "words"), [

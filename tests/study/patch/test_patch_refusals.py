@@ -16,6 +16,9 @@ CORNER_HEAD = ",".join(f"{c}{k}_mm" for k in (1, 2, 3) for c in "xyz") + ",press
 SI = "--unit", "m", "--pressure-unit", "pa"
 POINTS, CELLS = cylinder_mesh()
 ONES = np.ones(len(CELLS))
+CUBE = np.array([[x, y, z] for z in (0, 1) for y in (0, 1) for x in (0, 1)], float)
+PRESSED = [("pressure", ONES)]
+TURNED = [c[::-1] if i % 5 == 2 else c for i, c in enumerate(CELLS.tolist())]
 
 
 @pytest.fixture
@@ -86,11 +89,6 @@ def test_a_missing_or_damaged_file_cannot_be_read(tmp_path, refused, name):
     assert code == OTHER_FILE
     assert len(errors.splitlines()) == 1
     assert name in errors
-
-
-CUBE = np.array([[x, y, z] for z in (0, 1) for y in (0, 1) for x in (0, 1)], float)
-PRESSED = [("pressure", ONES)]
-TURNED = [c[::-1] if i % 5 == 2 else c for i, c in enumerate(CELLS.tolist())]
 
 
 @pytest.mark.parametrize(("name", "grid", "words", "code", "key"), [

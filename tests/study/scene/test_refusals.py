@@ -80,11 +80,10 @@ def test_a_result_file_is_named_with_its_ending(tmp_path, command):
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize(
-    ("body", "inside", "outside"),
-    [(BOTTLE, "[25, 175]", "[20, 100]"), (CYLINDER, "[-75, 75]", "[0, 80]"), (BOX, "[-35, 35]", "[-40]"),
-     (FLASK, "[25, 95]", "[10]")],
-)  # fmt: skip
+@pytest.mark.parametrize(("body", "inside", "outside"), [
+    (BOTTLE, "[25, 175]", "[20, 100]"), (CYLINDER, "[-75, 75]", "[0, 80]"), (BOX, "[-35, 35]", "[-40]"),
+    (FLASK, "[25, 95]", "[10]"),
+])  # fmt: skip
 def test_pads_that_leave_the_object_along_its_axis_get_a_warning(body, inside, outside):
     assert warnings(at(inside, body)) == ()
     assert len(warnings(at(outside, body))) == 1

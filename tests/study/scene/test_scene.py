@@ -203,9 +203,8 @@ def test_overrides_replace_values_which_are_in_si_units_and_hyperfoam_fills_in_i
     assert (scene.object.radius_mm, scene.gripper.material, scene.object.name) == (40, "linear", "a ball")
     assert scene.candidates.station_values_mm == (-9, 0, 9)
     assert scene.sweep == {"friction.mu": (0.5, 1.0)}
-    scene = parse_scene(
-        BOTTLE, overrides=["load.normal_force_n=[7, 2, 4]", "candidates.angles_deg=[90, 0]", "gripper.pad_width_mm=22"]
-    )
+    given = ["load.normal_force_n=[7, 2, 4]", "candidates.angles_deg=[90, 0]", "gripper.pad_width_mm=22"]
+    scene = parse_scene(BOTTLE, overrides=given)
     assert scene.load.normal_force == (2, 4, 7)
     assert scene.candidates.angles == (0, math.pi / 2)
     assert scene.gripper.pad_size == (0.05, 0.022, 0.015)
@@ -231,16 +230,10 @@ def test_overrides_replace_values_which_are_in_si_units_and_hyperfoam_fills_in_i
     assert (p.key, p.found) == ("gripper.shear_modulus_kpa", "40.0")
 
 
-@pytest.mark.parametrize(
-    "overrides",
-    [
-        ["friction.mu=5"],
-        ["load.normal_force_n=[500]"],
-        ["gripper.material=linear", "gripper.poisson_ratio=0.49"],
-        ["gripper.shear_modulus_kpa=40000"],
-        ["gripper.tilt_stiffness_nm_per_rad=1", "gripper.sheet_thickness_mm=0.3"],
-    ],
-)
+@pytest.mark.parametrize("overrides", [
+    ["friction.mu=5"], ["load.normal_force_n=[500]"], ["gripper.material=linear", "gripper.poisson_ratio=0.49"],
+    ["gripper.shear_modulus_kpa=40000"], ["gripper.tilt_stiffness_nm_per_rad=1", "gripper.sheet_thickness_mm=0.3"],
+])  # fmt: skip
 def test_values_that_are_seldom_meant_are_allowed_with_a_warning(overrides):
     assert len(parse_scene(BALL, overrides=overrides).warnings) == 1
     assert not parse_scene(BALL).warnings

@@ -23,7 +23,7 @@ SMALL = {  # what makes a run of a second or two of each kind
 
 @pytest.fixture(autouse=True)
 def _here(tmp_path, monkeypatch):
-    """Each test in a folder of its own, and every rank speaks."""
+    """Each test in a folder of its own."""
     monkeypatch.chdir(tmp_path)
 
 

@@ -21,6 +21,7 @@ from tests.study import formula_results
 from tests.study.scenes import pose_of
 
 FORCES = np.array([1.0, 5.0])
+WIDE = ("mass", "wall", "two meshes")
 
 
 def study(quality, flags=0.0, labels=None, status=DONE, needs=()):
@@ -164,9 +165,6 @@ def test_the_force_is_the_largest_that_most_share_or_the_lowest_that_holds_a_mas
     assert "payload [kg]" in as_csv(table).splitlines()[0].split(",")
 
 
-WIDE = ("mass", "wall", "two meshes")
-
-
 def test_errors_stand_with_what_they_belong_to_and_the_largest_is_found_with_its_place():
     table = best(study([[0.04]], needs=WIDE))
     for name in ("quality", "e_n", "f_x_max", "f_y_max", "tau_z_max"):
@@ -260,10 +258,9 @@ def test_the_answer_says_what_is_held_and_which_force_holds_a_mass():
     assert "±" not in told["force"]
 
 
-@pytest.mark.parametrize(
-    ("low", "high", "text"),
-    [(0.8, 2.5, "0.8..2.5"), (0.8, 5.0, "0.8..5+"), (3.0, 2.5, "none"), (np.nan, np.nan, "-"), (None, 2.5, "..2.5")],
-)
+@pytest.mark.parametrize(("low", "high", "text"), [
+    (0.8, 2.5, "0.8..2.5"), (0.8, 5.0, "0.8..5+"), (3.0, 2.5, "none"), (np.nan, np.nan, "-"), (None, 2.5, "..2.5"),
+])  # fmt: skip
 def test_the_safe_forces_of_a_grasp(low, high, text):
     ds = study([[1.0]], needs=["mass"])
     bounds = {"force_low": low, "force_high": high}
