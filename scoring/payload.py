@@ -1,12 +1,18 @@
 """How much a gripper holds: the largest force at the centre of mass that both contacts bear in every direction.
 
-The drive of a parallel gripper keeps the sum of both normal forces. A load along the closing axis shifts force from one
-finger to the other, ``F + s`` and ``F - s``, and the friction of each contact follows its normal force. With ``P_i``
-the wrench of finger i's pressure at the force ``F`` and ``B_i`` its limit surface there, the grasp answers with
+The drive of a parallel gripper keeps the sum of the forces along its closing axis. A load along that axis shifts force
+from one finger to the other, ``F + s`` and ``F - s``, and the friction of each contact follows its normal force. With
+``P_i`` the wrench of finger i's pressure at the force ``F`` and ``B_i`` its limit surface there, the grasp answers with
 
-    W = 2 conv(A_1, A_2),    A_i = P_i + B_i          ("shared", the default),
+    W = 2 conv(A_1, A_2)                              ("shared", the default),
     W = conv(0, A_1) + conv(0, A_2)                   ("up_to": each finger gives way down to nothing),
-    W = A_1 + A_2                                     ("fixed": each keeps its force).
+    W = A_1 + A_2                                     ("fixed": each keeps its force),
+
+    A_i = {F w / (d_i . f(w)) : w in P_i + B_i}       f: the force of a wrench, d_i: in which the drive presses.
+
+Where a contact leans, its friction bears a part of the drive, or adds to it, and the pressure becomes less or more: a
+wedge that is pulled out at its thin end is pressed less. The map to ``A_i`` takes lines to lines, so points of the limit
+surface are all that is needed.
 
 The squeeze comes first: two forces that do not face each other make a couple, and unless 0 lies in W the grasp does not
 hold even itself. The forces without a torque about the centre of mass in W are a convex set ``K`` in space, and what
@@ -33,6 +39,7 @@ from softjaw.scoring.contact import FloatArray, SoftContact
 KINDS = ("shared", "up_to", "fixed")
 BOUND_GAP = 5e-4  # of the bounds, relative, at which the search ends
 ROUNDING_FORCE = 1e-7  # of the forces of the grasp, below which a force is rounding
+MOST_PRESSED = 2.0  # times the pressure of the grasp that a load may make; beyond it the contact would be another one
 MOST_POINTS = 400  # of the section, after which the search ends with the bounds that it has
 TORQUE_OFFSET = 1e-11  # torque at which K is taken, so that no two bases of the programme are alike
 
@@ -58,6 +65,7 @@ def payload(
     centre_of_mass: ArrayLike,
     direction: ArrayLike | None = None,
     kind: str = "shared",
+    drive: ArrayLike | None = None,
 ) -> Payload:
     """Largest force at the centre of mass that two contacts hold, along ``direction`` or the worst of all.
 
@@ -73,20 +81,31 @@ def payload(
         In which it pulls, of any length.
     kind : str
         What happens to the normal forces: one of `KINDS`.
+    drive : (2, 3) array, optional
+        Force with which the gripper presses each finger [N]; by default that of its pressure.
     """
     centre, P = np.asarray(centre_of_mass, float), np.asarray(pressure, float)
     length = max(float(np.linalg.norm(c.position - centre)) for c in contacts) or 1.0
     C = np.array([c.wrench_map(length, length, centre) for c in contacts])
     C[:, :3, 0], C[:, 3:, 0] = P[:, :3], (P[:, 3:] - np.cross(centre, P[:, :3])) / length
     size = float(np.linalg.norm(P[:, :3], axis=1).sum())
-    V1, V2 = (np.ascontiguousarray(getattr(c.body, "vertices").T) / size for c in contacts)  # noqa: B009
     C[:, :, 0] /= size
+    pressed = (P[:, :3] if drive is None else np.asarray(drive, float)) / size
+    vertices = [getattr(c.body, "vertices") / size for c in contacts]  # noqa: B009
+    V1, V2 = (_driven(*each) for each in zip(vertices, C, pressed, strict=True))
     grasp = C, V1, V2, KINDS.index(kind)
     answer = _along(grasp, np.asarray(direction, float)) if direction is not None else _worst(grasp)
     return Payload(size * answer.force, size * answer.upper, answer.direction, answer.borne)
 
 
-# both contacts, forces in units of that of the grasp: C (2, 6, 4), vertices (3, k) of each, and the kind
+def _driven(vertices: FloatArray, C: FloatArray, pressed: FloatArray) -> FloatArray:
+    """Columns ``(4, k)`` of which ``C (6, 4)`` makes the points of ``A``, from ``vertices (k, 3)`` of ``B``."""
+    V = np.vstack([np.ones(len(vertices)), vertices.T])
+    along = pressed @ C[:3] @ V / (pressed @ pressed)
+    return np.ascontiguousarray(V / np.maximum(along, 1.0 / MOST_PRESSED))
+
+
+# both contacts, forces in units of that of the grasp: C (2, 6, 4), columns (4, k) of each, and the kind
 _Grasp = tuple[FloatArray, FloatArray, FloatArray, int]
 
 
@@ -219,16 +238,15 @@ def _times(A, x, out):
 
 @njit(cache=True)
 def _touching(C, V, q, t, out):
-    """Support of ``P + B`` along ``q (6,)``; its point goes into ``out (6,)``, and ``t (4,)`` is room."""
+    """Support of ``A`` along ``q (6,)``; its point goes into ``out (6,)``, and ``t (4,)`` is room."""
     _times(C.T, q, t)
     best, at = -np.inf, 0
     for k in range(V.shape[1]):
-        h = V[0, k] * t[1] + V[1, k] * t[2] + V[2, k] * t[3]
+        h = V[0, k] * t[0] + V[1, k] * t[1] + V[2, k] * t[2] + V[3, k] * t[3]
         if h > best:
             best, at = h, k
-    for i in range(6):
-        out[i] = C[i, 0] + C[i, 1] * V[0, at] + C[i, 2] * V[1, at] + C[i, 3] * V[2, at]
-    return t[0] + best
+    _times(C, V[:, at], out)
+    return best
 
 
 @njit(cache=True)

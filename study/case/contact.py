@@ -117,6 +117,12 @@ class Contact:
         return np.concatenate([force.sum(axis=0), cross(arm, force).sum(axis=0)])
 
     @property
+    def drive(self) -> FloatArray:
+        """Force with which the gripper presses, along the approach, in the object's frame ``(3,)`` [N]."""
+        approach = self.pose.rotation[:, 2]
+        return (self.pressure_wrench[:3] @ approach) * approach
+
+    @property
     def loaded(self) -> NDArray[np.bool_]:
         """Which faces of the patch carry load ``(n,)``."""
         return self.patch.pressure > NEGLIGIBLE * self.patch.pressure.max(initial=0.0)

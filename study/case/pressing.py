@@ -65,6 +65,11 @@ class PressedContact(Contact):
         other.hole_share = finger.hole_share
         return other
 
+    @property
+    def drive(self) -> np.ndarray:
+        """As of any contact; where friction acts back it bears a part of it."""
+        return self.state.force * self.pose.rotation[:, 2]
+
     @cached_property
     def used(self) -> np.ndarray:
         """Friction wrench on the pad ``(f_x, f_y, tau_z)`` while it is pressed, in the contact frame [N, N, N m]."""

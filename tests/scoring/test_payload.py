@@ -51,6 +51,17 @@ def test_in_the_worst_direction_the_load_also_takes_force_from_a_finger():
     assert round_one.force <= round_one.upper <= round_one.force * (1 + 1.01 * BOUND_GAP)
 
 
+@pytest.mark.parametrize("kind", ["shared", "fixed"])
+@pytest.mark.parametrize("lean", [0.0, 0.1, 0.3])
+def test_a_wedge_is_pressed_less_where_it_is_pulled_out_at_its_thin_end_and_more_at_the_other(kind, lean):
+    """N (cos a + mu sin a) = F and 2 N (mu cos a - sin a) = W; on the other side with the other sign."""
+    contacts, c, s = pair(tilt=lean), np.cos(lean), np.sin(lean)
+    drive = [[F, 0, 0], [-F, 0, 0]]
+    for sign in (1, -1):
+        found = payload(contacts, pushes(contacts), MIDDLE, [0, 0, sign], kind, drive)
+        assert found.force == pytest.approx(2 * F * (MU * c - sign * s) / (c + sign * MU * s), rel=1e-6)
+
+
 @pytest.mark.parametrize("arm", [0.003, 0.02])
 def test_a_load_beside_the_contacts_tips_them(arm):
     """Along y at an arm along z the torque about x is borne as torsion, which takes its share of friction."""
