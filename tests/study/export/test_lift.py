@@ -85,6 +85,12 @@ def test_it_holds_nine_tenths_of_the_payload_lets_go_at_twelve_tenths_and_a_plat
     grasp, body = best(tmp_path / "map.hdf")
     assert holds(grasp, body, 0.9, 5.0, DIRECTIONS[:6]).all()
     assert not holds(grasp, body, 1.2, 2.0, DIRECTIONS[:6]).all()
+    # the drive, not the pressure, keeps its force where sides lean by 14 degrees
+    cone = scene_of('shape = "revolution"\nprofile_mm = [[0, 17.5], [25, 23.75], [50, 30], [100, 42.5]]', ONE_MESH)
+    cone = cone.with_values(COARSE | {"candidates.stations_mm": [50], "candidates.angles_deg": [0]})
+    sj.run(cone, tmp_path / "cone.hdf")
+    assert holds(*best(tmp_path / "cone.hdf"), 1.0, 1.0).all()
+    assert not holds(*best(tmp_path / "cone.hdf"), 1.3, 1.0).all()
 
 
 def test_opened_and_run_untouched_it_holds_and_an_elliptic_cylinder_has_its_inertia(cylinder):
