@@ -11,8 +11,8 @@ from one finger to the other, ``F + s`` and ``F - s``, and the friction of each 
     A_i = {F w / (d_i . f(w)) : w in P_i + B_i}       f: the force of a wrench, d_i: in which the drive presses.
 
 Where a contact leans, its friction bears a part of the drive, or adds to it, and the pressure becomes less or more: a
-wedge that is pulled out at its thin end is pressed less. The map to ``A_i`` takes lines to lines, so points of the limit
-surface are all that is needed.
+wedge that is pulled out at its thin end is pressed less. The map to ``A_i`` takes lines to lines, so points of the
+limit surface are all that is needed.
 
 The squeeze comes first: two forces that do not face each other make a couple, and unless 0 lies in W the grasp does not
 hold even itself. The forces without a torque about the centre of mass in W are a convex set ``K`` in space, and what

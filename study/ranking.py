@@ -226,7 +226,7 @@ def distinct(ds: xr.Dataset, order: Sequence[int], score: np.ndarray, k: int, to
     index = np.array(np.unravel_index(np.arange(count), shape)).T
     origin, turn = (ds[name].values if name in ds else None for name in ("finger_pose_origin", "finger_pose_rotation"))
     pad = task_keys(ds, "gripper")
-    opening = values_of(ds, "opening")[..., k].ravel() if "opening" in ds else score
+    opening = np.nan_to_num(values_of(ds, "opening")[..., k].ravel()) if "opening" in ds else score
     half = 0.5e-3 * np.array([pad.get(f"pad_{side}_mm", 0.0) for side in ("length", "width", "width")])
     while len(rest) and not 0 < top <= len(places):
         head = rest[0]
@@ -252,19 +252,35 @@ def distinct(ds: xr.Dataset, order: Sequence[int], score: np.ndarray, k: int, to
 def at_level(ds: Any, force: float | None = None) -> tuple[Any, int, str]:
     """The dataset at a force [N], the number of its level, and in words why it is that one.
 
-    Between two solved forces values are interpolated; without a force it is the one of `shown_level`.
+    Between two solved forces values are interpolated; without a force it is that of `window` or of `shown_level`.
 
     Raises `ValueError` for a force outside of the solved ones.
     """
     forces = ds["normal_force"].values
-    if force is None:
-        return ds, *shown_level(ds, judged(ds))
+    if force is None and (force := window(ds, flags := judged(ds))) is None:
+        return ds, *shown_level(ds, flags)
     near = np.flatnonzero(np.isclose(forces, force))
     if near.size:
         return ds, int(near[0]), ""
     found = at_force(ds, force)
     low, high = found.attrs["between"]
     return found, 0, f"between solved ones, {low:g} and {high:g} N"
+
+
+def window(ds: Any, flags: np.ndarray) -> float | None:
+    """The least force that holds the object and does no harm, where these are between solved ones alone [N].
+
+    None where a solved one does, or no other is known. ``flags``: as `judged` gives them.
+    """
+    if "force_low" not in ds or ((ds["status"].values == DONE) & (flags & LOST == 0)).any():
+        return None
+    low, first = ds["force_low"].values, ds["normal_force"].values[0]
+    high = ds["force_high"].values if "force_high" in ds else np.full(low.shape, np.inf)
+    for force in np.sort(low[(low >= first) & (low <= high)])[:LISTED]:
+        found = at_force(ds, float(force))
+        if ((found["status"].values == DONE) & (judged(found) & LOST == 0)).any():
+            return float(force)
+    return None
 
 
 def shown_level(ds: Any, flags: np.ndarray) -> tuple[int, str]:

@@ -5,6 +5,7 @@ The safe force range of a candidate is enough to hold the object's weight, and n
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,9 @@ from softjaw.study.quantities import FORCE_RANGE, Quantity
 from softjaw.study.scene import Scene
 
 LOW, HIGH = FORCE_RANGE
-LOW_ERROR = f"{LOW}_error"
+LOW_ERROR, HIGH_ERROR = f"{LOW}_error", f"{HIGH}_error"
+# maps that they follow from, of the curved model
+SOURCES = ("safety_factor", "payload_error", "indentation", "indentation_error", "wall_stress", "wall_stress_error")
 
 SWEPT = {"object.semi_axis_a_mm", "object.semi_axis_b_mm"}  # give the axes that curvature studies are drawn over
 
@@ -45,12 +48,14 @@ def derived(scene: Scene) -> list[Quantity]:
                      "move it; NaN where fewer than two of them are solved up to it.", "derived"),
         ]  # fmt: skip
     if getattr(scene.object, "wall", None) is not None:
-        listed.append(Quantity(
-            HIGH, over, "N", "largest force that the wall bears",
-            "Normal force per finger at which the indentation passes object.allowed_dent_mm or the stress the yield "
-            "strength, as force_low; where neither does, the largest solved force. NaN: the wall was taken as rigid.",
-            "derived",
-        ))  # fmt: skip
+        listed += [
+            Quantity(HIGH, over, "N", "largest force that the wall bears",
+                     "Normal force per finger at which the indentation passes object.allowed_dent_mm or the stress the"
+                     " yield strength, as force_low; where neither does, the largest solved force. NaN: the wall was"
+                     " taken as rigid.", "derived"),
+            Quantity(HIGH_ERROR, over, "N", "error of the largest force that the wall bears",
+                     "How much less it is where indentation and stress are larger by their stated errors.", "derived"),
+        ]  # fmt: skip
     return listed
 
 
@@ -63,26 +68,38 @@ def finalise(writer: Any, scene: Scene) -> None:
         a, b = (np.reshape([getattr(p, name) for p in points], shape) for name in ("semi_axis_a", "semi_axis_b"))
         writer.write_derived("b_over_a", b / a)
         writer.write_derived("apex_curvature", a / b**2)
-    forces = np.asarray(scene.load.normal_force)
-    if LOW in wanted:
-        factor = writer.read("safety_factor/ccm")
-        writer.write_derived(LOW, first_crossing(forces, factor, scene.task.safety))
-        stated = writer.read("maps/payload_error") if scene.accuracy.meshes > 1 else 0.0
-        writer.write_derived(LOW_ERROR, crossing_error(forces, factor, scene.task.safety, stated))
-    if HIGH in wanted:
-        writer.write_derived(HIGH, _largest(writer, scene, forces))
+    maps = {q.name: q for q in writer.layout.quantities if q.name in SOURCES}
+    values = {name: writer.read(f"{q.key}/ccm" if q.by_model else q.key) for name, q in maps.items()}
+    for name, value in force_ranges(scene, values).items():
+        writer.write_derived(name, value)
 
 
-def _largest(writer: Any, scene: Scene, forces: FloatArray) -> FloatArray:
-    """Largest force that the wall bears; NaN where it was taken as rigid, so that nothing is known of it."""
-    dent: float | None = getattr(scene.object, "allowed_dent", None)
-    limits = {"indentation": dent, "wall_stress": geometry().material_of(scene.object).yield_strength}
-    values = {name: writer.read(f"{name}/{name}") for name in limits}
-    known = np.isfinite(values["indentation"])
-    solved = np.where(known.any(axis=-1), np.where(known, forces, 0.0).max(axis=-1), np.nan)
-    crossings = [first_crossing(forces, values[name], most) for name, most in limits.items() if most is not None]
-    # fmin, not minimum: a limit that is never passed is NaN and bounds nothing.
-    return np.fmin.reduce([solved, *crossings])
+def force_ranges(scene: Scene, values: Mapping[str, FloatArray], ended: ArrayLike = True) -> dict[str, FloatArray]:
+    """Safe force ranges of the candidates and their errors, from maps by name, of which NaN are not solved.
+
+    ``ended``: which candidates have no case that is still to come, beyond which nothing is known of the others.
+    """
+    forces, ranges = np.asarray(scene.load.normal_force), dict[str, FloatArray]()
+    if scene.object.mass is not None:
+        factor, stated = values["safety_factor"], values.get("payload_error", 0.0)
+        ranges[LOW] = first_crossing(forces, factor, scene.task.safety)
+        ranges[LOW_ERROR] = crossing_error(forces, factor, scene.task.safety, stated)
+    if getattr(scene.object, "wall", None) is not None:
+        dent: float | None = getattr(scene.object, "allowed_dent", None)
+        limits = {"indentation": dent, "wall_stress": geometry().material_of(scene.object).yield_strength}
+        known = np.isfinite(values["indentation"])
+        solved = np.where(known.any(axis=-1) & ended, np.where(known, forces, 0.0).max(axis=-1), np.nan)
+
+        def largest(share: float) -> FloatArray:
+            """With values that are larger by a share of their errors."""
+            larger = {n: values[n] * (1.0 + share * np.nan_to_num(values.get(f"{n}_error", 0.0))) for n in limits}
+            crossings = [first_crossing(forces, larger[n], most) for n, most in limits.items() if most is not None]
+            # fmin, not minimum: a limit that is never passed is NaN and bounds nothing.
+            return np.fmin.reduce([solved, *crossings])
+
+        ranges[HIGH] = largest(0.0)
+        ranges[HIGH_ERROR] = ranges[HIGH] - largest(1.0)
+    return ranges
 
 
 def crossing_error(forces: ArrayLike, values: ArrayLike, limit: float, stated: ArrayLike = 0.0) -> FloatArray:

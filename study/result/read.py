@@ -16,7 +16,19 @@ from numpy.typing import NDArray
 
 from softjaw.friction.patch import FloatArray
 from softjaw.study.flags import OF_FILE, Flag
-from softjaw.study.quantities import BOTH_ENDS, BY_KEY, FINGERS, MISSING, MODELS, REALISATION, TABLE, Axis, Quantity
+from softjaw.study.quantities import (
+    BOTH_ENDS,
+    BY_KEY,
+    FINGERS,
+    FORCE_RANGE,
+    MISSING,
+    MODELS,
+    REALISATION,
+    TABLE,
+    Axis,
+    Quantity,
+)
+from softjaw.study.result.derived import SOURCES, force_ranges
 from softjaw.study.result.index import index_path, open_index
 from softjaw.study.result.layout import DONE, VERSION
 from softjaw.study.result.store import Result, open_result
@@ -148,8 +160,19 @@ def dataset(result: Result) -> xr.Dataset:
     marks = {"flag_masks": tuple(map(int, known)), "flag_meanings": tuple(flag.word for flag in known)}
     variables["flags"] = xr.Variable(layout.names, flags, variables["flags"].attrs | marks)
     variables["status"] = xr.Variable(layout.names, status.astype(np.int8), _about(BY_KEY["status/code"]))
+    if set(FORCE_RANGE) & variables.keys() and (status == MISSING).any():  # what is solved has its range at once
+        _fill_ranges(variables, status, parse_scene(result.scene, check_files=False))
     ds = xr.Dataset(variables, _coordinates(result, variables), _attributes(result))
     return with_intervals(ds) if REALISATION in ds.dims else ds
+
+
+def _fill_ranges(variables: dict[str, Any], status: NDArray[np.integer], scene: Scene) -> None:
+    """Put the safe force ranges of what is solved so far in."""
+    maps = {name: variables[name] for name in SOURCES if name in variables}
+    curved = {name: v.values[..., 0] if "model" in v.dims else v.values for name, v in maps.items()}
+    ranges = force_ranges(scene, curved, (status != MISSING).all(axis=-1))
+    for name in ranges.keys() & variables.keys():  # files of earlier versions lack some
+        variables[name].values[...] = ranges[name]
 
 
 def scene_of(ds: xr.Dataset, index: Sequence[int] = ()) -> Scene:
@@ -263,9 +286,10 @@ def contact_kinds(name: str, values: np.ndarray) -> NDArray[np.int64]:
 def at_force(ds: xr.Dataset, force: float) -> xr.Dataset:
     """The dataset at one force [N] between two solved ones, by power laws; flags of both. `ValueError` beyond them.
 
-    Both are in its attribute ``between``. What has directions, or is not positive, lies on straight lines. The errors
-    hold how far power laws are from straight lines, too. A case beside one that is not solved has that one's state.
-    Across a snap-in of the wall, and between contacts that differ in kind, nothing is known: it is "not computed".
+    Both are in its attribute ``between``, the largest solved one in ``largest``. What has directions, or is not
+    positive, lies on straight lines. The errors hold how far power laws are from straight lines, too. A case beside one
+    that is not solved has that one's state. Across a snap-in of the wall, and between contacts that differ in kind,
+    nothing is known: it is "not computed".
     """
     forces = ds["normal_force"].values
     if not forces[0] <= force <= forces[-1] or len(forces) < 2:
@@ -274,7 +298,7 @@ def at_force(ds: xr.Dataset, force: float) -> xr.Dataset:
     k = min(int(np.searchsorted(forces, force, side="right")) - 1, len(forces) - 2)
     share, power = ((force - forces[k]) / np.diff(forces)[k], np.log(force / forces[k]) / np.diff(np.log(forces))[k])
     low, high = (ds.isel(normal_force=[i]).assign_coords(normal_force=[force]) for i in (k, k + 1))
-    between = low.assign_attrs(between=forces[k : k + 2].tolist())
+    between = low.assign_attrs(between=forces[k : k + 2].tolist(), largest=float(forces[-1]))
     for name in (str(n) for n, v in ds.data_vars.items() if "normal_force" in v.dims):
         dims, first, last = ds[name].dims, low[name].values, high[name].values
         if ds[name].dtype.kind == "f":

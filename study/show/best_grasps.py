@@ -16,7 +16,7 @@ from softjaw.study.quantities import BY_KEY, FORCE_RANGE, LEAST_FORCE, LISTED, M
 from softjaw.study.ranking import distinct, index_of, judge, passed_over, rank_values, score_of, sure, task_keys
 from softjaw.study.result.layout import DONE
 from softjaw.study.result.read import axes_of, dataset, other_levels, values_of
-from softjaw.study.show.grasps import Index, at, candidate_of, forces, note, order, place
+from softjaw.study.show.grasps import Index, at, candidate_of, forces, largest_force, note, order, place
 from softjaw.study.show.places import folded_text, named, short_name, side_text, spot
 from softjaw.study.show.status import (
     MOST_PLACES,
@@ -65,6 +65,10 @@ def best(
     marks = ds["flags"].values[tuple(np.array(listed, int).reshape(-1, ds.status.ndim).T)]
     table = case_table(ds, listed, True, maps, common(marks) if maps is BRIEF else 0)
     if not found:
+        if "between" in ds.attrs:
+            low, high = ds.attrs["between"]
+            text = f"contacts change between {low:g} and {high:g} N, or one of them is not solved"
+            return Table(f"no value at {forces(ds)[k]:g} N: {text}", table.columns, ())
         solved = np.any(ds.status.values == DONE, axis=tuple(range(ds.status.ndim - 1)))
         others_ = ", ".join(f"{f:g} N" for f in forces(ds)[solved]) or "none"
         return Table(f"no candidate is solved at {forces(ds)[k]:g} N; forces with one: {others_}", table.columns, ())
@@ -160,7 +164,7 @@ def safe_range(ds: xr.Dataset, index: Index) -> str:
         return "-"
     if all(name in ds for name in FORCE_RANGE) and not low <= high:
         return "none"
-    more = "+" * bool(high >= forces(ds)[-1] * (1 - NEGLIGIBLE))
+    more = "+" * bool(high >= largest_force(ds) * (1 - NEGLIGIBLE) and not at(ds, "force_high_error", index) > 0)
     return "..".join("" if np.isnan(bound) else f"{bound:.3g}" for bound in (low, high)) + more
 
 
@@ -190,18 +194,20 @@ def common(marks: np.ndarray) -> int:
 
 
 def _notes(ds: xr.Dataset, accuracy: Sequence[str], marks: np.ndarray) -> list[str]:
-    """At most three lines by what to do about them: how exact, which flags to look at, what is left out or last.
+    """At most four lines by what to do about them: how exact, which flags to look at, what is to come or left out.
 
     Each has its first clause, and of the others what a line of a terminal has room for.
     """
     states = ds.status.values[..., ds.attrs["level"]]
     apart = np.count_nonzero(states == MISSING) * ("between" in ds.attrs)
+    to_come = np.count_nonzero(ds.status.values == MISSING) * ("between" not in ds.attrs)
     count = {flag: int(np.count_nonzero(marks & flag)) for flag in Flag if flag != Flag.OUT_OF_REACH}
     raised = sorted(filter(count.get, count), key=lambda flag: (-count[flag], flag))
     words = {flag: f"{flag.word} ({count[flag]} of {len(marks)})" for flag in raised}
     faults = [flag for flag in raised if not flag & FINER]
     parts = {"accuracy": [*filter(None, accuracy), *(words[flag] for flag in raised if flag & FINER)],
              "look at": [f"{words[f]}{f': {f.sentence}' * (len(faults) == 1)}" for f in faults],
+             "not ended": [f"{to_come} cases are not computed yet"] * bool(to_come),
              "left out": [*no_grasps(states), *[f"{apart} whose contact changes between"] * (apart > 0)]}  # fmt: skip
     if gone := [short_name(ds, c) for c, approach in ds.attrs["reach"].items() if approach == ()]:
         hand = Path(task_keys(ds, "gripper")["preset"]).stem
@@ -269,11 +275,18 @@ def _force(ds: xr.Dataset, index: Index) -> tuple[str, str]:
         known = np.isfinite(error)
         covers = f"±: mesh, interpolation, {100 * MU_ERROR:g} % of mu" if known else "error not known"
         least = with_error(low, error) if known else number(low, 3)
-        if (high := at(ds, "force_high", index)) < low:
-            return "none is safe", f"{wanted} need {least} N per finger ({covers}), and the wall bears {high:.3g} N"
-        return f"{least} N per finger", f"the least that holds {wanted} ({covers})"
+        if at(ds, "force_high", index) < low:
+            return "none is safe", f"{wanted} need {least} N per finger ({covers}), the wall bears {_borne(ds, index)}"
+        alone = "; no solved force does without harm: solve one" * bool(int(ds["flags"].values[index]) & Flag.TOO_WEAK)
+        return f"{least} N per finger", f"the least that holds {wanted} ({covers}){alone}"
     weak = not at(ds, "safety_factor", index) >= safety * (1 - TIE)
     return pressed, f"no solved force holds {wanted}" if weak else f"the smallest solved force that holds {wanted}"
+
+
+def _borne(ds: xr.Dataset, index: Index) -> str:
+    """The largest force that the wall bears, with its error where that is known."""
+    high, error = (at(ds, name, index) for name in ("force_high", "force_high_error"))
+    return f"{with_error(high, error) if error > 0 else number(high, 3)} N"
 
 
 def _held(ds: xr.Dataset, index: Index) -> tuple[str, str]:
@@ -291,9 +304,9 @@ def _held(ds: xr.Dataset, index: Index) -> tuple[str, str]:
 def _limit(ds: xr.Dataset, index: Index) -> str:
     """Why a grasp holds no more: what lies beyond its force, and better grasps that fail."""
     k, high = index[-1], at(ds, "force_high", index)
-    if high < forces(ds)[-1] * (1 - NEGLIGIBLE):
+    if high < largest_force(ds) * (1 - NEGLIGIBLE):
         friction = f"friction at {forces(ds)[k]:g} N, and " * bool(forces(ds)[k] < high)
-        parts = [f"{friction}the wall, which bears {high:.3g} N at most"]
+        parts = [f"{friction}the wall, which bears {_borne(ds, index)} at most"]
     else:
         parts = [f"friction at {forces(ds)[k]:g} N{_beyond(ds, index)}"]
     done = np.flatnonzero(ds["status"].values[..., k].ravel() == DONE)

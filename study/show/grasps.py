@@ -106,6 +106,11 @@ def forces(ds: xr.Dataset) -> np.ndarray:
     return np.asarray(ds.variables["normal_force"].values)
 
 
+def largest_force(ds: xr.Dataset) -> float:
+    """The largest normal force of the cases, also where values between two are shown [N]."""
+    return float(ds.attrs.get("largest", forces(ds)[-1]))
+
+
 def candidate_of(ds: xr.Dataset, index: Index) -> int:
     """Number of a case's candidate, counted over sweeps, stations and angles."""
     return int(np.ravel_multi_index(index[:-1], ds.status.shape[:-1]))

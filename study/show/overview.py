@@ -8,6 +8,8 @@ from typing import Any
 from softjaw.study.case.build import axis_span, geometry, has_wall, listed_accuracy, told
 from softjaw.study.units import UNITS, shown, shown_text
 
+OPEN = {"top": "open top", "both": "open at both ends", "none": "closed top"}
+
 
 def scene_text(scene: Any, file: str) -> str:
     """What would be run, in a few lines."""
@@ -73,7 +75,7 @@ def wall_text(shape: Any) -> str:
     words = [
         f"{thickness} mm {shape.wall_material} ({found.young_modulus / UNITS['gpa'].size:g} GPa, {strength})",
         shape.support,
-        "open top" if shape.open_top else "closed top",
+        OPEN[shape.open_ends],
         f"indentation up to {shape.allowed_dent_mm:g} mm allowed" if shape.allowed_dent_mm else "any indentation",
     ]
     return ", ".join(words)
