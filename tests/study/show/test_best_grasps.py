@@ -119,6 +119,23 @@ def test_a_force_between_two_solved_ones_needs_both_and_carries_their_flags():
     assert not best(ds, force=2.0).rows
 
 
+def test_a_window_between_two_solved_forces_is_shown_where_it_lies():
+    """150 g twice over need 3 and 1.5 N; the wall bears 2 N of 1 and 5."""
+    ds = rising(0.15)
+    ds = ds.assign(force_high=ds.force_low.copy(data=np.full(ds.force_low.shape, 2.0)))
+    table = best(ds)
+    assert table.facts["force"] == pytest.approx(1.5)
+    assert stations(table)[0] == 1.0
+    assert table.rows[0]["payload"] == pytest.approx(0.3)
+    assert safe_range(judge(ds), (1, 0, 0)) == "1.5..2"  # 5 N is the largest solved force there, too
+    ds["finger_rims"] = ((*ds.status.dims, "finger"), np.zeros((*ds.status.shape, 2)), {"units": ""})
+    ds["finger_pieces"] = ds["finger_holes"] = ds.finger_rims.copy(data=ds.finger_rims.values + [[1], [2]])
+    table = best(ds)  # contacts change on the way: the nearest that is solved, and what to do
+    assert table.facts["force"] == 1.0
+    assert not best(ds, force=2.0).rows
+    assert "none" not in best(ds, force=2.0).title
+
+
 def test_grasps_are_ranked_by_payload_or_what_is_named_and_of_those_alike_the_simpler_comes_first():
     assert stations(best(rising())) == [1.0, 0.0]
     assert stations(best(rising(), by="quality")) == [0.0, 1.0]

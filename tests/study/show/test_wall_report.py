@@ -82,6 +82,20 @@ def test_the_size_of_a_shell_is_that_of_its_mesh_and_show_has_indentations_stres
     assert [row["flags"] & (Flag.TOO_WEAK | Flag.TOO_STRONG) for row in strong.rows] == [0, 0]  # as in the file
 
 
+def test_what_an_unfinished_run_has_solved_is_judged_by_its_wall(solved, tmp_path, can):
+    """Of the second station 3 N are still to come: nothing is known beyond 1 N, which dents it less than is allowed."""
+    writer = ResultWriter(write(tmp_path / "a.hdf", *solved), make_plan(solved[0], "can.toml").layout, None)
+    writer.forget(3)
+    writer.close()
+    ds, whole = open(tmp_path / "a.hdf"), open(can)
+    assert ds.force_high.values[0, 0] == whole.force_high.values[0, 0] < 3
+    assert np.isnan(ds.force_high.values[1, 0])
+    assert (ds.force_low.values == whole.force_low.values).all()
+    assert judged(ds)[0, 0, 1] & Flag.TOO_STRONG
+    assert 0 < ds.force_high_error.values[0, 0] < 1
+    assert any("1 cases" in note for note in best(ds).notes)
+
+
 @pytest.mark.parametrize("flag", [Flag.SLIDES_OUT, Flag.YIELDS])
 def test_grasps_that_slide_out_or_yield_come_last(can, flag):
     ds = open(can)
