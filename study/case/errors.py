@@ -34,24 +34,32 @@ OF_EDGES = dict.fromkeys((q.name for q in TABLE), 0.12) | {
     "payload": 0.02, "safety_factor": 0.02, "f_x_max": 0.04, "f_y_max": 0.04, "closing": 0.25, "contact_area": 0.2,
     "p_max": 3.0,
 }  # fmt: skip
+# Of the square of the overlap where one line of nodes bears, which tells little of the contact's width.
+ONE_LINE = 2.0  # elements across a contact that one line of nodes makes
+OF_OVERLAP = {"closing": 2.0, "contact_area": 2.6, "p_max": 70.0}
 EDGES_ROUNDED = 1.6  # times the error of a payload on the coarse mesh alone, where the object's edges are rounded
 OF_PAIRS = {"p_max": 3.0}  # of what pairs differ by: peaks that an effect makes at an edge grow as elements shrink
 PAYLOADS = ("payload", "safety_factor")  # what arms and couples leave of the friction: little of it moves all of them
 
 
 class Unseen(NamedTuple):
-    """Shares that no difference of two meshes shows: floors of sums over a contact and of widths; load on edges."""
+    """Shares that no difference of two meshes shows: floors of sums over a contact and of widths; load on edges.
+
+    ``overlap`` is how far the pad is in the object at most, over the closing displacement, where one line of nodes bears.
+    """
 
     floor: float = 0.0
     of_width: float = 0.0
     on_edges: float = 0.0
+    overlap: float = 0.0
 
     @classmethod
     def of(cls, contacts: Sequence[Any], doubt: float = 1.0) -> Unseen:
         """On these contacts; floors, at which meshes agree by luck, are ``doubt`` times what the elements tell."""
         floor = doubt * FLOOR / min(c.elements for c in contacts) ** POWER
         of_width = doubt * FLOOR / min(c.across for c in contacts) ** POWER
-        return cls(floor, of_width, max(c.on_edges for c in contacts))
+        overlap = max(c.overlap * (c.across <= ONE_LINE) for c in contacts)
+        return cls(floor, of_width, max(c.on_edges for c in contacts), overlap)
 
     def share(self, q: Quantity, contacts: Sequence[Any], acts: bool = False) -> float:
         """Of a quantity's value; ``acts``: whether friction acts back."""
@@ -59,6 +67,7 @@ class Unseen(NamedTuple):
         if q.name == "closing" and (pad := contacts[0].state.pad).shape.element == "hex8":
             # trilinear elements close less, the less the foam can be compressed
             floor *= 0.4 + 0.2 / (1.0 - 2.0 * pad.material.poisson_ratio)
+        floor += OF_OVERLAP.get(q.name, 0.0) * self.overlap**2
         # pressures alone give forces along the face by balance, with friction that acts back they do not
         return floor * (2.0 if acts and q.name.startswith("f_") else 1.0) + self.on_edges * OF_EDGES[q.name]
 

@@ -32,6 +32,7 @@ from softjaw.study.scene import Scene
 OBLIQUE_EXCESS = 0.05  # of the commanded force: beyond it the force along the contact normal is another one
 SHARP = np.radians(20.0)  # by which normals of neighbouring faces turn more than usual, from which it is an edge
 BENT = np.radians(120.0)  # between the object's normals at neighbouring loaded faces, beyond which it is coarse too
+OVERLAPS = 0.1  # share of the closing displacement, beyond which the mesh is coarse for the contact
 MESH_HOLE = 0.01  # of a pad's face before a hole of the mesh, beyond which that is flagged
 MAX_SLOPE = np.radians(60.0)  # of an approach against the planes across a thin-walled object's axis
 UPRIGHT, HALF_TURN = (1.0, 1.0, 1.0), (-1.0, -1.0, 1.0)  # signs of the axes of a pad's frame
@@ -156,6 +157,11 @@ class PressedContact(Contact):
         return float((share * load).sum() / load.sum())
 
     @property
+    def overlap(self) -> float:
+        """How far the pad is in the object at most, over the closing displacement."""
+        return self.state.checks.penetration_depth / self.state.closing
+
+    @property
     def coarse(self) -> bool:
         """Whether the mesh is coarse for this contact, or its elements are too stiff for the foam."""
         shape, law = self.state.pad.shape, self.state.pad.material
@@ -168,11 +174,9 @@ class PressedContact(Contact):
         # a blade thinner than an element is met on its flanks alone, or not on them, as the faces happen to lie
         pairs = zip(_neighbours(normals), _neighbours(loaded.reshape(n * k, m * k)), strict=True)
         bent = any((np.einsum("ijc,ijc->ij", a, b)[p & q] < np.cos(BENT)).any() for (a, b), (p, q) in pairs)
-        # share of the closing displacement, beyond which the mesh is coarse for the contact
-        overlaps = self.state.checks.penetration_depth > 0.1 * self.state.closing
         # Trilinear elements alone lock when the foam is nearly incompressible.
         # Poisson's ratio above which trilinear elements are too stiff
-        return bool(overlaps or few or bent or (shape.element == "hex8" and law.poisson_ratio > 0.45))
+        return bool(self.overlap > OVERLAPS or few or bent or (shape.element == "hex8" and law.poisson_ratio > 0.45))
 
     @property
     def free_face(self) -> float:

@@ -71,6 +71,23 @@ def test_errors_hold_where_the_edge_of_a_face_lies_within_an_element(width):
     assert abs(reference / value - 1) < 0.13 < 2 * found["maps/contact_area_error"] < 0.5
 
 
+@pytest.mark.parametrize(("radius", "modulus"), [(5, 1000), (5, 4000), (25, 4000)])
+def test_errors_hold_where_a_contact_is_narrower_than_an_element(radius, modulus):
+    """One line of nodes bears; Hertz's line contact, with half-widths of 0.22, 0.11 and 0.24 mm at 1 N."""
+    cylinder = {"shape": "elliptic_cylinder", "semi_axis_a_mm": radius, "semi_axis_b_mm": radius, "length_mm": 120}
+    scene = Scene.of_tables({
+        "object": cylinder, "gripper": {"shear_modulus_kpa": modulus}, "load": {"normal_force_n": [1]},
+        "candidates": {"stations_mm": [0], "angles_deg": [0]}, "effects": {"friction_pressure_coupling": "none"},
+    })  # fmt: skip
+    line, stiffness, thickness = 1 / 0.05, 2.5e3 * modulus / (1 - 0.25**2), 0.015
+    half = np.sqrt(4 * line * radius * 1e-3 / (np.pi * stiffness))
+    closing = line / (np.pi * stiffness) * (2 * np.log(4 * thickness / half) - 1)
+    [found] = [result.values for result in results_of(scene)]
+    true = {"closing": closing, "contact_area": 2 * half * 0.05, "p_max": 2 * line / (np.pi * half)}
+    for name, at_best in true.items():
+        assert abs(at_best / found[f"maps/{name}"] - 1) < found[f"maps/{name}_error"], name
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("station", [40, 148.5])
 def test_errors_of_both_kinds_of_gaps_cancel(station):

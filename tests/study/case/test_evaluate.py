@@ -97,7 +97,7 @@ def test_extents_scale_arms_contacts_that_lean_are_flagged_and_errors_are_differ
         assert found[1] == pytest.approx(torques, rel=1e-12)
     fine, coarse = pair(math.radians(8.0)), pair(math.radians(8.0), strips=17)
     for contact, elements in ((fine[0], 8.0), (fine[1], 9.0), (coarse[0], 2.0), (coarse[1], 2.0)):
-        contact.elements, contact.across, contact.on_edges = elements**2, elements, 0.0
+        contact.elements, contact.across, contact.on_edges, contact.overlap = elements**2, elements, 0.0, 0.0
     values, _ = evaluate(fine, SETTINGS)
     assert values["maps/flags"] & Flag.NOT_ANTIPODAL
     assert values["maps/misalignment"] == pytest.approx(math.radians(8.0), rel=1e-9)
