@@ -28,6 +28,7 @@ MEANING = {
     BUG: "a bug",
     STOPPED: "stopped, run the same command again",
 }
+LACKING = "{what} needs {error.name}: {error}; what does not solve works without, and 'softjaw doctor' checks the rest"
 RANK = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID")
 # What controls a terminal or hides text: control characters, line separators, changes of direction, surrogates
 UNPRINTABLE = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff\ufeff]")

@@ -10,15 +10,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from softjaw.study.messages import with_ending
+from softjaw.study.messages import LACKING, with_ending
 from softjaw.study.scene import Scene
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from softjaw.study.one_case import Case
-
-MISSING = "{what} needs {error.name}: {error}; what does not solve works without, and 'softjaw doctor' checks the rest"
 
 
 def press(
@@ -84,7 +82,7 @@ def press(
 
         from softjaw.study.one_case import solved_case
     except ImportError as error:
-        raise ImportError(MISSING.format(what="press", error=error), name=error.name) from error
+        raise ImportError(LACKING.format(what="press", error=error), name=error.name) from error
     # The order of a sum, so its last bits, depends on the number of threads; numpy has been loaded with any.
     with threadpool_limits(1):
         return solved_case(scene, station, angle, force, candidate, pose)
@@ -132,6 +130,6 @@ def run(scene: Scene, file: str | Path, comm: Any = None, *, retry_failed: bool 
 
         from softjaw.study.launch import solve_scene
     except ImportError as error:
-        raise ImportError(MISSING.format(what="run", error=error), name=error.name) from error
+        raise ImportError(LACKING.format(what="run", error=error), name=error.name) from error
     with threadpool_limits(1):
         return solve_scene(scene.reread(), path, MPI.COMM_WORLD if comm is None else comm, retry_failed=retry_failed)

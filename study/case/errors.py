@@ -45,7 +45,7 @@ PAYLOADS = ("payload", "safety_factor")  # what arms and couples leave of the fr
 class Unseen(NamedTuple):
     """Shares that no difference of two meshes shows: floors of sums over a contact and of widths; load on edges.
 
-    ``overlap`` is how far the pad is in the object at most, over the closing displacement, where one line of nodes bears.
+    ``overlap`` is how far the pad is in the object, over the closing displacement, where one line of nodes bears.
     """
 
     floor: float = 0.0

@@ -13,7 +13,7 @@ from typing import Any
 
 from softjaw.study.cli.options import program
 from softjaw.study.doctor import begin_mpi, keep_compiled_loops, pin_threads
-from softjaw.study.messages import BUG, CANNOT_WRITE, DONE, STOPPED, USAGE, StudyError, complain, printable
+from softjaw.study.messages import BUG, CANNOT_WRITE, DONE, LACKING, STOPPED, USAGE, StudyError, complain, printable
 from softjaw.study.run.limits import is_out_of_memory, no_room, require_room
 
 UNWRITABLE = {errno.EPIPE, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}  # what standard output can answer
@@ -48,6 +48,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return code
     except StudyError as error:
         return complain(error)
+    except ImportError as error:
+        return complain(StudyError(USAGE, LACKING.format(what=options.command, error=error)))
     except OSError as error:
         # An error with a file name is about that file and not about standard output.
         if error.errno not in UNWRITABLE or error.filename:

@@ -48,9 +48,10 @@ def _measured(options: Namespace) -> start.Measured:
     with fault_of("--mesh", ValueError, OSError):
         axis = options.axis or start.longest(dict(zip("xyz", built("z")[2], strict=True)))
         shape, made, extents = built(axis)
-        middle = geometry().middle_of(shape, in_si("pad_length_mm", start.PAD_LENGTH))
-        half = in_si("half_mm", start.PAD_LENGTH / 2)
-        stations = (s for s in start.heights(extents[2]) if not middle.remark(in_si("station_mm", s), half))
+        pad, _ = start.jaws(options.gripper)
+        middle = geometry().middle_of(shape, in_si("pad_length_mm", pad))
+        half = in_si("half_mm", pad / 2)
+        stations = (s for s in start.heights(extents[2], pad) if not middle.remark(in_si("station_mm", s), half))
         return axis, tuple(extents), tuple(stations), mesh_notes(made)
 
 

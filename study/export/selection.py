@@ -27,7 +27,7 @@ from softjaw.friction.patch import FloatArray
 from softjaw.study.case.reach import FREE, OPENED_MORE, clearest, hand_axes, opened, refused
 from softjaw.study.export.cases import cases
 from softjaw.study.export.rigid_body import scene_of
-from softjaw.study.flags import LOST, flag_words, flags_in
+from softjaw.study.flags import LOST, Flag, flag_words, flags_in
 from softjaw.study.grippers import Hand
 from softjaw.study.messages import USAGE, StudyError, fault_of
 from softjaw.study.quantities import BY_KEY, FORCE_RANGE, LEAST_FORCE, MAIN
@@ -211,4 +211,6 @@ def usable(grasps: Sequence[RankedGrasp]) -> tuple[list[RankedGrasp], str]:
     kept = [grasp for grasp in grasps if not grasp.reasons]
     reasons = Counter(reason for grasp in grasps for reason in grasp.reasons)
     listed = ", ".join(f"{reason} ({count})" if len(reasons) > 1 else reason for reason, count in reasons.items())
-    return kept, f"{len(grasps) - len(kept)} of {len(grasps)} grasps left out: {listed}" if reasons else ""
+    left = f"{len(grasps) - len(kept)} of {len(grasps)} grasps left out at {grasps[0].force:g} N" if reasons else ""
+    weak = "; --force names another" * (Flag.TOO_WEAK.word in reasons)
+    return kept, f"{left}: {listed}{weak}" if reasons else ""

@@ -146,6 +146,8 @@ class GraspMap:
             Force [N] at which they are ranked, solved or between two, and which the points have. By default that of
             ``softjaw show``; where the object's mass is known each point then has its own force to use.
         """
+        if n < 1:
+            raise ValueError(f"n is {n}: expected a number of grasps from 1 on")
         ds = judge(self.data, force=force, by=by, top=n, lines=False)
         k, (stations, angles, _) = ds.attrs["level"], (axis.values for axis in self.file_axes[-3:])
         forces, each = ds["normal_force"].values, force is None and "force_low" in ds

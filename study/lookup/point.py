@@ -20,7 +20,7 @@ INSIDE, OUTSIDE, NO_RESULT, SNAP, JUMP = range(5)
 BESIDE_CASES = 0.45  # of what interpolation claims alone, where the cases state errors: those err on the safe side, too
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class GraspPoint(GraspNumbers):
     """A map at points of this ``shape``; numbers for one point, arrays for many. Made by ``GraspMap.at``.
 
@@ -32,6 +32,21 @@ class GraspPoint(GraspNumbers):
     place: FloatArray  # (m, 3) station [m], angle [rad], force [N] as asked for
     corners: Corners
     states: np.ndarray  # (m,)
+
+    @property
+    def station(self) -> Any:
+        """Station [m]; of explicit poses the number of the candidate."""
+        return self._shaped(self.place[:, 0])
+
+    @property
+    def angle(self) -> Any:
+        """Angle [rad]."""
+        return self._shaped(self.place[:, 1])
+
+    @property
+    def force(self) -> Any:
+        """Normal force per finger [N]."""
+        return self._shaped(self.place[:, 2])
 
     @property
     def state(self) -> Any:
@@ -146,6 +161,8 @@ class GraspPoint(GraspNumbers):
             lines.append(f"  {name:<14} {shown_text(value, units, 5)}{doubt}")
         lines += [f"  {flag.sentence}" for flag in flags_in(self.flags)]
         return "\n".join(lines)
+
+    __repr__ = __str__
 
     def _shaped(self, values: np.ndarray) -> Any:
         return values.reshape(self.shape) if self.shape else values.tolist()[0]

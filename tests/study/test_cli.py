@@ -115,6 +115,13 @@ def test_quick_answers_load_neither_mpi_nor_petsc(command, scene, finished):
     assert ("numpy" in modules) == (not command.endswith("--help"))
 
 
+def test_without_petsc_a_run_says_what_is_missing(scene, tmp_path, monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "mpi4py", None)
+    monkeypatch.delitem(sys.modules, "softjaw.study.cli.running", raising=False)
+    assert main(["run", str(scene), "-o", str(tmp_path / "a.hdf")]) == 2
+    assert "mpi4py" in capsys.readouterr().err
+
+
 def test_bad_usage_is_told_by_the_first_rank_only(monkeypatch, capsys):
     monkeypatch.setenv("OMPI_COMM_WORLD_RANK", "1")
     assert main(["rum"]) == 2

@@ -18,7 +18,7 @@ from softjaw.study.messages import CANNOT_WRITE, USAGE, StudyError, write_file
 from softjaw.study.scene.section import numbers_text
 
 HERE = Path(__file__).parent
-PAD_LENGTH, OPENING = 50.0, 85.0  # mm, as in the template of a mesh
+PAD_LENGTH, OPENING = 50.0, 85.0  # mm, as in the template of a mesh, which names no gripper
 IN_METRES = (".glb", ".gltf")  # glTF has no other unit
 
 
@@ -37,16 +37,24 @@ def longest(sides: Mapping[str, float]) -> str:
     return axis if sides[axis] > 1.01 * sides["z"] else "z"
 
 
-def heights(height: float) -> tuple[float, ...]:
+def jaws(gripper: str | None) -> tuple[float, float]:
+    """Length of a gripper's pad, and the largest opening that its foam leaves [mm]."""
+    if not gripper:
+        return PAD_LENGTH, OPENING
+    keys, hand = gripper_file(gripper)
+    return keys.get("pad_length_mm", PAD_LENGTH), hand.stroke_mm - 2 * keys.get("pad_thickness_mm", 0.0)
+
+
+def heights(height: float, pad: float = PAD_LENGTH) -> tuple[float, ...]:
     """Stations [mm] at which a pad along the axis of an object does not reach beyond its ends; none on a short one.
 
     >>> heights(61.0), heights(40.0)
     ((25.0, 30.5, 36.0), ())
     """
-    room = height - PAD_LENGTH
+    room = height - pad
     count = min(8, 1 + int(room // 5))  # at two angles a first map of 16 candidates
     # Down to 0.1 mm, so that rounding leads over neither end.
-    return tuple(math.floor(10 * (PAD_LENGTH / 2 + room * i / max(count - 1, 1))) / 10 for i in range(max(count, 0)))
+    return tuple(math.floor(10 * (pad / 2 + room * i / max(count - 1, 1))) / 10 for i in range(max(count, 0)))
 
 
 def init(options: Namespace, measure: Callable[[Namespace], Measured]) -> str:
@@ -135,21 +143,21 @@ def _about_mesh(options: Namespace, scene: Path, measure: Callable) -> tuple[dic
     return {
         "MESH": json.dumps(file, ensure_ascii=False), "UNIT": options.unit, "AXIS": axis,
         "SIZE": " x ".join(f"{extents[i - 'xyz'.index(axis) - 1]:.4g}" for i in range(3)),
-        "STATIONS": _stations(extents, stations),
+        "STATIONS": _stations(extents, stations, *jaws(options.gripper)),
     }, notes  # fmt: skip
 
 
-def _stations(extents: Sequence[float], stations: Sequence[float]) -> str:
+def _stations(extents: Sequence[float], stations: Sequence[float], pad: float, opening: float) -> str:
     """Lines that propose stations, or say why there are none that `check` would not warn of."""
     wide, deep, height = extents
-    angles = [angle for angle, width in ((0, wide), (90, deep)) if width <= OPENING]
-    if height < PAD_LENGTH:
+    angles = [angle for angle, width in ((0, wide), (90, deep)) if width <= opening]
+    if height < pad:
         return f"# Stations along its axis: none, because the pad is longer than the object there, {height:.3g} mm."
     if not angles or not stations:
-        why = f"it is wider than {OPENING:g} mm" if not angles else "the line through its middle bends too much"
+        why = f"it is wider than {opening:g} mm" if not angles else "the line through its middle bends too much"
         return f"# Stations along its axis: none that would do everywhere, because {why}."
     return (
         "# Or, for an object with an axis, stations: heights above its lowest point, at which the pad stays on it.\n"
         f"# stations_mm = {json.dumps(stations)}\n"
-        f"# angles_deg = {json.dumps(angles)}        # about its centre line, where it is at most {OPENING:g} mm wide"
+        f"# angles_deg = {json.dumps(angles)}        # about its centre line, where it is at most {opening:g} mm wide"
     )
