@@ -18,6 +18,7 @@ Thickness = float | Sequence[tuple[float, float]]  # of a wall [m], or pairs (z,
 LINE_SAMPLES = 4000  # of the wanted element size along a line
 GROWTH = 0.25  # of the element size, per distance from the gripped regions
 TURN = np.radians(25.0)  # largest turn of the outline within one element
+MOST_BENT = 0.8  # thickness over the radius of curvature at the edge of a lid
 
 
 @dataclass(frozen=True)
@@ -222,12 +223,15 @@ def _wall(surface: OuterSurface, thickness: Thickness, base: float | None, s: Fl
         part = np.clip((surface.wall[0] - s) / max(surface.wall[0] - surface.flat[0], 1e-12), 0.0, 1.0)
         t = part * base + (1.0 - part) * t
     bend = surface.curve.curvature(s)
+    # the edges of lids are rounded by the program: a thick wall is thinner there, where nobody grasps it
+    lids = (s < surface.wall[0]) | (s > surface.wall[1])
+    t = np.where(lids & (bend * t > MOST_BENT), MOST_BENT / np.maximum(bend, NEGLIGIBLE), t)
     # a wall that reaches its centre of curvature has no inner face
     if (bend * t > 1.0 - 1e-6).any():
         k = int(np.argmax(bend * t))
         raise ValueError(
-            f"the wall is {t[k]:g} m thick at z = {z[k]:g} m, where the outline's radius is only "
-            f"{1 / bend[k]:g} m; round it more or make the wall thinner"
+            f"the wall is {1e3 * t[k]:.4g} mm thick at z = {1e3 * z[k]:.4g} mm, where the outline's radius of curvature "
+            f"is only {1e3 / bend[k]:.4g} mm; round it more or make the wall thinner"
         )
     return t
 

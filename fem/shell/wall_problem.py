@@ -31,7 +31,9 @@ from softjaw.fem.shell.wall_kernel import add_blocks, changes, force_blocks
 from softjaw.fem.shell.wall_model import NonlinearWall
 from softjaw.friction.patch import FloatArray
 
-ROUNDING = 1.5e-18  # norm of the residual over the wall's modulus [m^2]: its forces are differences of large numbers
+# Norm of the residual over modulus, thickness, extent and the root of the unknowns: its forces are differences of large
+# numbers.
+ROUNDING = 4e-16
 
 
 class WallProblem(ContactProblem):
@@ -80,7 +82,9 @@ class WallProblem(ContactProblem):
     @property
     def rounding(self) -> float:
         """See `ContactProblem`."""
-        return ROUNDING * self.model.shell.young_modulus + super().rounding
+        shell = self.model.shell
+        area = shell.mesh.thickness.max() * np.abs(shell.mesh.X).max()
+        return float(ROUNDING * shell.young_modulus * area * np.sqrt(shell.size)) + super().rounding
 
     def _object_points(self, f: Finger, x: FloatArray) -> FloatArray:
         """Quadrature points of a contact face in the object's frame ``(n, 3)`` [m]."""

@@ -162,7 +162,7 @@ def safe_range(ds: xr.Dataset, index: Index) -> str:
     low, high = (at(ds, name, index) for name in FORCE_RANGE)
     if np.isnan([low, high]).all():
         return "-"
-    if all(name in ds for name in FORCE_RANGE) and not low <= high:
+    if all(name in ds for name in FORCE_RANGE) and (low > high or np.isnan(low)):
         return "none"
     more = "+" * bool(high >= largest_force(ds) * (1 - NEGLIGIBLE) and not at(ds, "force_high_error", index) > 0)
     return "..".join("" if np.isnan(bound) else f"{bound:.3g}" for bound in (low, high)) + more

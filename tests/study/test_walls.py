@@ -141,3 +141,16 @@ def test_two_meshes_tell_the_error_a_tube_gives_way_more_than_a_cup_and_a_collap
         assert 0.2 < result.values["maps/support_force"] / 2.0 < 0.5
         assert bool(result.values["maps/flags"] & Flag.SLIDES_OUT) == slides
         assert (Flag.SLIDES_OUT.sentence in result.message) == slides
+
+
+def test_a_light_touch_of_a_large_flat_wall_is_solved():
+    """A canister of 180 x 250 mm: the rounding of its residual grows with its extent and thickness."""
+    canister = 'shape = "sections"\nwall_mm = 1.2\nwall_material = "HDPE"\n' + "".join(
+        f"[[object.sections]]\nz_mm = {z}\na_mm = {a}\nb_mm = {b}\nexponent = 5\n"
+        for z, a, b in ((0, 60, 80), (10, 65, 90), (30, 65, 90), (180, 65, 90), (230, 65, 90), (250, 55, 80))
+    )
+    pad = [f"gripper.pad_{name}_mm={size}" for name, size in (("length", 60), ("width", 40), ("thickness", 10))]
+    where = WHERE.replace("40", "120")
+    [found] = solved(canister, "accuracy.wall_element_mm=8", *pad, where=where, forces="[0.05]")
+    assert not isinstance(found, CaseFailure), found
+    assert found.values["maps/indentation"] > 0

@@ -198,12 +198,21 @@ def test_a_tube_under_pressure():
 
 
 @pytest.mark.parametrize(
-    "arguments", [{"thickness": 5e-3}, {"size": MeshSize(heights=(0.03, 0.5))}], ids=["too thick", "too high"],
+    "arguments", [{"surface": SURFACES["flask"], "thickness": 5e-2}, {"size": MeshSize(heights=(0.03, 0.5))}], ids=["too thick", "too high"],
 )
 def test_bodies_that_cannot_be_meshed_are_refused(arguments):
     with pytest.raises(ValueError):  # noqa: PT011 (the arguments say which)
         body_mesh(**({"surface": SURFACES["square"], "thickness": 4e-4, "size": COARSE} | arguments))
 
+
+def test_a_wall_that_is_thicker_than_the_edges_of_its_lids_are_round_is_thinner_there():
+    surface = SURFACES["square"]
+    mesh = body_mesh(surface, 3e-3, COARSE)
+    thickness = 2 * np.linalg.norm(mesh.D, axis=1)
+    assert thickness.min() < 2e-3
+    inside = (mesh.X + mesh.D)[:, 2]
+    on_wall = (inside > surface.heights[0] + 1e-6) & (inside < surface.heights[1] - 1e-6)
+    assert thickness[on_wall] == pytest.approx(3e-3)
 
 def test_wall_materials():
     assert wall_material("PP").young_modulus == 1.3e9

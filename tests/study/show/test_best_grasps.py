@@ -277,6 +277,7 @@ def test_the_answer_says_what_is_held_and_which_force_holds_a_mass():
 
 @pytest.mark.parametrize(("low", "high", "text"), [
     (0.8, 2.5, "0.8..2.5"), (0.8, 5.0, "0.8..5+"), (3.0, 2.5, "none"), (np.nan, np.nan, "-"), (None, 2.5, "..2.5"),
+    (np.nan, 2.5, "none"), (3.0, np.nan, "3.."),  # a wall that was taken as rigid
 ])  # fmt: skip
 def test_the_safe_forces_of_a_grasp(low, high, text):
     ds = study([[1.0]], needs=["mass"])
