@@ -303,13 +303,15 @@ class LoadPath(ABC, Generic[ProblemT]):
         """The state, checked."""
         problem, x, steps = self.problem, here.x, self._stepping
         residual = np.abs(problem.residual(x))
+        # a solve ends there where the force is so small, see `Stepping.solve`
+        tolerance = max(RESIDUAL, problem.rounding / (problem.share * here.force))
         instead, slack = problem.rule != self._wanted.rule, ALTERNATING if steps.off else 0.0
         pads = []
         for k, f in enumerate(problem.fingers):
             state, unknowns = problem.contact_state(x, k), x[f.unknowns].copy()
             pressure, _, points = state
             imbalance = float(residual[f.offset : f.closing_dof + 1].max()) / f.pad.share
-            checks = check(f.foam, unknowns, state, imbalance, here.force, RESIDUAL, slack)
+            checks = check(f.foam, unknowns, state, imbalance, here.force, tolerance, slack)
             effort = work if k == 0 else Work()
             pads.append(Pressed(
                 here.force, float(x[f.closing_dof]), unknowns, f.pad, f.pose, pressure,

@@ -230,8 +230,8 @@ def _wall(surface: OuterSurface, thickness: Thickness, base: float | None, s: Fl
     if (bend * t > 1.0 - 1e-6).any():
         k = int(np.argmax(bend * t))
         raise ValueError(
-            f"the wall is {1e3 * t[k]:.4g} mm thick at z = {1e3 * z[k]:.4g} mm, where the outline's radius of curvature "
-            f"is only {1e3 / bend[k]:.4g} mm; round it more or make the wall thinner"
+            f"the wall is {1e3 * t[k]:.4g} mm thick at z = {1e3 * z[k]:.4g} mm, where the outline's radius of "
+            f"curvature is only {1e3 / bend[k]:.4g} mm; round it more or make the wall thinner"
         )
     return t
 

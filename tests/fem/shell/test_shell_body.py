@@ -198,7 +198,8 @@ def test_a_tube_under_pressure():
 
 
 @pytest.mark.parametrize(
-    "arguments", [{"surface": SURFACES["flask"], "thickness": 5e-2}, {"size": MeshSize(heights=(0.03, 0.5))}], ids=["too thick", "too high"],
+    "arguments", [{"surface": SURFACES["flask"], "thickness": 5e-2}, {"size": MeshSize(heights=(0.03, 0.5))}],
+    ids=["too thick", "too high"],
 )
 def test_bodies_that_cannot_be_meshed_are_refused(arguments):
     with pytest.raises(ValueError):  # noqa: PT011 (the arguments say which)
