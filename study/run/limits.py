@@ -24,6 +24,7 @@ from softjaw.study.messages import USAGE, StudyError
 # Seconds to finish the case in flight. mpirun kills its ranks about two seconds after it was interrupted; USR1 is what
 # batch systems are asked to send a minute before the time limit.
 GRACE = {signal.SIGUSR1: 30.0, signal.SIGTERM: 0.5, signal.SIGINT: 0.5}
+PATIENCE = 2.0  # of the time limit, after which a process that has not even heard its own alarm ends itself
 RAISE_AGAIN_S = 1.0  # s; what a handler raises inside a finaliser is printed and lost, so it is raised once more
 PROGRAM_BYTES = 1.2e9  # bytes of addresses for the program with its libraries, which take 0.97, and the smallest cases
 SIGNS = ("Cannot allocate memory", "failed to map segment")  # of a file or library that finds no memory
@@ -41,8 +42,7 @@ class Stopper:
 
     ``on_stop``: called once, by the first signal. ``limit``: time of a single case [s]. It is looked at whenever the
     solver comes back to Python, which PETSc does for every residual and every tangent. ``last_resort``: time after
-    which this process ends itself because a case never came back to Python [s]; for a process that has nobody beside it
-    to notice.
+    which this process ends itself, and says where it was, because a case never came back to Python [s].
     """
 
     def __init__(self, on_stop: Callable[[], None], limit: float = math.inf, last_resort: float | None = None) -> None:
@@ -65,11 +65,6 @@ class Stopper:
             late = number == signal.SIGUSR1 and handler == signal.SIG_DFL
             # not SIG_IGN, which programs started from here would inherit
             signal.signal(number, (lambda number, frame: None) if late else handler)
-
-    @property
-    def overdue(self) -> float:
-        """Seconds since the moment at which everybody should have stopped; negative before, and without a signal."""
-        return time.monotonic() - self._leave
 
     @contextmanager
     def case(self) -> Iterator[None]:

@@ -17,16 +17,13 @@ from softjaw.study.quantities import FAILED, MISSING, NO_GRASP
 from softjaw.study.result.lock import OpenedFile
 from softjaw.study.result.write import Files, record
 from softjaw.study.run.limits import AbandonedError, Stopper, is_out_of_memory
-from softjaw.study.run.schedule import LostRanks
 from softjaw.study.run.shares import Share
 
 Pending = dict[int, list[tuple[int, int]]]  # for each force, the candidates that are served and their rows
 DEADLY = 2
 KILLED = "the process was killed {n} times while it solved {what}; 'run --retry-failed' tries again"
 NOT_TRIED = "not tried, because a lower force of this candidate failed: {text}"
-LEFT = "not tried, because the rank that had it was given up at a lower force; 'run --retry-failed' tries again"
 TOO_SLOW = "not solved within {limit:g} s; raise run.time_limit_s and run again with --retry-failed"
-HUNG = "did not come back to Python within {patience:g} s, so its rank was given up; 'run --retry-failed' tries again"
 NO_MEMORY = "more memory than run.memory_gb leaves to a rank ({text}); run on fewer ranks or a coarser mesh"
 
 
@@ -77,11 +74,10 @@ class PathSolver:
         solve_unit: Callable,
         image: Callable | None,
         claims: Any,
-        lost: LostRanks,
         state: OpenedFile,
     ) -> None:
         self._files, self._solve_unit, self._image, self._claims = files, solve_unit, image, claims
-        self._lost, self._state = lost, state
+        self._state = state
         self._begun: list[int] = []
 
     def on_stop(self) -> None:
@@ -89,8 +85,8 @@ class PathSolver:
         self._claims.stop()
         self._uncount()
 
-    def solve(self, share: Share, position: int, codes: np.ndarray, stopper: Stopper, look: Callable[[], Any]) -> None:
-        """Solve a share, which others know by its position, and store the rows that ``codes`` calls missing.
+    def solve(self, share: Share, codes: np.ndarray, stopper: Stopper, look: Callable[[], Any]) -> None:
+        """Solve a share, and store the rows that ``codes`` calls missing.
 
         Raises `StudyError`: the file cannot be written any more.
         """
@@ -102,7 +98,6 @@ class PathSolver:
             self._state.check()
             # Counted before the solve: a process that is killed cannot count afterwards.
             self._count(pending)
-            self._lost.begin(position)
             try:
                 with stopper.case():
                     k, result = next(cases)
@@ -114,9 +109,6 @@ class PathSolver:
                 self._fail(unit, pending, sentence(error, stopper.limit), time.perf_counter() - clock)
                 cases, clock = self._solve_unit(unit, tuple(pending)), time.perf_counter()
                 continue
-            finally:
-                # Also after a failure, or this rank would be taken for one that hangs.
-                self._lost.end()
             now = time.perf_counter()
             self._store(unit, pending.pop(k, []), result, now - clock)
             clock = now
@@ -167,12 +159,6 @@ class PathSolver:
         with self._state.writing():
             for writer, at in map(self._files.at, rows):
                 writer.count_attempt(at, change)
-
-
-def give_up(files: Files, share: Share, patience: float) -> None:
-    """Mark what is missing of a share as failed, because the rank that solves it hangs; by any other rank."""
-    above = LEFT if share.unit.apart else NOT_TRIED
-    fail_from(files, _pending(share, files.codes()), HUNG.format(patience=patience), above)
 
 
 def fail_from(files: Files, pending: Pending, message: str, above: str, seconds: float = math.nan) -> None:

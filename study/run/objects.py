@@ -178,8 +178,7 @@ class _ObjectsRun:
 
         codes = np.concatenate(on_rank0(self._comm, states))
         units = [files.counted(i, part.plan.units) for i, part in enumerate(parts)]
-        # A rank that hangs ends the run, and the next one derives what follows from all cases.
-        session = Session(units, self._work, files, self._comm, codes, more=True)
+        session = Session(units, self._work, files, self._comm, codes)
         code = session.solve()
         for part, writer in zip(parts, writers, strict=True):
             if part.number in self._mine:

@@ -1,8 +1,7 @@
-"""Who solves what, and since when: counters and clocks in the memory that the ranks of a node share."""
+"""Who solves what: counters in the memory that the ranks of a node share."""
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -10,16 +9,6 @@ import numpy as np
 from mpi4py import MPI
 
 NEXT, STOP, SPOKEN, TAKEN = range(4)  # what the counters of a node are for; those of the groups come last
-PATIENCE_LIMITS = 2.0  # of the time limit, after which a rank that has not even heard its own alarm counts as lost
-IDLE = -1
-
-
-def _shared(node: Any, count: int, kind: type) -> tuple[Any, np.ndarray]:
-    """A window and ``count`` numbers of eight bytes in it, which all ranks of the node see."""
-    # All of it at one rank, so that it is one block, which `Shared_query(0)` finds.
-    window = MPI.Win.Allocate_shared(8 * count if node.rank == 0 else 0, 8, comm=node)
-    memory: Any = window.Shared_query(0)[0]
-    return window, np.frombuffer(memory, kind)
 
 
 class Claims:
@@ -41,7 +30,11 @@ class Claims:
         leaders = sorted(set(comm.allgather(self.node.bcast(comm.rank))))
         self._sizes, self._first = np.array(sizes, np.int64), np.cumsum([0, *sizes])
         self._groups = np.arange(leaders.index(self.node.bcast(comm.rank)), len(sizes), len(leaders))
-        self._window, self._shared = _shared(self.node, TAKEN + len(sizes), np.int64)
+        # All of it at one rank, so that it is one block, which `Shared_query(0)` finds.
+        size = 8 * (TAKEN + len(sizes)) if self.node.rank == 0 else 0
+        self._window = MPI.Win.Allocate_shared(size, 8, comm=self.node)
+        memory: Any = self._window.Shared_query(0)[0]
+        self._shared = np.frombuffer(memory, np.int64)
         if self.node.rank == 0:
             self._shared[:] = 0
         # Nobody may count before the counters are 0.
@@ -93,42 +86,3 @@ class Claims:
         self._window.Free()
         if self._own:
             self.node.Free()
-
-
-class LostRanks:
-    """What the ranks of a node solve since when; creating and freeing are collective over the node.
-
-    A case that hangs inside a library cannot be ended from within: the process that holds it hears no signal in Python.
-    Another process of the node can see that, mark the case as failed, and end the run when everything else is done.
-
-    ``node``: ranks that share memory. ``limit``: time limit of a case [s].
-    """
-
-    def __init__(self, node: Any, limit: float) -> None:
-        self.patience, self._node = PATIENCE_LIMITS * limit, node
-        self._window, numbers = _shared(node, 2 * node.size, float)
-        self._share, self._since = numbers.reshape(2, node.size)
-        if node.rank == 0:
-            self._share[:] = IDLE
-        node.Barrier()
-
-    def begin(self, position: int) -> None:
-        """Note that this rank begins a case of the share of the work at this position."""
-        # Time before share: between the two a look must not pair the new share with an old time.
-        self._since[self._node.rank] = time.monotonic()  # one clock for all processes of a node
-        self._share[self._node.rank] = position
-
-    def end(self) -> None:
-        """Note that this rank solves nothing."""
-        self._share[self._node.rank] = IDLE
-
-    def positions(self) -> list[int]:
-        """Shares whose ranks have been in one case for much longer than its time limit."""
-        late = (self._share != IDLE) & (time.monotonic() - self._since > self.patience)
-        return [int(position) for position in self._share[late]]
-
-    def free(self) -> None:
-        """Give the memory back."""
-        # No view may outlive the window that it looks into.
-        self._share = self._since = np.empty(0)
-        self._window.Free()

@@ -26,12 +26,12 @@ from softjaw.study.result.lock import Lock, OpenedFile
 from softjaw.study.result.skeleton import create, rewrite
 from softjaw.study.result.store import Result, open_result, torn_rows
 from softjaw.study.result.write import MESH, Files, ResultWriter, codes_on, verify
-from softjaw.study.run.limits import GRACE, Stopper, limited_memory
-from softjaw.study.run.load_path import PathSolver, give_up, rows_again, settle
+from softjaw.study.run.limits import PATIENCE, Stopper, limited_memory
+from softjaw.study.run.load_path import PathSolver, rows_again, settle
 from softjaw.study.run.plan import Plan
 from softjaw.study.run.progress import Progress, code_of
 from softjaw.study.run.refine import Rounds, round_text
-from softjaw.study.run.schedule import Claims, LostRanks
+from softjaw.study.run.schedule import Claims
 from softjaw.study.run.shares import divided
 
 T = TypeVar("T")
@@ -203,17 +203,15 @@ def _begins(path: Path, codes: np.ndarray, torn: int, ranks: int, created: bool)
 class Session:
     """The ranks that solve the cases which ``codes`` calls missing; creating and solving are collective over ``comm``.
 
-    ``objects``: units of work on each of the ``files``. ``more``: whether the run goes on after these cases. ``signal``
-    names the signal that ended it, if one did.
+    ``objects``: units of work on each of the ``files``. ``signal`` names the signal that ended it, if one did.
     """
 
     signal = ""
 
     def __init__(
-        self, objects: Sequence[Sequence[Any]], work: Work, files: Files, comm: Any, codes: np.ndarray,
-        more: bool = False,
-    ) -> None:  # fmt: skip
-        self._work, self._files, self._comm, self._codes, self._more = work, files, comm, codes, more
+        self, objects: Sequence[Sequence[Any]], work: Work, files: Files, comm: Any, codes: np.ndarray
+    ) -> None:
+        self._work, self._files, self._comm, self._codes = work, files, comm, codes
         self._state = OpenedFile(files.path)
         self._todo, self._groups = divided(objects, codes, comm.size)
         hosts = len(set(comm.allgather(MPI.Get_processor_name())))
@@ -221,7 +219,7 @@ class Session:
         for writer in files.writers:
             if comm.rank == 0:
                 writer.begin_session(**about)
-            # Every rank needs it: the one that ends a hanging run writes how the session ended.
+            # Any rank may be the one that finishes the file.
             writer.session = comm.bcast(writer.session)
         self._progress = _progress(objects, codes, comm.size) if comm.rank == 0 else None
 
@@ -232,22 +230,15 @@ class Session:
         instead.
         """
         claims = Claims(self._comm, self._groups)
-        lost = LostRanks(claims.node, self._work.time_limit)
         try:
-            arrived, name = self._solve_share(claims, lost)
+            name = self._solve_share(claims)
         except StudyError as error:
             _end_all(self._comm, claims, error)
             with contextlib.suppress(OSError, RuntimeError):  # where it could not be written, it may not be closed
                 self._files.close()
             raise
-        if not arrived:  # the rank that hangs can neither close the file nor be waited for
-            for writer in self._files.writers:
-                finish(self._work, writer, name)
-            print_summary(self._work, self._files.path)
-            self._comm.Abort(STOPPED if self._more else code_of(self._files.codes()))
         # A signal may reach some ranks only; any name is larger than no name.
         self.signal = name = max(self._comm.allgather(name))
-        lost.free()
         claims.free()
         code = code_of(self._files.codes())
         self._files.close()
@@ -255,31 +246,21 @@ class Session:
             self._progress.clear()
         return code
 
-    def _solve_share(self, claims: Claims, lost: LostRanks) -> tuple[bool, str]:
-        """Solve this rank's share and wait for the others; whether all of them came, and the signal that came."""
-        solver = PathSolver(self._files, self._work.solve_unit, self._work.image, claims, lost, self._state)
-        # A rank that is alone on its node has nobody beside it to see that it hangs.
-        unseen = claims.node.size == 1 and self._work.time_limit < math.inf
-        stopper = Stopper(solver.on_stop, self._work.time_limit, lost.patience if unseen else None)
+    def _solve_share(self, claims: Claims) -> str:
+        """Solve this rank's share and wait for the others; the signal that came."""
+        solver, limit = PathSolver(self._files, self._work.solve_unit, self._work.image, claims, self._state), None
+        if self._work.time_limit < math.inf:
+            limit = PATIENCE * self._work.time_limit
+        stopper = Stopper(solver.on_stop, self._work.time_limit, limit)
         with stopper, limited_memory(self._work.memory, claims.node.size):
             for position in claims:
-                solver.solve(self._todo[position], position, self._codes, stopper, self._look)
+                solver.solve(self._todo[position], self._codes, stopper, self._look)
             request = self._comm.Ibarrier()  # a plain barrier would keep a core busy and rank 0 silent
             while not request.Test():
                 self._look()
-                if self._only_lost_are_left(lost, stopper):
-                    return False, stopper.name
                 # Sleeping leaves the core to ranks that still solve.
                 time.sleep(0.02)
-        return True, stopper.name
-
-    def _only_lost_are_left(self, lost: LostRanks, stopper: Stopper) -> bool:
-        """Mark the cases of ranks that hang as failed; whether there are such ranks, and nothing else to wait for."""
-        positions = lost.positions()
-        for position in positions:
-            give_up(self._files, self._todo[position], lost.patience)
-        # After a signal nobody begins anything new, so what is missing then stays missing.
-        return bool(positions) and (stopper.overdue > max(GRACE.values()) or not np.any(self._files.codes() == MISSING))
+        return stopper.name
 
     def _look(self) -> None:
         if self._progress and self._progress.due():

@@ -256,7 +256,7 @@ class Mesh(Walled):
     )
 
     # time and size of the file: what is kept of a mesh is not taken for another one in its place
-    _stamp: tuple[int, int] = PrivateAttr((0, 0))
+    _stamp = PrivateAttr((0, 0))
 
     def model_post_init(self, context: Any) -> None:
         """Note which file it is."""

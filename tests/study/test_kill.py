@@ -97,7 +97,6 @@ def whole(folder, *words):
 
 @pytest.mark.parametrize(("how", "ranks", "text"), [
     ("hang", 2, "not solved within 3 s"),
-    ("stuck", 3, "did not come back to Python within 6 s, so its rank was given up"),
     ("greedy", 2, "more memory than run.memory_gb leaves to a rank"),
 ])  # fmt: skip
 def test_one_case_fails_with_its_reason_and_the_others_go_on(tmp_path, how, ranks, text):
@@ -113,12 +112,13 @@ def test_one_case_fails_with_its_reason_and_the_others_go_on(tmp_path, how, rank
     assert differing(path, whole(tmp_path)) == []
 
 
-def test_a_single_process_that_hangs_ends_itself_and_gives_the_case_up_the_third_time(tmp_path):
-    path = tmp_path / "alone.hdf"
+@pytest.mark.parametrize("ranks", [0, 3])
+def test_a_rank_that_hangs_ends_the_run_and_the_case_is_given_up_the_third_time(tmp_path, ranks):
+    path = tmp_path / "stuck.hdf"
     for _ in range(2):
-        errors = ended(0, path, "--stuck", 13, "--limit", 1, code=1)
+        errors = ended(ranks, path, "--stuck", 13, "--limit", 1, code=1)
         assert "Timeout (0:00:02)!" in errors  # and where it was in Python
-    ended(0, path, "--stuck", 13, "--limit", 1, code=SOME_FAILED)
+    ended(ranks, path, "--stuck", 13, "--limit", 1, code=SOME_FAILED)
     assert [row for row, code in enumerate(states(path)) if code == FAILED] == [13, 14, 16, 17]
 
 
