@@ -240,6 +240,8 @@ def _at_station(scene: Scene, station: float, angle: float | None) -> tuple[Scen
             raise ValueError(f"angle is missing: give it in rad, as {where.angles[0]:.4g}")
         angle = where.angles[0]
     angle = _number("angle", angle, "rad")
+    if abs(angle) > 2 * math.pi:
+        raise ValueError(f"angle is {angle:g}: expected one up to a whole turn, 2 pi [rad]")
     stations, s = _joined(where.station_values_mm, converted(station, "m", "mm"))
     angles, a = _joined(where.angles_deg, converted(angle, "rad", "deg"))
     table = {"stations_mm": stations, "angles_deg": angles, "roll_deg": where.roll_deg, "shift_mm": where.shift_mm}

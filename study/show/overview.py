@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from softjaw.study.case.build import axis_span, geometry, has_wall, listed_accuracy, told
-from softjaw.study.units import UNITS, shown, shown_text
+from softjaw.study.units import UNITS, shown
 
 OPEN = {"top": "open top", "both": "open at both ends", "none": "closed top"}
 
@@ -71,9 +71,10 @@ def wall_text(shape: Any) -> str:
         return ""
     found, given = geometry().material_of(shape), shape.thicknesses_mm
     thickness = f"{min(given):g}" if min(given) == max(given) else f"{min(given):g} to {max(given):g}"
-    strength = f"yields at {shown_text(found.yield_strength, 'Pa', 6)}" if found.yield_strength else "strength unknown"
+    yields = found.yield_strength and f"yields at {found.yield_strength / UNITS['mpa'].size:g} MPa"
     words = [
-        f"{thickness} mm {shape.wall_material} ({found.young_modulus / UNITS['gpa'].size:g} GPa, {strength})",
+        f"{thickness} mm {shape.wall_material} ({found.young_modulus / UNITS['gpa'].size:g} GPa, "
+        f"{yields or 'strength unknown'})",
         shape.support,
         OPEN[shape.open_ends],
         f"indentation up to {shape.allowed_dent_mm:g} mm allowed" if shape.allowed_dent_mm else "any indentation",
