@@ -252,13 +252,13 @@ def distinct(ds: xr.Dataset, order: Sequence[int], score: np.ndarray, k: int, to
 def at_level(ds: Any, force: float | None = None) -> tuple[Any, int, str]:
     """The dataset at a force [N], the number of its level, and in words why it is that one.
 
-    Between two solved forces values are interpolated; without a force it is that of `window` or of `shown_level`.
+    Between two solved forces values are interpolated; without a force it is that of `shown_level`.
 
     Raises `ValueError` for a force outside of the solved ones.
     """
     forces = ds["normal_force"].values
-    if force is None and (force := window(ds, flags := judged(ds))) is None:
-        return ds, *shown_level(ds, flags)
+    if force is None:
+        return ds, *shown_level(ds, judged(ds))
     near = np.flatnonzero(np.isclose(forces, force))
     if near.size:
         return ds, int(near[0]), ""
@@ -267,11 +267,12 @@ def at_level(ds: Any, force: float | None = None) -> tuple[Any, int, str]:
     return found, 0, f"between solved ones, {low:g} and {high:g} N"
 
 
-def window(ds: Any, flags: np.ndarray) -> float | None:
+def window(ds: Any) -> float | None:
     """The least force that holds the object and does no harm, where these are between solved ones alone [N].
 
-    None where a solved one does, or no other is known. ``flags``: as `judged` gives them.
+    None where a solved one does, or no other is known.
     """
+    flags = judged(ds)
     if "force_low" not in ds or ((ds["status"].values == DONE) & (flags & LOST == 0)).any():
         return None
     low, first = ds["force_low"].values, ds["normal_force"].values[0]

@@ -31,7 +31,7 @@ from softjaw.study.flags import LOST, Flag, flag_words, flags_in
 from softjaw.study.grippers import Hand
 from softjaw.study.messages import USAGE, StudyError, fault_of
 from softjaw.study.quantities import BY_KEY, FORCE_RANGE, LEAST_FORCE, MAIN
-from softjaw.study.ranking import at_level, index_of, judged, ranked, score_of
+from softjaw.study.ranking import at_level, index_of, judged, ranked, score_of, window
 from softjaw.study.result.read import axes_of, maps_in
 from softjaw.study.result.store import place_text
 from softjaw.study.units import shown, shown_text
@@ -157,7 +157,7 @@ def chosen(
     Raises `StudyError`: A force outside of the solved ones, or a map that the file does not have.
     """
     with fault_of("--force", ValueError):
-        at, k, _ = at_level(ds, force)
+        at, k, _ = at_level(ds, window(ds) if force is None else force)
     units = maps_in(at)
     if unknown := [name for name in least if name not in units]:
         raise StudyError(USAGE, f"--min: found '{unknown[0]}', expected one of {', '.join(units)}")

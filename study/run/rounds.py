@@ -33,7 +33,7 @@ from softjaw.study.case.sampler import lids_of
 from softjaw.study.case.task import task_of
 from softjaw.study.flags import LOST
 from softjaw.study.quantities import FAILED, LISTED, NO_GRASP
-from softjaw.study.ranking import distinct, judged, largest, rank_values, ranked, shown_level, sure
+from softjaw.study.ranking import at_level, distinct, judged, largest, rank_values, ranked, sure
 from softjaw.study.result.read import dataset, other_levels
 from softjaw.study.run.refine import Place, gained, next_stations, scores_of_poses, with_places
 from softjaw.study.scene import Scene
@@ -141,8 +141,7 @@ def next_cases(result: Any, scene: Scene) -> tuple[Case, ...]:
     """Cases of the next round; none where the best are known as well as the scene asks for."""
     if not scene.candidates.sampled or "work/mesh" not in {q.key for q in result.layout.quantities}:
         return ()
-    ds = dataset(result)
-    k, _ = shown_level(ds, judged(ds))
+    ds, k, _ = at_level(dataset(result))
     order, known = [int(i) for i in ranked(ds, k, "payload")], sure(ds, "payload", k)
     if known is None:
         return ()

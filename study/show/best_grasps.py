@@ -13,7 +13,7 @@ from softjaw.friction.patch import NEGLIGIBLE
 from softjaw.study.case.result import TIE
 from softjaw.study.flags import LOST, OF_FILE, Flag, flag_words, flags_in
 from softjaw.study.quantities import BY_KEY, FORCE_RANGE, LEAST_FORCE, LISTED, MAIN, MISSING, MODELS, STATES, map_row
-from softjaw.study.ranking import distinct, index_of, judge, passed_over, rank_values, score_of, sure, task_keys
+from softjaw.study.ranking import distinct, index_of, judge, passed_over, rank_values, score_of, sure, task_keys, window
 from softjaw.study.result.layout import DONE
 from softjaw.study.result.read import axes_of, dataset, other_levels, values_of
 from softjaw.study.show.grasps import Index, at, candidate_of, forces, largest_force, note, order, place
@@ -50,7 +50,7 @@ def best(
     lines: bool = False,
     maps: Collection[str] = MAIN,
 ) -> Table:
-    """The ``top`` grasps (0: all) at a force [N], by default that of `study.ranking.shown_level`.
+    """The ``top`` grasps (0: all) at a force [N], by default that of `study.ranking.window` or `shown_level`.
 
     Between two solved forces values lie on straight lines. ``by`` names the map that grasps are ranked by. With
     ``lines`` images of one grasp share a row, and rows are counted. Where the scene names a gripper, listed grasps that
@@ -58,7 +58,7 @@ def best(
 
     Raises `ValueError` for a force outside of the solved ones.
     """
-    ds = judge(ds, force=force, by=by, top=top, lines=lines)
+    ds = judge(ds, force=window(ds) if force is None else force, by=by, top=top, lines=lines)
     k, score, found = ds.attrs["level"], ds.attrs["score"], order(ds, ds.attrs["level"])
     places = distinct(ds, [candidate_of(ds, index) for index in found], rank_values(ds, score, k), k, top)
     listed = [index_of(ds, place.best, k) for place in places] if lines else found[: top or None]

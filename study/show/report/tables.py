@@ -41,7 +41,8 @@ def best_grasps(ds: xr.Dataset) -> list[Block]:
     """The best grasps at the force shown, the best one at each force, and the candidate that was asked for."""
     if ds.attrs["best"] is None:
         return []
-    table_, chosen = best(ds, top=BEST, lines=True, maps=SHOWN), ds.attrs["chosen"]
+    force, chosen = float(forces(ds)[ds.attrs["level"]]), ds.attrs["chosen"]
+    table_ = best(ds, force, top=BEST, lines=True, maps=SHOWN)
     tops = [top for k in range(len(forces(ds))) for top in order(ds, k)[:1]]
     listed = {"Best grasp at each force": tops[len(forces(ds)) < 2 :], "Chosen candidate": [chosen][chosen is None :]}
     shown = {title: case_table(ds, cases, maps=SHOWN) for title, cases in listed.items() if cases}
