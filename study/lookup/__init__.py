@@ -30,6 +30,7 @@ from softjaw.study.lookup.interpolation import (
     plain,
 )
 from softjaw.study.lookup.point import INSIDE, JUMP, NO_RESULT, OUTSIDE, SNAP, GraspPoint
+from softjaw.study.messages import closest
 from softjaw.study.quantities import BY_KEY, DONE, checked_model
 from softjaw.study.ranking import judge, ranked
 from softjaw.study.result.index import one_file
@@ -244,7 +245,10 @@ class GraspMap:
         if name in self.quantities:
             return values_of(self.data, name, model)
         if not self.has(name):
-            raise KeyError(f"{name} is not in {self.data.file}; it has {', '.join(sorted(self.quantities))}")
+            names = [*self.quantities, *filter(self.has, BY_KEY)]
+            meant = closest(name, names)
+            hint = f"did you mean {meant}?" if meant else f"it has {', '.join(sorted(names))}"
+            raise KeyError(f"{name} is not in {self.data.file}; {hint}")
         variable = self.data[BY_KEY[name].variable]
         return (variable.sel(model=model) if "model" in variable.dims else variable).values
 

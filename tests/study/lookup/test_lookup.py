@@ -94,6 +94,9 @@ def test_one_point_is_the_same_as_an_array_of_points_and_units_are_those_of_peop
         straight.value("e_n", 0.01, 0.1, 3.0, "round")
     with pytest.raises(KeyError, match="safety_factor"):
         _ = straight.at(0.01, 0.1, 3).value("safety_factor")
+    with pytest.raises(KeyError, match="fingers/S"):
+        straight.at(0.01, 0.1, 3).value("finger_S")
+    assert (straight.at(0.01, 0.1, 3).station, straight.at(0.01, 0.1, 3).force) == (0.01, 3.0)
 
 
 @pytest.mark.parametrize(("place", "word"), [
