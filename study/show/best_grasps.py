@@ -127,7 +127,9 @@ def case_table(
     quantities = [*_map_columns(ds, maps), *bounds]
     values = {c.name: values_of(ds, c.name) for c in quantities if c.name in ds}
     values[PLANAR_E_N] = values_of(ds, "e_n", MODELS[1])
-    columns += [*quantities, *[Column("safe_forces", "N", "safe forces", programs=False)] * bool(bounds)]
+    first = 1 + bool(quantities and quantities[0].error)  # a wide table does not scroll the safe forces out
+    safe = [Column("safe_forces", "N", "safe forces", programs=False)] * bool(bounds)
+    columns += [*quantities[:first], *safe, *quantities[first:]]
     columns += [Column("flags", people=False), Column("notes", wrap=NOTES_WIDTH)]
     rows: list[Row] = []
     for place_, index in enumerate(cases, start=1):
