@@ -67,6 +67,8 @@ class Unseen(NamedTuple):
         if q.name == "closing" and (pad := contacts[0].state.pad).shape.element == "hex8":
             # trilinear elements close less, the less the foam can be compressed
             floor *= 0.4 + 0.2 / (1.0 - 2.0 * pad.material.poisson_ratio)
+        if q.name in PAYLOADS:  # by how much more normals that lean move what a drive holds than friction alone
+            floor *= 1.0 + contacts[0].mu ** 2
         floor += OF_OVERLAP.get(q.name, 0.0) * self.overlap**2
         # pressures alone give forces along the face by balance, with friction that acts back they do not
         return floor * (2.0 if acts and q.name.startswith("f_") else 1.0) + self.on_edges * OF_EDGES[q.name]
