@@ -94,7 +94,7 @@ class FitErrors(NamedTuple):
 
     ``E1 = mean |P - 1|`` grows with the degree of the polynomial: models of different degree compare by ``Erad = mean
     |P^(-1/degree) - 1|``, the error of the radius. ``Edir`` is the mean angle between the gradient and the motion
-    [deg].
+    [deg]; results of a study and of ``softjaw.fit_ellipsoid`` have it in rad.
     """
 
     E1: float

@@ -18,9 +18,9 @@ from softjaw.study.case.evaluate import ECCENTRICITIES, exact_score, soft
 from softjaw.study.case.limit_surface import STANDS_IN, fit_surfaces
 from softjaw.study.case.result import UNDECIDED
 from softjaw.study.flags import Flag, flags_in, raised
-from softjaw.study.messages import USAGE, StudyError, fault_of
+from softjaw.study.messages import USAGE, StudyError, fault_of, shown
 from softjaw.study.patch.faces import ReadPatch
-from softjaw.study.patch.patch_reader import ENDINGS, Reading, checked_file, read_table
+from softjaw.study.patch.patch_reader import ENDINGS, FACTORS, Reading, checked_file, read_table
 from softjaw.study.quantities import MODELS, map_row
 
 HALF_TURN = np.diag([1.0, -1.0, -1.0])  # about x: how the second of two equal fingers stands
@@ -59,6 +59,9 @@ OF_FRAME = Flag.CYCLE | Flag.HOLE | Flag.NO_CORNERS | Flag.OVERHANG
 
 def read_patch(file: str, reading: Reading) -> ReadPatch:
     """The patch in a file, in the file's coordinates; `StudyError` for what cannot be read (3) or is no patch (2)."""
+    for name, kind, unit in (("unit", "length", reading.unit), ("pressure_unit", "pressure", reading.pressure_unit)):
+        if unit not in (None, *FACTORS[kind]):
+            raise StudyError(USAGE, f"{name}: found {shown(unit)}, expected one of {', '.join(FACTORS[kind])}")
     path = checked_file(file, ENDINGS)
     if path.suffix.lower() == ".csv":
         return read_table(path, reading)

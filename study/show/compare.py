@@ -158,7 +158,9 @@ def _error(ds: xr.Dataset, name: str, model: str) -> FloatArray | None:
     """Error of a map in its unit; None where the file has none, as for models other than CCM."""
     if map_row(name).by_model and model != "ccm":
         return None
-    return values_of(ds, f"{name}_interval") if f"{name}_interval" in ds else stated_error(ds, name)
+    parts = [values_of(ds, f"{name}_interval")] if f"{name}_interval" in ds else []
+    parts += [stated] if (stated := stated_error(ds, name)) is not None else []
+    return np.sqrt(sum(part**2 for part in parts)) if parts else None
 
 
 def _summary(name: str, values: dict[str, NDArray[Any]]) -> Row:

@@ -106,11 +106,19 @@ class Pad:
         return np.stack([start, start + longest * force / most], axis=1)
 
 
-def corners_of(centres: np.ndarray) -> np.ndarray:
-    """Corners ``(i + 1, j + 1, c)`` of a grid of faces from their centres ``(i, j, c)``, continued beyond the rim."""
-    # Continued by a line and averaged: the outermost corners lie half a face beyond the centres.
-    c = np.pad(centres, ((1, 1), (1, 1), (0, 0)), mode="reflect", reflect_type="odd")
-    return 0.25 * (c[1:, 1:] + c[1:, :-1] + c[:-1, 1:] + c[:-1, :-1])
+def corners_of(centres: np.ndarray, per_side: int) -> np.ndarray:
+    """Corners ``(i + 1, j + 1, c)`` of a grid of faces from their centres ``(i, j, c)``.
+
+    They lie in the middle between centres. A face at a rim is as wide as the one on the other side of its element,
+    along a side of which lie ``per_side``.
+    """
+    for axis in (0, 1):
+        c = np.moveaxis(centres, axis, 0)
+        inner, k = 0.5 * (c[:-1] + c[1:]), per_side
+        first = inner[:1] - (inner[k - 1 : k] - inner[k - 2 : k - 1])
+        last = inner[-1:] + (inner[len(inner) - k + 1 :][:1] - inner[len(inner) - k :][:1])
+        centres = np.moveaxis(np.concatenate([first, inner, last]), 0, axis)
+    return centres
 
 
 def pads_of(ds: xr.Dataset, gripper: Any, index: Index, faces: Faces) -> list[Pad]:
@@ -133,7 +141,7 @@ def _pad(gripper: Any, faces: Faces, lift: Any, R: Any, o: Any, closing: Any, ax
         face = np.column_stack([x, y, np.zeros(4)])[[0, 3, 1, 2]].reshape(2, 2, 3)
         grid, faces = (0, 0), {name: np.empty(0) for name in ("centroid", "normal", "pressure", "area")}
     else:
-        face = corners_of(faces["centroid"].reshape(*grid, 3))
+        face = corners_of(faces["centroid"].reshape(*grid, 3), pad_shape(gripper).per_side)
     back = np.column_stack([x, y, np.full(4, closing - thickness)])
     centroid, normal = (faces[name].reshape(*grid, 3) for name in ("centroid", "normal"))
     return Pad(
