@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softjaw.fem.objects.gap import Pose
-from softjaw.friction.frame import FrameFlag, behind, principal_direction, wound
+from softjaw.friction.frame import FrameFlag, behind, contact_length, principal_direction, wound
 from softjaw.friction.patch import ContactPatch
 from softjaw.friction.wrench import checked_mu, friction_wrench, pure_torque
 from softjaw.lsfit.body import ExactSurface
@@ -28,6 +28,7 @@ SURFACES = {  # as a scene names them, and in the text
     "three_motions": "ellipsoid, three motions", "axis_aligned": "ellipsoid, axis-aligned", "full": "ellipsoid, full",
     "quartic": "convex quartic",
 }  # fmt: skip
+FAINT, SHORTER = 1e-3, 0.05  # of S, on faces that may be noise; of rho, which they change
 FITTED_ON = 500  # motions; a fit is judged on others
 SPACE = 3  # dimension of the loads (f_x, f_y, tau_z)
 FRICTION = {"f_x_max": "f_x", "f_y_max": "f_y", "tau_z_max": "tau_z", "tau_pure": "", **{n: n for n in ECCENTRICITIES}}
@@ -255,6 +256,13 @@ def _patch_notes(evaluated: EvaluatedPatch) -> list[str]:
     for flag in flags_in(raised(frame.flag) & OF_FRAME):
         share = f": {frame.overhang_count}, with {100 * frame.overhang_share:.2g} % of S"
         notes.append(flag.sentence + share * (flag == Flag.OVERHANG))
+    patch, rho = evaluated.contact.local, evaluated.contact.rho
+    order = np.argsort(patch.load)
+    bears = np.empty(len(order), bool)
+    bears[order] = np.cumsum(patch.load[order]) > FAINT * patch.load.sum()
+    if (shorter := contact_length(patch.only(bears))) < (1 - SHORTER) * rho:
+        text = f"rho is {1e3 * rho:.4g} mm by faces that carry a thousandth of S, {1e3 * shorter:.4g} mm without them"
+        notes.append(f"{text}; the score divides torques by it: take out what is noise, or give --contact-length")
     if frame.flag & FrameFlag.WINDING:
         against = evaluated.count(wound(evaluated.read.patch) < 0)
         notes.append(f"the corners of {against}, are wound against their normals; the normals were taken as they are")

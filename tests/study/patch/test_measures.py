@@ -65,6 +65,8 @@ def test_the_quality_is_that_of_the_command_with_every_surface():
     (lambda: sj.grasp_quality(FLAT, mu=0.8, distance=1, surface="round"), ValueError, "surface is 'round'.*exact"),
     (lambda: sj.grasp_quality(FLAT, mu=0.8, distance=1, model="x"), ValueError, "model is 'x'"),
     (lambda: sj.read_pressure("none.csv"), sj.StudyError, "none.csv: cannot be read"),
+    (lambda: sj.read_pressure(EXAMPLE, unit="inch"), sj.StudyError, "unit: found .inch.*mm"),
+    (lambda: sj.read_pressure(EXAMPLE, pressure_unit="bar"), sj.StudyError, "pressure_unit: found .bar"),
 ])  # fmt: skip
 def test_what_is_no_argument_is_refused(call, error, words):
     with pytest.raises(error, match=words):
@@ -77,3 +79,11 @@ def test_what_a_file_says_beside_its_patch_is_a_warning(tmp_path):
     (tmp_path / "a.csv").write_text("\n".join(lines))
     with pytest.warns(UserWarning, match="remark_kg"):
         assert sj.read_pressure(tmp_path / "a.csv").area.shape == (240,)
+
+
+@pytest.mark.parametrize(("kilopascals", "noted"), [(0.001, True), (3.0, False)])
+def test_faint_faces_far_away_that_set_the_length_of_a_contact_are_noted(tmp_path, kilopascals, noted):
+    (tmp_path / "a.csv").write_text(f"{EXAMPLE.read_text()}80,0,-30,5.236,0,0,1,{kilopascals}\n")
+    found = as_record([EvaluatedPatch(read_patch(str(tmp_path / "a.csv"), Reading()), 0.8)], None)
+    assert found["patches"][0]["rho"] > 0.09
+    assert any(note.startswith("rho is") for note in found["notes"]) == noted
