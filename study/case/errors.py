@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from softjaw.study.case.contact import Contact
+from softjaw.study.case.contact import Contact, angles
 from softjaw.study.case.evaluate import LIMITS, EvaluationSettings, overestimates, quality
 from softjaw.study.case.task import payload_alone
 from softjaw.study.quantities import TABLE, Quantity
@@ -39,6 +39,7 @@ ONE_LINE = 2.0  # elements across a contact that one line of nodes makes
 OF_OVERLAP = {"closing": 2.0, "contact_area": 2.6, "p_max": 70.0}
 EDGES_ROUNDED = 1.6  # times the error of a payload on the coarse mesh alone, where the object's edges are rounded
 OF_PAIRS = {"p_max": 3.0}  # of what pairs differ by: peaks that an effect makes at an edge grow as elements shrink
+ALIGNED, LEANING = 0.2, np.radians(15.0)  # times the floor of a payload where contacts face each other; added per angle
 PAYLOADS = ("payload", "safety_factor")  # what arms and couples leave of the friction: little of it moves all of them
 
 
@@ -67,8 +68,8 @@ class Unseen(NamedTuple):
         if q.name == "closing" and (pad := contacts[0].state.pad).shape.element == "hex8":
             # trilinear elements close less, the less the foam can be compressed
             floor *= 0.4 + 0.2 / (1.0 - 2.0 * pad.material.poisson_ratio)
-        if q.name in PAYLOADS:  # by how much more normals that lean move what a drive holds than friction alone
-            floor *= 1.0 + contacts[0].mu ** 2
+        if q.name in PAYLOADS:  # of contacts that face each other friction and the drive's force tell it, on any mesh
+            floor *= ALIGNED + max(angles(*contacts)) / LEANING
         floor += OF_OVERLAP.get(q.name, 0.0) * self.overlap**2
         # pressures alone give forces along the face by balance, with friction that acts back they do not
         return floor * (2.0 if acts and q.name.startswith("f_") else 1.0) + self.on_edges * OF_EDGES[q.name]

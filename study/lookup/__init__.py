@@ -73,8 +73,8 @@ class GraspMap:
     the main maps stay where that was measured. Between angles more than 25 degrees apart there are no values: edges
     that come to bear between them would stay unseen. Errors that the cases around state themselves
     (``accuracy.meshes = 2``; in between as the values are) are added in squares. Along an axis of two values there is
-    no second derivative, and half of their difference stands in. What is narrower than the spacing of the candidates
-    stays unseen.
+    no second derivative, and half of their difference stands in; along two forces half of how far a power law is from
+    constant or from proportional, whatever is nearer. What is narrower than the spacing of the candidates stays unseen.
 
     Examples
     --------
@@ -200,7 +200,9 @@ class GraspMap:
             bent, powers = bends(grid, self.axes, self.snapped), not (grid <= 0.0).any()  # NaN, of no case, is not
             if powers:
                 forces = replace(self.axes[2], x=np.log(self.axes[2].x))
-                bent[2] = bends(np.log(grid), (*self.axes[:2], forces), self.snapped)[2]
+                # of two forces a guess is left: how far from constant or from proportional, whatever is nearer
+                logs, axes = np.log(grid), (*self.axes[:2], forces)
+                bent[2] = np.minimum(*(bends(v, axes, self.snapped)[2] for v in (logs, logs - forces.x)))
             self._bends[key] = claims(bent, self.shape), powers
         bend, powers = self._bends[key]
         if not powers:

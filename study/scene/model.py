@@ -438,7 +438,10 @@ def put_overrides(data: dict[str, Any], overrides: Sequence[str], given: dict[Ke
     """Put ``section.key=value`` texts into ``data``; ``given`` gets the text behind every key."""
     problems = []
     for text in overrides:
-        place = f"--set {shortened(text)}"
+        place, (named, _, written) = f"--set {shortened(text)}", text.partition("=")
+        whole = written.strip().startswith("{")  # such a table takes the place of another one, keys of one are put in
+        if whole and named.strip() == "sweep":
+            data["sweep"] = {}
         if (tables := _override(text)) is None:
             problems.append(Problem(place, None, "", shown(text), OVERRIDE, ""))
         for section, table in (tables or {}).items():
@@ -447,7 +450,7 @@ def put_overrides(data: dict[str, Any], overrides: Sequence[str], given: dict[Ke
                 continue
             for key, value in (flat(table) if section == "sweep" else table).items():
                 old = data[section].get(key)
-                both = isinstance(old, dict) and isinstance(value, Mapping)
+                both = isinstance(old, dict) and isinstance(value, Mapping) and not whole
                 data[section][key] = {**old, **value} if both else value
                 given[(section, key)] = place, None
                 given.setdefault((section,), (place, None)) if len(data[section]) == 1 else None

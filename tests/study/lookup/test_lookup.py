@@ -55,6 +55,16 @@ def test_lines_and_power_laws_are_met_and_the_error_of_a_point_holds_that_of_the
     assert "0.1 mm" in str(point)
 
 
+@pytest.mark.parametrize("power", [0.0, 0.3, 0.9, 1.0])
+def test_between_two_forces_alone_the_error_is_how_far_a_law_is_from_constant_and_from_proportional(tmp_path, power):
+    axes = grid_axes([0.0], [0.0], [1.0, 2.0])
+    path = make(tmp_path / "two.hdf", lambda station, angle, force: 0.01 * force**power, axes)
+    point = GraspMap(path).at(0.0, 0.0, 1.5)
+    assert point.e_n == pytest.approx(0.01 * 1.5**power, rel=1e-12)
+    away = min(power, 1.0 - power) * np.log(2.0)
+    assert 0.3 * away - 1e-12 <= point.error("e_n") / point.e_n <= 4.0 * away + 1e-12
+
+
 @pytest.mark.parametrize("along", [0, 1, 2, None])
 def test_the_estimate_covers_the_true_error_of_cases_left_out(tmp_path, along):
     """Every second node is left out of the file, along one axis or along all."""

@@ -12,6 +12,7 @@ from softjaw.study.scene.model import tables_of
 from softjaw.study.scene.objects import SHAPES
 from softjaw.study.scene.section import RENAMED
 from tests.study.launching import ROOT, launch
+from tests.study.scenes import text_of
 
 JOBS = sorted((ROOT / "jobs").glob("*.toml"))
 SPHERE = 'shape = "sphere"\nradius_mm = 30'
@@ -375,3 +376,17 @@ def test_a_scene_starts_no_heavy_machinery_is_that_of_tables_and_what_is_wrong_i
     for tables in (5, {5: {}}):
         with pytest.raises(TypeError):
             Scene.from_dict(tables)
+
+
+def test_a_table_on_the_command_line_takes_the_place_of_another_and_a_key_of_one_is_put_in():
+    text = text_of('shape = "sphere"\nradius_mm = 30') + '[sweep]\n"friction.mu" = [0.3, 0.8]\n[uncertainty]\n'
+    text += 'spread = { "friction.mu" = 0.1, "candidates.roll_deg" = 1 }\n'
+    cases = {
+        'sweep={"gripper.pad_width_mm"=[20, 22]}': (["gripper.pad_width_mm"], 2),
+        "sweep.gripper.pad_width_mm=[20, 22]": (["friction.mu", "gripper.pad_width_mm"], 2),
+        'uncertainty.spread={"friction.mu"=0.05}': (["friction.mu"], 1),
+        'uncertainty.spread."friction.mu"=0.05': (["friction.mu"], 2),
+    }
+    for override, (swept, uncertain) in cases.items():
+        scene = parse_scene(text, overrides=[override])
+        assert (list(scene.sweep), len(scene.uncertainty.spread)) == (swept, uncertain), override
