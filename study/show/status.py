@@ -150,6 +150,8 @@ def largest_error(errors: Any, cases: Any, axes: Sequence[Any], labels: Any, mes
         parts.append(f"{above} of {count} above {100 * target:g} %")
     if count < solved:
         parts.append(f"{solved - count} of {solved} have none")
+    if coarse := int(np.count_nonzero(status == DONE)) - solved:
+        parts.append(f"{coarse} on the coarse mesh alone are not counted")
     return [*parts, f"the largest at {place_text(axes, labels, worst)}"]
 
 
