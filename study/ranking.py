@@ -272,8 +272,7 @@ def window(ds: Any) -> float | None:
 
     None where a solved one does, or no other is known.
     """
-    flags = judged(ds)
-    if "force_low" not in ds or ((ds["status"].values == DONE) & (flags & LOST == 0)).any():
+    if "force_low" not in ds or ((ds["status"].values == DONE) & (judged(ds) & LOST == 0)).any():
         return None
     low, first = ds["force_low"].values, ds["normal_force"].values[0]
     high = ds["force_high"].values if "force_high" in ds else np.full(low.shape, np.inf)

@@ -116,11 +116,13 @@ class Contact:
         arm = self.pose.to_object(self.patch.centroid)
         return np.concatenate([force.sum(axis=0), cross(arm, force).sum(axis=0)])
 
-    @property
-    def drive(self) -> FloatArray:
-        """Force with which the gripper presses, along the approach, in the object's frame ``(3,)`` [N]."""
+    def drive(self, pressure: FloatArray) -> FloatArray:
+        """Force with which the gripper presses, along the approach, in the object's frame ``(3,)`` [N].
+
+        ``pressure (6,)`` is the contact's `pressure_wrench`.
+        """
         approach = self.pose.rotation[:, 2]
-        return (self.pressure_wrench[:3] @ approach) * approach
+        return (pressure[:3] @ approach) * approach
 
     @property
     def loaded(self) -> NDArray[np.bool_]:

@@ -66,9 +66,8 @@ class PressedContact(Contact):
         other.hole_share = finger.hole_share
         return other
 
-    @property
-    def drive(self) -> np.ndarray:
-        """As of any contact; where friction acts back it bears a part of it."""
+    def drive(self, pressure: np.ndarray) -> np.ndarray:
+        """As of any contact; where friction acts back it bears a part of it, which the pressure does not tell."""
         return self.state.force * self.pose.rotation[:, 2]
 
     @cached_property

@@ -76,5 +76,5 @@ def _payload(
     # a motion the other way gives the opposite wrench, which costs no further sample
     both = [np.vstack([wrench, -wrench])[:, [0, 1, 5]] for wrench in wrenches]
     soft = [c.soft(PolytopeBody(c.mu * wrench)) for c, wrench in zip(contacts, both, strict=True)]
-    drive = [c.drive for c in contacts]
+    drive = [c.drive(p) for c, p in zip(contacts, pressure, strict=True)]
     return payload(soft, pressure, task.centre_of_mass, task.direction, task.kind, drive)

@@ -249,6 +249,14 @@ def _notes(patches: Sequence[EvaluatedPatch], grasp: dict[str, Any] | None) -> l
     return notes
 
 
+def _without_faint(patch: ContactPatch) -> float:
+    """Length of a patch in its contact frame without the faces that together carry next to nothing [m]."""
+    order = np.argsort(patch.load)
+    bears = np.empty(len(order), bool)
+    bears[order] = np.cumsum(patch.load[order]) > FAINT * patch.load.sum()
+    return contact_length(patch.only(bears))
+
+
 def _patch_notes(evaluated: EvaluatedPatch) -> list[str]:
     frame, notes = evaluated.contact.frame, []
     if not evaluated.x_given:
@@ -256,11 +264,8 @@ def _patch_notes(evaluated: EvaluatedPatch) -> list[str]:
     for flag in flags_in(raised(frame.flag) & OF_FRAME):
         share = f": {frame.overhang_count}, with {100 * frame.overhang_share:.2g} % of S"
         notes.append(flag.sentence + share * (flag == Flag.OVERHANG))
-    patch, rho = evaluated.contact.local, evaluated.contact.rho
-    order = np.argsort(patch.load)
-    bears = np.empty(len(order), bool)
-    bears[order] = np.cumsum(patch.load[order]) > FAINT * patch.load.sum()
-    if (shorter := contact_length(patch.only(bears))) < (1 - SHORTER) * rho:
+    rho, shorter = evaluated.contact.rho, _without_faint(evaluated.contact.local)
+    if shorter < (1 - SHORTER) * rho:
         text = f"rho is {1e3 * rho:.4g} mm by faces that carry a thousandth of S, {1e3 * shorter:.4g} mm without them"
         notes.append(f"{text}; the score divides torques by it: take out what is noise, or give --contact-length")
     if frame.flag & FrameFlag.WINDING:

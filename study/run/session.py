@@ -248,10 +248,9 @@ class Session:
 
     def _solve_share(self, claims: Claims) -> str:
         """Solve this rank's share and wait for the others; the signal that came."""
-        solver, limit = PathSolver(self._files, self._work.solve_unit, self._work.image, claims, self._state), None
-        if self._work.time_limit < math.inf:
-            limit = PATIENCE * self._work.time_limit
-        stopper = Stopper(solver.on_stop, self._work.time_limit, limit)
+        solver = PathSolver(self._files, self._work.solve_unit, self._work.image, claims, self._state)
+        limit = self._work.time_limit
+        stopper = Stopper(solver.on_stop, limit, PATIENCE * limit if limit < math.inf else None)
         with stopper, limited_memory(self._work.memory, claims.node.size):
             for position in claims:
                 solver.solve(self._todo[position], self._codes, stopper, self._look)

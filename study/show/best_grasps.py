@@ -52,7 +52,7 @@ def best(
 ) -> Table:
     """The ``top`` grasps (0: all) at a force [N], by default that of `study.ranking.window` or `shown_level`.
 
-    Between two solved forces values lie on straight lines. ``by`` names the map that grasps are ranked by. With
+    Between two solved forces values lie on power laws. ``by`` names the map that grasps are ranked by. With
     ``lines`` images of one grasp share a row, and rows are counted. Where the scene names a gripper, listed grasps that
     its hand does not reach come last.
 

@@ -112,12 +112,15 @@ def corners_of(centres: np.ndarray, per_side: int) -> np.ndarray:
     They lie in the middle between centres. A face at a rim is as wide as the one on the other side of its element,
     along a side of which lie ``per_side``.
     """
+
+    def rim(inner: np.ndarray) -> np.ndarray:
+        """The corners before the first ones between faces."""
+        return inner[0] - (inner[per_side - 1] - inner[per_side - 2])
+
     for axis in (0, 1):
         c = np.moveaxis(centres, axis, 0)
-        inner, k = 0.5 * (c[:-1] + c[1:]), per_side
-        first = inner[:1] - (inner[k - 1 : k] - inner[k - 2 : k - 1])
-        last = inner[-1:] + (inner[len(inner) - k + 1 :][:1] - inner[len(inner) - k :][:1])
-        centres = np.moveaxis(np.concatenate([first, inner, last]), 0, axis)
+        inner = 0.5 * (c[:-1] + c[1:])
+        centres = np.moveaxis(np.concatenate([[rim(inner)], inner, [rim(inner[::-1])]]), 0, axis)
     return centres
 
 
