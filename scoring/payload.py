@@ -34,7 +34,7 @@ from numba import njit
 from numpy.typing import ArrayLike
 from scipy.spatial import ConvexHull
 
-from softjaw.scoring.contact import FloatArray, SoftContact
+from softjaw.scoring.contact import FloatArray, SoftContact, vertices_of
 
 KINDS = ("shared", "up_to", "fixed")
 BOUND_GAP = 5e-4  # of the bounds, relative, at which the search ends
@@ -91,7 +91,7 @@ def payload(
     size = float(np.linalg.norm(P[:, :3], axis=1).sum())
     C[:, :, 0] /= size
     pressed = (P[:, :3] if drive is None else np.asarray(drive, float)) / size
-    vertices = [getattr(c.body, "vertices") / size for c in contacts]  # noqa: B009
+    vertices = [np.asarray(vertices_of(c.body), float) / size for c in contacts]
     V1, V2 = (_driven(*each) for each in zip(vertices, C, pressed, strict=True))
     grasp = C, V1, V2, KINDS.index(kind)
     answer = _along(grasp, np.asarray(direction, float)) if direction is not None else _worst(grasp)
