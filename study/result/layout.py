@@ -198,8 +198,7 @@ def layout_of(text: str) -> Layout:
     axes = tuple(replace(axis, values=np.asarray(axis.values, float)) for axis in layout.axes)
     if len(axes) < 3 or not all(axis.values.ndim == 1 and np.isfinite(axis.values).all() for axis in axes):
         raise ValueError("its axes are not those of a study")
-    older = (NEEDS[0],) * (json.loads(text).get("meshes", 1) > 1)  # a field of its own in files of before
-    return replace(layout, axes=axes, has=(*older, *layout.has))
+    return replace(layout, axes=axes)
 
 
 def header_of(text: str, scene: str) -> Header:

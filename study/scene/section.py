@@ -24,24 +24,6 @@ Errors = Iterator[InitErrorDetails]  # what a rule yields
 Place = tuple[str, int | None]  # a file and a line of it, or an override
 Tables = Mapping[str, Mapping[str, FieldInfo]]  # keys of every section, by its name
 MOST_LISTED = 50  # problems in one message
-FORMER = {  # keys, and those of earlier versions that they stand for
-    "accuracy.meshes": ("uncertainty.mesh",),
-    "accuracy.target": ("accuracy.cost_file", "accuracy.e_n", "candidates.refine_within"),
-    "candidates.sampled": ("candidates.count", "candidates.solve_best"),
-    "effects.object": ("object.wall_heights_mm",),  # a mesh with a handle is rigid
-    "gripper.terms_kpa": ("gripper.alpha", "gripper.shear_moduli_kpa"),
-    "limit_surface.model": ("effects.limit_surface",),
-    "object.open_ends": ("object.base", "object.open_top"),
-    "object.wall_mm": ("object.wall_profile_mm",),
-    "run.patches": ("output", "limit_surface.wrench_samples"),  # from which `softjaw.friction_wrench` has them
-    "score.contact_length_mm": ("score.torque_scale",),
-    "score.object_length_mm": ("score.length_scale",),
-    "uncertainty.spread": (
-        "uncertainty.mu", "uncertainty.pose_deg", "uncertainty.pose_mm", "uncertainty.shear_modulus_percent",
-        "uncertainty.wall_thickness_percent",
-    ),
-}  # fmt: skip
-RENAMED = {old: new for new, olds in FORMER.items() for old in olds}
 HEADER = re.compile(r"\s*(\[\[?)([\w.\"' -]+)\]\]?\s*(?:#.*)?$")
 KEY = re.compile(r"""\s*([\w.\"' -]+?)\s*=""")
 NAME = re.compile(r""""[^"]*"|'[^']*'|[^.\s]+""")
@@ -199,8 +181,6 @@ def _expectation(entry: ErrorDetails, path: KeyPath) -> str:
 def _right_key(path: KeyPath, tables: Tables) -> str:
     """What to write instead of an unknown key or section."""
     key, (stem, _) = str(path[-1]), split_unit(str(path[-1]))
-    if new := RENAMED.get(key_text(path)):
-        return f"write `{new}`"
     if len(path) == 1 and (near := closest(key, list(tables))):
         return f"did you mean [{near}]?"
     keys = list(dict.fromkeys(k for name, table in tables.items() if name == path[0] for k in table))

@@ -8,9 +8,7 @@ import pytest
 from pydantic import ValidationError
 
 from softjaw.study.scene import Scene, SceneError, load_scene, parse_scene
-from softjaw.study.scene.model import tables_of
 from softjaw.study.scene.objects import SHAPES
-from softjaw.study.scene.section import RENAMED
 from tests.study.launching import ROOT, launch
 from tests.study.scenes import text_of
 
@@ -88,15 +86,6 @@ def test_a_wrong_line_is_named_with_its_key_value_and_remedy(row):
     assert p.expected
     assert remedy in p.remedy
     assert str(p).startswith(f"ball.toml:{line}: {key}: found {found}, expected {p.expected}")
-
-
-def test_a_key_of_an_earlier_version_is_answered_with_the_one_that_stands_for_it():
-    tables = tables_of({"object": {"shape": "revolution"}})
-    remedies = {p.key: p.remedy for p in problems(BOTTLE, *(f"{k if '.' in k else f'{k}.file'}=1" for k in RENAMED))}
-    for old, new in RENAMED.items():
-        section, key = new.split(".")
-        assert key in tables[section]
-        assert f"`{new}`" in remedies[old]
 
 
 # What is put in place of what; the line and key that are named, and the value found.
