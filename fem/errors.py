@@ -19,7 +19,7 @@ class SpentError(RuntimeError):
 
 
 class NotReachedError(ConvergenceError):
-    """However far the backing plate travelled, the force stayed below the one that was asked for."""
+    """However far the backing plate moved, the force stayed below the one that was asked for."""
 
 
 class CheckError(RuntimeError):

@@ -172,10 +172,10 @@ class NonlinearSolver:
 
     Attributes
     ----------
-    left : float
+    iterations_left : float
         Newton iterations that further solves may take in all, failed ones too; a caller sets it.
     patient : bool
-        Whether a solve goes on where its residual stalls; a caller sets it.
+        Whether a solve continues where its residual stalls; a caller sets it.
     """
 
     problem: Problem
@@ -184,7 +184,7 @@ class NonlinearSolver:
     def __post_init__(self) -> None:
         """Create matrix, vectors and solver."""
         comm, n = PETSc.COMM_SELF, self.problem.size
-        self.seconds, self.thrifty, self.patient, self.left = Seconds(), True, True, math.inf
+        self.seconds, self.thrifty, self.patient, self.iterations_left = Seconds(), True, True, math.inf
         pattern = self.problem.pattern
         self._stored = pattern.start
         self._stepped: SteppedProblem | None = None
@@ -264,7 +264,7 @@ class NonlinearSolver:
         MemoryError
             When there is no memory for the factors.
         """
-        if self.left <= 0:
+        if self.iterations_left <= 0:
             raise SpentError
         snes, start, factor = self._snes, time.perf_counter(), factorisation_seconds()
         _, _, _, limit = snes.getTolerances()
@@ -283,7 +283,7 @@ class NonlinearSolver:
             ) from error
         finally:
             snes.setTolerances(max_it=limit)
-            self.left -= max(1, snes.getIterationNumber())
+            self.iterations_left -= max(1, snes.getIterationNumber())
             # unknown until this solve has converged: a failed one leaves no solution to start from
             self._end = None
             self.seconds.total += time.perf_counter() - start
@@ -456,19 +456,19 @@ class Factors:
         """
         columns = np.asfortranarray(B.reshape(len(B), -1))
         # dense PETSc matrices take over the memory they are given, so each gets an array of its own
-        right, left = (
+        rhs, solution = (
             PETSc.Mat().createDense(columns.shape, array=a, comm=PETSc.COMM_SELF)
             for a in (columns.copy(order="F"), np.zeros_like(columns, order="F"))
         )
         try:
-            self.factor.matSolve(right, left)
+            self.factor.matSolve(rhs, solution)
         except PETSc.Error as error:  # the factorisation itself fails silently
             raise ConvergenceError(
                 f"a linear system of {len(B)} unknowns is singular; is everything supported?"
             ) from error
-        X = left.getDenseArray().copy()
-        right.destroy()
-        left.destroy()
+        X = solution.getDenseArray().copy()
+        rhs.destroy()
+        solution.destroy()
         return X.reshape(B.shape)
 
     def destroy(self) -> None:

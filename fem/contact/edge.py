@@ -113,11 +113,11 @@ def _bearing(load: FloatArray, place: FloatArray, low: FloatArray, high: FloatAr
     starts, ends = np.flatnonzero(first[on]), np.flatnonzero(last[on])
     # two faces share a node, so the closest nodes are two of the smallest faces apart
     spacing = 2.0 * np.minimum.reduceat(side[on], starts)
-    whole = np.broadcast_to(upper[:, -1:], on.shape)[first]
+    lengths = np.broadcast_to(upper[:, -1:], on.shape)[first]
     at_rims = np.nonzero(first)[1] == 0, np.nonzero(last)[1] == on.shape[1] - 1
-    begin, end = _edges(load[on], s[on], starts, ends, spacing, whole, at_rims)
+    begin, end = _edges(load[on], s[on], starts, ends, spacing, lengths, at_rims)
     # where the middle by load is not that of the stretch, one edge lies beyond the loaded faces
-    free = (begin > 0.0) & (end < whole)
+    free = (begin > 0.0) & (end < lengths)
     shift = np.maximum(lower[first] - begin, 0.0) - np.maximum(end - upper[last], 0.0)
     begin, end = (np.repeat(edge + free * shift, ends - starts + 1) for edge in (begin, end))
     share = np.zeros(load.shape)
@@ -127,11 +127,11 @@ def _bearing(load: FloatArray, place: FloatArray, low: FloatArray, high: FloatAr
 
 def _edges(
     load: FloatArray, s: FloatArray, starts: NDArray[np.intp], ends: NDArray[np.intp], spacing: FloatArray,
-    whole: FloatArray, at_rims: tuple[NDArray[np.bool_], NDArray[np.bool_]],
+    lengths: FloatArray, at_rims: tuple[NDArray[np.bool_], NDArray[np.bool_]],
 ) -> tuple[FloatArray, FloatArray]:  # fmt: skip
     """Both edges of loaded stretches [m], from the loads of their faces at distances ``s`` from a rim [m].
 
-    ``starts, ends`` of the stretches among the faces, ``whole`` lengths of their lines [m].
+    ``starts, ends`` of the stretches among the faces, ``lengths`` of their lines [m].
     """
     force = np.add.reduceat(load, starts)
     mean = np.add.reduceat(load * s, starts) / force
@@ -139,13 +139,13 @@ def _edges(
     variance, fourth = (np.add.reduceat(load * z**k, starts) / force for k in (2, 4))
     half = 0.5 * _between_edges(variance, fourth, spacing)
     # a quarter of the spacing from a rim: an even pressure on few faces ends a little before it
-    low, high = (rim & (to - half < 0.25 * spacing) for rim, to in zip(at_rims, (mean, whole - mean), strict=True))
+    low, high = (rim & (to - half < 0.25 * spacing) for rim, to in zip(at_rims, (mean, lengths - mean), strict=True))
     # the first idle node is not in contact; beside a rim, where pressure may be singular, all but the last ones are
     b = np.maximum(_from_rim(mean, variance + mean**2, spacing), s[np.maximum(ends - 1, starts)] - 0.5 * spacing)
-    from_other = _from_rim(whole - mean, variance + (whole - mean) ** 2, spacing)
-    c = np.minimum(whole - from_other, s[np.minimum(starts + 1, ends)] + 0.5 * spacing)
+    from_other = _from_rim(lengths - mean, variance + (lengths - mean) ** 2, spacing)
+    c = np.minimum(lengths - from_other, s[np.minimum(starts + 1, ends)] + 0.5 * spacing)
     begin = np.where(low, 0.0, np.where(high, c, mean - half))
-    return begin, np.where(high, whole, np.where(low, b, mean + half))
+    return begin, np.where(high, lengths, np.where(low, b, mean + half))
 
 
 def _between_edges(variance: FloatArray, fourth: FloatArray, spacing: FloatArray) -> FloatArray:

@@ -29,7 +29,7 @@ def extract(pad: Pad, pressed: Pressed, rule: str = "") -> ContactPatch:
     position, normal, load, side_weights = _points(pad, pressed.points, rule)
     load = _unfold(pad, _as_grid(pad, _non_negative(load)[..., None]), False)[..., 0].ravel()
     nodes = pressed.contact_face.reshape(*pad.contact_grid, 3)
-    # each quadrature point owns the part of the facet that its weight stands for, so areas and loads belong together
+    # each quadrature point owns the part of the facet that its weight represents, so areas and loads belong together
     for axis in range(2):
         nodes = _subdivide(nodes, axis, side_weights)
     nodes = _unfold(pad, nodes, shared=True)

@@ -175,8 +175,8 @@ class Stepping:
         least = shortest * (longest if np.isfinite(longest) else step)
         for _ in range(MOST_STEPS):
             try:
-                there = Control(closing=problem.closing(low[0]) + step)
-                ahead = self.solve(low[0], there, work, self.most, slack=self.passed)
+                target = Control(closing=problem.closing(low[0]) + step)
+                ahead = self.solve(low[0], target, work, self.most, slack=self.passed)
                 high = (ahead, problem.normal_force(ahead))
                 # bracketed: from here on the state is looked for between two that lie on the path
                 if high[1] >= force:
@@ -250,31 +250,31 @@ class Stepping:
         self, x: FloatArray, reached: float, force: float, work: Work, *, by_displacement: bool = True
     ) -> FloatArray:
         """From the state at ``reached`` [N] to ``force``: at once, by parts, or (``by_displacement``) by closing."""
-        here = self._begin(x, reached, work)
+        state = self._begin(x, reached, work)
         done, cut = 0.0, 1.0
         while done < 1.0:
             # all of a step that nothing is foretold of: NaN compares as false
-            allowed = LONGEST / max(LONGEST, self._foretold(here, force - reached))
+            allowed = LONGEST / max(LONGEST, self._foretold(state, force - reached))
             goal = min(1.0, done + cut * allowed)
             target = force if goal == 1.0 else reached + goal * (force - reached)
             try:
                 slack = self.slack if goal == 1.0 else self.passed
-                x = self.solve(self._ahead(here, target), Control(force=target), work, self.most, slack=slack)
+                x = self.solve(self._ahead(state, target), Control(force=target), work, self.most, slack=slack)
             except ConvergenceError:
                 cut *= 0.5
                 # `not >` instead of `<=`: NaN, where nothing is foretold, has to end the halving
                 # foretold closing displacement of a step that is given up where Newton's method does not converge
-                if cut < SHORTEST_PART and not self._foretold(here, 0.5 * (target - here.force)) > 0.01:
+                if cut < SHORTEST_PART and not self._foretold(state, 0.5 * (target - state.force)) > 0.01:
                     if not by_displacement:
                         raise
-                    return self._past_limit(here, force, work)
+                    return self._past_limit(state, force, work)
                 continue
             ahead = self._place(x, target, None)
-            leaves, forks = self._leaves(here, ahead), here.stable and not ahead.stable
+            leaves, forks = self._leaves(state, ahead), state.stable and not ahead.stable
             # a state may have converged and still belong to another branch: it is judged before it is passed on
-            if leaves or forks or ahead.strain - here.strain > FOLD:
-                # here NaN has to go on with the halving, down to a part of 1/1024
-                if cut > 1.0 / 1024.0 and not self._foretold(here, target - here.force) <= SHORTEST_FORETOLD:
+            if leaves or forks or ahead.strain - state.strain > FOLD:
+                # here NaN continues the halving, down to a part of 1/1024
+                if cut > 1.0 / 1024.0 and not self._foretold(state, target - state.force) <= SHORTEST_FORETOLD:
                     cut, work.halvings = 0.5 * cut, work.halvings + 1
                     continue
                 # the path was left before this force; refused where the caller has something else to try
@@ -284,9 +284,9 @@ class Stepping:
             self.watch(x, target)
             done, cut = goal, min(1.0, 2.0 * cut) if allowed < 1.0 else cut
             # the tangent costs a triangular solve, and behind the last step nobody asks for it
-            here = replace(ahead, tangent=self._tangent(x)) if done < 1.0 else ahead
-        self._last = here
-        return here.x
+            state = replace(ahead, tangent=self._tangent(x)) if done < 1.0 else ahead
+        self._last = state
+        return state.x
 
     def from_near(self, start: FloatArray, force: float, work: Work) -> FloatArray:
         """State at a force [N] by one Newton solve from ``start``, which has come along the path on another mesh.
@@ -298,11 +298,11 @@ class Stepping:
         """
         # Newton iterations from the state of a coarser mesh; good starts take 4 to 8
         x = self.solve(start, Control(force=force), work, self.most or (8 if self.followed else None))
-        here = self._place(x, force, None)
-        if here.strain - self._strain(start) > FOLD or not here.stable:
+        state = self._place(x, force, None)
+        if state.strain - self._strain(start) > FOLD or not state.stable:
             work.halvings += 1
             raise ConvergenceError(ASTRAY.format(force=force))
-        self._last = here
+        self._last = state
         return x
 
     def _begin(self, x: FloatArray, reached: float, work: Work) -> _Place:
@@ -315,9 +315,9 @@ class Stepping:
             # another problem's state is not quite this one's: solve here, or go without a tangent if that fails
             with suppress(ConvergenceError):
                 x, known = self.solve(x, Control(force=reached), work, self.most), True
-        here = self._place(x, reached, self._tangent(x) if known else None)
-        self.jumped |= not here.stable
-        return here
+        state = self._place(x, reached, self._tangent(x) if known else None)
+        self.jumped |= not state.stable
+        return state
 
     def _strain(self, x: FloatArray) -> float:
         """Largest strain; 0 where no path is followed."""
@@ -327,45 +327,45 @@ class Stepping:
         strain, stable = self._strain(x), True
         # foam that is strained little does not buckle: the check's factorisation is spared
         if self.followed and not strain <= STRAINED:
-            entries, held = self.followed.symmetric_tangent(x)
+            entries, multipliers = self.followed.symmetric_tangent(x)
             # every node in contact has one as a multiplier; any more is a direction of instability
-            stable = self.solver.negative_eigenvalues(entries) == held
+            stable = self.solver.negative_eigenvalues(entries) == multipliers
         return _Place(x, force, strain, stable, tangent)
 
     def _tangent(self, x: FloatArray) -> FloatArray | None:
         """Tangent of the path at the state at which the last solve ended; None where it is not followed."""
         return self.followed.path_tangent(x, self.solver.answer) if self.followed else None
 
-    def _ahead(self, here: _Place, force: float) -> FloatArray:
+    def _ahead(self, state: _Place, force: float) -> FloatArray:
         """Start for the state at a force [N], on the tangent of the path as far as it is a state of sound elements."""
-        if here.tangent is None or not self.problem.keep(here.x, True):
-            return here.x
+        if state.tangent is None or not self.problem.keep(state.x, True):
+            return state.x
         # pads get stiffer as the contact spreads: by the root of the force the path is straighter than by the force
-        step = -2.0 * here.force * (np.sqrt(force / here.force) - 1.0) * here.tangent
-        return here.x - self.problem.shorten(here.x, step) * step
+        step = -2.0 * state.force * (np.sqrt(force / state.force) - 1.0) * state.tangent
+        return state.x - self.problem.shorten(state.x, step) * step
 
-    def _foretold(self, here: _Place, step: float) -> float:
+    def _foretold(self, state: _Place, step: float) -> float:
         """Closing displacement over thickness that the tangent foretells for a step [N]; NaN if unknown."""
-        if here.tangent is None:
+        if state.tangent is None:
             return np.nan
-        return abs(self.problem.closing(here.tangent) * step) / self.problem.thickness
+        return abs(self.problem.closing(state.tangent) * step) / self.problem.thickness
 
-    def _leaves(self, here: _Place, ahead: _Place) -> bool:
-        """Whether the state ``ahead`` is not the one that the path leads to from ``here``."""
-        if here.tangent is not None:
+    def _leaves(self, state: _Place, ahead: _Place) -> bool:
+        """Whether the state ``ahead`` is not the one that the path leads to from ``state``."""
+        if state.tangent is not None:
             # displacements and closing only: the bound is a distance in space, which pressures are not
             assert self.followed is not None
-            off = (ahead.x - here.x - (ahead.force - here.force) * here.tangent)[: self.followed.closing_dof + 1]
+            off = (ahead.x - state.x - (ahead.force - state.force) * state.tangent)[: self.followed.closing_dof + 1]
             if np.abs(off).max() > STRAY * self.problem.thickness:
                 return True
         # strain that grows while the force hardly does is a fold of the foam's surface, not a larger contact
-        return ahead.strain - here.strain > max(FOLDING, FOLDS * abs(np.log(ahead.force / here.force)))
+        return ahead.strain - state.strain > max(FOLDING, FOLDS * abs(np.log(ahead.force / state.force)))
 
-    def _past_limit(self, here: _Place, force: float, work: Work) -> FloatArray:
+    def _past_limit(self, state: _Place, force: float, work: Work) -> FloatArray:
         """State at ``force`` by displacement control; the force may fall in between, which it does beyond a limit."""
         if not self.followed:
-            return self.displacement_control(here.x, force, work)
-        forces = [here.force]
-        x = self.displacement_control(here.x, force, work, STRAY * self.problem.thickness, forces)
+            return self.displacement_control(state.x, force, work)
+        forces = [state.force]
+        x = self.displacement_control(state.x, force, work, STRAY * self.problem.thickness, forces)
         self.jumped |= falls(forces)
         return x

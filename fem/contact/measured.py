@@ -4,8 +4,8 @@ The face is pressed into the shape that it had (see `fem.objects.measured_face`)
 free: where the measured face lies deeper than the true one, foam is pressed that was not. So the solve is done twice.
 At a closing displacement that is less by `NOISE_MARGIN` standard errors of the face only what surely bears still does.
 Farther from there than the contact grows on the rest of the way, the object is not where the face was measured but
-beyond, and is taken away by as much as the face may be wrong. What grows is told from a parabola, whose contact goes
-with the root of the closing displacement.
+beyond, and is taken away by as much as the face may be wrong. The growth is estimated from a parabola, whose contact
+goes with the root of the closing displacement.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class LiftedFace:
 def press_measured(
     face: MeasuredFace, pad: Pad, fallbacks: Sequence[Pad] = (), options: dict[str, Any] | None = None
 ) -> tuple[Pressed, bool]:
-    """State of a pad that is pressed into the shape of its measured face, and whether contact is told from noise.
+    """State of a pad pressed into the shape of its measured face, and whether contact is distinguished from noise.
 
     Parameters
     ----------

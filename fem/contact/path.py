@@ -154,12 +154,12 @@ class LoadPath(ABC, Generic[ProblemT]):
         """Steps of the problem as it is now, of which none has been made."""
 
     def _switch(self, problem: ProblemT) -> None:
-        """Go on with another problem; clock, iterations that are left and tolerances go on."""
-        seconds, left, before = self.solver.seconds, self.solver.left, self._stepping
+        """Continue with another problem; clock, remaining iterations and tolerances stay."""
+        seconds, iterations, before = self.solver.seconds, self.solver.iterations_left, self._stepping
         self.solver.destroy()
         self.problem = problem
         self._set_up()
-        self.solver.seconds, self.solver.left = seconds, left
+        self.solver.seconds, self.solver.iterations_left = seconds, iterations
         self._stepping.residual, self._stepping.slack = before.residual, before.slack
 
     def _begin(self) -> None:
@@ -178,7 +178,7 @@ class LoadPath(ABC, Generic[ProblemT]):
             self._switch(problem)
         self.solver.forget()
         self._stepping = self._steps()
-        self.solver.left = self.MOST_ITERATIONS
+        self.solver.iterations_left = self.MOST_ITERATIONS
         if state:
             assert problem.friction is not None
             problem.friction.anchors, self._stepping.jumped = state.anchors, state.at.jumped
@@ -195,13 +195,13 @@ class LoadPath(ABC, Generic[ProblemT]):
         if self.problem.friction is not None:
             yield from map(self.at, forces)
             return
-        here = None
+        state = None
         self._begin()
         for force in forces:
             work, elapsed = Work(), self._stopwatch()
-            self.solver.left = self.MOST_ITERATIONS
-            here = self._next(here, force, work)
-            yield self._pressed(here, work, elapsed())
+            self.solver.iterations_left = self.MOST_ITERATIONS
+            state = self._next(state, force, work)
+            yield self._pressed(state, work, elapsed())
 
     def at(self, force: float, coarse: Sequence[Pressed] = ()) -> Pressed:
         """State at one normal force on each whole pad [N], whatever else has been solved.
@@ -223,10 +223,10 @@ class LoadPath(ABC, Generic[ProblemT]):
             work = replace(below.work) if below else work
             return self._pressed(self._next(below.at if below else None, force, work), work, elapsed())
         self._begin_afresh()
-        here = self._near(coarse, work)
-        if here is None or here.force < force:
-            here = self._next(here, force, work)
-        return self._pressed(here, work, elapsed())
+        state = self._near(coarse, work)
+        if state is None or state.force < force:
+            state = self._next(state, force, work)
+        return self._pressed(state, work, elapsed())
 
     def _state_below(self, force: float) -> _PathState[ProblemT] | None:
         """The last state of the path below a force [N]; None where it begins above."""
@@ -240,16 +240,16 @@ class LoadPath(ABC, Generic[ProblemT]):
             work = replace(before.work) if before else Work()
             self._stepping.residual, self._stepping.slack = PATH_RESIDUAL, self._stepping.passed
             try:
-                here = self._next(before.at if before else None, goal, work)
+                state = self._next(before.at if before else None, goal, work)
             except (ConvergenceError, CheckError) as error:
                 self._end = error
                 raise
             assert self.problem.friction is not None
-            self._path.append(_PathState(here, work, self.problem, self._others, self.problem.friction.anchors))
+            self._path.append(_PathState(state, work, self.problem, self._others, self.problem.friction.anchors))
         return self._path[len(path) - 1] if path else None
 
     @abstractmethod
-    def _next(self, here: OnPath | None, force: float, work: Work) -> OnPath:
+    def _next(self, before: OnPath | None, force: float, work: Work) -> OnPath:
         """State at ``force`` from the one before, or from first contact."""
 
     def _near(self, coarse: Sequence[Pressed], work: Work) -> OnPath | None:
@@ -258,9 +258,9 @@ class LoadPath(ABC, Generic[ProblemT]):
             # beyond a jump the finer mesh may still be before it
             if not start.path_dependent:
                 try:
-                    here = self._from(start, work)
-                    self._pressed(here, work, Seconds())
-                    return here
+                    state = self._from(start, work)
+                    self._pressed(state, work, Seconds())
+                    return state
                 except (ConvergenceError, CheckError):
                     continue
         return None
@@ -299,28 +299,28 @@ class LoadPath(ABC, Generic[ProblemT]):
         spent = f"given up after {self.MOST_ITERATIONS} Newton iterations"
         return ConvergenceError(f"stuck at {reached:.4g} N of {force:.4g} N: {spent}")
 
-    def _pressed(self, here: OnPath, work: Work, seconds: Seconds) -> Pressed:
+    def _pressed(self, state: OnPath, work: Work, seconds: Seconds) -> Pressed:
         """The state, checked."""
-        problem, x, steps = self.problem, here.x, self._stepping
+        problem, x, steps = self.problem, state.x, self._stepping
         residual = np.abs(problem.residual(x))
         # a solve ends there where the force is so small, see `Stepping.solve`
-        tolerance = max(RESIDUAL, problem.rounding / (problem.share * here.force))
+        tolerance = max(RESIDUAL, problem.rounding / (problem.share * state.force))
         instead, slack = problem.rule != self._wanted.rule, ALTERNATING if steps.off else 0.0
         pads = []
         for k, f in enumerate(problem.fingers):
-            state, unknowns = problem.contact_state(x, k), x[f.unknowns].copy()
-            pressure, _, points = state
+            contact, unknowns = problem.contact_state(x, k), x[f.unknowns].copy()
+            pressure, _, points = contact
             imbalance = float(residual[f.offset : f.closing_dof + 1].max()) / f.pad.share
-            checks = check(f.foam, unknowns, state, imbalance, here.force, tolerance, slack)
+            checks = check(f.foam, unknowns, contact, imbalance, state.force, tolerance, slack)
             effort = work if k == 0 else Work()
             pads.append(Pressed(
-                here.force, float(x[f.closing_dof]), unknowns, f.pad, f.pose, pressure,
+                state.force, float(x[f.closing_dof]), unknowns, f.pad, f.pose, pressure,
                 (f.pad.nodes + f.pad.displacement(unknowns))[f.pad.contact_nodes], points, checks, effort.iterations,
-                effort.steps, effort.halvings, seconds if k == 0 else Seconds(), here.jumped, instead, self._notes(),
+                effort.steps, effort.halvings, seconds if k == 0 else Seconds(), state.jumped, instead, self._notes(),
             ))  # fmt: skip
-        return self._together(here, pads, residual)
+        return self._together(state, pads, residual)
 
-    def _together(self, here: OnPath, pads: list[Pressed], residual: FloatArray) -> Pressed:
+    def _together(self, state: OnPath, pads: list[Pressed], residual: FloatArray) -> Pressed:
         """The first of the pads, which knows what it shares the state with."""
         return pads[0]
 

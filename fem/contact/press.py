@@ -113,7 +113,7 @@ class Press(LoadPath[RigidProblem]):
             if problem is not None:
                 self._switch(problem())
             try:
-                self.solver.left = self.MOST_ITERATIONS
+                self.solver.iterations_left = self.MOST_ITERATIONS
                 x = self._close_to(closing, work)
                 return self._pressed(OnPath(x, self.problem.normal_force(x)), work, elapsed())
             except (ConvergenceError, CheckError) as error:
@@ -125,11 +125,11 @@ class Press(LoadPath[RigidProblem]):
         longest = LONGEST_CLOSING * self.problem.thickness
         step, path = min(longest, closing), list[State]()
         while not path or path[-1][1] < closing:
-            x, here = path[-1] if path else (None, 0.0)
-            ahead = closing if closing - here <= 1.001 * step else here + step
+            x, reached = path[-1] if path else (None, 0.0)
+            ahead = closing if closing - reached <= 1.001 * step else reached + step
             guess = self.problem.guess(ahead) if x is None else x
             if x is not None and len(path) > 1:
-                guess = x + (ahead - here) / (here - path[-2][1]) * (x - path[-2][0])
+                guess = x + (ahead - reached) / (reached - path[-2][1]) * (x - path[-2][0])
             try:
                 path.append((self._stepping.solve(guess, Control(closing=ahead), work), ahead))
             except ConvergenceError:
@@ -140,29 +140,29 @@ class Press(LoadPath[RigidProblem]):
             step = min(1.5 * step, longest)
         return path[-1][0]
 
-    def _next(self, here: OnPath | None, force: float, work: Work) -> OnPath:
+    def _next(self, before: OnPath | None, force: float, work: Work) -> OnPath:
         self._stepping.closed = False
         try:
-            x = self._reach(here, force, work)
+            x = self._reach(before, force, work)
         except SpentError as error:
             raise explained(self._given_up(self._last[1], force), self.problem.foam, *self._last) from error
-        if here is not None:
+        if before is not None:
             # the solver cannot see this: both states are in equilibrium and may pass their own checks
-            refuse_fall((here.force, self.problem.closing(here.x)), (force, self.problem.closing(x)))
+            refuse_fall((before.force, self.problem.closing(before.x)), (force, self.problem.closing(x)))
         return OnPath(x, force, self._stepping.jumped)
 
-    def _reach(self, here: OnPath | None, force: float, work: Work) -> FloatArray:
+    def _reach(self, before: OnPath | None, force: float, work: Work) -> FloatArray:
         """State at ``force``, with other gaps if need be."""
         # where these gaps do not lead on soon, the others are given the time
         if self._others:
-            self.solver.left = self.MOST_ITERATIONS // 2
+            self.solver.iterations_left = self.MOST_ITERATIONS // 2
         try:
-            return self._step_to(here, force, work)
+            return self._step_to(before, force, work)
         except (ConvergenceError, SpentError) as error:
             if not self._others:
                 raise
             # the path of one pad does not lead to states of the other, so it starts afresh
-            return self._from_first_contact(here, force, work, error)
+            return self._from_first_contact(before, force, work, error)
 
     def _from_first_contact(self, below: OnPath | None, force: float, work: Work, failed: Exception) -> FloatArray:
         """State at ``force`` of a fallback, else of the pad itself beyond a jump, from first contact on.
@@ -173,7 +173,7 @@ class Press(LoadPath[RigidProblem]):
         # no fallback from here on, so that displacement control may take over and jumps are passed
         problems = self._others if self._leads else (*self._others, lambda: self._wanted)
         self._others, errors, tried = (), list[Exception](), [self._wanted.rule]
-        self.solver.left = self.MOST_ITERATIONS
+        self.solver.iterations_left = self.MOST_ITERATIONS
         for problem in problems:
             self._switch(problem())
             tried.append(self.problem.rule)
@@ -182,7 +182,7 @@ class Press(LoadPath[RigidProblem]):
             except (ConvergenceError, SpentError) as error:
                 errors.append(error)
             # as much as a pad with a fallback has, or a force without a state would take for ever
-            self.solver.left = max(self.solver.left, self.MOST_ITERATIONS // 2)
+            self.solver.iterations_left = max(self.solver.iterations_left, self.MOST_ITERATIONS // 2)
         # a limit that was seen is the reason; else what stopped the first that knows of one
         if not (known := [error for error in errors if isinstance(error, ConvergenceError)]):
             raise errors[0]
@@ -203,14 +203,14 @@ class Press(LoadPath[RigidProblem]):
         self._stepping.jumped |= differs
         return x
 
-    def _step_to(self, here: OnPath | None, force: float, work: Work) -> FloatArray:
+    def _step_to(self, before: OnPath | None, force: float, work: Work) -> FloatArray:
         """State at ``force`` from the one before, or from scratch."""
-        if here is None:
+        if before is None:
             steps = self._load_steps(0.0, force)
             self.problem.begin()
             x, reached = self._stepping.first(self.problem.closing_of_bed(steps[0]), steps[0], work)
         else:
-            (x, reached), steps = (here.x, here.force), self._load_steps(here.force, force)
+            (x, reached), steps = (before.x, before.force), self._load_steps(before.force, force)
         # friction is measured from this state, and a failure on the way is explained by it
         self._watch(x, reached)
         try:

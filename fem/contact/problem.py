@@ -218,18 +218,18 @@ class ContactProblem(ABC):
 
     def _face(self, k: int, f: Finger, x: FloatArray) -> Evaluated:
         points, gap, normal, surface = self._met(k, x)
-        N, whole, lam = f.pad.face_N, f.pad.face_area, f.pressure(x)[f.nodes]
+        N, face_area, lam = f.pad.face_N, f.pad.face_area, f.pressure(x)[f.nodes]
         # points that face nothing are left out, so that a pad over a rim is carried up to the rim
-        area = np.where(gap.reshape(whole.shape) == FAR, 0.0, whole)
+        area = np.where(gap.reshape(face_area.shape) == FAR, 0.0, face_area)
         load = (area * (lam @ N.T)).reshape(-1, 1) * normal
-        weighted = f.nodal((area * gap.reshape(whole.shape)) @ N)
+        weighted = f.nodal((area * gap.reshape(face_area.shape)) @ N)
         # a node that hangs over the rim with most of its area would put all of its pressure on the rest
         # part of a node's area that must face something for the node to carry load
         gaps = np.where(f.nodal(area @ N) > 0.3 * f.area, weighted, FAR * f.area)
         c = Evaluated(points, gap, normal, lam, gaps, f.active(x, gaps), load, surface)
         if self.friction is not None:
             c.traction = self.traction(k, x, c)[0]
-            c.load = load + whole.reshape(-1, 1) * c.traction
+            c.load = load + face_area.reshape(-1, 1) * c.traction
         return c
 
     def residual(self, x: FloatArray) -> FloatArray:

@@ -72,7 +72,7 @@ class CentreLine:
         return moved
 
     def at(self, z: float) -> tuple[FloatArray, FloatArray]:
-        """Place ``(3,)`` [m] and unit tangent ``(3,)`` at a height; beyond the ends the line goes on straight."""
+        """Place ``(3,)`` [m] and unit tangent ``(3,)`` at a height; beyond the ends the line continues straight."""
         if self.straight:
             return np.array([0.0, 0.0, z]), np.array([0.0, 0.0, 1.0])
         inside = float(np.clip(z, self.z[0], self.z[-1]))

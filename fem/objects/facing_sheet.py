@@ -49,7 +49,7 @@ def _seen(which, normals, sides, directions, spacing, rotation, origin, lower, u
     """
     corners = nodes[0]
     stack, spot = np.empty(DEPTH, np.int64), np.empty(3)
-    seen, hides = np.zeros(len(which), np.int64), np.zeros(len(directions), np.int64)
+    visibility, hides = np.zeros(len(which), np.int64), np.zeros(len(directions), np.int64)
     for m in range(len(which)):
         p, normal = corners[which[m]], normals[which[m]]
         longest = 0.0
@@ -60,18 +60,18 @@ def _seen(which, normals, sides, directions, spacing, rotation, origin, lower, u
         n = min(max(int(np.ceil(np.sqrt(longest) / spacing)), 1), 40)
         for i in range(n * n):
             b, c = (i // n + 1.0 / 3.0) / n, (i % n + 1.0 / 3.0) / n
-            if abs(seen[m]) == 2 or b + c >= 1.0:
+            if abs(visibility[m]) == 2 or b + c >= 1.0:
                 continue
             for s in range(sides):
                 sign = 1.0 - 2.0 * s
                 for d in range(3):
                     spot[d] = p[0, d] + b * (p[1, d] - p[0, d]) + c * (p[2, d] - p[0, d]) + sign * lift * normal[d]
                 y = (spot - origin) @ rotation
-                if (y < lower).any() or (y > upper).any() or abs(seen[m]) == 2:
+                if (y < lower).any() or (y > upper).any() or abs(visibility[m]) == 2:
                     continue
                 for k in range(len(directions)):
                     # seen on a slant already: only the straight line, which comes first, can tell more
-                    if seen[m] != 0 and k > 0:
+                    if visibility[m] != 0 and k > 0:
                         break
                     # a line at a smaller sine to a triangle runs along it and does not see it
                     if sign * (normal * directions[k]).sum() > -0.01:
@@ -84,20 +84,20 @@ def _seen(which, normals, sides, directions, spacing, rotation, origin, lower, u
                     if hit >= 0:
                         hides[k] = hit
                     else:
-                        seen[m] = sign * (2 if k == 0 else 1)
+                        visibility[m] = sign * (2 if k == 0 else 1)
                         break
-    return seen
+    return visibility
 
 
 @dataclass(frozen=True, eq=False)
 class FacingSheet:
-    """What a finger sees of a mesh: small triangles of the surface that is seen, and the ``whole`` mesh.
+    """What a finger sees of a mesh: small triangles of the surface that is seen, and the whole ``mesh``.
 
     ``directions (k, 3)`` are lines of sight, away from the finger.
     """
 
     sheet: TriangleTree
-    whole: TriangleTree
+    mesh: TriangleTree
     directions: FloatArray
 
     def signed(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -108,7 +108,7 @@ class FacingSheet:
             out = np.zeros(np.count_nonzero(border), dtype=bool)
             for direction in self.directions:
                 hidden = np.flatnonzero(~out)
-                out[hidden] = np.isinf(self.whole.along(x[border][hidden], -direction))
+                out[hidden] = np.isinf(self.mesh.along(x[border][hidden], -direction))
             turn = np.where(out == (g[border] >= 0), 1.0, -1.0)
             g[border] *= turn
             normal[border] *= turn[:, None]
@@ -137,11 +137,11 @@ def _with_shadows(g: FloatArray, step: float, stairs: float) -> FloatArray:
     """
     shadow = np.zeros(g.shape, dtype=bool)
     for axis in range(3):
-        one, two = (tuple([slice(None)] * axis + [part]) for part in (slice(None, -1), slice(1, None)))
+        first, second = (tuple([slice(None)] * axis + [part]) for part in (slice(None, -1), slice(1, None)))
         # a sign that changes farther from the sheet than the sheet could explain
-        change = ((g[one] < 0) != (g[two] < 0)) & (np.abs(g[one]) + np.abs(g[two]) > (1 + 1e-6) * step)
-        shadow[one] |= change
-        shadow[two] |= change
+        change = ((g[first] < 0) != (g[second] < 0)) & (np.abs(g[first]) + np.abs(g[second]) > (1 + 1e-6) * step)
+        shadow[first] |= change
+        shadow[second] |= change
     if not shadow.any():
         return g
     # the shadow line runs between two marked samples, half a step from either
@@ -152,7 +152,7 @@ def _with_shadows(g: FloatArray, step: float, stairs: float) -> FloatArray:
 
 
 def facing_sheet(
-    smooth: SmoothTriangles, whole: TriangleTree, closed: bool, pose: Pose, box: FloatArray, step: float
+    smooth: SmoothTriangles, mesh: TriangleTree, closed: bool, pose: Pose, box: FloatArray, step: float
 ) -> FacingSheet:
     """What a finger at ``pose`` sees of triangles in the ``box (2, 3)`` of its frame [m].
 
@@ -161,28 +161,28 @@ def facing_sheet(
     """
     depth = box[1, 2] - box[0, 2]
     lower, upper = box[0] - BOX_MARGIN * depth, box[1] + BOX_MARGIN * depth
-    y = pose.to_pad(whole.points)[whole.triangles]
+    y = pose.to_pad(mesh.points)[mesh.triangles]
     near = np.flatnonzero(((y.max(axis=1) >= lower) & (y.min(axis=1) <= upper)).all(axis=1))
-    normals = whole.face_normals
+    normals = mesh.face_normals
     # share of the mesh's size: how far above a triangle a line of sight starts
-    lines, lift = lines_of_sight(pose), 1e-7 * float(np.ptp(whole.points, axis=0).max())
+    lines, lift = lines_of_sight(pose), 1e-7 * float(np.ptp(mesh.points, axis=0).max())
     R = np.ascontiguousarray(pose.rotation)
-    how = _seen(near, normals, 1 if closed else 2, lines, 2 * step, R, pose.origin, lower, upper, lift, whole.nodes)
+    how = _seen(near, normals, 1 if closed else 2, lines, 2 * step, R, pose.origin, lower, upper, lift, mesh.nodes)
     side = np.ones(len(normals))
     side[near[how < 0]] = -1.0
     straight = np.zeros(len(normals), dtype=bool)
     straight[near[np.abs(how) == 2]] = True
     slanted = near[np.abs(how) == 1]
-    far, hit = whole.behind(slanted, side[slanted, None] * normals[slanted], lift)
+    far, hit = mesh.behind(slanted, side[slanted, None] * normals[slanted], lift)
     # without a hit the index is -1, which does no harm: the distance is infinite then
     # share of the box's depth: a wall thinner than this has one side only
     slanted = slanted[~(straight[hit] & (far < (1 / 3) * depth))]
     chosen = np.union1d(np.flatnonzero(straight), slanted)
     # nothing faces the finger here, and the whole mesh keeps the distance defined
     if not len(chosen):
-        return FacingSheet(whole, whole, lines)
+        return FacingSheet(mesh, mesh, lines)
     # share of the grid's step: how well flat pieces follow the smooth triangles
     pieces = smooth.pieces_for(chosen, (1 / 200) * step)
     x, small = smooth.refined(chosen, pieces)
     back = np.repeat(side[chosen] < 0, pieces**2)
-    return FacingSheet(TriangleTree(x, np.where(back[:, None], small[:, ::-1], small)), whole, lines)
+    return FacingSheet(TriangleTree(x, np.where(back[:, None], small[:, ::-1], small)), mesh, lines)

@@ -129,7 +129,7 @@ class NoContactError(ValueError):
 
 
 def first_touch(obj: GapFunction, pose: Pose, points: FloatArray, reach: float) -> float:
-    """Distance [m] that the pad travels along its approach until the first of its points meets the object.
+    """Distance [m] that the pad moves along its approach until the first of its points meets the object.
 
     Sphere tracing: a point may move by its signed distance without crossing the surface. All points are traced at once
     and those that are already further than the first hit are given up; each hit is then located by bisection.
@@ -170,7 +170,7 @@ def first_touch(obj: GapFunction, pose: Pose, points: FloatArray, reach: float) 
         t = t + np.maximum(g, 1e-4 * reach)
         g = gap(active, t)
         closest = min(closest, g.min())
-        # a touch too shallow for a hit: told apart from a pad that passes well clear
+        # a touch too shallow for a hit: distinguished from a pad that passes well clear
         grazed |= bool((g[t < reach] < GRAZE).any())
         hit = g <= -GRAZE
         if hit.any():

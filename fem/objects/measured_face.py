@@ -184,7 +184,7 @@ def _penalty(lines: list[Line]) -> FloatArray:
     if len(lines) == 1:
         return lines[0].penalty
     mass = [line.basis(np.linspace(*line.ends, 4 * line.cells + 1))[:2] for line in lines]
-    (M0, T0), (M1, T1) = ([B.T @ B / len(B) for B in own] for own in mass)
+    (M0, T0), (M1, T1) = ([B.T @ B / len(B) for B in bases] for bases in mass)
     lengths = [line.ends[1] - line.ends[0] for line in lines]
     R0, R1 = (line.penalty / length for line, length in zip(lines, lengths, strict=True))
     return np.asarray(np.kron(R0, M1) + 2.0 * np.kron(T0, T1) + np.kron(M0, R1))
@@ -200,19 +200,19 @@ def _fitted(A: FloatArray, z: FloatArray, R: FloatArray) -> tuple[FloatArray, fl
     mu, V = eigh(scale * R, G)
     mu, b, AV = np.maximum(mu, 0.0), V.T @ (A.T @ z), A @ V
 
-    def kept(strength: float) -> FloatArray:
+    def filters(strength: float) -> FloatArray:
         return np.asarray(1.0 / (1.0 + strength * mu))
 
-    def left(strength: float) -> tuple[float, float]:
+    def residual(strength: float) -> tuple[float, float]:
         """Sum of squares that the face leaves [m^2], and numbers that judge it."""
-        return float(((z - AV @ (kept(strength) * b)) ** 2).sum()), len(z) - float(kept(strength).sum())
+        return float(((z - AV @ (filters(strength) * b)) ** 2).sum()), len(z) - float(filters(strength).sum())
 
     # with as many numbers as points nothing would be left to judge by
-    sound = [s for s in STRENGTHS.tolist() if CAUTIOUS * (len(z) - left(s)[1]) <= len(z) - 1.0]
-    strength = min(sound, key=lambda s: left(s)[0] / (len(z) - CAUTIOUS * (len(z) - left(s)[1])) ** 2)
-    squares, free = left(strength)
+    sound = [s for s in STRENGTHS.tolist() if CAUTIOUS * (len(z) - residual(s)[1]) <= len(z) - 1.0]
+    strength = min(sound, key=lambda s: residual(s)[0] / (len(z) - CAUTIOUS * (len(z) - residual(s)[1])) ** 2)
+    squares, free = residual(strength)
     noise = float(np.sqrt(squares / free))
-    return V @ (kept(strength) * b), noise, noise * float(np.sqrt((AV**2 @ kept(strength)).max()))
+    return V @ (filters(strength) * b), noise, noise * float(np.sqrt((AV**2 @ filters(strength)).max()))
 
 
 def cell_of(size: Sequence[float], elements: Sequence[int]) -> float:

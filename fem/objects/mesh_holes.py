@@ -30,7 +30,7 @@ def with_holes_filled(points: FloatArray, triangles: IntArray) -> tuple[IntArray
     # sides of holes per triangle, above which they are no holes
     if not loops or sum(map(len, loops)) > 0.5 * len(triangles):
         return triangles, []
-    taken = set(map(tuple, np.sort(edges_of(triangles), axis=1).tolist()))
+    edges = set(map(tuple, np.sort(edges_of(triangles), axis=1).tolist()))
     present = set(map(tuple, np.sort(triangles, axis=1).tolist()))
     parts, places = [triangles], []
     for loop in loops:
@@ -38,14 +38,14 @@ def with_holes_filled(points: FloatArray, triangles: IntArray) -> tuple[IntArray
         across = float(np.linalg.norm(np.ptp(x, axis=0)))
         # a triangle or two that are missing can be meant in one way only, so these may be larger
         small = across <= (SMALL_HOLE if len(loop) > FEW_SIDES else LARGEST_GAP) * size
-        new = filling(points, loop, taken) if small else None
+        new = filling(points, loop, edges) if small else None
         # the border of a triangle that stands alone is no hole
         if new is None or any(tuple(sorted(t)) in present for t in new.tolist()):
             continue
         middle = ", ".join(f"{v:.4g}" for v in x.mean(axis=0))
         places.append(f"{across * 1e3:.3g} mm near ({middle}) m of the file's frame")
         # the filling of the next hole must not use an edge of this one a third time
-        taken.update(map(tuple, np.sort(edges_of(new), axis=1).tolist()))
+        edges.update(map(tuple, np.sort(edges_of(new), axis=1).tolist()))
         parts.append(new)
     more = "; ..." if len(places) > 3 else ""
     notes = [f"small holes filled: {len(places)} ({'; '.join(places[:3])}{more})"] if places else []
@@ -64,35 +64,35 @@ def border_loops(triangles: IntArray) -> list[list[int]]:
     for k, (a, b) in enumerate(border.tolist()):
         at.setdefault(a, []).append(k)
         at.setdefault(b, []).append(k)
-    left, loops = set(range(len(border))), []
+    remaining, loops = set(range(len(border))), []
     for start in range(len(border)):
-        if start not in left:
+        if start not in remaining:
             continue
-        left.remove(start)
+        remaining.remove(start)
         path = [int(border[start, 1]), int(border[start, 0])]
-        while (here := path[-1]) != path[0] and (ways := [k for k in at[here] if k in left]):
+        while (point := path[-1]) != path[0] and (ways := [k for k in at[point] if k in remaining]):
             # one that runs the same way, if there is a choice: two holes may share a point
-            k = min(ways, key=lambda k: (border[k, 1] != here, k))
-            left.remove(k)
-            path.append(int(border[k, 0] if border[k, 1] == here else border[k, 1]))
+            k = min(ways, key=lambda k: (border[k, 1] != point, k))
+            remaining.remove(k)
+            path.append(int(border[k, 0] if border[k, 1] == point else border[k, 1]))
             loops += _closed_part(path)
     return loops
 
 
 def _closed_part(path: list[int]) -> list[list[int]]:
     """Cut the loop that the last point of the ``path`` closes, if any; the path keeps the rest."""
-    here = path.index(path[-1])
-    if here == len(path) - 1:
+    start = path.index(path[-1])
+    if start == len(path) - 1:
         return []
-    loop = path[here:-1]
-    del path[here + 1 :]
+    loop = path[start:-1]
+    del path[start + 1 :]
     return [loop] if len(loop) > 2 else []
 
 
-def filling(points: FloatArray, loop: list[int], taken: set[tuple[int, int]]) -> IntArray | None:
+def filling(points: FloatArray, loop: list[int], edges: set[tuple[int, int]]) -> IntArray | None:
     """Triangles ``(n - 2, 3)`` of least area that close a loop of n points, or None where there are none.
 
-    ``taken`` are edges (smaller number first) that already have two triangles or would get a third.
+    ``edges`` (smaller number first) are those that already have two triangles or would get a third.
     """
     n, x = len(loop), points[loop]
     if n > 60:  # sides of a loop that is filled without a new point: the effort grows with the cube
@@ -105,7 +105,7 @@ def filling(points: FloatArray, loop: list[int], taken: set[tuple[int, int]]) ->
             area = 0.5 * np.linalg.norm(np.cross(x[k] - x[i], x[j] - x[i]), axis=1)
             cost = best[i, k] + best[k, j] + area
             chord = (min(loop[i], loop[j]), max(loop[i], loop[j]))
-            best[i, j] = np.inf if length < n - 1 and chord in taken else cost.min()
+            best[i, j] = np.inf if length < n - 1 and chord in edges else cost.min()
             cut[i, j] = k[cost.argmin()]
     if not np.isfinite(best[0, n - 1]):
         return None

@@ -28,7 +28,7 @@ POLE: End = [(1, 0.0)], [(2, 0.0)]  # on the axis: at right angles, r odd and z 
 
 def joint(first: FloatArray, second: Sequence[float] = (0.0, 0.0)) -> End:
     """End at which the neighbour's first and second derivative, zero by default, are taken over."""
-    z, r = ([(1, float(one)), (2, float(two))] for one, two in zip(first, second, strict=True))
+    z, r = ([(1, float(slope)), (2, float(curvature))] for slope, curvature in zip(first, second, strict=True))
     return z, r
 
 
@@ -195,12 +195,12 @@ def with_lids(given: Curve, rim: float, heights: Sequence[float | None] = (None,
 def through(points: FloatArray, rim: float) -> Curve:
     """Curve through the points; ``rim`` is the radius of the rounding at corners [m]."""
     runs = straight_runs(points)
-    found = (
+    candidates = (
         (j, _corner(points, runs[k], runs[k + 1], rim))
         for k, (_, j, flat) in enumerate(runs[:-1])
         if flat and runs[k + 1][2]
     )
-    corners = {j: corner for j, corner in found if corner is not None}
+    corners = {j: corner for j, corner in candidates if corner is not None}
     pieces: list[Curve] = []
     for i, j, flat in runs:
         if flat:

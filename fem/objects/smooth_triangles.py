@@ -147,7 +147,7 @@ def smooth_triangles(points: FloatArray, triangles: IntArray, crease_angle: floa
         corner = np.where(starts, halves, _following(halves))
         p, q = points[ends[:, end]], points[ends[:, 1 - end]]
         tangent = _tangent(q - p, corner_normals[corner[:, 0]], corner_normals[corner[:, 1]])
-        # where several surfaces end nobody knows how the edge goes on
+        # where several surfaces end nobody knows how the edge continues
         inner[:, end] = p + np.where((paired | (joined.at_edge == 1))[:, None], tangent, q - p) / 3
     return SmoothTriangles(points, triangles, ends, joined.edge_of, inner, crease, turn)
 

@@ -4,7 +4,7 @@ A shell needs a structured mesh and a smooth face with normals and curvature; tr
 neither. From a smooth centre line rays go out at even angles and at even steps along the outline. The radii they find
 are freed from waves of the facets' size (``smoothing``) and split into the outline ``(z, a)(s)``, ``a`` the mean
 radius, and the shape ``q(theta, s)`` of the sections: ``X = centre(z) + a q (cos theta, sin theta)``. Bottom and top
-are closed by rounded lids as on other bodies; there the shape of the last section goes on. Facets are chords: on a
+are closed by rounded lids as on other bodies; there the shape of the last section continues. Facets are chords: on a
 round body the traced surface lies inside by about two thirds of their sagitta, ``size^2 / (8 radius)``.
 """
 

@@ -2,7 +2,7 @@
 
 The sign of the distance comes from the pseudo-normal of the feature (face, edge or corner) on which the closest point
 lies; the sums of face normals at an edge and the sums weighted by angle at a corner give the right sign wherever the
-surface goes on all round that feature (Baerentzen and Aanaes, 2005). At the border of an open surface it does not:
+surface continues all round that feature (Baerentzen and Aanaes, 2005). At the border of an open surface it does not:
 such points are marked, and their sign has to come from elsewhere.
 """
 

@@ -3,7 +3,7 @@
 A finger meets the first surface along its approach, so nothing has to be closed, manifold or turned outwards: which
 side of a triangle is met is decided where it is met (`facing_sheet`). What is done here only spares work and smooths
 facets: doubled points and triangles become one, specks and shells inside are dropped, triangles that share an edge are
-turned alike. Where more than two meet at an edge the two that go on most smoothly are neighbours, and the others end
+turned alike. Where more than two meet at an edge the two that continue most smoothly are neighbours, the others end
 there.
 """
 
@@ -32,7 +32,7 @@ UNITS = {name: times / over for name, (times, over) in LENGTHS.items()}
 
 
 class Neighbours(NamedTuple):
-    """Edges of triangles, and which two triangles go on into each other there.
+    """Edges of triangles, and which two triangles continue each other there.
 
     ``edges (e, 2)`` and ``edge_of (m, 3)`` as in `SmoothTriangles`; ``sides (e, 2)``: both triangles' sides, ``3 *
     triangle + corner``, -1 twice where the edge has no such pair; ``at_edge (e,)``: how many triangles meet there.
@@ -72,7 +72,7 @@ def cleaned(points: FloatArray, triangles: IntArray, unit: str = "m") -> Triangl
         No triangles with finite coordinates, or an implausible size.
     """
     points, triangles = np.asarray(points, dtype=float), np.asarray(triangles)
-    triangles, notes = _finite(points, triangles)
+    triangles, dropped = _finite(points, triangles)
     points, triangles, merged = _merged(points, triangles)
     # points that no triangle uses are gone by now and do not count for the size
     _check_size(float(np.ptp(points, axis=0).max()), unit)
@@ -85,8 +85,8 @@ def cleaned(points: FloatArray, triangles: IntArray, unit: str = "m") -> Triangl
         points, triangles, shells = _without_shells(points, triangles)
     loops = border_loops(triangles)
     opened = [f"{len(loops)} hole{'s' * (len(loops) > 1)} left open"] if loops else []
-    told = (*notes, *merged, *thinned, *specks, *filled, *opened, *turned, *shells)
-    return Triangles(points, triangles, told, lid_corners(points, loops), closed)
+    notes = (*dropped, *merged, *thinned, *specks, *filled, *opened, *turned, *shells)
+    return Triangles(points, triangles, notes, lid_corners(points, loops), closed)
 
 
 def _finite(points: FloatArray, triangles: IntArray) -> tuple[IntArray, list[str]]:
@@ -286,8 +286,8 @@ def turned_alike(points: FloatArray, triangles: IntArray) -> tuple[IntArray, boo
     up = (sides[:, 0] < sides[:, 1]) != np.repeat(turned, 3)
     balanced = not np.bincount(joined.edge_of.ravel(), np.where(up, 1.0, -1.0)).any()
     closed = bool(balanced and not one_sided.any() and not flat.any())
-    told = [f"turned {turned.sum()} of {n} triangles"] if turned.any() else []
-    return np.ascontiguousarray(triangles), closed, told
+    notes = [f"turned {turned.sum()} of {n} triangles"] if turned.any() else []
+    return np.ascontiguousarray(triangles), closed, notes
 
 
 def _without_shells(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray, list[str]]:

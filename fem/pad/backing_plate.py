@@ -116,8 +116,8 @@ def _plate(x: tuple[float, ...], y: tuple[float, ...], symmetry: tuple[bool, boo
     shell = Shell(patch(X, np.array([0.0, 0.0, 1.0]), plate.thickness), plate.young_modulus, plate.poisson_ratio)
     # nodes on the rim count as held, whatever rounding makes of their place
     rim = 0.5 * np.array(plate.support) + NEGLIGIBLE * (np.ptp(x) + np.ptp(y))
-    held = (np.abs(X[..., :2]) <= rim).all(axis=-1)
-    fixed = np.repeat(held[..., None], 6, axis=-1)
+    clamped = (np.abs(X[..., :2]) <= rim).all(axis=-1)
+    fixed = np.repeat(clamped[..., None], 6, axis=-1)
     for axis in range(2):
         if symmetry[axis]:
             fixed[np.abs(X[..., axis]) < NEGLIGIBLE, axis] = fixed[np.abs(X[..., axis]) < NEGLIGIBLE, 3 + axis] = True

@@ -71,7 +71,7 @@ class Wall:
 
 @dataclass(frozen=True, eq=False)
 class Facing:
-    """What ``n`` points face; letters as in the module's formulas.
+    """What ``n`` points face; symbols as in the module's formulas.
 
     ``gap``: signed distance along the director, `FAR` where the point faces no wall [m]; ``nodes, N (n, 4)``: of the
     shell element and their shape functions; ``S (n, 4, 3)``: ``dN_a/dx``, by how much the share of a node changes when

@@ -97,8 +97,8 @@ class Grip(LoadPath[WallProblem]):
 
     def _from(self, start: Pressed, work: Work) -> OnPath:
         """As `LoadPath._from`; refused where more force would open the fingers, which is beyond a limit."""
-        here, compliance = super()._from(start, work), self._compliance()
-        x, force = here.x, here.force
+        state, compliance = super()._from(start, work), self._compliance()
+        x, force = state.x, state.force
         if not compliance > 0.0:
             work.halvings += 1
             raise ConvergenceError(f"the state at {force:.4g} N lies beyond a limit")
@@ -110,25 +110,25 @@ class Grip(LoadPath[WallProblem]):
         x[: model.size] = interpolated(wall.mesh, wall.q, model.shell.mesh)[model.free]
         return x
 
-    def _next(self, here: OnPath | None, force: float, work: Work) -> OnPath:
+    def _next(self, before: OnPath | None, force: float, work: Work) -> OnPath:
         """State at ``force`` from the one before, or from first contact; where it has none, with nodal gaps."""
         self._stepping.closed = False
         try:
-            return self._level(here, force, work)
+            return self._level(before, force, work)
         except ConvergenceError as error:
             self._refuse_folded(error, FOLDED if self._others else INDENTED)
             if not self._others:
                 raise
-        # the unknowns are numbered alike, so the path goes on from the last state
+        # the unknowns are numbered alike, so the path continues from the last state
         limit, last, problem = self._peak, self.opening.last, self._others[0]
         self._others = self._others[1:]
         self._switch(problem())
         self.opening.last = last
         # what friction remembers belongs to the other problem, so with friction the path begins anew
         if self.problem.friction is not None:
-            here = None
+            before = None
         try:
-            return self._level(here, force, work)
+            return self._level(before, force, work)
         except ConvergenceError as again:
             self._refuse_unstable(again, limit)
             self._refuse_folded(again, INDENTED)
@@ -140,23 +140,23 @@ class Grip(LoadPath[WallProblem]):
         ``limit`` is the largest force with the first kind [N]. Which nodes touch depends on the kind, so a Newton
         method that does not find them stops elsewhere with the other one.
         """
-        left, _ = self.opening.last
+        opening, _ = self.opening.last
         low, high = sorted([limit, self._peak])
         # part of the force by which the ends of the load path with both kinds of gaps may differ
-        if left < INDENTED and high - low <= 0.05 * high:
+        if opening < INDENTED and high - low <= 0.05 * high:
             raise CheckError(
                 f"the wall seems to give way at {high:.3g} N on this mesh: with gaps of either kind its load path ends "
-                f"there (at {low:.4g} and {high:.4g} N), its opposite sides {1 - left:.0%} of their distance closer; "
-                f"press less or take a thicker wall ({error})"
+                f"there (at {low:.4g} and {high:.4g} N), its opposite sides {1 - opening:.0%} of their distance "
+                f"closer; press less or take a thicker wall ({error})"
             ) from error
 
     def _refuse_folded(self, error: ConvergenceError, limit: float) -> None:
         """Say that a wall collapsed where that is why no further state was found, or that it may have."""
-        left, force = self.opening.last
+        opening, force = self.opening.last
         # the opening tells a wall that has collapsed from a solve that failed for another reason
-        if left < limit:
-            closer = f"its opposite sides have come {1 - left:.0%} of their distance closer"
-            if left < FOLDED:
+        if opening < limit:
+            closer = f"its opposite sides have come {1 - opening:.0%} of their distance closer"
+            if opening < FOLDED:
                 text = f"the wall collapsed: beyond {force:.3g} N, where {closer}, no equilibrium was found"
             else:
                 text = (
@@ -165,15 +165,15 @@ class Grip(LoadPath[WallProblem]):
                 )
             raise CheckError(f"{text} ({error})") from error
 
-    def _level(self, here: OnPath | None, force: float, work: Work) -> OnPath:
+    def _level(self, state: OnPath | None, force: float, work: Work) -> OnPath:
         """State at ``force`` from the one before, or from first contact."""
-        self._peak = 0.0 if here is None else here.force
+        self._peak = 0.0 if state is None else state.force
         try:
             for goal in self._load_steps(self._peak, force):
-                self.solver.left = self.MOST_ITERATIONS
-                here = self._step_on(here, goal, work)
-            assert here is not None
-            return here
+                self.solver.iterations_left = self.MOST_ITERATIONS
+                state = self._step_on(state, goal, work)
+            assert state is not None
+            return state
         except SpentError as error:
             failed = self._given_up(self.opening.last[1], force)
             failed.__cause__ = error
@@ -184,15 +184,15 @@ class Grip(LoadPath[WallProblem]):
             raise failed
         self._in_vain = force
         try:
-            return self._creep(here, force, work)
+            return self._creep(state, force, work)
         except (ConvergenceError, SpentError):
             raise failed from None
 
-    def _creep(self, here: OnPath | None, force: float, work: Work) -> OnPath:
+    def _creep(self, before: OnPath | None, force: float, work: Work) -> OnPath:
         """State at ``force`` that the wall creeps to from the last one on the path."""
         assert self._last is not None
         # iterations of a wall that creeps for one force
-        self.solver.left, slow = 600, 2e-5  # velocity at which it may have come to rest, see ``creep``
+        self.solver.iterations_left, slow = 600, 2e-5  # velocity at which it may have come to rest, see ``creep``
         start, (_, reached) = self._last, self.opening.last
         for ahead, speed in creep(self.problem, self.solver, start, force):
             if self.opening(self.problem.wall_state(ahead)) <= 0.0:
@@ -209,22 +209,22 @@ class Grip(LoadPath[WallProblem]):
                 slow = 0.2 * speed
         self._watch(x, force)
         compliance, moved = self._compliance(), self.problem.closing(x) - self.problem.closing(start)
-        expected = max(JUMP, 2.0 * (here.compliance if here else 0.0) * (force - reached))
+        expected = max(JUMP, 2.0 * (before.compliance if before else 0.0) * (force - reached))
         jumped = not 0.0 <= moved <= expected or compliance < 0.0
         self._crept |= jumped
-        snapped = jumped or self._gives_way(x, force, compliance) or bool(here and here.snapped)
-        return OnPath(x, force, jumped or bool(here and here.jumped), compliance, snapped)
+        snapped = jumped or self._gives_way(x, force, compliance) or bool(before and before.snapped)
+        return OnPath(x, force, jumped or bool(before and before.jumped), compliance, snapped)
 
-    def _step_on(self, here: OnPath | None, force: float, work: Work) -> OnPath:
+    def _step_on(self, state: OnPath | None, force: float, work: Work) -> OnPath:
         """State at ``force`` from the one before, or from first contact, as far as the iterations last."""
-        if here is None:
+        if state is None:
             self.problem.begin()
             x, reached = self._stepping.first(self.problem.closing_of_bed(force), force, work)
             self.problem.accept(x)
             # foam gets stiffer, so this is more than what comes
-            here = OnPath(x, reached, False, self.problem.closing(x) / reached)
-        x, reached = here.x, here.force
-        ahead, fell = self._step_to(x, reached, force, here.compliance, work)
+            state = OnPath(x, reached, False, self.problem.closing(x) / reached)
+        x, reached = state.x, state.force
+        ahead, fell = self._step_to(x, reached, force, state.compliance, work)
         compliance = self._compliance()
         slope, gives_way = np.inf, self._gives_way(ahead, force, compliance)
         # a state at which more force would open the fingers lies beyond a limit, even if no step saw the force fall
@@ -234,7 +234,7 @@ class Grip(LoadPath[WallProblem]):
             slope = (self.problem.closing(ahead) - self.problem.closing(x)) / (force - reached)
             gives_way |= GIVES_WAY * slope > self.problem.closing(x) / reached
             gives_way |= jumps((reached, self._shut(x)), (force, self._shut(ahead)))
-        return OnPath(ahead, force, here.jumped or fell, slope, here.snapped or fell or gives_way)
+        return OnPath(ahead, force, state.jumped or fell, slope, state.snapped or fell or gives_way)
 
     def _step_to(
         self, x: FloatArray, reached: float, force: float, compliance: float, work: Work
@@ -269,7 +269,7 @@ class Grip(LoadPath[WallProblem]):
     def _gives_way(self, x: FloatArray, force: float, compliance: float) -> bool:
         """Whether the force grows much more slowly with the closing displacement here than it has done so far.
 
-        Pads on a rigid object get stiffer as they spread. Walls in front of soft pads have a plateau instead of a limit
+        Pads on a rigid object get stiffer as they spread. Walls under soft pads have a plateau instead of a limit
         when they snap in, and no force falls there.
         """
         return bool(compliance * force > self.problem.closing(x) / GIVES_WAY)
@@ -285,10 +285,10 @@ class Grip(LoadPath[WallProblem]):
         load[[f.closing_dof for f in fingers]] = [f.pad.share for f in fingers]
         return self.problem.closing(self.solver.answer(load))
 
-    def _together(self, here: OnPath, pads: list[Pressed], residual: FloatArray) -> Pressed:
+    def _together(self, state: OnPath, pads: list[Pressed], residual: FloatArray) -> Pressed:
         """Both pads and the wall, checked."""
-        force, problem = here.force, self.problem
-        load, q = problem.wall_load(here.x), problem.wall_state(here.x)
+        force, problem = state.force, self.problem
+        load, q = problem.wall_load(state.x), problem.wall_state(state.x)
         worst = residual[: problem.model.size].max(initial=0.0)
         if not worst <= max(WALL_BALANCE, RESIDUAL) * force:
             raise CheckError(
@@ -298,6 +298,6 @@ class Grip(LoadPath[WallProblem]):
         # the supports balance both fingers: forces across a plane of symmetry cancel, the others add up
         mirrored = np.array([*problem.model.shell.mesh.symmetry, False])
         reaction = np.where(mirrored, 0.0, -load.sum(axis=0)) * 2.0 ** mirrored.sum()
-        wall = WallState(problem.model.shell.mesh, q, load, reaction, here.snapped, self.opening(q))
+        wall = WallState(problem.model.shell.mesh, q, load, reaction, state.snapped, self.opening(q))
         first, *others = (replace(pad, wall=wall) for pad in pads)
         return replace(first, other=others[0]) if others else first

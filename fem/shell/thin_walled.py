@@ -38,16 +38,16 @@ def supported(
     height; "free". The springs hold the rigid motions that are left, and resist no others: ``stiffness`` is that of all
     together, per direction [N/m].
     """
-    held = np.zeros((len(mesh.X), 6), dtype=bool)
+    constrained = np.zeros((len(mesh.X), 6), dtype=bool)
     if support == "clamped":
         lines = mesh.s <= max(mesh.surface.flat[0], mesh.s[0]) + NEGLIGIBLE
         # the mesh of a tube begins off the axis
         if mesh.s[0] > NEGLIGIBLE:
             lines |= mesh.s >= min(mesh.surface.flat[1], mesh.s[-1]) - NEGLIGIBLE
-        held[np.unique(mesh.number[:, lines])] = True
+        constrained[np.unique(mesh.number[:, lines])] = True
     elif support == "standing":
-        held[mesh.foot, 2] = True
-    fixed = held.ravel() | mesh.symmetric
+        constrained[mesh.foot, 2] = True
+    fixed = constrained.ravel() | mesh.symmetric
     springs = _springs(mesh, fixed.reshape(-1, 6), stiffness)
     return Shell(mesh, material.young_modulus, material.poisson_ratio, springs), fixed
 
@@ -62,13 +62,13 @@ def _springs(mesh: BodyMesh, fixed: NDArray[np.bool_], stiffness: float) -> tupl
     motions[3:, :, 3:] = np.cross(unit, mesh.D / np.linalg.norm(mesh.D, axis=1, keepdims=True))
     at_fixed = motions[:, fixed]
     squares, mixed = np.linalg.eigh(at_fixed @ at_fixed.T)
-    left = mixed[:, squares < 1e-9].T  # what is fixed moves by rounding alone
+    free = mixed[:, squares < 1e-9].T  # what is fixed moves by rounding alone
     # between the pads, which lie at 0 and at half a turn, and away from the ends
     angles = [at for at in np.pi * np.array([-0.25, 0.25, 0.75, 1.25, 1.75]) if mesh.theta[0] < at < mesh.theta[-1]]
     i = [np.abs(mesh.theta - at).argmin() for at in angles]
     j = [np.abs(mesh.s - mesh.s[0] - share * np.ptp(mesh.s)).argmin() for share in (0.25, 0.75)]
     nodes = np.unique(mesh.number[np.ix_(i, j)])
-    basis = np.linalg.qr((left @ motions[:, nodes, :3].reshape(6, -1)).T)[0]
+    basis = np.linalg.qr((free @ motions[:, nodes, :3].reshape(6, -1)).T)[0]
     return nodes, stiffness * mesh.share / len(nodes) * basis @ basis.T
 
 
@@ -137,15 +137,15 @@ def grasp(body: ThinWalled, poses: tuple[Pose, Pose], allowed: tuple[bool, bool]
     return Grasp(angle, solved[:n], flipped[:n], (between, across))
 
 
-def wall_between(body: ThinWalled, held: Grasp, pad_size: Sequence[float], size: MeshSize, *, linear: bool = False):
+def wall_between(body: ThinWalled, frame: Grasp, pad_size: Sequence[float], size: MeshSize, *, linear: bool = False):
     """Shell meshed finely where the pads of this grasp touch: the model, and what each finger can touch."""
-    low, high, half = _footprint(held, pad_size)
+    low, high, half = _footprint(frame, pad_size)
     # a pad may reach beyond the wall, where the outline has no station
     low, high = (float(end) for end in np.clip([low, high], *body.surface.heights))
-    shell, fixed = _supported(body, held, replace(size, heights=(low, high), half_width=half))
+    shell, fixed = _supported(body, frame, replace(size, heights=(low, high), half_width=half))
     meshed = shell.mesh
     wall = Wall(_surface(meshed), meshed.theta, meshed.s, meshed.number, 0.5 * meshed.thickness)
-    return (LinearWall if linear else NonlinearWall)(shell, fixed), [wall] * len(held.poses)
+    return (LinearWall if linear else NonlinearWall)(shell, fixed), [wall] * len(frame.poses)
 
 
 # the indicator of every candidate asks for the same factors
@@ -154,13 +154,13 @@ def object_factors(
     body: ThinWalled, angle: float, mirrors: tuple[bool, bool], size: MeshSize, half: float
 ) -> LinearShell:
     """First stiffness of the object, meshed alike along its whole wall; made once per rank."""
-    whole = replace(size, heights=body.surface.heights, half_width=half)
-    return LinearShell(*_supported(body, Grasp(angle, (), (), mirrors), whole))
+    mesh_size = replace(size, heights=body.surface.heights, half_width=half)
+    return LinearShell(*_supported(body, Grasp(angle, (), (), mirrors), mesh_size))
 
 
-def _supported(body: ThinWalled, held: Grasp, size: MeshSize) -> tuple[Shell[BodyMesh], FloatArray]:
+def _supported(body: ThinWalled, frame: Grasp, size: MeshSize) -> tuple[Shell[BodyMesh], FloatArray]:
     mesh = body_mesh(
-        body.surface.turned(held.angle), body.thickness, size, held.mirrors,
+        body.surface.turned(frame.angle), body.thickness, size, frame.mirrors,
         open_top=body.open_top, open_bottom=body.open_bottom, base_thickness=body.base_thickness,
     )  # fmt: skip
     return supported(mesh, body.material, body.support, body.springs)
@@ -172,11 +172,11 @@ def _surface(mesh: BodyMesh):
     return wall_surface(mesh.surface, max(mesh.s[0], low), min(mesh.s[-1], high))
 
 
-def _footprint(held: Grasp, pad_size: Sequence[float]) -> tuple[float, float, float]:
+def _footprint(frame: Grasp, pad_size: Sequence[float]) -> tuple[float, float, float]:
     """Heights that the pads reach over, and half the width they cover round the object [m], with a margin."""
     margin = 0.1 * max(pad_size[:2])
     corners = np.array([[i * pad_size[0], j * pad_size[1], 0.0] for i in (-0.5, 0.5) for j in (-0.5, 0.5)])
-    points = np.concatenate([pose.to_object(corners) for pose in held.poses])
+    points = np.concatenate([pose.to_object(corners) for pose in frame.poses])
     ends = points[:, 2].min() - margin, points[:, 2].max() + margin, np.abs(points[:, 1]).max() + margin
     low, high, half = (float(np.round(v, 9)) for v in ends)  # alike for candidates that differ by rounding alone
     return low, high, half

@@ -107,7 +107,7 @@ def around(surface: OuterSurface, size: MeshSize, symmetry: tuple[bool, bool]) -
     off = np.abs((x[:, None] - middles + 0.5 * turn) % turn - 0.5 * turn).min(axis=1)
     h = np.minimum(size.around + GROWTH * np.maximum(off - size.half_width, 0.0), size.coarse)
     theta = np.interp(divided(first, last, x, h, 4 >> sum(symmetry)), arc, fine)
-    # exactly, because nodes on planes of symmetry are told by their angle
+    # exactly, because nodes on planes of symmetry are identified by their angle
     theta[[0, -1]] = begin, end
     return theta
 
@@ -180,7 +180,7 @@ def body_mesh(
     """
     s = along(surface, size, open_bottom, open_top, _steps(surface, thickness))
     theta = around(surface, size, symmetry)
-    number, first = _numbers(surface, theta, s, whole=not any(symmetry))
+    number, first = _numbers(surface, theta, s, closed=not any(symmetry))
     t, p = theta[first[0]], s[first[1]]
     D = 0.5 * _wall(surface, thickness, base_thickness, p)[:, None] * surface.normals(t, p)
     X = surface.jets(t, p)[:, 0] - D
@@ -196,11 +196,11 @@ def _steps(surface: OuterSurface, thickness: Thickness) -> list[float]:
     return [surface.station(z) for z, _ in thickness if low + NEGLIGIBLE < z < high - NEGLIGIBLE]
 
 
-def _numbers(surface: OuterSurface, theta: FloatArray, s: FloatArray, *, whole: bool) -> tuple[IntArray, IntArray]:
+def _numbers(surface: OuterSurface, theta: FloatArray, s: FloatArray, *, closed: bool) -> tuple[IntArray, IntArray]:
     """Node on each crossing, and the (theta, s) line numbers ``(2, k)`` of every node's first crossing."""
     m, n = len(theta), len(s)
     key = np.arange(m * n).reshape(m, n)
-    if whole:
+    if closed:
         # the last line of a whole body is its first one
         key[-1] = key[0]
     for end, j in ((0.0, 0), (surface.end, n - 1)):

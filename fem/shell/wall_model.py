@@ -162,7 +162,7 @@ class FaceState:
 
 def faces(shell: Shell[BodyMesh], q: FloatArray) -> tuple[FaceState, FaceState]:
     """Outer and inner face where grid lines cross, ``(m + 1, n + 1)``, in the state ``q (6 k,)``."""
-    outer, inner = (_state(shell, _at_crossings(shell.mesh, own.strain)) for own in middles(shell, q))
+    outer, inner = (_state(shell, _at_crossings(shell.mesh, middle.strain)) for middle in middles(shell, q))
     return outer, inner
 
 

@@ -203,15 +203,15 @@ class WallProblem(ContactProblem):
         nodes, old = self.wall_dofs(facing.nodes), np.empty((len(pick), 3, 0))
         before = np.empty((len(pick), 0), np.int32)
         if self.friction is not None:
-            anchor, held = self.friction.anchors[k], self._dragged(k, f, c)[pick]
+            anchor, loaded = self.friction.anchors[k], self._dragged(k, f, c)[pick]
             slip = self.traction(k, x, c, derivatives=True)
-            t, by_motion, by_normal, by_pressure = (v[pick] * held.reshape(-1, *[1] * (v.ndim - 1)) for v in slip)
+            t, by_motion, by_normal, by_pressure = (v[pick] * loaded.reshape(-1, *[1] * (v.ndim - 1)) for v in slip)
             force, by_lam, pad = force + t, by_lam + by_pressure, slice(3 * N.shape[1])
             change += by_normal @ dn
             change[:, :, pad] += by_motion @ D[:, :, pad]
             dragged = -np.einsum("na,ndc->ndac", anchor.N[pick], by_motion).reshape(len(pick), 3, 12)
             old = np.concatenate([dragged, dragged], axis=2)
-            before = np.where(held[:, None], self.wall_dofs(anchor.nodes[pick]), -1)
+            before = np.where(loaded[:, None], self.wall_dofs(anchor.nodes[pick]), -1)
         moved = np.concatenate([f.dofs[facet].reshape(len(pick), -1), nodes], axis=1)
         unknowns = np.concatenate([moved, f.pressure_dofs[facet], before], axis=1)
         change = np.concatenate([change, f.kappa * by_lam[:, :, None] * N[:, None], old], axis=2)

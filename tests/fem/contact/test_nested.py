@@ -77,8 +77,8 @@ def test_a_force_without_a_state_fails_alone_and_within_its_iterations():
     before = press.at(3.0, [start]).unknowns
     with pytest.raises(ConvergenceError):
         press.at(3000.0, [])
-    assert press.solver.left >= -25
-    assert press.MOST_ITERATIONS - press.solver.left > 25
+    assert press.solver.iterations_left >= -25
+    assert press.MOST_ITERATIONS - press.solver.iterations_left > 25
     assert press.at(3.0, [start]).unknowns.tobytes() == before.tobytes()
 
 
@@ -109,7 +109,7 @@ def test_a_solve_whose_residual_does_not_fall_is_given_up(patient, iterations):
     with pytest.raises(ConvergenceError):
         solver.solve(np.ones(1), 1e-10)
     assert problem.asked == iterations
-    solver.left = 3
+    solver.iterations_left = 3
     with pytest.raises(ConvergenceError):  # the next solve is judged by its own
         solver.solve(np.ones(1), 1e-10)
     assert problem.asked == 2 * iterations
