@@ -9,7 +9,7 @@ from typing import Any
 from mpi4py import MPI
 
 from softjaw.study import pipeline
-from softjaw.study.case.build import told
+from softjaw.study.case.build import notices
 from softjaw.study.case.candidates import with_sampled_grasps
 from softjaw.study.case.model import check_petsc
 from softjaw.study.result import derived
@@ -88,7 +88,7 @@ def prepare(scene: Scene, scene_file: str, overrides: Sequence[str]) -> Any:
     # A wrong option would fail every case alike, after hours of a large study.
     check_petsc(dict(scene.petsc))
     plan = make_plan(scene, scene_file, overrides)
-    for line in told(scene):
+    for line in notices(scene):
         print(line, flush=True)
     return plan
 

@@ -152,15 +152,15 @@ class JawsOnSurface:
     @property
     def tilt(self) -> FloatArray:
         """Approach that meets both contacts squarely, in the frame of the gripper ``(3,)``."""
-        one, two = (side.normal for side in self.sides)
-        mean = one + np.array([two[0], -two[1], two[2]]) * [-1.0, -1.0, 1.0]
+        first, second = (side.normal for side in self.sides)
+        mean = first + np.array([second[0], -second[1], second[2]]) * [-1.0, -1.0, 1.0]
         return mean / np.linalg.norm(mean)
 
     @property
     def shift(self) -> FloatArray:
         """From the middle of the pads to the middle of both centres of pressure ``(2,)`` [m]."""
-        one, two = (side.centre for side in self.sides)
-        return 0.5 * (one + two * [1.0, -1.0])
+        first, second = (side.centre for side in self.sides)
+        return 0.5 * (first + second * [1.0, -1.0])
 
     @property
     def misalignment(self) -> tuple[float, float]:
@@ -224,7 +224,7 @@ def grips(
             yield grip
 
 
-def held(contacts: Sequence[Contact], task: Task) -> float:
+def spring_payload(contacts: Sequence[Contact], task: Task) -> float:
     """Payload of contacts on a bed of springs [kg]; 0 where they bear no torque at all."""
     try:
         return payload_alone(contacts, MOTIONS, task)["maps/payload"]

@@ -212,7 +212,7 @@ def warnings(scene: Scene) -> tuple[str, ...]:
     return (*scene.warnings, *placed, *_remarks(scene), *walls)
 
 
-def told(scene: Scene) -> list[str]:
+def notices(scene: Scene) -> list[str]:
     """Lines with all `warnings`, and notes on meshes: what was mended, tolerated, or may be meant otherwise."""
     # share of a pad's shorter side: narrower facets are hardly felt
     notes, width = [], 0.25 * min(scene.gripper.pad_size[:2])
@@ -262,8 +262,8 @@ def rounds_edges(scene: Scene) -> bool:
 
 def listed_accuracy(scene: Scene) -> Accuracy:
     """The accuracy in effect: of sampled grasps without a target of their own that of those that are listed."""
-    own = not scene.candidates.sampled or scene.accuracy.target is not None or not forces_apart(scene)
-    return scene.accuracy if own else scene.accuracy.model_copy(update={"target": LISTED_TARGET})
+    as_given = not scene.candidates.sampled or scene.accuracy.target is not None or not forces_apart(scene)
+    return scene.accuracy if as_given else scene.accuracy.model_copy(update={"target": LISTED_TARGET})
 
 
 def pad_elements(scene: Scene, mesh: int) -> tuple[int, int, int]:

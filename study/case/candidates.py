@@ -108,9 +108,9 @@ def check_candidates(scene: Scene) -> None:
                 labels[number] = f"{shown([*scene.candidates.poses[number].point_mm])} of '{place.label}'"
     if labels:
         remedy = "expected a line of approach that meets it; point_mm is in mm, in the frame of the object's own file"
-        found = [f"candidates.poses[{i}].point_mm: found {label}, where the pads miss the object; {remedy}"
+        misses = [f"candidates.poses[{i}].point_mm: found {label}, where the pads miss the object; {remedy}"
                  for i, label in labels.items()]  # fmt: skip
-        raise StudyError(USAGE, "\n".join(first_of(found, MOST_NAMED, " poses miss it")))
+        raise StudyError(USAGE, "\n".join(first_of(misses, MOST_NAMED, " poses miss it")))
 
 
 def turn_between(first: Candidate, second: Candidate, axis_symmetry: int) -> float | None:
@@ -220,12 +220,12 @@ def axes(scene: Scene) -> list[Axis]:
         station = Axis("station", np.array(where.station_values), "m", "station along the object's axis")
         angle = Axis("angle", np.array(where.angles), "rad", "angle about the object's axis")
     force = Axis("normal_force", np.array(scene.load.normal_force), "N", "normal force per finger")
-    own = [station, angle, force]
+    scene_axes = [station, angle, force]
     if samples := scene.realisations[1:]:
         texts = (", ".join(f"{key} = {value:g}" for key, value in inputs.items()) for inputs in samples)
         numbers = np.arange(1.0 + len(samples))
-        own.insert(0, Axis(REALISATION, numbers, "", "sample of the uncertain inputs", ("as given", *texts)))
-    return [*_sweep_axes(scene.sweep), *own]
+        scene_axes.insert(0, Axis(REALISATION, numbers, "", "sample of the uncertain inputs", ("as given", *texts)))
+    return [*_sweep_axes(scene.sweep), *scene_axes]
 
 
 def _sweep_axes(sweep: Mapping[str, Sequence[Any]]) -> list[Axis]:

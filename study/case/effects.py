@@ -246,8 +246,8 @@ class EffectChoice:
         ):
             return nan, nan, nan
         low, high = (self._judged(contacts) for contacts in pair)
-        e_n, held, score = (b / a - 1.0 if a > 0 else nan for a, b in zip(low, high, strict=True))
-        return e_n, held, score
+        e_n, payload, score = (b / a - 1.0 if a > 0 else nan for a, b in zip(low, high, strict=True))
+        return e_n, payload, score
 
     def _coarse_pair(
         self, name: str, step: Step, k: int
@@ -258,12 +258,12 @@ class EffectChoice:
         return (low, high) if low and high else None
 
     def _judged(self, contacts: Sequence[PressedContact]) -> tuple[float, float, float]:
-        """e_n of the weaker finger [m], payload [kg] and quality, NaN where that cannot be told."""
+        """e_n of the weaker finger [m], payload [kg] and quality, NaN where unknown."""
         e_n = min(c.limits["ccm"].e_n for c in contacts)
         settings = self.solver.settings
         try:
-            held = payload_alone(contacts, PAYLOAD_MOTIONS, settings.task)["maps/payload"]
-            return e_n, held, quality(contacts, settings)
+            payload = payload_alone(contacts, PAYLOAD_MOTIONS, settings.task)["maps/payload"]
+            return e_n, payload, quality(contacts, settings)
         except (*TOO_SMALL, RuntimeError, ValueError):  # a contact without torque has no hull
             return e_n, nan, nan
 

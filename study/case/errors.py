@@ -96,11 +96,11 @@ def mesh_errors(
     acts = any(contact.state.points.friction is not None for _, high, _ in pairs for contact in high)
     errors = {}
     for q in (q for q in TABLE if q.error and q.key in coarse_mesh and q.name != "opening_loaded"):
-        seen = [view[q.key] for view in viewed if q.key in view]
+        view_values = [view[q.key] for view in viewed if q.key in view]
         value, size = fine_mesh[q.key], _size(q, fine_mesh[q.key])
         # dents of walls converge with first order: as far as the coarser mesh's is away, they are off
         share = 1.0 if "wall" in q.needs else OF_FARTHEST
-        error = estimate(value, coarse_mesh[q.key], seen, q.error, q.name in PAYLOADS, share)
+        error = estimate(value, coarse_mesh[q.key], view_values, q.error, q.name in PAYLOADS, share)
         error += unseen.share(q, fine, acts) * size
         if q.error == "relative" and not np.all(coarse_mesh[q.key]):
             error = max(error, 1.0)  # a payload of which the coarse mesh has nothing

@@ -76,9 +76,9 @@ def fit_of(points: FloatArray, triangles: IntArray, jaws: Jaws, doubt: float = 0
         return WIDE, f"needs an opening of {needed}, the gripper opens to {allowed}"
     if jaws.finger is None or not math.isfinite(opening):
         return MISSING, ""
-    front, back = extremes(points, triangles, jaws.finger)
+    nearest, farthest = extremes(points, triangles, jaws.finger)
     # how far the object reaches back beside each pad, from the pad's face
-    reach = {"finger 1": low - front, "finger 2": back - high}
+    reach = {"finger 1": low - nearest, "finger 2": farthest - high}
     hit = {name: far for name, far in reach.items() if far > jaws.pad[2] + doubt}
     if not hit:
         return MISSING, ""

@@ -90,14 +90,14 @@ def fit_surfaces(
     W, T = normalised_samples(wrench, twist, limits.S, rho)
     f_x, f_y, tau_z = limits.per_unit_force
     ellipsoid = three_motion_ellipsoid(f_x, f_y, tau_z / rho, 1.0)
-    # a fit is judged by motions that it has not seen
-    seen, unseen = (W[:samples], T[:samples]), (W[samples:], T[samples:])
-    reference, too_much = _fit_error(ellipsoid, *unseen), overclaim(ellipsoid, unseen[0])
+    # a fit is judged by motions that it was not made from
+    training, validation = (W[:samples], T[:samples]), (W[samples:], T[samples:])
+    reference, too_much = _fit_error(ellipsoid, *validation), overclaim(ellipsoid, validation[0])
     surfaces = {}
     for kind in kinds:
-        surface, certificate = fitted(ellipsoid, *seen, kind, objective)
-        errors = _fit_error(surface, *seen), _fit_error(surface, *unseen), reference
-        claims = overclaim(surface, unseen[0]), too_much
+        surface, certificate = fitted(ellipsoid, *training, kind, objective)
+        errors = _fit_error(surface, *training), _fit_error(surface, *validation), reference
+        claims = overclaim(surface, validation[0]), too_much
         surfaces[kind] = SurfaceFit(rho, surface, certificate, wrench[:samples], *errors, *claims)
     return surfaces
 

@@ -72,9 +72,9 @@ def quadrants(finger: Finger, size: tuple[float, float, float]) -> dict[tuple[in
 
 def looks_alike(first: Finger, other: Finger, signs: tuple[int, int], size: tuple[float, float, float]) -> bool:
     """Whether the object before one finger is that before the other one with these signs of x and y of the pad."""
-    one, two = quadrants(first, size), quadrants(other, size)
+    gaps, other_gaps = quadrants(first, size), quadrants(other, size)
     a, b = signs
-    return all(np.abs(two[i, j] - one[i * a, j * b]).max() <= MIRRORED * size[0] for i, j in one)
+    return all(np.abs(other_gaps[i, j] - gaps[i * a, j * b]).max() <= MIRRORED * size[0] for i, j in gaps)
 
 
 def image_signs(first: Finger, other: Finger, size: tuple[float, float, float]) -> tuple[int, int] | None:

@@ -82,13 +82,13 @@ def rooms(
 
     ``pad``: axes of finger 1's as columns ``(3, 3)``. ``size``: of a pad, along its axes. Others as for `boxes`.
     """
-    found = {}
+    clearances = {}
     for approach in hand.approaches:
         R = hand_axes(pad, approach, hand.closing)
         sides = size[:2] if approach.endswith("x") else size[1::-1]
         parts = boxes(hand, np.array([*sides, size[2]]), wide, depth)
-        found[approach] = clearance((points - middle) @ R + [0.0, 0.0, depth], parts)
-    return found
+        clearances[approach] = clearance((points - middle) @ R + [0.0, 0.0, depth], parts)
+    return clearances
 
 
 def opened(hand: Hand, gripper: Any, opening: float, wider: float = OPENED_MORE) -> tuple[float, float, float]:

@@ -18,7 +18,7 @@ import numpy as np
 from softjaw.fem.objects.gap import IntArray
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.friction.patch import FloatArray, NoContactError
-from softjaw.study.case.bed import JawsOnSurface, Side, grips, held
+from softjaw.study.case.bed import JawsOnSurface, Side, grips, spring_payload
 from softjaw.study.case.build import build_object, listed_accuracy, own_frame, surface_triangles
 from softjaw.study.case.contact import slips
 from softjaw.study.case.fit import Jaws, fit_of, jaws_of
@@ -36,7 +36,7 @@ TURNS = 4  # rounds of setting a grasp straight; most end after two
 STRAIGHT = math.radians(0.5)  # tilt between two rounds that ends them
 APART, NEAR = 0.5, 0.25  # of the pad's length: grasps that are nearer are at one place; and one, if directions agree
 ALIKE, ROLLED = math.radians(20.0), math.radians(30.0)  # the same for approach and roll
-CLIMBS = (0.25, 0.25, 0.12, 0.06)  # steps of a climb, of the pad's sides; rolls of `ROLLED` go with the first
+SEARCH_STEPS = (0.25, 0.25, 0.12, 0.06)  # of a local search, of the pad's sides; rolls of `ROLLED` go with the first
 WORTHWHILE = 0.01  # gain of payload that is worth a step
 BETWEEN = 4e-3  # distance of the points of an object that a hand must not meet [m]
 EDGE_COST = 0.05  # of a payload, for which a place off the edges of the object is preferred
@@ -141,15 +141,15 @@ def antipodal_grasps(
     others are given where it gets to none.
     """
     surface = np.ascontiguousarray(surface[0]), np.ascontiguousarray(surface[1])
-    found: dict[bool | None, list[SampledGrasp]] = {None: [], False: [], True: []}  # by what `offers` says of them
+    offered: dict[bool | None, list[SampledGrasp]] = {None: [], False: [], True: []}  # by what `offers` says of them
     for grasp, over in offers(surface, jaws, task, seed, samples, lids):
-        found[over].append(grasp)
-    seen = found[False]
-    if all(grasp.state for grasp in seen):  # an open box may be held nowhere else
-        seen += found[True]
-    best = [grasp for grasp in thinned(seen, count, jaws.pad[0], reached) if not grasp.state]
-    seen += [climbed(surface, grasp, jaws, task, lids) for grasp in best]
-    return thinned(seen + found[None], count, jaws.pad[0], reached)
+        offered[over].append(grasp)
+    grasps = offered[False]
+    if all(grasp.state for grasp in grasps):  # an open box may be held nowhere else
+        grasps += offered[True]
+    best = [grasp for grasp in thinned(grasps, count, jaws.pad[0], reached) if not grasp.state]
+    grasps += [improved(surface, grasp, jaws, task, lids) for grasp in best]
+    return thinned(grasps + offered[None], count, jaws.pad[0], reached)
 
 
 def offers(
@@ -180,17 +180,17 @@ def offers(
             continue
 
 
-def climbed(
+def improved(
     surface: tuple[FloatArray, IntArray], grasp: SampledGrasp, jaws: Jaws, task: Task, lids: FloatArray | None = None
 ) -> SampledGrasp:
     """The best grasp by payload that shifts of the pads along their sides and rolls lead to from another one.
 
     A grasp whose pressure is in the middle of the pads may hold less than one nearer to the centre of mass.
     """
-    for share in CLIMBS:
+    for share in SEARCH_STEPS:
         point, axes = grasp.point, axes_of(grasp.approach, grasp.long_side)
         shifts = [point + sign * share * jaws.pad[k] * axes[:, k] for k in (0, 1) for sign in (1.0, -1.0)]
-        rolls = [axes[:, 0] + sign * math.tan(share * ROLLED / CLIMBS[0]) * axes[:, 1] for sign in (1.0, -1.0)]
+        rolls = [axes[:, 0] + sign * math.tan(share * ROLLED / SEARCH_STEPS[0]) * axes[:, 1] for sign in (1.0, -1.0)]
         frames = [*((place, axes) for place in shifts), *((point, axes_of(axes[:, 2], roll)) for roll in rolls)]
         for grip in grips(surface, frames, jaws, lids):
             other = judged(grip, task)
@@ -240,21 +240,21 @@ def judged(grip: JawsOnSurface, task: Task) -> SampledGrasp:
     """State of a grasp on a bed of springs, with its payload there."""
     state = state_of(grip)
     inward = 1.0 - min(grip.on_edges, EDGE_COST)
-    worth = 0.0 if state else grip.peak * inward * held(grip.contacts, task)
+    worth = 0.0 if state else grip.peak * inward * spring_payload(grip.contacts, task)
     return SampledGrasp(grip.point, grip.axes[:, 2], grip.axes[:, 0], grip.opening, worth, state)
 
 
 def thinned(
-    seen: Sequence[SampledGrasp], count: int, length: float, reached: Callable[[SampledGrasp], bool]
+    grasps: Sequence[SampledGrasp], count: int, length: float, reached: Callable[[SampledGrasp], bool]
 ) -> list[SampledGrasp]:
     """At most ``count`` distinct grasps that are worth a solve, then as many that are not; by payload each.
 
     Of the first those that the hand has ``reached``, if there are any. The best one of every place comes before any
     place gets a second one; places are half a pad's ``length`` apart.
     """
-    kept: list[SampledGrasp] = []
+    distinct: list[SampledGrasp] = []
     for good in (True, False):
-        some = [g for g in seen if (not g.state) is good]
+        some = [g for g in grasps if (not g.state) is good]
         best = max((g.payload for g in some), default=0.0)
         # rounded, so that those that are equal but for rounding come in the order in which they were found
         # digits of a payload over the best one, by which grasps are ranked
@@ -262,8 +262,8 @@ def thinned(
         # share of the best payload, below which a grasp is not proposed
         worth = ranked[: next((n for n, grasp in enumerate(ranked) if grasp.payload < 0.02 * best), len(ranked))]
         chosen = (good and _spread(worth, count, length, reached)) or _spread(worth, count, length)
-        kept += sorted(chosen, key=lambda g: -g.payload)
-    return kept
+        distinct += sorted(chosen, key=lambda g: -g.payload)
+    return distinct
 
 
 def _spread(
@@ -307,14 +307,14 @@ def with_sampled_grasps(scene: Scene) -> Scene:
     """
     given, obj = scene.candidates, build_object(scene.object)
     task, surface = task_of(scene, obj), surface_triangles(scene.object)
-    found = antipodal_grasps(
+    grasps = antipodal_grasps(
         surface, jaws_of(scene), task, given.sampled or 1, lids=lids_of(obj), reached=reached_by_hand(scene)
     )
     placed = own_frame(scene.object)
-    given_as = [(in_file(grasp.point, grasp.approach, grasp.long_side, placed), grasp.state) for grasp in found]
+    given_as = [(in_file(grasp.point, grasp.approach, grasp.long_side, placed), grasp.state) for grasp in grasps]
     poses = tuple(pose_of(numbers) for numbers, state in given_as if not state)
     if not poses:
-        raise _no_grasp(found)
+        raise _no_grasp(grasps)
     # how many were asked for stays, which tells that they are screened
     where = given.model_copy(update={"poses": poses})
     where._rejected = tuple((*numbers, state) for numbers, state in given_as if state)
@@ -340,20 +340,20 @@ def reached_by_hand(scene: Scene) -> Callable[[SampledGrasp], bool]:
 
 def check_sampler(scene: Scene) -> None:
     """Refuse a scene of which `with_sampled_grasps` would find no grasp; it ends with the first one."""
-    obj, seen = build_object(scene.object), list[SampledGrasp]()
+    obj, rejected = build_object(scene.object), list[SampledGrasp]()
     surface, task = surface_triangles(scene.object), task_of(scene, obj)
     for grasp, _ in offers(surface, jaws_of(scene), task, 0, SAMPLES, lids_of(obj)):
         if not grasp.state:
             return
-        seen.append(grasp)
-    raise _no_grasp(seen)
+        rejected.append(grasp)
+    raise _no_grasp(rejected)
 
 
-def _no_grasp(found: Sequence[SampledGrasp]) -> NoGraspError:
-    states = [STATES[state] for state in sorted({grasp.state for grasp in found})] or ["the pads miss the object"]
+def _no_grasp(rejected: Sequence[SampledGrasp]) -> NoGraspError:
+    states = [STATES[state] for state in sorted({grasp.state for grasp in rejected})] or ["the pads miss the object"]
     width = ""
-    if found:
-        width = f"; the narrowest needs an opening of {shown_text(min(g.opening for g in found), 'm', 3)}"
+    if rejected:
+        width = f"; the narrowest needs an opening of {shown_text(min(g.opening for g in rejected), 'm', 3)}"
     text = f"candidates.sampled: found no grasp between the pads ({', '.join(states)}{width}); expected one: give"
     return NoGraspError(USAGE, f"{text} poses, another pad, or a larger gripper.max_opening_mm")
 

@@ -3,7 +3,7 @@
 What is asked for is a solution at a force, on a mesh, at levels of the effects. How it is started is known here and
 nowhere else: on the coarse mesh the load path leads through all forces of the scene, on the scene's mesh each force
 starts from the coarse states at it and below, on a finer one from the state on the mesh before. So forces do not depend
-on each other, or on who asks first. A state, or the failure that stands for it, is solved once.
+on each other, or on who asks first. A state, or the failure in its place, is solved once.
 """
 
 from __future__ import annotations

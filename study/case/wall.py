@@ -23,7 +23,7 @@ from softjaw.study.quantities import ALONG, AROUND
 from softjaw.study.scene import Scene
 from softjaw.study.scene.objects import Walled
 
-DENTED_SHARE = 0.2  # of the object's half width between the fingers, beyond which an indentation is told by a flag
+DENTED_SHARE = 0.2  # of the object's half width between the fingers, beyond which an indentation is flagged
 ESTIMATE = MeshSize(0.004, 0.006, 0.012)  # mesh of the estimate that the level is chosen by
 
 

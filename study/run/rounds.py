@@ -24,7 +24,7 @@ import numpy as np
 
 from softjaw.friction.patch import FloatArray
 from softjaw.study import ranking
-from softjaw.study.case.bed import JawsOnSurface, grips, held
+from softjaw.study.case.bed import JawsOnSurface, grips, spring_payload
 from softjaw.study.case.build import build_object, own_frame, shapes_of, surface_triangles
 from softjaw.study.case.fit import jaws_of
 from softjaw.study.case.poses import STANDOFF, explicit_poses, in_file
@@ -88,7 +88,7 @@ def _neighbours(scene: Scene, rounds: Any, values: FloatArray, share: float) -> 
     lids, task = lids_of(obj), task_of(scene, obj)
 
     def promise(grip: JawsOnSurface) -> float:
-        return grip.peak * held(grip.contacts, task)
+        return grip.peak * spring_payload(grip.contacts, task)
 
     known = [_frame(pose, placed) for pose in with_places(scene.candidates.poses, rounds)]
 

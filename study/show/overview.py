@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from softjaw.study.case.build import axis_span, geometry, has_wall, listed_accuracy, told
+from softjaw.study.case.build import axis_span, geometry, has_wall, listed_accuracy, notices
 from softjaw.study.units import UNITS, shown
 
 OPEN = {"top": "open top", "both": "open at both ends", "none": "closed top"}
@@ -40,7 +40,7 @@ def scene_text(scene: Any, file: str) -> str:
         "petsc": " ".join(f"-{key} {value}" for key, value in scene.petsc.items()),
         "each case": limits_text(scene.run),
     }
-    return "\n".join([f"{file}: no errors", *aligned(rows), *told(scene)])
+    return "\n".join([f"{file}: no errors", *aligned(rows), *notices(scene)])
 
 
 def _meshes(accuracy: Any, which: str) -> str:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from softjaw.study.case.bed import CRUSHED, GRID, JawsOnSurface, height_fields, held
+from softjaw.study.case.bed import CRUSHED, GRID, JawsOnSurface, height_fields, spring_payload
 from softjaw.study.case.candidates import with_sampled_grasps
 from softjaw.study.case.fit import Jaws, fit_of
 from softjaw.study.case.sampler import SampledGrasp, antipodal_grasps, axes_of, reached_by_hand, same_grasp, state_of
@@ -110,8 +110,8 @@ def test_a_bowl_is_held_from_outside_or_by_its_bottom_and_springs_on_a_face_hold
     strain = JAWS.force / (PAD[0] * PAD[1] * JAWS.stiffness * PAD[2])
     assert grip.peak == pytest.approx(1.0 / (1.0 + (strain / CRUSHED) ** 2))
     cones = 2 * JAWS.mu * JAWS.force / np.hypot(1.0, JAWS.mu) / GRAVITY
-    assert held(grip.contacts, TASK) == pytest.approx(cones, rel=0.01)
-    assert held(grip.contacts, Task(np.array([0.0, 0.1, 0.0]))) < 0.2 * cones
+    assert spring_payload(grip.contacts, TASK) == pytest.approx(cones, rel=0.01)
+    assert spring_payload(grip.contacts, Task(np.array([0.0, 0.1, 0.0]))) < 0.2 * cones
     length, width = PAD[:2]
     assert at_origin(box(0.2, 0.2, 0.05)).on_edges == pytest.approx(0.0, abs=1e-12)
     # the object ends between the last cells of the face and the ones beyond it, along the length or the width
