@@ -53,8 +53,8 @@ def table(
 
 
 def block_of(shown: Table, first: bool = False) -> Block:
-    """The columns for people of a table, as a block; what is wrapped in a text is text here."""
-    columns = [c for c in shown.columns if c.people]
+    """The displayed columns of a table, as a block; what is wrapped in a text is text here."""
+    columns = [c for c in shown.columns if c.display]
     heads = [with_unit(c.label or c.name, shown_unit(c.unit)) for c in columns]
     # A number stays in one line with its error.
     cells = ([(c, shown.cell(row, c)) for c in columns] for row in shown.rows)

@@ -41,14 +41,14 @@ class Column:
     unit : str
         SI unit of the rows.
     label : str
-        Head for people; the name where it is empty.
+        Displayed head; the name where it is empty.
     error : str
         Key that holds the error of this quantity.
     relative : bool
         Whether that is a share of the value; else it is in the unit.
     digits : int
         Significant digits where no error says how many there are.
-    people, programs : bool
+    display, programs : bool
         Whether text and page show it, and whether CSV and JSON hold it.
     drop : int
         Above 0, what a narrow text leaves out, the largest number first.
@@ -62,7 +62,7 @@ class Column:
     error: str = ""
     relative: bool = True
     digits: int = 4
-    people: bool = True
+    display: bool = True
     programs: bool = True
     drop: int = 0
     wrap: int = 0
@@ -83,7 +83,7 @@ class Table:
     name: str = "rows"
 
     def cell(self, row: Row, column: Column) -> str:
-        """A value as people read it, with its error where that is known."""
+        """A value as it is displayed, with its error where that is known."""
         value = row.get(column.name)
         if isinstance(value, bool):
             return "yes" if value else "no"
@@ -243,8 +243,8 @@ def _broken(text: str, width: int) -> str:
 
 
 def _fitting(table: Table, width: int) -> list[Column]:
-    """The columns for people that fit into a line, without the least important ones where need be."""
-    columns = [c for c in table.columns if c.people]
+    """The displayed columns that fit into a line, without the least important ones where need be."""
+    columns = [c for c in table.columns if c.display]
     sizes = {}
     for c in columns:
         cells = [c.label or c.name, shown_unit(c.unit) + "[]"]

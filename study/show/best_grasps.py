@@ -59,12 +59,12 @@ def best(
     Raises `ValueError` for a force outside of the solved ones.
     """
     ds = judge(ds, force=window(ds) if force is None else force, by=by, top=top, lines=lines)
-    k, score, found = ds.attrs["level"], ds.attrs["score"], order(ds, ds.attrs["level"])
-    places = distinct(ds, [candidate_of(ds, index) for index in found], rank_values(ds, score, k), k, top)
-    listed = [index_of(ds, place.best, k) for place in places] if lines else found[: top or None]
+    k, score, ranking = ds.attrs["level"], ds.attrs["score"], order(ds, ds.attrs["level"])
+    places = distinct(ds, [candidate_of(ds, index) for index in ranking], rank_values(ds, score, k), k, top)
+    listed = [index_of(ds, place.best, k) for place in places] if lines else ranking[: top or None]
     marks = ds["flags"].values[tuple(np.array(listed, int).reshape(-1, ds.status.ndim).T)]
     table = case_table(ds, listed, True, maps, common(marks) if maps is BRIEF else 0)
-    if not found:
+    if not ranking:
         if "between" in ds.attrs:
             low, high = ds.attrs["between"]
             text = f"contacts change between {low:g} and {high:g} N, or one of them is not solved"
@@ -77,15 +77,15 @@ def best(
     columns = [replace(column, drop=0) if column.name == score else column for column in table.columns]
     columns = [*columns[:-1], *others, columns[-1]]
     what = "places" if lines else "candidates"
-    title = f"best {len(listed)} {what} of {len(found)} solved candidates by {score} at {forces(ds)[k]:g} N"
+    title = f"best {len(listed)} {what} of {len(ranking)} solved candidates by {score} at {forces(ds)[k]:g} N"
     shown = np.full(ds.status.shape, MISSING)
     shown[tuple(np.array(listed).T)] = DONE
     errors, alone = ds.get(f"{aim(ds)[0]}_error"), ds.assign(status=(ds.status.dims, shown))
     known = errors is not None or "e_n_interval" not in ds
     error = largest_error(errors, alone, axes_of(ds), ds.label.values) if known else []
     notes = _notes(ds, [certainty(ds, [place.best for place in places], score, k), *error], marks)
-    told = {key: ", ".join(filter(None, texts)) for key, texts in answer(ds, found[0]).items()}
-    facts = {"answer": told, "pads": pads(ds, found[0]), "force": float(forces(ds)[k]), "ranked_by": score,
+    answers = {key: ", ".join(filter(None, texts)) for key, texts in answer(ds, ranking[0]).items()}
+    facts = {"answer": answers, "pads": pads(ds, ranking[0]), "force": float(forces(ds)[k]), "ranked_by": score,
              "largest_error": "; ".join(error)}  # fmt: skip
     return Table(title, columns if lines else table.columns, rows if lines else table.rows, notes, facts, "grasps")
 
@@ -93,8 +93,8 @@ def best(
 def best_text(ds: xr.Dataset, width: int, force: float | None = None, top: int = LISTED, by: str | None = None) -> str:
     """The answer and the best grasps for a terminal; the choice is that of `best`."""
     table = best(ds, force, top, by, lines=True, maps=BRIEF)
-    told = [wrapped(f"{name:<9}{text}", width, more=" " * 9) for name, text in table.facts.get("answer", {}).items()]
-    return "\n".join([*told, *[""] * bool(told), as_text(table, width)])
+    answers = [wrapped(f"{name:<9}{text}", width, more=" " * 9) for name, text in table.facts.get("answer", {}).items()]
+    return "\n".join([*answers, *[""] * bool(answers), as_text(table, width)])
 
 
 def summary(result: Any) -> str:
@@ -119,18 +119,18 @@ def case_table(
     columns = [Column("rank"), Column("name")] if rank else [Column("name"), Column("state", wrap=NOTES_WIDTH)]
     for axis in axes[: -1 if rank else None]:
         title, pose = "force" if axis is axes[-1] else "", poses and axis.name in ("station", "angle")
-        columns.append(Column(axis.name, axis.units, title, digits=5, people=not pose))
-    columns += [Column("label", wrap=LABEL_WIDTH, people=named(ds))] if poses else []
+        columns.append(Column(axis.name, axis.units, title, digits=5, display=not pose))
+    columns += [Column("label", wrap=LABEL_WIDTH, display=named(ds))] if poses else []
     middles = ds["finger_pose_origin"].values.mean(axis=-2) if poses and "finger_pose_origin" in ds else None
-    columns += [Column(axis, "m", people=False) for axis in "xyz"] * (middles is not None)
-    bounds = [Column(name, "N", people=False) for name in FORCE_RANGE if name in ds]
+    columns += [Column(axis, "m", display=False) for axis in "xyz"] * (middles is not None)
+    bounds = [Column(name, "N", display=False) for name in FORCE_RANGE if name in ds]
     quantities = [*_map_columns(ds, maps), *bounds]
     values = {c.name: values_of(ds, c.name) for c in quantities if c.name in ds}
     values[PLANAR_E_N] = values_of(ds, "e_n", MODELS[1])
     first = 1 + bool(quantities and quantities[0].error)  # a wide table does not scroll the safe forces out
     safe = [Column("safe_forces", "N", "safe forces", programs=False)] * bool(bounds)
     columns += [*quantities[:first], *safe, *quantities[first:]]
-    columns += [Column("flags", people=False), Column("notes", wrap=NOTES_WIDTH)]
+    columns += [Column("flags", display=False), Column("notes", wrap=NOTES_WIDTH)]
     rows: list[Row] = []
     for place_, index in enumerate(cases, start=1):
         row: Row = {axis.name: float(axis.values[i]) for axis, i in zip(axes, index, strict=True)}
@@ -139,7 +139,7 @@ def case_table(
         row |= {"state": STATES[int(ds.status.values[index])]}
         row |= {"label": str(ds.label.values[index[-3:-1]]), "flags": int(ds["flags"].values[index]) & OF_FILE}
         row |= {} if middles is None else dict(zip("xyz", middles[index].tolist(), strict=True))
-        row |= {name: float(found[index]) for name, found in values.items()}
+        row |= {name: float(array[index]) for name, array in values.items()}
         rows.append(row | {"safe_forces": safe_range(ds, index), "notes": note(ds, index, known)})
     return Table("", columns, rows)
 
@@ -152,7 +152,7 @@ def _map_columns(ds: xr.Dataset, maps: Collection[str]) -> list[Column]:
         error = next((e for e in (f"{name}_interval", q.of_error.name) if e in ds), "")
         relative = error == q.of_error.name and q.error == "relative"
         columns.append(Column(name, q.unit, q.symbol, error, relative, drop=least * (least > 1)))
-        columns += [Column(error, ds[error].units, people=False)] if error else []
+        columns += [Column(error, ds[error].units, display=False)] if error else []
         if name == "e_n" and maps is not BRIEF:
             columns.append(Column(PLANAR_E_N, q.unit, drop=len(maps)))
     extra = [name for name in ("misalignment", "pad_elements") if name in ds and maps is MAIN]
@@ -270,8 +270,8 @@ def _force(ds: xr.Dataset, index: Index) -> tuple[str, str]:
     if mass is None:
         some = [(*index[:-1], k) for k in other_levels(len(forces(ds)), index[-1])]
         known = [i for i in some if np.isfinite(at(ds, "payload", i)) and not int(ds["flags"].values[i]) & LOST]
-        held = ", ".join(f"{value_text(ds, 'payload', i, 3, unit=True)} at {forces(ds)[i[-1]]:g} N" for i in known)
-        return pressed, "; ".join(filter(None, (ds.attrs["why"], held, "object.mass_g gives the least")))
+        payloads = ", ".join(f"{value_text(ds, 'payload', i, 3, unit=True)} at {forces(ds)[i[-1]]:g} N" for i in known)
+        return pressed, "; ".join(filter(None, (ds.attrs["why"], payloads, "object.mass_g gives the least")))
     wanted, (low, error) = f"{safety:g} times its {shown_text(in_si('mass_g', mass), 'kg', 3)}", force_to_use(ds, index)
     if np.isfinite(low):
         known = np.isfinite(error)
@@ -327,8 +327,8 @@ def _beyond(ds: xr.Dataset, index: Index) -> str:
     last = (*index[:-1], len(forces(ds)) - 1)
     if last == index:
         return ", the largest solved" * ("between" not in ds.attrs)
-    held = f"it holds {value_text(ds, 'payload', last, 3, unit=True)}" * bool(np.isfinite(at(ds, "payload", last)))
-    more = flag_words(int(ds["flags"].values[last]) & LOST) or held
+    payload = f"it holds {value_text(ds, 'payload', last, 3, unit=True)}" * bool(np.isfinite(at(ds, "payload", last)))
+    more = flag_words(int(ds["flags"].values[last]) & LOST) or payload
     return f"; at {forces(ds)[-1]:g} N {more}" if more else ""
 
 

@@ -25,25 +25,25 @@ Pair = tuple[xr.Dataset, xr.Dataset]
 SAME_PLACE = 1e-3  # distance of the middles of the pads of one grasp, which edges and meshes move by less [m]
 
 
-def compare(one: xr.Dataset, other: xr.Dataset, quantity: str = "e_n", model: str = "ccm") -> Table:
+def compare(first: xr.Dataset, second: xr.Dataset, quantity: str = "e_n", model: str = "ccm") -> Table:
     """Every common case of one map of two result files (``a`` and ``b``), and counts for all maps as facts.
 
     A difference exceeds the errors if it is larger than the sum of both: half-widths of intervals, or else errors of
     the mesh.
 
-    ``one, other`` (xarray.Dataset): as `study.result.read.open` gives them. ``quantity``: map to be listed case by
+    ``first, second`` (xarray.Dataset): as `study.result.read.open` gives them. ``quantity``: map to be listed case by
     case. ``model``: friction model of all quantities. Raises `StudyError`: different kinds of axes, nothing in common,
     or an unknown quantity.
     """
-    axes, pair = _matched(one, other)
+    axes, pair = _matched(first, second)
     try:
-        changed = changes(one.scene, other.scene)
+        changed = changes(first.scene, second.scene)
     except ValueError as error:
-        raise StudyError(OTHER_FILE, f"{one.file}, {other.file}: a stored scene cannot be read ({error})") from error
+        raise StudyError(OTHER_FILE, f"{first.file}, {second.file}: a stored scene cannot be read ({error})") from error
     in_a, in_b = (ds.status.values == DONE for ds in pair)
     states = {"solved in both": in_a & in_b, "only in a": in_a & ~in_b, "only in b": ~in_a & in_b,
               "in neither": ~in_a & ~in_b}  # fmt: skip
-    names = [q.name for q in TABLE if q.group == "maps" and q.name != "flags" and q.name in one and q.name in other]
+    names = [q.name for q in TABLE if q.group == "maps" and q.name != "flags" and q.name in first and q.name in second]
     if quantity not in names:
         raise StudyError(USAGE, f"--quantity: found '{quantity}', expected one of: {', '.join(names)}")
     units = map_row(quantity).unit
@@ -54,16 +54,16 @@ def compare(one: xr.Dataset, other: xr.Dataset, quantity: str = "e_n", model: st
     for index in np.ndindex(in_a.shape):
         place: Row = {name: float(axis["common"][i]) for (name, axis), i in zip(axes.items(), index, strict=True)}
         place["label"] = str(pair[0].label.values[index[-3:-1]])
-        rows.append(place | {name: found[index] for name, found in values.items()})
+        rows.append(place | {name: array[index] for name, array in values.items()})
     hidden = [name for name in (*few, station, angle) if len(axes[name]["common"]) < 2]
     hidden += [station, angle] * poses
-    columns = [Column(name, axis["units"], digits=5, people=name not in hidden) for name, axis in axes.items()]
+    columns = [Column(name, axis["units"], digits=5, display=name not in hidden) for name, axis in axes.items()]
     columns += [Column("label", wrap=24)] * poses
     judged = any(value is not None for value in values["beyond_error"].ravel())
     columns += [Column("a", units), Column("b", units), Column("difference", units, "b-a"), Column("relative"),
-                Column("error", units, "errors", digits=2, people=judged),
-                Column("beyond_error", "", "exceeds\nerrors", people=judged)]  # fmt: skip
-    facts = {"files": {"a": str(one.file), "b": str(other.file)}, "axes": axes,
+                Column("error", units, "errors", digits=2, display=judged),
+                Column("beyond_error", "", "exceeds\nerrors", display=judged)]  # fmt: skip
+    facts = {"files": {"a": str(first.file), "b": str(second.file)}, "axes": axes,
              "settings": [{"key": key, "a": a, "b": b} for key, a, b in changed],
              "states": {words: int(cases.sum()) for words, cases in states.items()}, "quantity": quantity,
              "summary": [_summary(name, _values(pair, name, model)) for name in names
@@ -101,16 +101,16 @@ def _setting_lines(settings: list[Row], width: int) -> list[str]:
 # --- axes ------------------------------------------------------------------------------------------------------------
 
 
-def _matched(one: xr.Dataset, other: xr.Dataset) -> tuple[dict[str, Row], Pair]:
+def _matched(first: xr.Dataset, second: xr.Dataset) -> tuple[dict[str, Row], Pair]:
     """Values of every axis that both files have, and that only one has; the common cases of both."""
-    both = axes_of(one), axes_of(other)
+    both = axes_of(first), axes_of(second)
     kinds = [[(axis.name, axis.units) for axis in axes] for axes in both]
     if kinds[0] != kinds[1]:
         words = [", ".join(with_unit(*axis) for axis in kind) for kind in kinds]
-        text = f"the maps have different axes: {words[0]} in {one.file}, {words[1]} in {other.file}"
+        text = f"the maps have different axes: {words[0]} in {first.file}, {words[1]} in {second.file}"
         raise StudyError(USAGE, f"{text}; compare files with the same kind of candidates and the same swept keys")
     axes: dict[str, Row] = {}
-    pair = one, other
+    pair = first, second
     for a, b in zip(*both, strict=True):
         scale = max(np.abs(a.values).max(), np.abs(b.values).max(), 1e-300)
         # relative difference of coordinates that is only rounding
@@ -118,11 +118,11 @@ def _matched(one: xr.Dataset, other: xr.Dataset) -> tuple[dict[str, Row], Pair]:
         if a.options and b.options:  # the numbers are those of texts
             same = np.array(a.options)[:, None] == np.array(b.options)
         # poses, of which samplers may have found others
-        if a.name == "station" and not a.units and "finger_pose_origin" in one and "finger_pose_origin" in other:
-            same &= ~(np.linalg.norm(_middles(one)[:, None] - _middles(other), axis=-1) > SAME_PLACE)
+        if a.name == "station" and not a.units and "finger_pose_origin" in first and "finger_pose_origin" in second:
+            same &= ~(np.linalg.norm(_middles(first)[:, None] - _middles(second), axis=-1) > SAME_PLACE)
         only = a.values[~same.any(axis=1)], b.values[~same.any(axis=0)]
         if not same.any():
-            raise StudyError(USAGE, f"{one.file} and {other.file} have no common {a.name}: nothing to compare")
+            raise StudyError(USAGE, f"{first.file} and {second.file} have no common {a.name}: nothing to compare")
         at = np.nonzero(same)
         pair = pair[0].isel({a.name: at[0]}), pair[1].isel({a.name: at[1]})
         axes[a.name] = {"units": a.units, "common": a.values[at[0]], "only_a": only[0], "only_b": only[1]}

@@ -39,10 +39,10 @@ def field(ds: xr.Dataset, name: str, model: str = "ccm") -> Any:
     """
     if name not in ds.variables:
         return None
-    found = ds.variables[name]
-    several = "model" in found.dims and "finger" not in found.dims
-    values = np.asarray(found.isel(model=MODELS.index(model)).values if several else found.values, float)
-    if found.dims == ds.status.dims[:-1]:
+    variable = ds.variables[name]
+    several = "model" in variable.dims and "finger" not in variable.dims
+    values = np.asarray(variable.isel(model=MODELS.index(model)).values if several else variable.values, float)
+    if variable.dims == ds.status.dims[:-1]:
         values = np.repeat(values[..., None], ds.status.shape[-1], axis=-1)
     # A map without any value is left out instead of being drawn empty.
     return values if np.isfinite(values).any() else None
@@ -57,15 +57,15 @@ def at(ds: xr.Dataset, name: str, index: Index, model: str = "ccm") -> float:
     """A map's value at one case, or what is known of its candidate; NaN if there is none."""
     if name not in ds.variables:
         return float("nan")
-    found = ds.variables[name]
-    return float(found.values[(*index, MODELS.index(model)) if "model" in found.dims else index[: found.ndim]])
+    variable = ds.variables[name]
+    return float(variable.values[(*index, MODELS.index(model)) if "model" in variable.dims else index[: variable.ndim]])
 
 
 def quantity(ds: xr.Dataset, name: str) -> tuple[str, str, float]:
     """A variable's long name without its unit, the displayed unit, and the factor from SI."""
-    found = ds.variables[name].attrs if name in ds.variables else {}
-    units = found.get("units", "")
-    return found.get("long_name", name), shown_unit(units), shown(1.0, units)
+    attrs = ds.variables[name].attrs if name in ds.variables else {}
+    units = attrs.get("units", "")
+    return attrs.get("long_name", name), shown_unit(units), shown(1.0, units)
 
 
 def label_of(ds: xr.Dataset, name: str) -> str:

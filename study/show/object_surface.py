@@ -58,8 +58,8 @@ def surface_of(scene: Any, axes: Any, feet: Feet = ()) -> Surface:
         size = c * length + s * width, c * width + s * length
         corners, cell = coloured(corners, Cells(axes[-3].values, axes[-2].values, scene.object.axis_symmetry, *size))
         corners = middle.straightened(corners, -1.0) if middle else corners
-        kept = ~_lid(scene.object, corners)
-        corners, cell = corners[kept], cell[kept]
+        visible = ~_lid(scene.object, corners)
+        corners, cell = corners[visible], cell[visible]
     # After the cuts, corners of neighbours differ by rounding: 1 nm makes them one point again.
     rows = np.column_stack([np.round(corners.reshape(-1, 3), 9), np.repeat(cell, 3)])
     points, inverse = np.unique(rows, axis=0, return_inverse=True)

@@ -18,13 +18,13 @@ from softjaw.study.result.store import open_result
 from softjaw.study.run.progress import duration
 from softjaw.study.table import Column, Row, Table, as_text, wrapped
 
-LOOKS: dict[str, dict[str, Any]] = {  # of the columns for people
+LOOKS: dict[str, dict[str, Any]] = {  # of the displayed columns
     "payload": {"error": "payload_error"}, "opening": {"drop": 1}, "force": {}, "e_n": {"drop": 2},
     "grasps": {"drop": 3}, "seconds": {"drop": 4}, "state": {"wrap": 12}, "reason": {"wrap": 34, "drop": 5},
 }  # fmt: skip
 SHOWN = (
     Column("object", wrap=20),
-    *(Column(name, unit, people=name in LOOKS, programs=name != "key", **LOOKS.get(name, {}))
+    *(Column(name, unit, display=name in LOOKS, programs=name != "key", **LOOKS.get(name, {}))
       for name, (_, unit, _) in index.COLUMNS.items()),
 )  # fmt: skip
 
@@ -83,8 +83,8 @@ def look(path: Path) -> tuple[list[str], int | None]:
 
 def _under_way(path: Path, rows: list[Row]) -> list[tuple[int, int]]:
     """Cases that have an end, and all, of the file of each object that is under way."""
-    found = []
+    counts = []
     for file in (path.parent / row["file"] for row in rows if row["state"] == index.STOPPED):
         with suppress(StudyError), open_result(file, unchecked=True) as result:
-            found.append((int(np.sum(result.codes != MISSING)), result.codes.size))
-    return found
+            counts.append((int(np.sum(result.codes != MISSING)), result.codes.size))
+    return counts

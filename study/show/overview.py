@@ -69,11 +69,11 @@ def wall_text(shape: Any) -> str:
     """Thickness, material and support of an object's wall; empty for a rigid object."""
     if not has_wall(shape):
         return ""
-    found, given = geometry().material_of(shape), shape.thicknesses_mm
+    material, given = geometry().material_of(shape), shape.thicknesses_mm
     thickness = f"{min(given):g}" if min(given) == max(given) else f"{min(given):g} to {max(given):g}"
-    yields = found.yield_strength and f"yields at {found.yield_strength / UNITS['mpa'].size:g} MPa"
+    yields = material.yield_strength and f"yields at {material.yield_strength / UNITS['mpa'].size:g} MPa"
     words = [
-        f"{thickness} mm {shape.wall_material} ({found.young_modulus / UNITS['gpa'].size:g} GPa, "
+        f"{thickness} mm {shape.wall_material} ({material.young_modulus / UNITS['gpa'].size:g} GPa, "
         f"{yields or 'strength unknown'})",
         shape.support,
         OPEN[shape.open_ends],

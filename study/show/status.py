@@ -207,9 +207,9 @@ def reasons_in(result: Any) -> list[Reason]:
 
 def reasons(result: Any, width: int = PAPER, notes: bool = True) -> list[str]:
     """The most frequent reasons, one line each; ``notes``: also of solved cases."""
-    found = [reason for reason in reasons_in(result) if notes or reason.state != DONE]
-    lines = [reason.text(result.axes, result.labels) for reason in found[:MOST_NOTES]]
-    rest = found[MOST_NOTES:]
+    listed = [reason for reason in reasons_in(result) if notes or reason.state != DONE]
+    lines = [reason.text(result.axes, result.labels) for reason in listed[:MOST_NOTES]]
+    rest = listed[MOST_NOTES:]
     cases = len({case for reason in rest for case in reason.cases})
     lines += [f"and {len(rest)} more kinds on {cases} cases: 'softjaw status --json' lists all"] * bool(rest)
     return [wrapped(line, width, "  ", "    ") for line in lines]

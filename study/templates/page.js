@@ -39,7 +39,7 @@ function object3d(div, all) {
 
   const state = (c) => all.states[at.force][c];
 
-  function told(c) {
+  function tooltip(c) {
     if (c < 0) return "no candidate";
     const q = quantity(), v = q && q.values[at.force][c], key = `${at.force} ${c}`;
     return `${all.names[c]}<br>` + (v == null ? "" : `${q.label}: ${+v.toPrecision(4)}<br>`) + (all.notes[key] || "");
@@ -58,7 +58,7 @@ function object3d(div, all) {
       for (let k = 0; k < 3; k++) into[k].push(corners[t + k]);
       into[3].push(v == null ? all.colours[[1, 0, 2][state(c)] ?? 0] : v);
     }
-    const names = Array.from(owner, told), base = {x: part(place, 0), y: part(place, 1), z: part(place, 2), text: names};
+    const names = Array.from(owner, tooltip), base = {x: part(place, 0), y: part(place, 1), z: part(place, 2), text: names};
     const [cmin, cmax] = q ? q.limits[at.force] : [], scale = q ? {cmin, cmax, colorscale: q.scale} : {}, [one, other] = div.data;
     Object.assign(one, base, {i: shown[0], j: shown[1], k: shown[2], intensity: shown[3], visible: shown[3].length > 0}, scale);
     Object.assign(other, base, {i: rest[0], j: rest[1], k: rest[2], facecolor: rest[3], visible: rest[3].length > 0});

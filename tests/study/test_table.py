@@ -12,9 +12,9 @@ from softjaw.study.page import block_of
 from softjaw.study.table import MOST_NOTES, Column, Table, as_csv, as_json, as_text, with_error
 
 COLUMNS = (
-    Column("grasp"), Column("e_n", "m", error="e_n_error"), Column("e_n_error", people=False),
+    Column("grasp"), Column("e_n", "m", error="e_n_error"), Column("e_n_error", display=False),
     Column("opening", "m", "open", error="opening_error", relative=False, drop=1),
-    Column("opening_error", "m", people=False),
+    Column("opening_error", "m", display=False),
     Column("force", "N", digits=5, drop=2), Column("range", programs=False, wrap=8),
 )
 ROWS = (
@@ -32,9 +32,9 @@ def test_people_read_units_and_as_many_digits_as_the_errors_leave():
     assert units.split() == ["grasp", "[mm]", "[mm]", "[N]", "range"]
     assert first.split() == ["1", "17.10", "±", "0.17", "60.00", "±", "0.20", "2", "a,", "b"]
     assert second.split() == ["2", "-", "60.00", "±", "0.20", "-", "-"]
-    held = Column("held", "kg", error="off"), Column("off", "1", people=False)
+    held = Column("held", "kg", error="off"), Column("off", "1", display=False)
     assert "641 ± 13" in as_text(Table("", held, [{"held": 0.641, "off": 0.02}]))
-    score = Column("score", error="interval", relative=False), Column("interval", people=False)
+    score = Column("score", error="interval", relative=False), Column("interval", display=False)
     assert "0.45 ± 0.29" in as_text(Table("", score, [{"score": 0.45, "interval": 0.29}]))
     assert notes[:MOST_NOTES] == list(TABLE.notes[:MOST_NOTES])
     assert len(notes) == MOST_NOTES + 1

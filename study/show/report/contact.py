@@ -30,10 +30,10 @@ def patch(view: View, index: Index) -> Block | None:
     both = view.pads(index)
     if not any(pad.loaded.any() for pad in both):
         return None
-    one, two = (np.sort(pad.pressure, axis=None) for pad in both)
-    top = max(one[-1], two[-1])
+    first, second = (np.sort(pad.pressure, axis=None) for pad in both)
+    top = max(first[-1], second[-1])
     # difference of the fingers' pressures over the largest one that is not drawn twice
-    alike = bool(np.abs(one - two).max() <= 1e-3 * top)
+    alike = bool(np.abs(first - second).max() <= 1e-3 * top)
     fingers = {"both fingers alike": both[0]} if alike else {f"finger {k}": pad for k, pad in enumerate(both, start=1)}
     titles = [f"{name}: friction against {SLIPS[m]}" for name in fingers for m in MOTIONS]
     made = plots.figure(len(fingers), 2, titles)
@@ -55,13 +55,13 @@ def patch(view: View, index: Index) -> Block | None:
 
 def pad_face(pad: Pad, motion: str) -> list[Any]:
     """Traces of one pad in its own frame [mm, kPa]: pressure of the loaded faces, friction, contact frame."""
-    own = 1e3 * pad.pose.to_pad(pad.centroid)
+    centres = 1e3 * pad.pose.to_pad(pad.centroid)
     pressure = np.where(pad.loaded, 1e-3 * pad.pressure, np.nan).T
-    size = 0.5 * np.ptp(own[..., 1])
+    size = 0.5 * np.ptp(centres[..., 1])
     arrows = 1e3 * pad.pose.to_pad(1e-3 * pad.arrows(motion, size / 4))
     frame = 0.6 * size * (pad.frame @ pad.pose.rotation)[:2]
     axes = 1e3 * pad.pose.to_pad(pad.origin) + np.stack([np.zeros((2, 3)), frame], axis=1)
-    return [plots.heatmap(own[..., 0].mean(axis=1), own[..., 1].mean(axis=0), pressure),
+    return [plots.heatmap(centres[..., 0].mean(axis=1), centres[..., 1].mean(axis=0), pressure),
             plots.segments(arrows, FORCE), plots.segments(axes, "white", "xy")]  # fmt: skip
 
 

@@ -156,9 +156,9 @@ def wall_curves(ds: xr.Dataset, index: Index, allowed: float | None) -> Block | 
     made = plots.figure(1, 2, ("closing displacement of the pads [mm]", "indentation [mm]"), shared_yaxes=True)
     others = [i for i in range(len(snapped)) if i != index[-3]]
     for i in (*others[:: -(-len(others) // MOST_LINES) or 1], index[-3]):
-        own = i == index[-3]
+        chosen = i == index[-3]
         name = label(place(ds, (*index[:-3], i, *index[-2:])))
-        look = {"color": "#12436d" if own else "#aeb6bc", "width": 2.5 if own else 1}
+        look = {"color": "#12436d" if chosen else "#aeb6bc", "width": 2.5 if chosen else 1}
         symbols = ["circle", *np.where(snapped[i], "diamond-open", "circle")]
         for column, displacement in enumerate((closing, indentation), start=1):
             made.add_scatter(x=[0, *1e3 * displacement[cut][i]], y=[0, *forces(ds)], mode="lines+markers", line=look,
@@ -170,8 +170,8 @@ def wall_curves(ds: xr.Dataset, index: Index, allowed: float | None) -> Block | 
     rule = f" Dashed: the allowed indentation, {1e3 * allowed:g} mm." if allowed is not None else ""
     diamonds = "Open diamonds: the wall snapped in at a smaller force."
     caption = f"Dark: {place(ds, index)}; grey: other candidates. {diamonds}{rule}"
-    here = f"{number(1e3 * indentation[index])} mm at {place(ds, index, force=True)}"
-    return plot(made, caption, f"Force over closing and indentation; {here}.", 340)
+    summary = f"{number(1e3 * indentation[index])} mm at {place(ds, index, force=True)}"
+    return plot(made, caption, f"Force over closing and indentation; {summary}.", 340)
 
 
 def wall_section(view: View, index: Index) -> Block | None:

@@ -60,12 +60,12 @@ def different_angles(ds: xr.Dataset) -> list[int]:
     return different
 
 
-def some(values: Sequence[int], kept: int) -> list[int]:
-    """At most `MOST_PANELS` of the values, evenly spread, ``kept`` among them where it is one."""
+def some(values: Sequence[int], required: int) -> list[int]:
+    """At most `MOST_PANELS` of the values, evenly spread, ``required`` among them where it is one."""
     if len(values) <= MOST_PANELS:
         return list(values)
     spread = {values[int(i)] for i in np.linspace(0, len(values) - 1, MOST_PANELS)}
-    return sorted(spread if kept in spread or kept not in values else {kept, *sorted(spread)[1:]})
+    return sorted(spread if required in spread or required not in values else {required, *sorted(spread)[1:]})
 
 
 def maps(ds: xr.Dataset, index: Index) -> list[Block]:
@@ -111,10 +111,10 @@ def _on_cells(made: Any, ds: xr.Dataset, cuts: Any, x: int, y: int) -> None:
     """Axes of all panels, notes on their cells, and marks of cases without values."""
     (xv, xs), (yv, ys), notes = ticks(ds, x), ticks(ds, y), _notes(ds)
     made.update_traces(x=xv, y=yv)
-    for k, (_, here) in enumerate(cuts):
+    for k, (_, cut) in enumerate(cuts):
         row, column = k // 2 + 1, k % 2 + 1
-        made.data[k].customdata = None if notes is None else plane(notes, x, y, here)
-        states = plane(ds.status.values, x, y, here)
+        made.data[k].customdata = None if notes is None else plane(notes, x, y, cut)
+        states = plane(ds.status.values, x, y, cut)
         for which, symbol, size in MARKS:
             i, j = np.nonzero(np.isin(states, which))
             if i.size:

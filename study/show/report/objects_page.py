@@ -25,7 +25,7 @@ def write_objects_page(index: Path, out: Path) -> Path:
     """
     rows, about = read_index(index)
     table = index_table(index)
-    columns = [c for c in table.columns if c.people]
+    columns = [c for c in table.columns if c.display]
     heads = [(with_unit(c.label or c.name, shown_unit(c.unit)), "text" if c.wrap else "n") for c in columns]
     listed, sections = [], []
     for row in table.rows:

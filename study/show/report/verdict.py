@@ -68,19 +68,19 @@ def _planar(ds: xr.Dataset, index: Index) -> list[str]:
 
 def warnings(ds: xr.Dataset) -> list[str]:
     """What speaks against trusting the best grasp."""
-    index, found = ds.attrs["best"], []
+    index, texts = ds.attrs["best"], []
     if missing := int(np.sum(ds.status.values == MISSING)):
-        found.append(f"This study is unfinished: {missing} cases are not computed, so a better grasp may be found.")
+        texts.append(f"This study is unfinished: {missing} cases are not computed, so a better grasp may be found.")
     if index is None:
-        return found
+        return texts
     if reasons := [flag.sentence for flag in flags_in(int(ds.flags.values[index])) if flag & BORNE]:
-        found.append(f"Every grasp at this force carries a warning. Best one: {'; '.join(reasons)}.")
+        texts.append(f"Every grasp at this force carries a warning. Best one: {'; '.join(reasons)}.")
     if failed := flagged(ds, index):
-        found.append(f"The best case does not pass its checks: {', '.join(failed)}.")
+        texts.append(f"The best case does not pass its checks: {', '.join(failed)}.")
     stations = ds.station.values
     if len(stations) > 2 and not ds.attrs["poses"] and index[-3] in (int(stations.argmin()), int(stations.argmax())):
-        found.append("The best station is the first or last one that was tried; a better one may lie beyond.")
-    return found
+        texts.append("The best station is the first or last one that was tried; a better one may lie beyond.")
+    return texts
 
 
 def plain_report(ds: xr.Dataset) -> str:

@@ -79,8 +79,8 @@ class View:
 
         Grasps are compared at one force: over all forces together their differences would hardly be seen.
         """
-        found = field(self.ds, name)
-        values = np.full(self.ds.status.shape, np.nan) if found is None else found * quantity(self.ds, name)[2]
+        array = field(self.ds, name)
+        values = np.full(self.ds.status.shape, np.nan) if array is None else array * quantity(self.ds, name)[2]
         return values, [span(values[self.point][..., k]) for k in range(values.shape[-1])]
 
     # --- the object ---
@@ -139,8 +139,8 @@ class View:
 
     def moved(self, index: Index) -> np.ndarray:
         """The surface's points ``(n, 3)``, moved with the wall of a case where the file has it."""
-        found, x = self.displacement(index), self.surface.points
-        return x if found is None or self.wall is None else x + moved(self.wall, *found)
+        shift, x = self.displacement(index), self.surface.points
+        return x if shift is None or self.wall is None else x + moved(self.wall, *shift)
 
     # --- a case ---
 
@@ -229,8 +229,8 @@ def _nearest(ds: xr.Dataset, best: Index, where: Place, k: int) -> Index:
     """The case at this force nearest to a station and an angle; the best one where only one of them is given."""
     wanted = zip((ds.station.values, ds.angle.values), where, strict=True)
     near = [None if value is None else nearest(values, value) for values, value in wanted]
-    here = (i for i in order(ds, k) if i[:-3] == best[:-3])
-    fits = (i for i in here if all(n in (None, m) for n, m in zip(near, i[-3:-1], strict=True)))
+    cases = (i for i in order(ds, k) if i[:-3] == best[:-3])
+    fits = (i for i in cases if all(n in (None, m) for n, m in zip(near, i[-3:-1], strict=True)))
     given = tuple(b if n is None else n for n, b in zip(near, best[-3:-1], strict=True))
     return next(fits, (*best[:-3], *given, k))
 

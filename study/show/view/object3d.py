@@ -27,19 +27,19 @@ MOST = 24_000_000  # bytes of pads, walls and limit surfaces; beyond it, those o
 
 
 def object_block(
-    view: View, index: Index, quantity: str, motion: str, cases: Sequence[Index], whole: bool = False
+    view: View, index: Index, quantity: str, motion: str, cases: Sequence[Index], limit_surface: bool = False
 ) -> Block:
     """The figure as a part of a page, with the geometry of some cases; why there is none where nothing can be drawn.
 
-    ``whole`` adds the limit surface of the weaker finger.
+    ``limit_surface`` adds the limit surface of the weaker finger.
     """
     if not len(view.surface.points):
         return text(f"{view.note[:1].upper()}{view.note[1:]}.", "warn")
-    content, left_out = payload(view, index, quantity, cases, motion, whole)
-    made = go.Figure([*_traces(whole), _room(view, index)])
+    content, left_out = payload(view, index, quantity, cases, motion, limit_surface)
+    made = go.Figure([*_traces(limit_surface), _room(view, index)])
     made.update_layout(template="none", margin={"l": 0, "r": 0, "t": 10, "b": 0}, uirevision="keep", showlegend=False)
     made.update_layout(meta={"object3d": content}, scene=plots.scene(camera=_camera(view, index)))
-    if whole:
+    if limit_surface:
         made.update_layout(scene={"domain": {"x": [0, 0.66]}})
         made.update_layout(scene2=plots.scene(NAMES, aspectmode="cube", domain={"x": [0.7, 1], "y": [0.2, 0.8]}))
     gone = [f"pads of the {left_out} worst cases are left out, or the page would be too large"] * bool(left_out)
@@ -53,21 +53,21 @@ def view_page(view: View, index: Index, quantity: str, motion: str) -> str:
     """The page of a view, which opens at a case and a map, with all cases."""
     levels = sorted(range(len(forces(view.ds))), key=lambda k: abs(k - index[-1]))
     cases = [index, *(i for k in levels for i in order(view.ds, k) if i[:-3] == view.point)]
-    block = object_block(view, index, quantity, motion, list(dict.fromkeys(cases)), whole=True)
+    block = object_block(view, index, quantity, motion, list(dict.fromkeys(cases)), limit_surface=True)
     return page(view.ds.attrs["title"], view.summary(index, quantity)[0], [("object", "", [block])])
 
 
 def payload(
-    view: View, index: Index, quantity: str, cases: Sequence[Index], motion: str, whole: bool
+    view: View, index: Index, quantity: str, cases: Sequence[Index], motion: str, limit_surface: bool
 ) -> tuple[dict[str, Any], int]:
     """Everything that the figure shows, as plain data, and how many solved cases had to be left out."""
-    ds, kept, left_out, size = view.ds, {}, 0, 0
+    ds, drawn, left_out, size = view.ds, {}, 0, 0
     for i in (i for i in cases if ds.status.values[i] == DONE):
         if size > MOST:
             left_out += 1
             continue
-        kept[f"{i[-1]} {view.candidate(i)}"] = one = case(view, i, motion, whole)
-        size += sum(len(part) for part in one.values() if isinstance(part, str))
+        drawn[f"{i[-1]} {view.candidate(i)}"] = parts = case(view, i, motion, limit_surface)
+        size += sum(len(part) for part in parts.values() if isinstance(part, str))
     levels = range(len(forces(ds)))
     every = {f"{k} {c}": view.index(c, k) for k in levels for c in range(view.candidates)}
     surface, wall = view.surface, view.wall
@@ -77,18 +77,18 @@ def payload(
         "names": [label(place(ds, view.index(c, 0))) for c in range(view.candidates)],
         "states": [view.state(k).tolist() for k in levels],
         "words": {key: view.summary(i, quantity) for key, i in every.items()},
-        "notes": {key: label(said) for key, i in every.items() if (said := stated(ds, i))},
+        "notes": {key: label(note) for key, i in every.items() if (note := stated(ds, i))},
         "quantities": [_choice(view, name) for name in choices(ds, quantity)],
         "points": _packed(1e3 * surface.points, "<f4"), "triangles": _packed(surface.triangles, "<i4"),
         "owner": _packed(surface.owner, "<i4"), "grid": [AROUND, ALONG],
         "around": "" if wall is None else _packed(np.nan_to_num(wall[:, 0], nan=-1e9), "<f4"),
         "along": "" if wall is None else _packed(np.nan_to_num(wall[:, 1]), "<f4"),
-        "colours": [NEUTRAL, OPEN, CROSSED], "cases": kept,
+        "colours": [NEUTRAL, OPEN, CROSSED], "cases": drawn,
     }  # fmt: skip
     return content, left_out
 
 
-def case(view: View, index: Index, motion: str, whole: bool) -> dict[str, Any]:
+def case(view: View, index: Index, motion: str, limit_surface: bool) -> dict[str, Any]:
     """Pads with pressure and friction, deformed wall and limit surface of one case, packed."""
     both = view.pads(index)
     pressed = [pad.pressed() for pad in both]
@@ -104,7 +104,7 @@ def case(view: View, index: Index, motion: str, whole: bool) -> dict[str, Any]:
     }  # fmt: skip
     if (moved := view.displacement(index)) is not None:
         parts |= {"wall": _packed(1e3 * moved[0], "<f4"), "angle": moved[1]}
-    if whole and (points := view.limit(index)) is not None:
+    if limit_surface and (points := view.limit(index)) is not None:
         parts |= {"limit": _packed(points, "<f4"), "rows": points.shape[0]}
     return parts
 
@@ -127,7 +127,7 @@ def _choice(view: View, name: str) -> dict[str, Any]:
             "scale": plots.colours(name)}  # fmt: skip
 
 
-def _traces(whole: bool) -> list[Any]:
+def _traces(limit_surface: bool) -> list[Any]:
     """Empty traces in the script's order: object, rest, pressure, pads, lines, arrows, tips, limit surface."""
     soft = {"lighting": {"ambient": 0.8, "diffuse": 0.3, "specular": 0.02, "roughness": 0.9}, "flatshading": False}
     bar = plots.bars("", len=0.5, y=0.76, x=0.0)
@@ -144,7 +144,7 @@ def _traces(whole: bool) -> list[Any]:
     ]  # fmt: skip
     blue = plots.MODELS["ccm"][1]
     limit = {"showscale": False, "colorscale": [[0, blue], [1, blue]], "opacity": 0.85, "scene": "scene2"}
-    return [*made, go.Surface(**limit)] if whole else made
+    return [*made, go.Surface(**limit)] if limit_surface else made
 
 
 def _room(view: View, index: Index) -> Any:

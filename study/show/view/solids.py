@@ -226,8 +226,8 @@ def _object_file(view: View, index: Index) -> pv.PolyData:
     for k, force in enumerate(forces(view.ds)):
         state = view.state(k)
         values = {name: np.where(state == DONE, view.over_candidates(v, k), np.nan) for name, v in maps.items()}
-        for name, found in {"status": state.astype(float), **values}.items():
-            body.cell_data[f"{name}, {force:g} N"] = np.where(cell == NOBODY, np.nan, found[cell])
+        for name, array in {"status": state.astype(float), **values}.items():
+            body.cell_data[f"{name}, {force:g} N"] = np.where(cell == NOBODY, np.nan, array[cell])
     if view.displacement(index) is not None:
         name = f"displacement, candidate {view.candidate(index)}, {forces(view.ds)[index[-1]]:g} N"
         body.point_data[name] = view.moved(index) - x

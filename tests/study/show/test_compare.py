@@ -77,7 +77,7 @@ def test_rounding_is_no_difference_and_errors_of_one_file_alone_are_unknown(pair
         assert {row["beyond_error"] for row in compare(one, other).rows if row["a"]} == {beyond}
     found = compared(pair[0], make(tmp_path / "c.hdf"))
     assert {row["beyond_error"] for row in found.rows} == {None}
-    assert not any(c.people for c in found.columns if c.name in ("error", "beyond_error"))
+    assert not any(c.display for c in found.columns if c.name in ("error", "beyond_error"))
     assert found.facts["settings"] == []
 
 

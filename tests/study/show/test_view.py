@@ -187,7 +187,7 @@ def every(view):
 
 def test_the_page_holds_every_solved_case_with_pads_friction_and_limit_surface_where_the_file_says(shown):
     view, index = shown
-    told, left_out = payload(view, index, "quality", every(view), "x", whole=True)
+    told, left_out = payload(view, index, "quality", every(view), "x", limit_surface=True)
     assert left_out == 0
     assert set(told["cases"]) == {f"{k} {c}" for k in (0, 1) for c in range(6)} - {"1 5", "1 0"}
     assert told["start"] == {"candidate": 2, "force": 1, "quantity": "quality"}
@@ -200,7 +200,7 @@ def test_the_page_holds_every_solved_case_with_pads_friction_and_limit_surface_w
     assert points == pytest.approx(1e3 * view.surface.points, rel=1e-6)
     assert (owner == view.surface.owner).all()
     assert (unpacked(told["triangles"], "<i4").reshape(-1, 3) == view.surface.triangles).all()
-    one = payload(view, index, "quality", [index], "x", whole=True)[0]["cases"]["1 2"]
+    one = payload(view, index, "quality", [index], "x", limit_surface=True)[0]["cases"]["1 2"]
     both = view.pads(index)
     faces = (unpacked(one["faces"], "<i2") * one["step"]).reshape(-1, 4, 3)
     assert len(faces) == 8  # four loaded faces of each pad
@@ -210,13 +210,13 @@ def test_the_page_holds_every_solved_case_with_pads_friction_and_limit_surface_w
     assert np.diff(arrows, axis=1)[:4, 0] == pytest.approx(np.broadcast_to(6.0 * both[0].frame[0], (4, 3)), abs=1e-4)
     body = unpacked(one["limit"]).reshape(one["rows"], -1, 3)
     assert np.abs(body).max(axis=(0, 1)) == pytest.approx([0.8 * 5, 0.7 * 5, 0.01 * 5e3], rel=1e-6)
-    assert "limit" not in payload(view, index, "quality", [index], "x", whole=False)[0]["cases"]["1 2"]
+    assert "limit" not in payload(view, index, "quality", [index], "x", limit_surface=False)[0]["cases"]["1 2"]
 
 
 def test_the_page_says_what_it_leaves_out_to_stay_small(shown, monkeypatch):
     monkeypatch.setattr("softjaw.study.show.view.object3d.MOST", 0)
     view, index = shown
-    told, left_out = payload(view, index, "quality", [index, *every(view)], "x", whole=False)
+    told, left_out = payload(view, index, "quality", [index, *every(view)], "x", limit_surface=False)
     assert list(told["cases"]) == ["1 2"]
     assert left_out == 10
     assert "10" in object_block(view, index, "quality", "x", [index, *every(view)])["caption"]

@@ -73,7 +73,7 @@ def test_the_size_of_a_shell_is_that_of_its_mesh_and_show_has_indentations_stres
     ds = open(can)
     table, strong, low, high = best(ds), best(ds, force=3.0), ds.force_low.values, ds.force_high.values
     assert table.facts["force"] == 1.0
-    names = [c.name for c in table.columns if c.people]
+    names = [c.name for c in table.columns if c.display]
     assert {"payload", "indentation", "wall_stress", "safe_forces"} <= set(names)
     assert table.rows[0]["safe_forces"] == f"{low[0, 0]:.3g}..{high[0, 0]:.3g}"
     assert (table.rows[0]["force_low"], table.rows[0]["force_high"]) == (low[0, 0], high[0, 0])
