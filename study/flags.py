@@ -112,7 +112,7 @@ def flags_in(value: int) -> list[Flag]:
 
 
 def flag_words(value: int, misalignment: float = math.nan) -> str:
-    """Flags as a cell of a table; ``misalignment`` of the contacts [rad] is told with its flag.
+    """Flags as a cell of a table; ``misalignment`` of the contacts [rad] is shown with its flag.
 
     >>> flag_words(8 + 1024), flag_words(256, 0.21)
     ('hole, slips', 'not antipodal by 12 deg')

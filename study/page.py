@@ -93,12 +93,12 @@ def page(title: str, subtitle: str, sections: Sequence[Section]) -> str:
     made.policies["json.dumps_function"] = lambda figure, **_: figure.to_json(validate=False)
     parts = ((anchor, head, [block for block in blocks if block]) for anchor, head, blocks in sections)
     shown = [part for part in parts if part[2]]
-    own = [files(FOLDER).joinpath(name).read_text(encoding="utf-8") for name in ("page.css", "page.js", "objects.js")]
+    texts = [files(FOLDER).joinpath(name).read_text(encoding="utf-8") for name in ("page.css", "page.js", "objects.js")]
     kinds = {block["kind"] for _, _, blocks in shown for block in blocks}
-    scripts = [get_plotlyjs().replace("</script", "<\\/script"), own[1]] if "plot" in kinds else []
-    scripts += [own[2]] if "objects" in kinds else []
+    scripts = [get_plotlyjs().replace("</script", "<\\/script"), texts[1]] if "plot" in kinds else []
+    scripts += [texts[2]] if "objects" in kinds else []
     return made.get_template("page.html").render(
-        title=title, subtitle=subtitle, sections=shown, style=own[0], scripts=scripts, policy=policy(scripts)
+        title=title, subtitle=subtitle, sections=shown, style=texts[0], scripts=scripts, policy=policy(scripts)
     )
 
 

@@ -176,8 +176,8 @@ def rank_values(ds: xr.Dataset, name: str, k: int) -> np.ndarray:
     """
     if name != LEAST_FORCE:
         return values_of(ds, name)[..., k].ravel()
-    force, held = ds["force_low"].values.ravel(), values_of(ds, "payload")[..., k].ravel()
-    return np.where(np.isfinite(force), 1.0 / force, held - held[np.isfinite(held)].max(initial=0.0) - 1.0)
+    force, payload = ds["force_low"].values.ravel(), values_of(ds, "payload")[..., k].ravel()
+    return np.where(np.isfinite(force), 1.0 / force, payload - payload[np.isfinite(payload)].max(initial=0.0) - 1.0)
 
 
 def ranked(ds: xr.Dataset, k: int, by: str | None = None) -> IntArray:
@@ -230,9 +230,9 @@ def distinct(ds: xr.Dataset, order: Sequence[int], score: np.ndarray, k: int, to
     half = 0.5e-3 * np.array([pad.get(f"pad_{side}_mm", 0.0) for side in ("length", "width", "width")])
     while len(rest) and not 0 < top <= len(places):
         head = rest[0]
-        here = (index[rest, :-2] == index[head, :-2]).all(axis=1)
+        same_point = (index[rest, :-2] == index[head, :-2]).all(axis=1)
         alike = np.all([np.abs(v[rest] - v[head]) <= TIE * abs(v[head]) for v in (score, opening)], axis=0)
-        images = here & (index[rest, -2] == index[head, -2]) & alike & (not ds.attrs["poses"])
+        images = same_point & (index[rest, -2] == index[head, -2]) & alike & (not ds.attrs["poses"])
         near, far = np.zeros(len(rest), bool), np.zeros(len(rest))
         if origin is not None and turn is not None:
             x, R = origin[..., k, :, :].reshape(count, 2, 3), turn[..., k, :, :, :].reshape(count, 2, 3, 3)
@@ -240,7 +240,7 @@ def distinct(ds: xr.Dataset, order: Sequence[int], score: np.ndarray, k: int, to
             for i, pads in product((head, *rest[images]), (x[rest], x[rest][:, ::-1])):
                 rolled = np.abs(R[rest, 0, :, 0] @ R[i, 0, :, 0]) < MIN_ROLL_COSINE
                 apart = np.einsum("nfi,fij->nfj", pads - x[i], R[i])
-                close = (np.abs(apart) < half).all(axis=(1, 2)) & here & ~rolled
+                close = (np.abs(apart) < half).all(axis=(1, 2)) & same_point & ~rolled
                 near, far = near | close, np.where(close, np.linalg.norm(apart, axis=2).max(axis=1), far)
         near[0] = images[0] = False
         near &= ~images
@@ -262,9 +262,9 @@ def at_level(ds: Any, force: float | None = None) -> tuple[Any, int, str]:
     near = np.flatnonzero(np.isclose(forces, force))
     if near.size:
         return ds, int(near[0]), ""
-    found = at_force(ds, force)
-    low, high = found.attrs["between"]
-    return found, 0, f"between solved ones, {low:g} and {high:g} N"
+    interpolated = at_force(ds, force)
+    low, high = interpolated.attrs["between"]
+    return interpolated, 0, f"between solved ones, {low:g} and {high:g} N"
 
 
 def window(ds: Any) -> float | None:
@@ -281,8 +281,8 @@ def window(ds: Any) -> float | None:
     for force in (float(begin * more) for begin, more in product(begins, (1.0, 1.02, 1.05))):
         if force > ds["normal_force"].values[-1]:
             continue
-        found = at_force(ds, force)
-        if ((found["status"].values == DONE) & (judged(found) & LOST == 0)).any():
+        interpolated = at_force(ds, force)
+        if ((interpolated["status"].values == DONE) & (judged(interpolated) & LOST == 0)).any():
             return force
     return None
 
@@ -334,18 +334,18 @@ def judge(
     while True:
         flags = ds["flags"].values.copy()
         flags.reshape(-1, flags.shape[-1])[[c for c, approach in reach.items() if approach == ()]] |= Flag.OUT_OF_REACH
-        found, k, why = at_level(ds.assign(flags=(ds.status.dims, flags, ds["flags"].attrs)), force)
-        score = score_of(found, by or ds.attrs.get("score"))
-        found = found.assign(flags=(ds.status.dims, judged(found), ds["flags"].attrs))
-        ranks = places = ranked(found, k, score).tolist()
+        result, k, why = at_level(ds.assign(flags=(ds.status.dims, flags, ds["flags"].attrs)), force)
+        score = score_of(result, by or ds.attrs.get("score"))
+        result = result.assign(flags=(ds.status.dims, judged(result), ds["flags"].attrs))
+        ranks = places = ranked(result, k, score).tolist()
         if lines and hand:
-            places = [place.best for place in distinct(found, ranks, rank_values(found, score, k), k, top)]
-        marks = found["flags"].values[..., k].ravel()
+            places = [place.best for place in distinct(result, ranks, rank_values(result, score, k), k, top)]
+        marks = result["flags"].values[..., k].ravel()
         new = [c for c in places[: top or None] if c not in reach and not marks[c] & LOST]
         if not new or hand is None:
-            best = index_of(found, ranks[0], k) if ranks else None
-            return found.assign_attrs(about, score=score, level=k, why=why, best=best)
-        reach |= {c: approach_of(found, c, k, hand) for c in new}
+            best = index_of(result, ranks[0], k) if ranks else None
+            return result.assign_attrs(about, score=score, level=k, why=why, best=best)
+        reach |= {c: approach_of(result, c, k, hand) for c in new}
 
 
 def index_of(ds: xr.Dataset, candidate: int, k: int) -> tuple[int, ...]:

@@ -57,9 +57,9 @@ def export(options: Namespace) -> str:
     gripper = gripper_of(options, task_keys(ds, "gripper").get("preset"))
     ranked = grasps(ds, gripper, **choice)
     if options.form != "graspgen":  # which has a field for those that do not hold
-        ranked, left = usable(ranked)
-        if left:
-            print(f"note: {left}", file=sys.stderr)
+        ranked, note = usable(ranked)
+        if note:
+            print(f"note: {note}", file=sys.stderr)
     if not ranked:
         raise StudyError(USAGE, f"{options.file}: no grasp is left to write; 'softjaw show' lists all")
     if options.form in PLANNERS:

@@ -63,7 +63,7 @@ def no_file(text: str) -> str:
     return text
 
 
-def whole(least: int) -> Callable[[str], int]:
+def integer(least: int) -> Callable[[str], int]:
     """A type of whole numbers from ``least`` to a million."""
     return number(f"a whole number from {least} to {MILLION}", least, MILLION, int)
 
@@ -119,9 +119,9 @@ OPTIONS = {
     "set": _option("--set", metavar="KEY=VALUE", action="append", default=[], dest="overrides",
                    help="replace one value of the scene, as in object.radius_mm=20; repeatable"),
     "objects": _option("--objects", metavar="MESHES", help="meshes in place of the scene's: 'm/*.stl', a folder, CSV"),
-    "ranks": _option("-n", type=several(whole(1), "whole numbers, such as 16,64"), default=(1,), dest="ranks",
+    "ranks": _option("-n", type=several(integer(1), "whole numbers, such as 16,64"), default=(1,), dest="ranks",
                      metavar="RANKS", help="ranks (default 1); 16,64,256: replay a finished study on each"),
-    "repeat": _option("--repeat", type=whole(1), default=1, metavar="K", help="replay K times as many candidates"),
+    "repeat": _option("--repeat", type=integer(1), default=1, metavar="K", help="replay K times as many candidates"),
     "result": _option("-o", metavar="FILE", dest="output", help="result file (default: results/<scene>.hdf)"),
     "retry": _option("--retry-failed", action="store_true", help="solve failed cases again"),
     "file": _option("file", metavar="FILE", help="result file (.hdf)"),
@@ -135,8 +135,8 @@ OPTIONS = {
     "force": _option("--force", type=POSITIVE, metavar="N", help=NORMAL_FORCE),
     "level": _option("--force", type=number(), metavar="N", help="force level nearest to N [N]"),
     "by": _option("--by", choices=RANKED_BY, help="what ranks grasps; force: the least that holds (default payload)"),
-    "top": _option("--top", type=whole(0), metavar="K", help=f"how many rows, 0: all (default {LISTED})"),
-    "most": _option("--top", type=whole(0), metavar="K",
+    "top": _option("--top", type=integer(0), metavar="K", help=f"how many rows, 0: all (default {LISTED})"),
+    "most": _option("--top", type=integer(0), metavar="K",
                     help="how many grasps, 0: all (default: 1 for a simulator, which gets a file for each, else all)"),
     "compared": _option("--quantity", default="e_n", metavar="NAME", help="map that is listed by case (default e_n)"),
     "model": _option("--model", choices=MODELS, default="ccm", help="friction model (default ccm)"),

@@ -102,10 +102,10 @@ def objects_text(folder: ObjectFolder, out: Path, ranks: Sequence[int]) -> str:
     objects, planned = folder.objects, []
     some = objects[:: -(-len(objects) // PLANNED)]
     scale, begin = len(objects) / len(some), time.perf_counter()
-    for one in some:
+    for obj in some:
         with suppress(StudyError):
-            scene = with_sampled_grasps(folder.scene(one))
-            planned.append((make_plan(scene, folder.scene_file, folder.overrides_of(one)), memory(scene)))
+            scene = with_sampled_grasps(folder.scene(obj))
+            planned.append((make_plan(scene, folder.scene_file, folder.overrides_of(obj)), memory(scene)))
     preparing = scale * (time.perf_counter() - begin)
     rows = {"objects": f"{len(objects)}, of which {len(some)} were looked at"}
     if planned:

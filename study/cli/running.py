@@ -20,7 +20,7 @@ from softjaw.study.table import terminal_width
 
 def run(options: Namespace) -> int:
     """Solve a scene; the same exit code on every rank."""
-    # A run in a pipe whose reader leaves must go on solving.
+    # A run in a pipe whose reader leaves must continue solving.
     sys.stdout = Unbreakable(sys.stdout)
     if options.folder:
         out = results_folder(options)

@@ -80,7 +80,7 @@ def write_data_set(index: Path, out: Path, form: str, gripper: GripperFrame) -> 
         raise StudyError(USAGE, f"-o: found '{out}', expected another folder than that of the results")
     before = {path: path.stat().st_mtime_ns for path in out.rglob("*") if path.is_file()}
     listed: dict[str, list[str]] = {split: [] for split in SPLITS}
-    good = whole = 0
+    good = total = 0
     with ExitStack() as stack:
         shards: dict[str, tarfile.TarFile] = {}
         for grasps in _objects(index, gripper):
@@ -91,12 +91,12 @@ def write_data_set(index: Path, out: Path, form: str, gripper: GripperFrame) -> 
             _add(FORMS[form](grasps), out, shards.get(grasps.split))
             listed[grasps.split].append(grasps.file)
             good += int(grasps.arrays["object_in_gripper"].sum())
-            whole += len(grasps.arrays["object_in_gripper"])
-    if not whole:
+            total += len(grasps.arrays["object_in_gripper"])
+    if not total:
         raise StudyError(USAGE, f"{index}: found no grasp that is solved; 'softjaw status' says why")
     for split, files in listed.items():
         write_file(out / "splits" / f"{split}.txt", "".join(f"{file}\n" for file in files), folders=True)
-    about = {"format": form, "grasps": whole, "successful": good, "splits": {k: len(v) for k, v in listed.items()},
+    about = {"format": form, "grasps": total, "successful": good, "splits": {k: len(v) for k, v in listed.items()},
              "gripper": {"name": gripper.hand.frame, "approach_axis": "z", "closing_axis": gripper.hand.closing},
              "units": UNITS_OF, "meaning": MEANING, "states": STATES,
              "object_in_gripper": "holds (a known mass with task.safety), does no harm, and this gripper can take it"}
@@ -104,7 +104,7 @@ def write_data_set(index: Path, out: Path, form: str, gripper: GripperFrame) -> 
     counts = " and ".join(f"{len(files)} for {split}" for split, files in listed.items())
     stale = sum(path.stat().st_mtime_ns == stamp for path, stamp in before.items())
     others = f"\nnote: {stale} files in {out} are from before and of other objects or formats" * bool(stale)
-    return f"written: {out}: {counts}; {good} of {whole} grasps are successful{others}"
+    return f"written: {out}: {counts}; {good} of {total} grasps are successful{others}"
 
 
 def _add(files: Files, out: Path, shard: tarfile.TarFile | None) -> None:

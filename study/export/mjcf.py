@@ -67,7 +67,7 @@ def as_mjcf(grasp: RankedGrasp, body: RigidBody) -> str:
     """A MuJoCo model of one grasp of an object, with gravity."""
 
     def foam(contact: PointContact) -> tuple[FloatArray, FloatArray]:
-        """The undeformed pad that a ball stands for, in the contact frame."""
+        """The undeformed pad that a ball represents, in the contact frame."""
         middle = contact.pad_origin - body.pad[2] / 2 * contact.pad_rotation[:, 2] - contact.origin
         return contact.rotation.T @ contact.pad_rotation, contact.rotation.T @ middle
 

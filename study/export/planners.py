@@ -14,7 +14,7 @@ GraspGen (``docs/GRASP_DATASET_FORMAT.md`` and ``docs/GRIPPER_DESCRIPTION.md`` o
 take these keys by name, so what else is known stands beside them.
 
 moveit_msgs/Grasp (``msg/Grasp.msg``, ``msg/GripperTranslation.msg`` of moveit_msgs for ROS 2): a list of messages with
-every field. Quaternions are ``{x, y, z, w}``. An empty ``frame_id`` of the pose stands for the object, whose pose
+every field. Quaternions are ``{x, y, z, w}``. An empty ``frame_id`` of the pose means the object, whose pose
 MoveIt takes from its first shape; approach and retreat are along the gripper's own z axis.
 """
 
@@ -90,7 +90,7 @@ def flow(value: Any) -> str:
     ('2.0e-07', '"2e-7"', '{w: 1.0, xyz: [0.0, 5.0e-324]}')
     """
     if isinstance(value, dict):
-        return f"{{{', '.join(f'{key}: {flow(held)}' for key, held in value.items())}}}"
+        return f"{{{', '.join(f'{key}: {flow(item)}' for key, item in value.items())}}}"
     if isinstance(value, list):
         return f"[{', '.join(map(flow, value))}]"
     if isinstance(value, float) and not math.isfinite(value):

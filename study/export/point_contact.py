@@ -25,7 +25,7 @@ from softjaw.study.export.selection import FloatArray, RankedGrasp
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.templates import template
 
-RADIUS = 0.01  # of the ball that stands for a pad [m]: any will do, because it touches at one point
+RADIUS = 0.01  # of the ball that represents a pad [m]: any will do, because it touches at one point
 PAD_MASS = 0.02  # [kg]: friction does not depend on it
 PLATE = 5e-3  # half the thickness of the object's plates [m], far more than a ball sinks in
 SHARE = 0.9  # of the payload, the most that an object without a mass weighs
@@ -115,10 +115,10 @@ def _contact(finger: dict[str, Any], W: FloatArray, middle: FloatArray) -> Point
 
 def carried(grasp: RankedGrasp, body: RigidBody) -> RigidBody:
     """The object with the mass that it has in a simulator: the scene's, else no more than a share of the payload."""
-    most, held = SHARE * grasp.maps["payload"], body.mass
-    if body.weighed or not most < held:  # also where the payload is unknown
+    most, mass = SHARE * grasp.maps["payload"], body.mass
+    if body.weighed or not most < mass:  # also where the payload is unknown
         return body
-    return replace(body, mass=most, inertia=body.inertia * most / held)
+    return replace(body, mass=most, inertia=body.inertia * most / mass)
 
 
 def numbers(*values: float) -> str:

@@ -165,12 +165,12 @@ def chosen(
     which = [index_of(at, int(c), k) for c in ranked(at, k, by)]
     bounds = {name: value / shown(1.0, units[name]) for name, value in least.items()}
     # NaN is not at least anything, so a grasp without the value is left out.
-    found = [
+    listed = [
         (case, place_text(axes_of(at), at.label.values, index))
         for index, case in zip(which, cases(at, model, which), strict=True)
         if all(case["maps"][name] >= value for name, value in bounds.items())
     ][: top or None]
-    return [case for case, _ in found], [place for _, place in found], score_of(at, by)
+    return [case for case, _ in listed], [place for _, place in listed], score_of(at, by)
 
 
 def grasps(ds: xr.Dataset, gripper: GripperFrame, **choice: Any) -> list[RankedGrasp]:
@@ -208,9 +208,9 @@ def holds(ds: xr.Dataset, case: dict[str, Any], gripper: GripperFrame) -> dict[s
 
 def usable(grasps: Sequence[RankedGrasp]) -> tuple[list[RankedGrasp], str]:
     """Grasps that hold the object, do no harm and fit the gripper, and a sentence on those left out."""
-    kept = [grasp for grasp in grasps if not grasp.reasons]
+    valid = [grasp for grasp in grasps if not grasp.reasons]
     reasons = Counter(reason for grasp in grasps for reason in grasp.reasons)
     listed = ", ".join(f"{reason} ({count})" if len(reasons) > 1 else reason for reason, count in reasons.items())
-    left = f"{len(grasps) - len(kept)} of {len(grasps)} grasps left out at {grasps[0].force:g} N" if reasons else ""
+    omitted = f"{len(grasps) - len(valid)} of {len(grasps)} grasps left out at {grasps[0].force:g} N" if reasons else ""
     weak = "; --force names another" * (Flag.TOO_WEAK.word in reasons)
-    return kept, f"{left}: {listed}{weak}" if reasons else ""
+    return valid, f"{omitted}: {listed}{weak}" if reasons else ""

@@ -289,24 +289,24 @@ def _like(mask: np.ndarray, values: np.ndarray, lead: int = 1) -> np.ndarray:
 
 def _sweep_point(axes: Any, where: Mapping[str, Any]) -> tuple[int, ...]:
     """Index along the swept axes."""
-    index, left = [], dict(where)
+    index, rest = [], dict(where)
     for axis in axes:
         key, factor = axis.long_name, in_si(axis.long_name, 1.0)
         options: list[Any] = [*axis.options] or [v / factor for v in axis.values.tolist()]
         known = f"{key} = {', '.join(map(_text, options))}"
-        if key not in left and axis.name in left:
-            value = left.pop(axis.name)
-            left[key] = value if isinstance(value, str) else value / factor
-        if key not in left and len(options) > 1:
+        if key not in rest and axis.name in rest:
+            value = rest.pop(axis.name)
+            rest[key] = value if isinstance(value, str) else value / factor
+        if key not in rest and len(options) > 1:
             raise ValueError(f"where is missing {key}: give one of {known}")
-        given = left.pop(key, options[0])
+        given = rest.pop(key, options[0])
         matching = [i for i, option in enumerate(options) if _same(option, given)]
         if not matching:
             raise ValueError(f"where has {key} = {_text(given)}: expected one of {known}; there is no interpolation")
         index.append(matching[0])
-    if left:
+    if rest:
         known = ", ".join(axis.long_name for axis in axes) or "nothing: the file has no sweep"
-        raise ValueError(f"where has {', '.join(left)}: expected {known}")
+        raise ValueError(f"where has {', '.join(rest)}: expected {known}")
     return tuple(index)
 
 

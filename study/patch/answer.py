@@ -85,9 +85,9 @@ def contact_of(
     except ValueError as error:
         raise type(error)(str(error).replace("x_hint", "x_axis")) from error
     if contact.frame.flag & FrameFlag.ORIENTATION:
-        found = f"normals in {count(behind(patch.normal, contact.frame.axes[2]))} that oppose their neighbours"
+        fault = f"normals in {count(behind(patch.normal, contact.frame.axes[2]))} that oppose their neighbours"
         remedy = "orient them before export (ParaView: Generate Surface Normals with Consistency)"
-        raise ValueError(f"normal: found {found}, expected all to one side; {remedy}")
+        raise ValueError(f"normal: found {fault}, expected all to one side; {remedy}")
     return contact
 
 
@@ -110,12 +110,12 @@ def check_facing(contacts: Sequence[Contact], names: Sequence[str]) -> None:
     # difference of cosines that decides nothing
     away = [name for c, name, to in pairs if c.normal @ to < -1e-6 * distance]
     if away:
-        found = f"the normals of {away[0]} and {away[-1]} point away from each other"
+        fault = f"the normals of {away[0]} and {away[-1]} point away from each other"
         remedy = "turn both (--flip-normals, flip_normals=True)"
         if len(away) == 1:
-            found = f"the normals of {away[0]} point away from the other contact and those of the other towards it"
+            fault = f"the normals of {away[0]} point away from the other contact and those of the other towards it"
             remedy = f"turn the normals of {away[0]}"
-        raise ValueError(f"{found}, expected the direction in which each finger presses, into the object; {remedy}")
+        raise ValueError(f"{fault}, expected the direction in which each finger presses, into the object; {remedy}")
 
 
 def grasp_lengths(

@@ -47,7 +47,7 @@ def solve_deformed(file: str, unit: str | None, scene: Scene) -> ReadPatch:
         raise StudyError(SOME_FAILED, f"{file}: the pad has no state with this face: {error}") from error
     patch = extract(state.pad, state)
     loaded = patch.pressure > NEGLIGIBLE * patch.pressure.max(initial=0.0)
-    kept = np.flatnonzero(loaded).tolist()
+    faces = np.flatnonzero(loaded).tolist()
     back = np.array([0.0, 0.0, state.closing])  # to where the backing plate stands
     patch = patch.only(loaded)
     corners = None if patch.corners is None else patch.corners - back
@@ -56,7 +56,7 @@ def solve_deformed(file: str, unit: str | None, scene: Scene) -> ReadPatch:
     text = f"{smooth} {1e3 * face.doubt:.2g} mm; closed by {1e3 * state.closing:.3g} mm, {state.force:.3g} N"
     weak = "the face is pressed in by hardly more than its error: contact may be noise"
     notes = (*notes, text, *[weak] * (not judged), *state.notes)
-    return ReadPatch(file, in_file, len(loaded), lambda i: f"face {kept[i]} of the pad", notes)
+    return ReadPatch(file, in_file, len(loaded), lambda i: f"face {faces[i]} of the pad", notes)
 
 
 def _points(path: Path, unit: str | None, scene: Scene) -> tuple[FloatArray, tuple[str, ...]]:
@@ -67,8 +67,8 @@ def _points(path: Path, unit: str | None, scene: Scene) -> tuple[FloatArray, tup
     if len(cells) > MOST_MEASURED:
         raise refused(path, None, "", f"{len(cells)} points", f"at most {MOST_MEASURED}", "thin them")
     if not {"y", "z"} <= given.keys():
-        found = f"the columns {', '.join(headers)}"
-        raise refused(path, 1, "", found, COLUMNS, "name the columns in the first line, with their unit")
+        actual = f"the columns {', '.join(headers)}"
+        raise refused(path, 1, "", actual, COLUMNS, "name the columns in the first line, with their unit")
     metres = si_columns(path, numbers[1:], cells, headers, {name: given[name] for name in needed}, Reading(unit))
     sides = dict(zip("xyz", scene.gripper.pad_size, strict=True))
     problems = []
@@ -77,9 +77,9 @@ def _points(path: Path, unit: str | None, scene: Scene) -> tuple[FloatArray, tup
         # a point beyond 1.5 half sides of the pad belongs to something else, or has another unit
         most = sides[name] if name == "z" else 0.75 * sides[name]
         for i in np.flatnonzero(np.abs(metres[name]) > most).tolist():
-            found, expected = f"{1e3 * metres[name][i]:.4g} mm", f"at most {1e3 * most:.4g} mm from the face's centre"
+            actual, expected = f"{1e3 * metres[name][i]:.4g} mm", f"at most {1e3 * most:.4g} mm from the face's centre"
             remedy = "check the unit, and that the origin is the centre of the undeformed contact face"
-            problems.append(Problem(str(path), numbers[1 + i], headers[given[name]], found, expected, remedy))
+            problems.append(Problem(str(path), numbers[1 + i], headers[given[name]], actual, expected, remedy))
     refuse(problems)
     notes = [
         f"the points cover {100 * np.ptp(metres[name]) / sides[name]:.0f} % of the pad along {name}; straight beyond"

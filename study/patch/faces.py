@@ -60,9 +60,9 @@ def checked(
     """The loaded faces [m, m^2, Pa] as a contact patch; all that is wrong with them at once, by their places."""
     problems: list[Problem] = []
 
-    def wrong(bad: NDArray[np.bool_], key: str, found: Callable[[int], str], expected: str, remedy: str) -> None:
+    def wrong(bad: NDArray[np.bool_], key: str, actual: Callable[[int], str], expected: str, remedy: str) -> None:
         for i in np.flatnonzero(bad).tolist():
-            problems.append(Problem(f"{file}, {place(i)}", None, key, found(i), expected, remedy))
+            problems.append(Problem(f"{file}, {place(i)}", None, key, actual(i), expected, remedy))
 
     given = {"centroid": centroid, "area": area, "normal": normal, "pressure": pressure, "corners": corners}
     _check_range({key: value for key, value in given.items() if value is not None}, wrong)
@@ -83,8 +83,8 @@ def checked(
         centroid[loaded], area[loaded], (-1.0 if flip else 1.0) * normal[loaded], pressure[loaded],
         None if corners is None else corners[loaded],
     )  # fmt: skip
-    kept = np.flatnonzero(loaded).tolist()
-    return ReadPatch(file, patch, len(loaded), lambda i: place(kept[i]), notes)
+    faces = np.flatnonzero(loaded).tolist()
+    return ReadPatch(file, patch, len(loaded), lambda i: place(faces[i]), notes)
 
 
 def _check_range(given: dict[str, FloatArray], wrong: Callable[..., None]) -> None:

@@ -51,10 +51,10 @@ def checked_file(file: str, endings: Sequence[str]) -> Path:
     """The path of a file with one of these endings, which can be read."""
     path = Path(file)
     if path.suffix.lower() not in endings:
-        found = f"the ending {path.suffix}" if path.suffix else "no ending"
+        actual = f"the ending {path.suffix}" if path.suffix else "no ending"
         expected = f"{'one of ' * (len(endings) > 1)}{', '.join(endings)}"
         remedy = "export the patch as CSV, or as VTU or VTP from ParaView" if len(endings) > 1 else "export a table"
-        raise StudyError(USAGE, f"{file}: found {found}, expected {expected}; {remedy}")
+        raise StudyError(USAGE, f"{file}: found {actual}, expected {expected}; {remedy}")
     try:
         if path.exists() and not path.is_file():  # a device or a pipe may have no end
             raise StudyError(OTHER_FILE, f"{file}: not a regular file; name the file of a patch")
@@ -64,9 +64,9 @@ def checked_file(file: str, endings: Sequence[str]) -> Path:
     return path
 
 
-def refused(path: Path, line: int | None, key: str, found: str, expected: str, remedy: str) -> StudyError:
+def refused(path: Path, line: int | None, key: str, actual: str, expected: str, remedy: str) -> StudyError:
     """The error of a single problem of a file."""
-    return StudyError(USAGE, str(Problem(str(path), line, key, found, expected, remedy)))
+    return StudyError(USAGE, str(Problem(str(path), line, key, actual, expected, remedy)))
 
 
 def check_count(path: Path, count: int) -> None:
@@ -111,8 +111,8 @@ def read_table(path: Path, reading: Reading) -> ReadPatch:
     position = {pair[0]: i for i, pair in enumerate(pairs) if pair}
     twice = [(pair[0], headers[i], headers[position[pair[0]]]) for i, pair in enumerate(pairs)
              if pair is not None and position[pair[0]] != i]  # fmt: skip
-    refuse([Problem(str(path), 1, name, f"{one} and {other}", "one column for it", "remove one of the two")
-            for name, one, other in twice] + _missing(path, headers, position, reading))  # fmt: skip
+    refuse([Problem(str(path), 1, name, f"{first} and {other}", "one column for it", "remove one of the two")
+            for name, first, other in twice] + _missing(path, headers, position, reading))  # fmt: skip
     needed = _needed(position)
     values = si_columns(path, numbers[1:], cells, headers, {name: position[name] for name in needed}, reading)
     unused = [h for pair, h in zip(pairs, headers, strict=True) if not pair or pair[0] not in needed]
@@ -142,8 +142,8 @@ def table_rows(path: Path) -> tuple[list[int], list[list[str]]]:
         raise StudyError(OTHER_FILE, f"{path}: not a text file; export the patch as CSV, VTU or VTP") from error
     lines = [(k, line) for k, line in enumerate(text.splitlines(), 1) if line.strip() and not line.startswith("#")]
     if len(lines) < 2:
-        found, expected = "one line" if lines else "an empty file", "a line of column names and one line per face"
-        raise refused(path, None, "", found, expected, f"write {MINIMAL}")
+        actual, expected = "one line" if lines else "an empty file", "a line of column names and one line per face"
+        raise refused(path, None, "", actual, expected, f"write {MINIMAL}")
     check_count(path, len(lines) - 1)
     mark = max(",;\t", key=lines[0][1].count)
     # not by a reader of CSV: no quotation mark may swallow the lines behind it
@@ -172,8 +172,8 @@ def _missing(path: Path, headers: Sequence[str], names: Any, reading: Reading) -
         named = f"called {reading.pressure_name}" if reading.pressure_name else "named pressure"
         remedy = f"no column is {named}: give the column's name with --pressure-name"
     units = ", ".join(unit for kind, factors in FACTORS.items() if kind != "number" for unit in factors)
-    found = f"the columns {shortened(', '.join(headers), 300)}"
-    return [Problem(str(path), 1, "", found, f"also {', '.join(absent)}", f"{remedy} (known units: {units})")]
+    actual = f"the columns {shortened(', '.join(headers), 300)}"
+    return [Problem(str(path), 1, "", actual, f"also {', '.join(absent)}", f"{remedy} (known units: {units})")]
 
 
 def si_columns(
@@ -205,9 +205,9 @@ def _numbers(
     values = {name: np.full(len(rows), np.nan) for name in position}
     for i, (line, cells) in enumerate(zip(numbers, rows, strict=True)):
         if len(cells) != len(headers):
-            found, expected = f"{len(cells)} cells", f"{len(headers)} as in the line of names"
+            actual, expected = f"{len(cells)} cells", f"{len(headers)} as in the line of names"
             remedy = "complete the line; write numbers with a decimal point, not a comma"
-            problems.append(Problem(str(path), line, "", found, expected, remedy))
+            problems.append(Problem(str(path), line, "", actual, expected, remedy))
             continue
         for name, k in position.items():
             cell = cells[k]
@@ -216,8 +216,8 @@ def _numbers(
             elif cell or name not in CORNERS[9:]:
                 comma = "," in cell and "." not in cell
                 remedy = "write a decimal point" if comma else "repair the cell or leave the face out"
-                found = shown(cell) if cell else "an empty cell"
-                problems.append(Problem(str(path), line, headers[k], found, "a finite number", remedy))
+                actual = shown(cell) if cell else "an empty cell"
+                problems.append(Problem(str(path), line, headers[k], actual, "a finite number", remedy))
     refuse(problems)
     return values
 

@@ -102,5 +102,5 @@ def _pressure_array(path: Path, grid: Any, reading: Reading) -> tuple[str, NDArr
                     return name, np.asarray(array), at_points
     wanted = reading.pressure_name or "pressure"
     remedy = f"give its name with --pressure-name {closest(wanted, names) or (names[0] if names else 'NAME')}"
-    found = f"the arrays {', '.join(names)}" if names else "no array of scalars"
-    raise refused(path, None, wanted, found, "the pressure", remedy)
+    actual = f"the arrays {', '.join(names)}" if names else "no array of scalars"
+    raise refused(path, None, wanted, actual, "the pressure", remedy)

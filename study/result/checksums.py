@@ -42,10 +42,10 @@ def of_rows(layout: Layout, values: Any, rows: NDArray[Any]) -> NDArray[np.uint3
 
 def broken_rows(file: StoredFile, layout: Layout, path: str, values: Any, rows: NDArray[Any]) -> NDArray[Any]:
     """Those of the ``rows`` whose values in the dataset at a path do not match their checksum."""
-    found = of_rows(layout, values, rows)
-    wrong = found != stored_sums(file, layout, path)[rows]
+    sums = of_rows(layout, values, rows)
+    wrong = sums != stored_sums(file, layout, path)[rows]
     # a run may have stored a row anew since the sums were read
-    return rows[wrong & (found != stored_sums(file, layout, path, anew=True)[rows])] if wrong.any() else rows[wrong]
+    return rows[wrong & (sums != stored_sums(file, layout, path, anew=True)[rows])] if wrong.any() else rows[wrong]
 
 
 def stored_sums(file: StoredFile, layout: Layout, path: str, *, anew: bool = False) -> NDArray[np.uint32]:

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 XYZ = ("x", "y", "z")
 FIELDS = ("wall/place",)  # too large to be read with the rest
-KINDS = {"pieces": 7, "holes": 7, "rims": 1}  # what a kind of contact is told by, and the largest number that counts
+KINDS = {"pieces": 7, "holes": 7, "rims": 1}  # what identifies a kind of contact, and the largest number that counts
 UNCERTAIN_MAPS = tuple(q.name for q in TABLE if q.group == "maps" and q.error and q.rank)
 
 
@@ -328,7 +328,7 @@ def power_law(low: FloatArray, high: FloatArray, share: float | FloatArray, line
 
 
 def other_levels(count: int, k: int) -> list[int]:
-    """Force levels of ``count`` at which it is told too what a grasp holds that is shown at the ``k``-th."""
+    """Force levels of ``count`` whose payload is reported beside that of the ``k``-th, which is shown."""
     return sorted({0, (count - 1) // 2, count - 1} - {k})
 
 

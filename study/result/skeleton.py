@@ -135,7 +135,7 @@ def _write_skeleton(file: h5py.File, layout: Layout, header: Header, packed: boo
     file.attrs.update(NX_class="NXroot", default=ROOT[1:], program=PROGRAM, layout_version=VERSION)
     study = file.create_group(ROOT)
     study.attrs.update(NX_class="NXentry", default="map", title=header.title)
-    study.attrs.create("checksum", 0, dtype="<u4")  # has its place here, at the front, before its value is known
+    study.attrs.create("checksum", 0, dtype="<u4")  # has its place here, at the start, before its value is known
     for name, attributes in groups(layout).items():
         group = study.create_group(name)
         for key, value in attributes.items():
@@ -285,8 +285,8 @@ def axes_of(layout: Layout, chosen: Sequence[int]) -> list[str]:
 
 def groups(layout: Layout) -> dict[str, dict[str, Any]]:
     """Every group below ``/study`` with its attributes; NXdata groups draw themselves in NeXus viewers."""
-    whole = range(len(layout.shape))
-    plot = {"NX_class": "NXdata", "axes": axes_of(layout, whole), "default_slice": view_slice(layout)}
+    all_axes = range(len(layout.shape))
+    plot = {"NX_class": "NXdata", "axes": axes_of(layout, all_axes), "default_slice": view_slice(layout)}
     others = [(axis, int(i)) for axis, i in zip(layout.axes, view_slice(layout), strict=True) if i != "."]
     at = [f"{axis.name} {shown_text(axis.values[i], axis.units, 5)}" for axis, i in others]
     title = ", ".join(["grasp map, curved contact model", *at])

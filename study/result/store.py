@@ -38,7 +38,7 @@ class Result:
     def __init__(self, path: Path, file: Any, unchecked: bool = False) -> None:
         self.path, self.file = path, file
         root = file.attributes()
-        # Asked first: a file of another program is told so, and not called damaged.
+        # Asked first: a file of another program is reported as such, not as damaged.
         if root.get("program") != PROGRAM:
             raise ValueError("it does not name its program")
         # Before the layout: an older one need not have what is read below.
@@ -210,7 +210,7 @@ def place_text(axes: Sequence[Any], labels: Any, index: Sequence[int]) -> str:
 
 
 def value_text(axis: Any, i: int) -> str:
-    """A value of an axis with its unit, or the text that it stands for."""
+    """A value of an axis with its unit, or the text that it represents."""
     return str(axis.options[i]) if axis.options else shown_text(axis.values[i], axis.units)
 
 

@@ -94,9 +94,9 @@ class Stopper:
         self._set_alarm()
 
     def _set_alarm(self) -> None:
-        left = min(self._leave, self._case_ends) - time.monotonic()
+        seconds = min(self._leave, self._case_ends) - time.monotonic()
         # A timer of 0 would be off, so a moment that has passed already gets a millisecond.
-        signal.setitimer(signal.ITIMER_REAL, 0 if left == math.inf else max(left, 1e-3), RAISE_AGAIN_S)
+        signal.setitimer(signal.ITIMER_REAL, 0 if seconds == math.inf else max(seconds, 1e-3), RAISE_AGAIN_S)
 
     def _alarm(self, *_: Any) -> None:
         now = time.monotonic()

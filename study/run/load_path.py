@@ -129,9 +129,9 @@ class PathSolver:
                 continue
             mine = self._image(result, unit, c) if self._image else result
             # A candidate that is served by symmetry cost nothing: its timings stay empty, so that sums are right.
-            own = {k: v for k, v in mine.values.items() if not (c and k.startswith("work/"))}
-            own = own if c else {"work/seconds_total": seconds, **own}
-            values = record(writer.layout, replace(mine, values=own))
+            entries = {k: v for k, v in mine.values.items() if not (c and k.startswith("work/"))}
+            entries = entries if c else {"work/seconds_total": seconds, **entries}
+            values = record(writer.layout, replace(mine, values=entries))
             with self._state.writing():
                 writer.write(at, values)
 

@@ -176,7 +176,7 @@ def plan_text(plan: Plan, scene: Any, path: Path, ranks: int) -> str:
 def _no_grasps(plan: Plan) -> str:
     """How many candidates are not solved and why, those of every point of a sweep counted; empty where there are none.
 
-    The first of a state stands for the others.
+    The first of a state represents the others.
     """
     texts = []
     for state in NO_GRASP:
@@ -201,8 +201,8 @@ def _time(plan: Plan, scene: Any, path: Path, ranks: int) -> str:
     expected = unit_seconds(plan, seconds) if seconds is not None else []
     if not expected:
         return f"{_estimated_time(plan, scene, ranks)}; more accurate once a few load paths are in {path}"
-    whole = duration(makespan(plan.in_parts(expected), ranks))
-    return f"about {whole} on {ranks} ranks for all cases, judged by those in {path}"
+    total = duration(makespan(plan.in_parts(expected), ranks))
+    return f"about {total} on {ranks} ranks for all cases, judged by those in {path}"
 
 
 def _estimated_time(plan: Plan, scene: Any, ranks: int) -> str:

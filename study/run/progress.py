@@ -102,8 +102,8 @@ class Progress:
         enough = min(max(MIN_CASES, 0.03 * int(self._todo.sum())), MOST_CASES)
         if cases >= enough and since >= MIN_SECONDS and weight > 0:
             # By cost, not by number: the most expensive load paths come first.
-            left = since * float(self._weights[self._todo & ~solved].sum()) / weight
-            text += f", {since / cases:.3g} s/case, {duration(left)} left"
+            remaining = since * float(self._weights[self._todo & ~solved].sum()) / weight
+            text += f", {since / cases:.3g} s/case, {duration(remaining)} left"
         return text
 
     def clear(self) -> None:

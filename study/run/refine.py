@@ -125,7 +125,7 @@ def next_stations(result: Any, scene: Scene, each: int) -> tuple[float, ...]:
     if where.refine is None:
         return ()
     given, added = where.station_values_mm, [s for some in result.layout.added for s in some]
-    left = where.refine // each - len(added)
+    budget = where.refine // each - len(added)
     chance = chances_in(result)
     stations = sorted({*given, *added})
     # share of the largest chance: intervals with at least that are divided in the same round
@@ -133,7 +133,7 @@ def next_stations(result: Any, scene: Scene, each: int) -> tuple[float, ...]:
     limit = max(scene.accuracy.refined_within * (1 + UNDECIDED), widest * (1 - UNDECIDED))
     # Rounded, so that chances that are equal but for rounding come in the order of their stations.
     order = np.lexsort((np.arange(len(chance)), -chance.round(6)))
-    chosen = [i for i in order if chance[i] > limit][: max(left, 0)]
+    chosen = [i for i in order if chance[i] > limit][: max(budget, 0)]
     return tuple(sorted(_middle(stations[i], stations[i + 1]) for i in chosen))
 
 

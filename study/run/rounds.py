@@ -69,11 +69,11 @@ def next_poses(result: Any, values: FloatArray, scene: Scene, each: int) -> tupl
     where, rounds = scene.candidates, result.layout.added
     given = len(values) - sum(map(len, rounds))
     added = np.moveaxis(result.status.reshape(-1, *result.layout.shape[-3:]), 1, 0)[given:]
-    left = ((where.refine or 0) - int(np.sum(~np.isin(added, NO_GRASP)))) // each
+    budget = ((where.refine or 0) - int(np.sum(~np.isin(added, NO_GRASP)))) // each
     share = rounds[-1][0][0] if rounds else 1.0
-    while left > 0 and share >= FINEST_STEP_SHARE:
+    while budget > 0 and share >= FINEST_STEP_SHARE:
         if poses := _neighbours(scene, rounds, values, share):
-            return tuple(poses[: min(left, POSES_PER_ROUND)])
+            return tuple(poses[: min(budget, POSES_PER_ROUND)])
         before = given + sum(len(some) for some in rounds if some[0][0] > share)
         if share < 1.0 and gained(values, before) < scene.accuracy.refined_within * (1 + UNDECIDED):
             return ()

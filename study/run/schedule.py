@@ -47,10 +47,10 @@ class Claims:
         while not self.stopped and (n := self._add_one(NEXT)) < len(self._groups):
             yield from self._of(self._groups[n])
         while not self.stopped and len(self._groups):
-            left = self._sizes[self._groups] - self._shared[TAKEN:][self._groups]
-            if left.max() <= 0:
+            remaining = self._sizes[self._groups] - self._shared[TAKEN:][self._groups]
+            if remaining.max() <= 0:
                 return
-            yield from self._of(self._groups[left.argmax()])
+            yield from self._of(self._groups[remaining.argmax()])
 
     def _of(self, group: int) -> Iterator[int]:
         while not self.stopped and (i := self._add_one(TAKEN + group)) < self._sizes[group]:

@@ -195,9 +195,9 @@ def file_of(path: Path, plan: Plan) -> tuple[bool, list[int]]:
 
 
 def _begins(path: Path, codes: np.ndarray, torn: int, ranks: int, created: bool) -> str:
-    state, left = "new file" if created else "resumed", int(np.sum(codes == MISSING))
+    state, missing = "new file" if created else "resumed", int(np.sum(codes == MISSING))
     again = f", {torn} torn results are solved again" if torn else ""
-    return f"{path}: {state}, {left} of {codes.size} cases to solve on {ranks} rank{'s' * (ranks > 1)}{again}"
+    return f"{path}: {state}, {missing} of {codes.size} cases to solve on {ranks} rank{'s' * (ranks > 1)}{again}"
 
 
 class Session:

@@ -73,12 +73,12 @@ def shares(units: Iterable[Any], codes: np.ndarray, ranks: int) -> list[Share]:
     ``codes`` (rows,) array: state of every case.
     """
     waiting = _in_order([Share(unit, forces) for unit in units if (forces := _missing(unit, codes))])
-    left, divided = sum(share.cost for share in waiting), list[Share]()
+    remaining, divided = sum(share.cost for share in waiting), list[Share]()
     for share in waiting:
-        left -= share.cost
+        remaining -= share.cost
         # what follows keeps the others busy meanwhile
-        whole = not share.unit.apart or left >= ranks * share.cost
-        divided += [share] if whole or ranks == 1 else share.divided(ranks)
+        undivided = not share.unit.apart or remaining >= ranks * share.cost
+        divided += [share] if undivided or ranks == 1 else share.divided(ranks)
     return _in_order(divided)
 
 
@@ -88,13 +88,13 @@ def divided(objects: Sequence[Sequence[Any]], codes: np.ndarray, ranks: int) -> 
     Object after object, the costliest first, each a group; forces are divided where little comes after. Of one object
     every share is a group.
     """
-    whole = [shares(units, codes, 1) for units in objects]
-    costs = [sum(share.cost for share in some) for some in whole]
-    left, todo, sizes = sum(costs), list[Share](), list[int]()
+    undivided = [shares(units, codes, 1) for units in objects]
+    costs = [sum(share.cost for share in some) for some in undivided]
+    remaining, todo, sizes = sum(costs), list[Share](), list[int]()
     for k in by_cost(costs):
-        left -= costs[k]
-        busy = left >= ranks * max((share.cost for share in whole[k]), default=0.0)
-        some = whole[k] if busy else shares(objects[k], codes, ranks)
+        remaining -= costs[k]
+        busy = remaining >= ranks * max((share.cost for share in undivided[k]), default=0.0)
+        some = undivided[k] if busy else shares(objects[k], codes, ranks)
         todo += some
         sizes += [len(some)] if len(objects) > 1 else [1] * len(some)
     return todo, sizes

@@ -397,8 +397,8 @@ def _scene(
         return next((given[k] for k in above if k in given), (str(path), line))
 
     if check_files and (trouble := filled_in(data, path.parent)):
-        key, found, expected = trouble
-        problems.append(Problem(*place(tuple(key.split("."))), key, shown(found), expected, ""))
+        key, actual, expected = trouble
+        problems.append(Problem(*place(tuple(key.split("."))), key, shown(actual), expected, ""))
     # Before the checks, which want to see what depends on the file's name and on the sweep.
     _fill_in(data, path)
     try:
@@ -439,8 +439,8 @@ def put_overrides(data: dict[str, Any], overrides: Sequence[str], given: dict[Ke
     problems = []
     for text in overrides:
         place, (named, _, written) = f"--set {shortened(text)}", text.partition("=")
-        whole = written.strip().startswith("{")  # such a table takes the place of another one, keys of one are put in
-        if whole and named.strip() == "sweep":
+        replaces = written.strip().startswith("{")  # such a table takes the place of another, keys of one are put in
+        if replaces and named.strip() == "sweep":
             data["sweep"] = {}
         if (tables := _override(text)) is None:
             problems.append(Problem(place, None, "", shown(text), OVERRIDE, ""))
@@ -450,7 +450,7 @@ def put_overrides(data: dict[str, Any], overrides: Sequence[str], given: dict[Ke
                 continue
             for key, value in (flat(table) if section == "sweep" else table).items():
                 old = data[section].get(key)
-                both = isinstance(old, dict) and isinstance(value, Mapping) and not whole
+                both = isinstance(old, dict) and isinstance(value, Mapping) and not replaces
                 data[section][key] = {**old, **value} if both else value
                 given[(section, key)] = place, None
                 given.setdefault((section,), (place, None)) if len(data[section]) == 1 else None
@@ -462,7 +462,7 @@ def put_overrides(data: dict[str, Any], overrides: Sequence[str], given: dict[Ke
 
 
 def _override(text: str) -> dict[str, Any] | None:
-    """The tables that an override stands for; None where it is no TOML."""
+    """The tables that an override represents; None where it is no TOML."""
     key, equals, value = (part.strip() for part in text.partition("="))
     # Shells take the quotes of a text away.
     for written in (value, json.dumps(value)) if value[:1] not in tuple("[{\"'") else (value,):

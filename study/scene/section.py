@@ -44,7 +44,7 @@ class SceneError(StudyError, ValueError):
 
 
 def refusal(expected: str) -> PydanticCustomError:
-    """The error that a validator raises; ``expected`` goes on a sentence that names the value."""
+    """The error that a validator raises; ``expected`` continues a sentence that names the value."""
     return PydanticCustomError("scene", "{expected}", {"expected": expected})
 
 
@@ -139,11 +139,11 @@ def problems_of(error: ValidationError, data: Any, tables: Tables, place: Callab
         expected.setdefault(path, []).append(_expectation(entry, path))  # more than one where a key has alternatives
     problems = []
     for path, (kind, value) in entries.items():
-        found = "an unknown key" if kind == "extra_forbidden" else "nothing" if value is None else shown(value)
+        actual = "an unknown key" if kind == "extra_forbidden" else "nothing" if value is None else shown(value)
         texts = " or ".join(dict.fromkeys(expected[path]))
         unknown = kind == "extra_forbidden"
         remedy = _right_key(path, tables) if unknown else _right_value(path, kind, value, texts, tables)
-        problems.append(Problem(*place(path), key_text(path), found, texts, remedy))
+        problems.append(Problem(*place(path), key_text(path), actual, texts, remedy))
     return problems
 
 

@@ -105,7 +105,7 @@ class Gripper(SceneSection):
         """Constants that the material cannot have, slivers, and meshes beyond any memory."""
         yield from self._hyperfoam_rules() if self.material == "hyperfoam" else self._material_rules()
         pad = (self.pad_length_mm, self.pad_width_mm)
-        if self.finger_size_mm and any(own < least for own, least in zip(self.finger_size_mm, pad, strict=True)):
+        if self.finger_size_mm and any(side < least for side, least in zip(self.finger_size_mm, pad, strict=True)):
             yield wrong(self.finger_size_mm, f"at least the pad's, {shown(list(pad))}, length first", "finger_size_mm")
         n = self.elements
         for i in (0, 1):
@@ -165,7 +165,7 @@ class Gripper(SceneSection):
         size = self.pad_length_mm, self.pad_width_mm
         need = [max(side / n[axis] if n[axis] % 2 else 0.0 for n in counts) for axis, side in enumerate(size)]
         pairs = zip(self.sheet_support_mm, need, strict=True)
-        if any(held < least and not math.isclose(held, least) for held, least in pairs):
+        if any(length < least and not math.isclose(length, least) for length, least in pairs):
             meshes = " and ".join(f"{list(n)}" for n in counts)
             expected = f"at least {need[0]:g} x {need[1]:g} mm, which holds nodes of meshes of {meshes} elements"
             yield wrong(self.sheet_support_mm, f"{expected}; even numbers need less", "sheet_support_mm")

@@ -20,8 +20,8 @@ MOST_NAMED, WIDTH = 5, 30
 def read_text(path: Path) -> str:
     """The text of a scene file; a `SceneError` says why it cannot be read."""
 
-    def refuse(found: str, expected: str, remedy: str) -> SceneError:
-        return SceneError([Problem(str(path), None, "", found, expected, remedy)])
+    def refuse(actual: str, expected: str, remedy: str) -> SceneError:
+        return SceneError([Problem(str(path), None, "", actual, expected, remedy)])
 
     toml = "a scene, which is a text file in TOML"
     try:
@@ -44,8 +44,8 @@ def read_text(path: Path) -> str:
         return content.decode("utf-8-sig").replace("\r\n", "\n")
     except UnicodeDecodeError as error:
         line = content[: error.start].count(b"\n") + 1
-        found = f"a byte that is not UTF-8 in line {line}"
-        raise refuse(found, toml + " coded in UTF-8", "save it as UTF-8 (or without special characters)") from None
+        actual = f"a byte that is not UTF-8 in line {line}"
+        raise refuse(actual, toml + " coded in UTF-8", "save it as UTF-8 (or without special characters)") from None
 
 
 def parse_toml(text: str, file: str) -> dict[str, Any]:
@@ -61,8 +61,8 @@ def parse_toml(text: str, file: str) -> dict[str, Any]:
         number = place.removeprefix("line ").partition(",")[0]  # tomllib gives it as text only
         # A place behind the text, as of a bracket that is never closed, becomes the last line.
         line = min(int(number), len(lines)) if number.isdigit() else len(lines)
-        found = f"{shown(lines[line - 1].strip())} ({reason[:1].lower()}{reason[1:]})"
-        raise SceneError([Problem(file, line, "", found, "TOML", REMEDY)]) from None
+        actual = f"{shown(lines[line - 1].strip())} ({reason[:1].lower()}{reason[1:]})"
+        raise SceneError([Problem(file, line, "", actual, "TOML", REMEDY)]) from None
 
 
 def toml_text(data: Mapping[str, Any]) -> str:
@@ -114,7 +114,7 @@ def differences(theirs: str, ours: str) -> str:
         return "its scene cannot be read"
     if not changed:
         return "the same keys, but another mesh file or another version"
-    named = [f"{key} is {value_text(one)} there and {value_text(other)} here" for key, one, other in changed]
+    named = [f"{key} is {value_text(first)} there and {value_text(second)} here" for key, first, second in changed]
     return "; ".join(first_of(named, MOST_NAMED, " keys"))
 
 

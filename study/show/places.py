@@ -25,7 +25,7 @@ ALONG_AXIS = math.cos(math.radians(15.0))  # between a direction and an axis tha
 
 
 def folded_text(ds: xr.Dataset, place: Place) -> str:
-    """What a line of a list stands for besides its grasp."""
+    """What a line of a list represents besides its grasp."""
     parts = []
     if place.images:
         angles = [axis_text(ds, "angle", unravelled(i, ds.status.shape[:-1])[-1]) for i in place.images]
