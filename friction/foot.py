@@ -162,9 +162,9 @@ def _on_line(corners, start, across):
             continue
         u, v = _reference(a, b, c, d)
         w = (1 - u) * (1 - v) / 4, (1 + u) * (1 - v) / 4, (1 + u) * (1 + v) / 4, (1 - u) * (1 + v) / 4
-        left = abs(w[0] * a + w[1] * b + w[2] * c + w[3] * d)
+        distance = abs(w[0] * a + w[1] * b + w[2] * c + w[3] * d)
         # Newton may end at the rim of the region it is kept in: only points that are on the line count
-        if max(abs(u), abs(v)) <= 1 + NEGLIGIBLE and left <= NEGLIGIBLE * size:
+        if max(abs(u), abs(v)) <= 1 + NEGLIGIBLE and distance <= NEGLIGIBLE * size:
             met[count], weights[count] = i, w
             count += 1
     return met[:count], weights[:count]

@@ -169,8 +169,8 @@ def nearest_solution(N: FloatArray, b: FloatArray, start: FloatArray) -> tuple[F
     # unit diagonal: the share of an eigenvalue then says what the data determine, not how long an axis is
     size = 1 / np.sqrt(np.maximum(N.diagonal(), 1e-12 * N.diagonal().max()))
     values, V = np.linalg.eigh(N * np.outer(size, size))
-    held = values > ZERO_SHARE * values[-1]
-    V = size[:, None] * V[:, held]
+    determined = values > ZERO_SHARE * values[-1]
+    V = size[:, None] * V[:, determined]
     # only the difference from the start is solved for, so what data leave open stays there
-    x = start + V @ ((V.T @ (b - N @ start)) / values[held])
+    x = start + V @ ((V.T @ (b - N @ start)) / values[determined])
     return x, FitFlag.CLEAN if values[0] > WEAK * values[-1] else FitFlag.UNDERDETERMINED

@@ -143,7 +143,7 @@ def sphere_rule(dimension: int, n: int) -> tuple[FloatArray, FloatArray]:
     any power of ``n``.
     """
     if dimension == 1:
-        # even functions: one end of the segment stands for both
+        # even functions: one end of the segment represents both
         return np.ones((1, 1)), np.array([2.0])
     if dimension == 2:
         phi = np.pi * (np.arange(n) + 0.5) / n
@@ -220,7 +220,7 @@ def quartic_shadow(coefficients: FloatArray, reach: FloatArray) -> float:
     # equal steps converge exponentially for a smooth outline, so two that agree are both right
     while change > 1e-13 * area and n < 4096:
         n, last = 2 * n, area
-        # half a turn stands for the whole, which cancels the half of 1/2 int r^2; r^2 is 1 / sqrt(P)
+        # half a turn represents the whole, which cancels the half of 1/2 int r^2; r^2 is 1 / sqrt(P)
         area = np.pi / n * float((1.0 / np.sqrt(_floors(c, _plane_monomials(n)))).sum())
         change = abs(area - last)
     if not change <= 1e-9 * area:

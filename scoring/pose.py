@@ -81,7 +81,7 @@ def pose_volume(
         fine = _volumes(fibres, delta, level, with_l1)
         # Errors go with the square of the size of the pieces.
         better = fine + (fine - coarse) / 3
-        # nan stands for an L1 volume that was not asked for
+        # nan represents an L1 volume that was not asked for
         off = np.maximum(np.abs(better - before), share * np.abs(better - fine))
         error = float(np.nanmax(off / np.maximum(np.abs(better), 1e-300)))
         if error <= relative_error:
