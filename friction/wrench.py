@@ -29,7 +29,7 @@ from numba import njit
 from numpy.typing import ArrayLike
 
 from softjaw.friction.motion import SLIDE_X, SLIDE_Y, TURN_Z
-from softjaw.friction.patch import CANCEL, ContactPatch, FloatArray
+from softjaw.friction.patch import CANCEL, ContactPatch, FloatArray, cross
 
 MODELS = ("ccm", "pcm", "pcm_projected")
 SEARCH_WIDTH = 1e-3  # at which the search for the direction of the largest force ends [rad]
@@ -127,6 +127,20 @@ def friction_support(patch: ContactPatch, twist: ArrayLike, mu: float, model: st
     """
     sums, scale = _sums(patch, twist, model)
     return checked_mu(mu) * scale * sums[:, 6]
+
+
+def friction_discs(patch: ContactPatch, mu: float, model: str = "ccm") -> FloatArray:
+    """Discs ``(n, 6)`` whose sum is the limit surface in ``(f_x, f_y, tau_z)`` [N, N, N m], two half-axes of each.
+
+    A face resists with any force of a disc in its own plane. Parameters as in `friction_wrench`.
+    """
+    arm, normal, load = model_faces(patch, model)
+    # the axis that is farthest from the normal gives directions in the plane without cancellation
+    other = np.eye(3)[np.abs(normal).argmin(axis=0)]
+    first = cross(normal.T, other)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    axes = [np.column_stack([e[:, :2], arm[0] * e[:, 1] - arm[1] * e[:, 0]]) for e in (first, cross(normal.T, first))]
+    return checked_mu(mu) * load[:, None] * np.hstack(axes)
 
 
 def friction_limits(patch: ContactPatch, mu: float, model: str = "ccm") -> FrictionLimits:

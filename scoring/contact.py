@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import ConvexHull, QhullError
 
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 ROUNDING_SHARE = 1e-12  # of the largest number of its kind: an extent, a load or an arm below it is the rounding of 0
 
 
@@ -72,10 +73,25 @@ class PolytopeBody:
         return PolytopeBody(self.vertices * np.asarray(factors, float))
 
 
+@dataclass(frozen=True, eq=False)
+class DiscBody:
+    """Sum of discs, such as the limit surface of faces with friction.
+
+    ``discs (n, 6)``: two half-axes of each, in ``(f_x, f_y, tau_z)``.
+    """
+
+    discs: FloatArray
+
+
 def vertices_of(body: Body) -> FloatArray | None:
     """Vertices ``(k, 3)`` of a polytope, None of any other body."""
     vertices = getattr(body, "vertices", None)
     return None if vertices is None else np.asarray(vertices, float)
+
+
+def discs_of(body: Body) -> FloatArray | None:
+    """Discs ``(n, 6)`` of a body that is their sum, two half-axes ``(3,)`` of each; None of any other body."""
+    return getattr(body, "discs", None)
 
 
 def ball_map(body: Body) -> FloatArray | None:

@@ -19,9 +19,10 @@ hold even itself. The forces without a torque about the centre of mass in W are 
 is held in every direction is the radius of the largest ball round 0 in it.
 
 One direction of ``K`` is a linear programme with four rows, whose columns, points of the limit surfaces, are looked for
-where its multipliers ask (column generation). The points that several directions give span a polytope inside ``K``; the
-normals of its nearest facets are the next directions. Its nearest facet bounds the radius from below, the support of
-``K`` from above, for any direction, so that the answer knows its error.
+where its multipliers ask (column generation): among those that are known, and where these have none, among all. The
+points that several directions give span a polytope inside ``K``; the normals of its nearest facets are the next
+directions. Its nearest facet bounds the radius from below, the support of ``K`` from above, for any direction, so that
+the answer knows its error.
 """
 
 from __future__ import annotations
@@ -34,12 +35,14 @@ from numba import njit
 from numpy.typing import ArrayLike
 from scipy.spatial import ConvexHull
 
-from softjaw.scoring.contact import FloatArray, SoftContact, vertices_of
+from softjaw.scoring.contact import Body, FloatArray, IntArray, SoftContact, discs_of, vertices_of
 
 KINDS = ("shared", "up_to", "fixed")
-BOUND_GAP = 5e-4  # of the bounds, relative, at which the search ends
+BOUND_GAP = 1e-3  # of the bounds, relative, at which the search ends
 ROUNDING_FORCE = 1e-7  # of the forces of the grasp, below which a force is rounding
 MOST_PRESSED = 2.0  # times the pressure of the grasp that a load may make; beyond it the contact would be another one
+MOST_COLUMNS = 2000  # that are kept of a limit surface
+NEAR = 4e-4  # relative, to which a programme over all points of sums of discs is solved
 MOST_POINTS = 400  # of the section, after which the search ends with the bounds that it has
 TORQUE_OFFSET = 1e-11  # torque at which K is taken, so that no two bases of the programme are alike
 
@@ -72,7 +75,7 @@ def payload(
     Parameters
     ----------
     contacts : two SoftContact
-        With polytopes as limit surfaces, at the solved forces [N, N, N m].
+        With sums of discs or polytopes as limit surfaces, at the solved forces [N, N, N m].
     pressure : (2, 6) array
         Wrench of each finger's pressure on the object, torques about the origin [N, N m].
     centre_of_mass : (3,) array
@@ -91,22 +94,28 @@ def payload(
     size = float(np.linalg.norm(P[:, :3], axis=1).sum())
     C[:, :, 0] /= size
     pressed = (P[:, :3] if drive is None else np.asarray(drive, float)) / size
-    vertices = [np.asarray(vertices_of(c.body), float) / size for c in contacts]
-    V1, V2 = (_driven(*each) for each in zip(vertices, C, pressed, strict=True))
-    grasp = C, V1, V2, KINDS.index(kind)
+    drives = [p @ c[:3] / (p @ p) for p, c in zip(pressed, C, strict=True)]
+    first, other = (_surface(contact.body, size, d) for contact, d in zip(contacts, drives, strict=True))
+    grasp = C, first, other, KINDS.index(kind)
     answer = _along(grasp, np.asarray(direction, float)) if direction is not None else _worst(grasp)
     return Payload(size * answer.force, size * answer.upper, answer.direction, answer.borne)
 
 
-def _driven(vertices: FloatArray, C: FloatArray, pressed: FloatArray) -> FloatArray:
-    """Columns ``(4, k)`` of which ``C (6, 4)`` makes the points of ``A``, from ``vertices (k, 3)`` of ``B``."""
-    V = np.vstack([np.ones(len(vertices)), vertices.T])
-    along = pressed @ C[:3] @ V / (pressed @ pressed)
-    return np.ascontiguousarray(V / np.maximum(along, 1.0 / MOST_PRESSED))
+def _surface(body: Body, size: float, drive: FloatArray) -> _Surface:
+    """Limit surface of a contact in units of a force; ``drive (4,)`` weighs what its points add to the drive."""
+    D, V = discs_of(body), vertices_of(body)
+    D = np.zeros((0, 6)) if D is None else np.ascontiguousarray(D / size)
+    columns, count = np.empty((4, MOST_COLUMNS if V is None else len(V))), np.zeros(1, np.int64)
+    if V is not None:
+        columns[0], columns[1:], count[0] = 1.0, V.T / size, len(V)
+        columns /= np.maximum(drive @ columns, 1.0 / MOST_PRESSED)
+    return columns, count, D, drive
 
 
-# both contacts, forces in units of that of the grasp: C (2, 6, 4), columns (4, k) of each, and the kind
-_Grasp = tuple[FloatArray, FloatArray, FloatArray, int]
+# columns (4, k) of which C makes points of A, how many are known, discs (n, 6), and what points add to the drive (4,)
+_Surface = tuple[FloatArray, IntArray, FloatArray, FloatArray]
+# both contacts, forces in units of that of the grasp: C (2, 6, 4), the surface of each, and the kind
+_Grasp = tuple[FloatArray, _Surface, _Surface, int]
 
 
 def _along(grasp: _Grasp, d: FloatArray) -> Payload:
@@ -151,7 +160,7 @@ def _worst(grasp: _Grasp) -> Payload:
 def _begin(grasp: _Grasp, rows: FloatArray) -> FloatArray:
     """Basis ``(m + 1, 8)`` of `_programme` that fulfils ``rows (m, 6)`` with the least that no point of W takes."""
     m, point = len(rows) + 1, np.empty(6)
-    _farthest(*grasp, np.ones(6), point)
+    _farthest(*grasp, np.ones(6), True, point)
     basis = np.zeros((m, 8))
     # every row but the last, which counts the points, begins with a column of its own
     basis[:, 7] = np.arange(1, m + 1)
@@ -188,7 +197,7 @@ def _joined(points, n, corners, planes):
 
 
 @njit(cache=True)
-def _looked(C, V1, V2, kind, rows, points, bases, directions, basis, n, empty, upper, u):
+def _looked(C, A1, A2, kind, rows, points, bases, directions, basis, n, empty, upper, u):
     """Fill in ``points`` and ``bases`` from the ``n``-th on, which are farthest in directions, without a part in rows.
 
     Each programme begins where the one before ended, the first at ``basis``. Returns the least support and its
@@ -196,7 +205,7 @@ def _looked(C, V1, V2, kind, rows, points, bases, directions, basis, n, empty, u
     """
     for k in range(len(directions)):
         bases[n] = basis
-        support, point, missing = _programme(C, V1, V2, kind, directions[k], rows, bases[n])
+        support, point, missing = _programme(C, A1, A2, kind, directions[k], rows, bases[n])
         points[n], basis, n = point[:3], bases[n], n + 1
         support = support if missing < ROUNDING_FORCE else empty
         if support < upper:
@@ -207,7 +216,7 @@ def _looked(C, V1, V2, kind, rows, points, bases, directions, basis, n, empty, u
 
 
 @njit(cache=True)
-def _refined(C, V1, V2, kind, rows, points, bases, n, corners, planes, upper, u):
+def _refined(C, A1, A2, kind, rows, points, bases, n, corners, planes, upper, u):
     """Distance of the hull's nearest facet, after a look along all that are nearer than the least support, and that.
 
     ``n`` points are known; ``corners, planes`` are the facets of their hull.
@@ -222,7 +231,7 @@ def _refined(C, V1, V2, kind, rows, points, bases, n, corners, planes, upper, u)
             return -plane[3], upper, u
         # a programme that did not fill its rows says nothing of the support
         before, basis, along = plane, bases[corners[nearest, 0]], plane[:3].copy().reshape(1, 3)
-        upper, u = _looked(C, V1, V2, kind, rows, points, bases, along, basis, n, np.inf, upper, u)
+        upper, u = _looked(C, A1, A2, kind, rows, points, bases, along, basis, n, np.inf, upper, u)
         corners, planes = _joined(points, n, corners, planes)
         n += 1
 
@@ -237,23 +246,44 @@ def _times(A, x, out):
 
 
 @njit(cache=True)
-def _touching(C, V, q, t, out):
-    """Support of ``A`` along ``q (6,)``; its point goes into ``out (6,)``, and ``t (4,)`` is room."""
+def _touching(C, A, q, exact, t, out):
+    """Support of ``A`` along ``q (6,)`` over known points or all; its point goes into ``out``, and ``t`` is room."""
+    V, count, D, drive = A
     _times(C.T, q, t)
-    best, at = -np.inf, 0
-    for k in range(V.shape[1]):
+    best, at = -np.inf, -1
+    for k in range(count[0]):
         h = V[0, k] * t[0] + V[1, k] * t[1] + V[2, k] * t[2] + V[3, k] * t[3]
         if h > best:
             best, at = h, k
+    if len(D) and (exact or at < 0):
+        point, h = np.empty(4), max(best, 0.0)
+        # the farthest point of a quotient, by Dinkelbach's method, which converges quadratically
+        for _ in range(6):
+            x, y, z = t[1] - h * drive[1], t[2] - h * drive[2], t[3] - h * drive[3]
+            point[:] = 1.0, 0.0, 0.0, 0.0
+            for i in range(len(D)):
+                a, b = D[i, 0] * x + D[i, 1] * y + D[i, 2] * z, D[i, 3] * x + D[i, 4] * y + D[i, 5] * z
+                size = np.sqrt(a * a + b * b)
+                if size > 0.0:
+                    a, b = a / size, b / size
+                    for c in range(3):
+                        point[1 + c] += a * D[i, c] + b * D[i, 3 + c]
+            point /= max(drive @ point, 1.0 / MOST_PRESSED)
+            before, h = h, point @ t
+            if h - before <= NEAR * abs(h):
+                break
+        if h > best:
+            best, at = h, min(count[0], V.shape[1] - 1)
+            V[:, at], count[0] = point, at + 1
     _times(C, V[:, at], out)
     return best
 
 
 @njit(cache=True)
-def _farthest(C, V1, V2, kind, q, point):
-    """How far W goes along ``q``; the farthest ``point (6,)`` is filled in."""
+def _farthest(C, A1, A2, kind, q, exact, point):
+    """How far W goes along ``q``, over the points that are known or all; the farthest ``point (6,)`` is filled in."""
     w1, w2, t = np.empty(6), np.empty(6), np.empty(4)
-    h1, h2 = _touching(C[0], V1, q, t, w1), _touching(C[1], V2, q, t, w2)
+    h1, h2 = _touching(C[0], A1, q, exact, t, w1), _touching(C[1], A2, q, exact, t, w2)
     a, b = 1.0, 1.0
     if kind == 0:
         a, b = (2.0, 0.0) if h1 >= h2 else (0.0, 2.0)
@@ -264,7 +294,7 @@ def _farthest(C, V1, V2, kind, q, point):
 
 
 @njit(cache=True)
-def _programme(C, V1, V2, kind, along, rows, basis):
+def _programme(C, A1, A2, kind, along, rows, basis):
     """Largest ``along (3,)`` times the force of points x of W with ``rows . x = off``, by the revised simplex method.
 
     ``basis (m, 8)`` is where it begins and ends: points ``(6,)``, then 1 and 0; or 0, a sign and the number of the row,
@@ -282,17 +312,20 @@ def _programme(C, V1, V2, kind, along, rows, basis):
             B[m - 1, k], cost[k] = 1.0, along @ basis[k, :3]
     inverse = np.linalg.inv(B)
     x, y, d, q, point = np.empty(m), np.empty(m), np.empty(m), np.empty(6), np.empty(6)
-    upper, column = np.inf, np.ones(m)
+    upper, column, near = np.inf, np.ones(m), NEAR if len(A1[2]) + len(A2[2]) else 1e-9
     _times(inverse, right, x)
     for _ in range(400):
         _times(inverse.T, cost, y)
         _times(rows.T, y, q)
         q[:] = -q
         q[:3] += along
-        bound = _farthest(C, V1, V2, kind, q, point) + y[: m - 1] @ right[: m - 1]
-        upper = min(upper, bound)
-        if bound - cost @ x <= 1e-9 * (1.0 + abs(bound)):
-            break
+        offset, value = y[: m - 1] @ right[: m - 1], cost @ x
+        bound = _farthest(C, A1, A2, kind, q, False, point) + offset
+        if bound - value <= near * abs(bound) + 1e-9:
+            bound = _farthest(C, A1, A2, kind, q, True, point) + offset
+            upper = min(upper, bound)
+            if bound - value <= near * abs(bound) + 1e-9:
+                break
         _times(rows, point, column)
         _times(inverse, column, d)
         out, most = -1, np.inf

@@ -177,7 +177,7 @@ ROWS = (
     Quantity("payload", M, "kg", "mass that is held",
              "Largest mass whose weight at the centre of mass both contacts hold with the normal force of this case, in"
              " whichever direction it pulls, or in that of [task]. The squeeze itself is borne first; 0 where friction"
-             " cannot. The limit surfaces are hulls of the sampled wrenches, on the safe side.", rank=1,
+             " cannot. The limit surfaces are those of friction itself; nothing is fitted.", rank=1,
              error="relative"),
     Quantity("safety_factor", M, "", "mass that is held over mass of the object", "payload over object.mass_g.",
              symbol="safety", needs=("mass",), rank=13, error="relative"),

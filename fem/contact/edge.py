@@ -7,15 +7,18 @@ so the moments of a stretch of loaded faces tell its length ``2 a``. With ``t`` 
     p = p_0 sqrt(1 - t^2) (1 + c t^2)
     <y^2> = a^2 (2 + c) / (8 + 2 c),   <y^4> / <y^2>^2 = (8 + 5 c) (4 + c) / (4 (2 + c)^2)
 
-``c = 0`` is Hertz's pressure. At an edge of the object pressure rises before it falls, and the fourth moment is small.
-A mesh that does not resolve how the edge is rounded meets it as a sharp one, with::
+``c = 0`` is Hertz's pressure. Under a pad much thinner than the contact is wide pressure goes as the depth, as
+``1 - t^2``, whose ratio is 15 / 7, and foam that gets stiffer makes it steeper. At an edge of the object pressure rises
+before it falls, and the fourth moment is small. A mesh that does not resolve how the edge is rounded meets it as a
+sharp one, with::
 
     p = p_0 (1 - t^2)^q
     <y^2> = a^2 / (2 q + 3),   <y^4> / <y^2>^2 = 3 (2 q + 3) / (2 q + 5)
 
 ``q = 0`` is an even pressure, ``q = -1/2`` that of a punch. The fourth moment is noisy on few faces, so it counts as
-far as the mesh resolves it. A stretch that such edges would lead to a rim of the pad or beyond, where pressure need not
-vanish, ends there; to its free edge at the distance ``b`` it has ``p = sqrt(1 - s / b) (c_0 + c_1 s)``.
+far as the mesh resolves it, in place of what is expected. A stretch that such edges would lead to a rim of the pad or
+beyond, where pressure need not vanish, ends there; to its free edge at the distance ``b`` it has
+``p = sqrt(1 - s / b) (c_0 + c_1 s)``.
 """
 
 from __future__ import annotations
@@ -28,11 +31,12 @@ from softjaw.friction.patch import NEGLIGIBLE, ContactPatch, FloatArray
 # Node spacing over half length at which half of the fourth moment counts: of Hertz's cylinder, and of a box's face; and
 # at which an edge of the object is half a sharp one, half a round one.
 RESOLVED, EDGE_RESOLVED, ROUND = 0.24, 0.5, 0.1
+THIN = 2.0  # half width of the contact over the pad's thickness at which pressure is half Hertz's, half the depth's
 FLATTEST, STEEPEST = 1.5, 2.4  # of <y^4> / <y^2>^2: a punch's, and more than any contact has that ends smoothly
 EVEN, POINTED = 7.0 / 6.0, 14.0 / 9.0  # bounds of <s^2> / <s>^2 from a rim on: c_0 = 0, and c_1 = -c_0 / b
 
 
-def contact_area(patch: ContactPatch, faces: tuple[int, int]) -> float:
+def contact_area(patch: ContactPatch, faces: tuple[int, int], thickness: float) -> float:
     """Area of the contact with its edge reconstructed inside the faces [m^2].
 
     Parameters
@@ -41,6 +45,8 @@ def contact_area(patch: ContactPatch, faces: tuple[int, int]) -> float:
         Of a whole pad as `fem.contact.extract.extract` makes it, with corners.
     faces : (int, int)
         Its faces along length and width.
+    thickness : float
+        Of the pad [m].
 
     Notes
     -----
@@ -52,8 +58,8 @@ def contact_area(patch: ContactPatch, faces: tuple[int, int]) -> float:
     corners = patch.corners.reshape(*faces, 4, 3)
     # corners run round each face from the lowest x and y
     low_x, high_x, low_y, high_y = (corners[..., pair, :].mean(axis=-2) for pair in ([0, 3], [1, 2], [0, 1], [3, 2]))
-    across = _bearing(load, place, low_y, high_y)
-    along = _bearing(load.T, *(points.swapaxes(0, 1) for points in (place, low_x, high_x))).T
+    across = _bearing(load, place, low_y, high_y, thickness)
+    along = _bearing(load.T, place.swapaxes(0, 1), low_x.swapaxes(0, 1), high_x.swapaxes(0, 1), thickness).T
     return float((np.minimum(across, along) * area).sum())
 
 
@@ -97,7 +103,9 @@ def _four(values: FloatArray) -> FloatArray:
     return values[:-1, :-1] + values[1:, :-1] + values[:-1, 1:] + values[1:, 1:]
 
 
-def _bearing(load: FloatArray, place: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+def _bearing(
+    load: FloatArray, place: FloatArray, low: FloatArray, high: FloatArray, thickness: float
+) -> FloatArray:  # fmt: skip
     """Share of each face ``(lines, faces)`` that bears by the line through it along the second axis.
 
     ``low, high (lines, faces, 3)`` are the middles of both sides of a face that the line crosses.
@@ -115,7 +123,7 @@ def _bearing(load: FloatArray, place: FloatArray, low: FloatArray, high: FloatAr
     spacing = 2.0 * np.minimum.reduceat(side[on], starts)
     lengths = np.broadcast_to(upper[:, -1:], on.shape)[first]
     at_rims = np.nonzero(first)[1] == 0, np.nonzero(last)[1] == on.shape[1] - 1
-    begin, end = _edges(load[on], s[on], starts, ends, spacing, lengths, at_rims)
+    begin, end = _edges(load[on], s[on], starts, ends, spacing, lengths, at_rims, thickness)
     # where the middle by load is not that of the stretch, one edge lies beyond the loaded faces
     free = (begin > 0.0) & (end < lengths)
     shift = np.maximum(lower[first] - begin, 0.0) - np.maximum(end - upper[last], 0.0)
@@ -127,7 +135,7 @@ def _bearing(load: FloatArray, place: FloatArray, low: FloatArray, high: FloatAr
 
 def _edges(
     load: FloatArray, s: FloatArray, starts: NDArray[np.intp], ends: NDArray[np.intp], spacing: FloatArray,
-    lengths: FloatArray, at_rims: tuple[NDArray[np.bool_], NDArray[np.bool_]],
+    lengths: FloatArray, at_rims: tuple[NDArray[np.bool_], NDArray[np.bool_]], thickness: float,
 ) -> tuple[FloatArray, FloatArray]:  # fmt: skip
     """Both edges of loaded stretches [m], from the loads of their faces at distances ``s`` from a rim [m].
 
@@ -137,7 +145,7 @@ def _edges(
     mean = np.add.reduceat(load * s, starts) / force
     z = s - np.repeat(mean, ends - starts + 1)
     variance, fourth = (np.add.reduceat(load * z**k, starts) / force for k in (2, 4))
-    half = 0.5 * _between_edges(variance, fourth, spacing)
+    half = 0.5 * _between_edges(variance, fourth, spacing, thickness)
     # a quarter of the spacing from a rim: an even pressure on few faces ends a little before it
     low, high = (rim & (to - half < 0.25 * spacing) for rim, to in zip(at_rims, (mean, lengths - mean), strict=True))
     # the first idle node is not in contact; beside a rim, where pressure may be singular, all but the last ones are
@@ -148,14 +156,16 @@ def _edges(
     return begin, np.where(high, lengths, np.where(low, b, mean + half))
 
 
-def _between_edges(variance: FloatArray, fourth: FloatArray, spacing: FloatArray) -> FloatArray:
+def _between_edges(variance: FloatArray, fourth: FloatArray, spacing: FloatArray, thickness: float) -> FloatArray:
     """Length of stretches with two free edges [m], from the central moments of their loads [m^2, m^4]."""
     # the load of one node alone is spread over the node's share of the face
     variance = np.maximum(variance, spacing**2 / 12.0)
     coarse = spacing / (2.0 * np.sqrt(variance))
     beyond = np.clip(fourth / variance**2, FLATTEST, STEEPEST) - 2.0  # what Hertz's pressure has
     edged = beyond < 0.0
-    k = 2.0 + beyond / (1.0 + (coarse / np.where(edged, EDGE_RESOLVED, RESOLVED)) ** 4)
+    thin = ~edged / (1.0 + (THIN * thickness / (2.0 * np.sqrt(variance))) ** 4)
+    resolved = np.where(edged, EDGE_RESOLVED, RESOLVED * (1.0 + thin))
+    k = 2.0 + thin / 7.0 + (beyond - thin / 7.0) / (1.0 + (coarse / resolved) ** 4)
     a, b, c = 4.0 * k - 5.0, 16.0 * k - 28.0, 16.0 * k - 32.0
     shape = (-b + np.sqrt(np.maximum(b**2 - 4.0 * a * c, 0.0))) / (2.0 * a)
     smooth = (8.0 + 2.0 * shape) / (2.0 + shape)  # a^2 / <y^2>

@@ -23,7 +23,6 @@ from softjaw.study.case.task import Task, payload_alone
 
 GRID = (25, 11)  # points of a pad's face along length and width
 CRUSHED = 0.25  # strain of the bed at its highest pressure that leaves half of a grasp
-MOTIONS = 50  # slip motions whose wrenches bound what a contact on springs carries
 INNER = (slice(1, -1), slice(1, -1))  # of height fields that reach one cell beyond the pad's face
 
 
@@ -227,6 +226,6 @@ def grips(
 def spring_payload(contacts: Sequence[Contact], task: Task) -> float:
     """Payload of contacts on a bed of springs [kg]; 0 where they bear no torque at all."""
     try:
-        return payload_alone(contacts, MOTIONS, task)["maps/payload"]
+        return payload_alone(contacts, task)["maps/payload"]
     except (ArithmeticError, QhullError, RuntimeError, ValueError):
         return 0.0

@@ -59,7 +59,6 @@ DOUBT = 0.3
 # What may be raised where a contact is smaller than a coarse element: that says nothing, and harms no case.
 TOO_SMALL = (ArithmeticError, ConvergenceError, CheckError, NoContactError)
 CHANGE_OF = {"e_n": "change", "payload": "payload_change", "quality": "quality_change"}  # fields of a `Level`
-PAYLOAD_MOTIONS = 100  # whose wrenches bound the payload; both levels err alike
 LEFT_OUT = "friction that acts back on the pressure was not solved ({reason})"
 MODEL_SIZES = ("full", "half", "quarter")  # by the number of planes of symmetry
 
@@ -262,7 +261,7 @@ class EffectChoice:
         e_n = min(c.limits["ccm"].e_n for c in contacts)
         settings = self.solver.settings
         try:
-            payload = payload_alone(contacts, PAYLOAD_MOTIONS, settings.task)["maps/payload"]
+            payload = payload_alone(contacts, settings.task)["maps/payload"]
             return e_n, payload, quality(contacts, settings)
         except (*TOO_SMALL, RuntimeError, ValueError):  # a contact without torque has no hull
             return e_n, nan, nan

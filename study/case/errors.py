@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from softjaw.scoring.payload import BOUND_GAP
 from softjaw.study.case.contact import Contact, angles
 from softjaw.study.case.evaluate import LIMITS, EvaluationSettings, overestimates, quality
 from softjaw.study.case.task import payload_alone
@@ -69,7 +70,7 @@ class Unseen(NamedTuple):
             # trilinear elements close less, the less the foam can be compressed
             floor *= 0.4 + 0.2 / (1.0 - 2.0 * pad.material.poisson_ratio)
         if q.name in PAYLOADS:  # of contacts that face each other friction and the drive's force tell it, on any mesh
-            floor *= ALIGNED + max(angles(*contacts)) / LEANING
+            floor = floor * (ALIGNED + max(angles(*contacts)) / LEANING) + BOUND_GAP
         floor += OF_OVERLAP.get(q.name, 0.0) * self.overlap**2
         # pressures alone give forces along the face by balance, with friction that acts back they do not
         return floor * (2.0 if acts and q.name.startswith("f_") else 1.0) + self.on_edges * OF_EDGES[q.name]
@@ -181,7 +182,7 @@ def _on_mesh(values: Mapping[str, Any], contacts: Sequence[Contact]) -> dict[str
 def grasp_values(contacts: tuple[Contact, ...], settings: EvaluationSettings) -> dict[str, Any]:
     """Quality of the ellipsoids and payload ``(1,)`` in the curved model."""
     values = {"maps/quality": quality(contacts, settings)}
-    values |= payload_alone(contacts, settings.surface.samples, settings.task)
+    values |= payload_alone(contacts, settings.task)
     return {key: [value] for key, value in values.items()}
 
 

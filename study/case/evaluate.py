@@ -97,7 +97,7 @@ def evaluate(
     alike = second.patch is first.patch
     fits.append(fits[0] if alike else {m: fit_surface(second, m, settings.surface) for m in MODELS})
     scores, best = _scores(contacts, fits, settings)
-    payloads, flag = payload_values(contacts, fits, settings.task)
+    payloads, flag = payload_values(contacts, settings.task)
     values = _friction_values(contacts) | scores | surface_values(contacts, fits, settings.six) | payloads
     values["maps/flags"] = pose_flags(contacts) | raised(best.flag) | fit_flag(fits) | flag
     return values, fits

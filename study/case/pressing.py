@@ -93,7 +93,8 @@ class PressedContact(Contact):
     @cached_property
     def area(self) -> float:
         """Area of the contact, with its edge inside the faces [m^2]."""
-        return contact_area(self.patch, self.state.pad.shape.patch_faces)
+        shape = self.state.pad.shape
+        return contact_area(self.patch, shape.patch_faces, shape.size[2])
 
     @cached_property
     def largest_pressure(self) -> float:

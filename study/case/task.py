@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from softjaw.friction.patch import FloatArray
-from softjaw.scoring.contact import PolytopeBody
+from softjaw.friction.wrench import friction_discs
+from softjaw.scoring.contact import DiscBody
 from softjaw.scoring.payload import Payload, payload
 from softjaw.study.case.build import centre_of_mass, own_frame
 from softjaw.study.case.contact import Contact
-from softjaw.study.case.limit_surface import SurfaceFit, fit_motions, sampled_wrenches
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import MODELS
 from softjaw.study.scene import Scene
@@ -43,25 +42,15 @@ def task_of(scene: Scene, obj: Any) -> Task:
     return Task(centre_of_mass(scene, obj), direction, keys.drive, scene.object.mass)
 
 
-def payload_values(
-    contacts: Sequence[Contact], fits: Sequence[Mapping[str, SurfaceFit]], task: Task
-) -> tuple[dict[str, Any], Flag]:
-    """Maps of what the grasp holds, one value for each friction model, and whether it holds itself (curved model).
-
-    The friction of a finger is the hull of the sampled wrenches, which lies inside the exact limit surface: what is
-    found errs on the safe side, with 500 samples by 2 % (median of 40 grasps) to 4 % (one in ten is farther off).
-    """
-    pressure = [c.pressure_wrench for c in contacts]
-    payloads = [_payload(contacts, [fit[m].wrench for fit in fits], pressure, task) for m in MODELS]
-    return _maps(np.array([f.force for f in payloads]), task), Flag(0) if payloads[0].borne else Flag.NOT_BORNE
+def payload_values(contacts: Sequence[Contact], task: Task) -> tuple[dict[str, Any], Flag]:
+    """Maps of what the grasp holds, one value for each friction model, and whether it holds itself (curved model)."""
+    payloads = [_payload(contacts, model, task) for model in MODELS]
+    return _maps(np.array([p.force for p in payloads]), task), Flag(0) if payloads[0].borne else Flag.NOT_BORNE
 
 
-def payload_alone(contacts: Sequence[Contact], samples: int, task: Task) -> dict[str, Any]:
-    """The maps of `payload_values` in the curved model, from so many sampled motions and no fit."""
-    motions, of_patch = fit_motions(samples)[:samples], {c.local: c for c in contacts}  # one for both where alike
-    wrench = {local: sampled_wrenches(c, MODELS[0], motions)[1] for local, c in of_patch.items()}
-    pressure = [c.pressure_wrench for c in contacts]
-    return _maps(_payload(contacts, [wrench[c.local] for c in contacts], pressure, task).force, task)
+def payload_alone(contacts: Sequence[Contact], task: Task) -> dict[str, Any]:
+    """The maps of `payload_values` in the curved model."""
+    return _maps(_payload(contacts, MODELS[0], task).force, task)
 
 
 def _maps(force: Any, task: Task) -> dict[str, Any]:
@@ -70,11 +59,8 @@ def _maps(force: Any, task: Task) -> dict[str, Any]:
     return {"maps/payload": mass} | ({} if task.mass is None else {"maps/safety_factor": mass / task.mass})
 
 
-def _payload(
-    contacts: Sequence[Contact], wrenches: Sequence[FloatArray], pressure: Sequence[FloatArray], task: Task
-) -> Payload:
-    # a motion the other way gives the opposite wrench, which costs no further sample
-    both = [np.vstack([wrench, -wrench])[:, [0, 1, 5]] for wrench in wrenches]
-    soft = [c.soft(PolytopeBody(c.mu * wrench)) for c, wrench in zip(contacts, both, strict=True)]
+def _payload(contacts: Sequence[Contact], model: str, task: Task) -> Payload:
+    soft = [c.soft(DiscBody(friction_discs(c.local, c.mu, model))) for c in contacts]
+    pressure = [c.pressure_wrench for c in contacts]
     drive = [c.drive(p) for c, p in zip(contacts, pressure, strict=True)]
     return payload(soft, pressure, task.centre_of_mass, task.direction, task.kind, drive)

@@ -14,7 +14,14 @@ from scipy.special import ellipe
 from softjaw.friction import wrench
 from softjaw.friction.motion import SLIDE_X, SLIDE_Y, fibonacci_twists
 from softjaw.friction.patch import ContactPatch
-from softjaw.friction.wrench import friction_limits, friction_sums, friction_support, friction_wrench, pure_torque
+from softjaw.friction.wrench import (
+    friction_discs,
+    friction_limits,
+    friction_sums,
+    friction_support,
+    friction_wrench,
+    pure_torque,
+)
 from tests import generators as made
 
 SEEDS = range(1, 21)
@@ -142,6 +149,16 @@ def test_friction_dissipates_and_no_other_motion_gets_more_out_of_it(patch, twis
     assert (H >= 0).all()
     assert (power <= H + slack).all()
     assert np.isfinite(W).all()
+
+
+@pytest.mark.parametrize("model", wrench.MODELS)
+@REPEATABLE
+@given(patches(), arrays(float, (4, 3), elements=COMPONENT))
+def test_the_limit_surface_is_a_sum_of_discs_in_the_planes_of_the_faces(model, patch, twist):
+    parts = np.einsum("mc,nkc->mnk", twist, friction_discs(patch, 0.6, model).reshape(-1, 2, 3))
+    size = patch.load.sum() * max(1.0, np.abs(patch.centroid).max()) * max(1.0, np.abs(twist).max())
+    H = friction_support(patch, twist, 0.6, model)
+    np.testing.assert_allclose(np.linalg.norm(parts, axis=2).sum(axis=1), H, rtol=0, atol=1e-13 * size)
 
 
 @REPEATABLE

@@ -6,7 +6,7 @@ import pytest
 from softjaw.fem.contact.edge import contact_area, largest_pressure
 from softjaw.friction.patch import ContactPatch
 
-LENGTH, WIDTH = 0.050, 0.022
+LENGTH, WIDTH, THICK = 0.050, 0.022, 0.015
 
 
 def patch_of(pressure, n):
@@ -31,7 +31,7 @@ def hertz(a, b, x_0=0.0, y_0=0.0):
 def errors(pressure, area, n):
     patch, faces = patch_of(pressure, n)
     counted = patch.area[patch.pressure > 0].sum()
-    found = contact_area(patch, faces), largest_pressure(patch, faces, 2), counted
+    found = contact_area(patch, faces, THICK), largest_pressure(patch, faces, 2), counted
     return np.abs(np.array(found) / [area, 1.0, area] - 1.0)
 
 
@@ -68,10 +68,22 @@ def test_area_and_peak_of_an_elliptic_contact_converge_and_a_line_contact_ends_a
             return np.sqrt(np.maximum(0.0, 1.0 - s)) * (1.0 + 0.5 * s)
 
         patch, faces = patch_of(pressure, (20, 3))
-        assert contact_area(patch, faces) == pytest.approx(b * WIDTH, rel=0.02)
+        assert contact_area(patch, faces, THICK) == pytest.approx(b * WIDTH, rel=0.02)
     patch, faces = patch_of(lambda x, y: 1.0 + 0.0 * x, (4, 3))
-    assert contact_area(patch, faces) == pytest.approx(LENGTH * WIDTH, rel=1e-12)
+    assert contact_area(patch, faces, THICK) == pytest.approx(LENGTH * WIDTH, rel=1e-12)
     assert largest_pressure(patch, faces, 2) == pytest.approx(1.0, rel=1e-9)
+
+
+@pytest.mark.parametrize(("power", "within"), [(1, 0.04), (2, 0.18)])
+def test_under_a_pad_that_is_thin_beside_the_contact_pressure_goes_as_the_depth_or_as_its_square(power, within):
+    """A layer of springs, and one that gets stiffer; as a thick pad's contact the areas would be 15 and 30 % less."""
+    a, n = 0.0047, 20
+
+    def pressure(x, y):
+        return np.maximum(0.0, 1.0 - (x**2 + y**2) / a**2) ** power
+
+    patch, faces = patch_of(pressure, (n, n))
+    assert contact_area(patch, faces, 0.0008) == pytest.approx(np.pi * a**2, rel=within)
 
 
 @pytest.mark.parametrize("line", [1, 0], ids=["inside", "rim"])
@@ -84,5 +96,5 @@ def test_one_loaded_line_of_nodes_has_about_the_width_of_its_share(line):
     place[..., 1] = -WIDTH / 2 + share * np.repeat(np.arange(n + 1), 2)[1:-1]
     load[:, {0: [0], 1: [1, 2]}[line]] = 1.0
     found = ContactPatch(place.reshape(-1, 3), patch.area, patch.normal, load.ravel(), patch.corners)
-    assert 0.8 < contact_area(found, faces) / (LENGTH * share * (1.0 if line else 0.5)) < 1.3
+    assert 0.8 < contact_area(found, faces, THICK) / (LENGTH * share * (1.0 if line else 0.5)) < 1.3
     assert largest_pressure(found, faces, 2) == pytest.approx(1.0, rel=0.35)

@@ -49,7 +49,7 @@ def cylinder_errors(n, factors, element="hex8", width=20.0, grade=20.0):
         area = 2 * hertz.radius * length
         errors.append([
             half_width / hertz.radius - 1, pressed.pressure.max() / hertz.peak - 1,
-            profile_error(pad, pressed, y, hertz), contact_area(patch, faces) / area - 1,
+            profile_error(pad, pressed, y, hertz), contact_area(patch, faces, shape.size[2]) / area - 1,
             largest_pressure(patch, faces, shape.per_side) / hertz.peak - 1,
             patch.area[patch.load > 0].sum() / area - 1,
         ])  # fmt: skip
@@ -87,7 +87,8 @@ def sphere_errors(n, factors=(0.8, 0.88, 0.96, 1.04, 1.12, 1.2), width=6.0, nu=0
         patch, faces = extract(pad, pressed), shape.patch_faces
         errors.append([
             radius(pressed, [0, 1], 2.5) / hertz.radius - 1, pressed.pressure[0] / hertz.peak - 1,
-            profile_error(pad, pressed, r, hertz), contact_area(patch, faces) / (np.pi * hertz.radius**2) - 1,
+            profile_error(pad, pressed, r, hertz),
+            contact_area(patch, faces, shape.size[2]) / (np.pi * hertz.radius**2) - 1,
             largest_pressure(patch, faces, shape.per_side) / hertz.peak - 1,
         ])  # fmt: skip
         lacking.append((hertz.approach - pressed.closing) * E_star * W / pressed.force)
