@@ -7,6 +7,7 @@ PETSc, and works on a file that a run is still writing.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 
 from softjaw.friction.patch import FloatArray
 from softjaw.study.flags import OF_FILE, Flag
+from softjaw.study.messages import Problem
 from softjaw.study.quantities import (
     BOTH_ENDS,
     BY_KEY,
@@ -32,7 +34,8 @@ from softjaw.study.result.derived import SOURCES, force_ranges
 from softjaw.study.result.index import index_path, open_index
 from softjaw.study.result.layout import DONE, VERSION
 from softjaw.study.result.store import Result, open_result
-from softjaw.study.scene import Scene, parse_scene
+from softjaw.study.scene import Scene, SceneError, parse_scene
+from softjaw.study.scene.model import file_digest
 from softjaw.study.scene.sections import UPPER
 
 if TYPE_CHECKING:
@@ -178,9 +181,21 @@ def _fill_ranges(variables: dict[str, Any], status: NDArray[np.integer], scene: 
 def scene_of(ds: xr.Dataset, index: Sequence[int] = ()) -> Scene:
     """The scene kept in a result file, with the values of a point of its sweep.
 
-    Raises `SceneError`: this version cannot read it.
+    Raises `SceneError`: this version cannot read it, or its mesh has changed since.
     """
-    return _scene_at(ds.attrs["scene"], ds.attrs.get("point") or tuple(index[: len(ds.status.dims) - 3]))
+    text = ds.attrs["scene"]
+    scene = _scene_at(text, ds.attrs.get("point") or tuple(index[: len(ds.status.dims) - 3]))
+    with suppress(OSError):  # a mesh that is not there now
+        if scene.object.shape == "mesh" and _digest_of(text, file_digest(scene.object.mesh)) != ds.attrs["digest"]:
+            changed, remedy = f"{scene.object.mesh}, changed since", "put it back, or run the scene again"
+            raise SceneError([Problem("scene", None, "object.mesh", changed, "the mesh that was solved", remedy)])
+    return scene
+
+
+@lru_cache(maxsize=64)
+def _digest_of(text: str, _mesh: str) -> str:
+    """Digest of a scene while its mesh has this one."""
+    return parse_scene(text, check_files=False).digest
 
 
 @lru_cache(maxsize=64)

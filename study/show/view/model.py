@@ -6,7 +6,6 @@ Positions are in m in the frame of the object's own file unless a unit is named.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import suppress
 from functools import cached_property
 from typing import Any
 
@@ -38,14 +37,17 @@ SLIPS = {"x": "a slip along x of the contact", "y": "a slip along y of the conta
 class View:
     """A study at one point of its sweep; candidates are counted over stations and angles.
 
-    ``scene`` is the scene there, None where this version cannot read it; ``note`` says why no object is drawn.
+    ``scene`` is the scene there, None where it cannot be read or its mesh has changed; ``note`` says why no object is
+    drawn.
     """
 
     def __init__(self, ds: xr.Dataset, point: Index = ()) -> None:
         self.ds, self.point, self.note = ds, point, ""
         self.scene: Any = None
-        with suppress(SceneError):
+        try:
             self.scene = scene_of(ds, point)
+        except SceneError as error:
+            self.note = f"the object is not drawn: {error}"
         self._faces: dict[int, xr.Dataset] = {}
 
     @property
@@ -97,11 +99,9 @@ class View:
     def surface(self) -> Surface:
         """The object's surface; empty with a `note`."""
         try:
-            if self.scene is None:
-                raise ValueError("this version cannot read the scene in the file")
             surface = surface_of(self.scene, axes_of(self.ds), self._feet())
-        except (ValueError, OSError) as error:
-            self.note = f"the object is not drawn: {error}"
+        except (AttributeError, ValueError, OSError) as error:
+            self.note = self.note or f"the object is not drawn: {error}"
             return Surface(np.empty((0, 3)), np.empty((0, 3), int), np.empty(0, int), np.empty(0, int))
         return surface._replace(points=self.placed.to_object(surface.points))
 

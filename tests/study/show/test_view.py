@@ -20,7 +20,8 @@ from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, USAGE, StudyError
 from softjaw.study.quantities import ALONG, AROUND
 from softjaw.study.ranking import judge
 from softjaw.study.result.layout import REPORT_BYTES
-from softjaw.study.result.read import open
+from softjaw.study.result.read import open, scene_of
+from softjaw.study.scene import SceneError
 from softjaw.study.show.grasps import order
 from softjaw.study.show.object_surface import NOBODY, Cells, areas, between, coloured, cut, moved, pressed
 from softjaw.study.show.report.verdict import plain_report
@@ -149,6 +150,12 @@ def test_a_mesh_is_drawn_in_the_frame_of_its_file(tmp_path, axis):
     drawn = View(judge(open(make(tmp_path / "a.hdf", scene=scene)))).surface.points
     np.testing.assert_allclose(1e3 * drawn.min(axis=0), box.bounds[0], atol=1e-3)
     np.testing.assert_allclose(1e3 * drawn.max(axis=0), box.bounds[1], atol=1e-3)
+    box.apply_scale(1.1).export(tmp_path / "box.stl")
+    other = View(judge(open(tmp_path / "a.hdf")))
+    assert other.surface.points.size == 0
+    assert "object.mesh" in other.note
+    with pytest.raises(SceneError, match=r"object\.mesh"):
+        scene_of(other.ds)
 
 
 def test_no_pads_are_invented_and_a_case_is_chosen_by_number_place_or_score(file, tmp_path, shown):
