@@ -75,7 +75,7 @@ class Flag(IntFlag):
         "on the coarse mesh by more than accuracy.target, or 1 % where the scene names no target"
     )  # fmt: skip
     OBLIQUE = 1 << 24, "oblique", "a contact normal lies oblique to the approach", (
-        "the force along it differs from the one that the gripper commands by 5 % or more: see force_excess"
+        "by 18 deg or more, so that the force along it is not the one that the gripper commands: see force_excess"
     )  # fmt: skip
     MESH_HOLE = 1 << 25, "mesh hole", "a hole of the mesh lies under a pad, where nothing is known of the object"
     # of no file: derived where a file holds the safe force range

@@ -29,7 +29,7 @@ from softjaw.study.flags import Flag
 from softjaw.study.quantities import MODELS
 from softjaw.study.scene import Scene
 
-OBLIQUE_EXCESS = 0.05  # of the commanded force: beyond it the force along the contact normal is another one
+OBLIQUE = 1.0 / 1.05  # cosine below which the force along the normal is 5 % from the commanded one
 SHARP = np.radians(20.0)  # by which normals of neighbouring faces turn more than usual, from which it is an edge
 BENT = np.radians(120.0)  # between the object's normals at neighbouring loaded faces, beyond which it is coarse too
 OVERLAPS = 0.1  # share of the closing displacement, beyond which the mesh is coarse for the contact
@@ -196,7 +196,8 @@ def state_flags(contacts: Sequence[PressedContact]) -> int:
     flags = Flag.COLLISION * (first.free_face + second.free_face > between_faces * (1.0 - UNDECIDED))
     flags |= Flag.UNSTABLE * (min(c.state.checks.ellipticity for c in contacts) <= 0)
     flags |= Flag.JUMPED * any(c.state.path_dependent for c in contacts)
-    flags |= Flag.OBLIQUE * (max(abs(c.force_excess) for c in contacts) > OBLIQUE_EXCESS - UNDECIDED)
+    leaning = min(float(c.frame.axes[2, 2]) for c in contacts)  # cosine between normal and approach
+    flags |= Flag.OBLIQUE * (leaning < OBLIQUE + UNDECIDED)
     flags |= Flag.MESH_HOLE * (max(c.hole_share for c in contacts) > MESH_HOLE)
     for c in contacts:
         flags |= Flag.NODAL * c.nodal_instead | Flag.COARSE * c.coarse

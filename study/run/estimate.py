@@ -24,7 +24,7 @@ from softjaw.study.case.candidates import meshes_cost
 from softjaw.study.case.fit import bed_closing, doubt, heights_over, jaws_of
 from softjaw.study.case.poses import turn_of_pose
 from softjaw.study.messages import OTHER_FILE, StudyError
-from softjaw.study.quantities import LISTED
+from softjaw.study.quantities import FAILED, LISTED
 from softjaw.study.result.layout import Layout
 from softjaw.study.result.store import open_result
 from softjaw.study.run.progress import duration
@@ -141,18 +141,19 @@ def unit_seconds(plan: Any, seconds: np.ndarray) -> list[float]:
     return np.where(known, times, times[known].sum() / costs[known].sum() * costs).tolist()
 
 
-def measured_seconds(layout: Layout, path: Path) -> Any:
-    """Seconds of every case ``(rows,)`` in a result file of this shape; None where there is no such file.
+def measured_seconds(plan: Any, path: Path) -> Any:
+    """Seconds of every solved case ``(rows,)`` in the result file of a plan; None where there is no such file.
 
-    Stations that a refinement added are left out.
+    Stations that a refinement added are left out. Raises `StudyError`: the file is of another scene.
     """
     if not path.is_file():
         return None
     with open_result(path) as result:
-        planned = np.flatnonzero(np.isin(result.axes[-3].values, layout.axes[-3].values))
-        seconds = result.read("work/seconds_total").take(planned, axis=-3)
-        # A file of another shape has other cases in the same places.
-        return seconds.ravel() if seconds.shape == layout.shape else None
+        if result.digest != plan.header.digest:
+            raise StudyError(OTHER_FILE, f"{path}: made from another scene; choose another file with -o")
+        planned = np.flatnonzero(np.isin(result.axes[-3].values, plan.layout.axes[-3].values))
+        seconds = np.where(result.status == FAILED, np.nan, result.read("work/seconds_total"))
+        return seconds.take(planned, axis=-3).ravel()
 
 
 def scaled(seconds: ArrayLike, served: ArrayLike, ranks: int, write: float, service: float) -> tuple[float, str]:
@@ -199,7 +200,7 @@ def scaling_text(plan: Any, path: Path, ranks: Sequence[int], repeat: int) -> st
 
     Raises `StudyError` if the file at ``path`` holds no times of this plan.
     """
-    known = measured_seconds(plan.layout, path)
+    known = measured_seconds(plan, path)
     parts = [] if known is None else _parts(plan, known) * repeat
     if not parts:
         raise StudyError(OTHER_FILE, f"{path}: no case was timed yet; run the study first, or give -n one number")

@@ -197,12 +197,12 @@ def _rounds(plan: Plan, scene: Any) -> str:
 
 
 def _time(plan: Plan, scene: Any, path: Path, ranks: int) -> str:
-    seconds = measured_seconds(plan.layout, path)
+    seconds = measured_seconds(plan, path)
     expected = unit_seconds(plan, seconds) if seconds is not None else []
     if not expected:
         return f"{_estimated_time(plan, scene, ranks)}; more accurate once a few load paths are in {path}"
     total = duration(makespan(plan.in_parts(expected), ranks))
-    return f"about {total} on {ranks} ranks for all cases, judged by those in {path}"
+    return f"about {total} on {ranks} rank{'s' * (ranks > 1)} for all cases, judged by those in {path}"
 
 
 def _estimated_time(plan: Plan, scene: Any, ranks: int) -> str:

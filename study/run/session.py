@@ -287,11 +287,14 @@ def finish(work: Work, writer: ResultWriter, name: str) -> None:
 
 
 def pack(work: Work, path: Path, plan: Plan) -> None:
-    """Write the report of a file to which no further round comes, and pack it; by one process."""
+    """Write the report of a file to which no further round comes, and pack it, if there is room; by one process."""
     if work.report is not None:
         with contextlib.closing(ResultWriter(path, plan.layout, MPI.COMM_SELF)) as writer:
             writer.write_report(work.report(writer.result()))
-    rewrite(path, plan.layout, plan.header, packed=True)
+    try:
+        rewrite(path, plan.layout, plan.header, packed=True)
+    except StudyError as error:  # every number is in the file already
+        print(f"note: {path}: complete, but not made smaller ({error})", file=sys.stderr, flush=True)
 
 
 def print_summary(work: Work, path: Path) -> None:

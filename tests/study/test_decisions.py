@@ -14,7 +14,7 @@ from softjaw.friction.frame import FrameFlag
 from softjaw.study.case import wall
 from softjaw.study.case.contact import ANTIPODAL, pose_flags
 from softjaw.study.case.effects import DOUBT, STEPS, STIFF_PLATE, decided
-from softjaw.study.case.pressing import OBLIQUE_EXCESS, state_flags
+from softjaw.study.case.pressing import OBLIQUE, state_flags
 from softjaw.study.case.result import TIE
 from softjaw.study.flags import Flag
 from softjaw.study.lookup.interpolation import CLOSING_GAP_RATIO, circle
@@ -95,7 +95,7 @@ def test_an_indicator_on_its_limit_takes_the_dearer_level(ulp):
         assert decided("sheet", step, STIFF_PLATE * on, lambda: (change, 0.0, 0.0), 0.01).level == level  # noqa: B023
 
 
-def facing(turn, lean, mu, distance=0.06, free=0.0, excess=0.0):
+def facing(turn, lean, mu, distance=0.06, free=0.0, upright=1.0):
     """Two contacts on one line whose normals lean by an angle to it, turned as a whole."""
     made = []
     for side, angle in ((1.0, lean), (-1.0, np.pi)):
@@ -104,8 +104,7 @@ def facing(turn, lean, mu, distance=0.06, free=0.0, excess=0.0):
         pose = SimpleNamespace(origin=origin, rotation=turn.as_matrix())
         made.append(SimpleNamespace(
             mu=mu, normal=R[:, 2], origin=origin, free_face=free, coarse=False, nodal_instead=False,
-            force_excess=excess,
-            frame=SimpleNamespace(flag=FrameFlag(0)), pose=pose, hole_share=0.0,
+            frame=SimpleNamespace(flag=FrameFlag(0), axes=np.diag([1.0, 1.0, upright])), pose=pose, hole_share=0.0,
             state=SimpleNamespace(checks=SimpleNamespace(ellipticity=1.0), path_dependent=False),
         ))  # fmt: skip
     return made
@@ -119,8 +118,8 @@ def test_flags_of_a_pair_do_not_hang_on_its_rotation(seed):
     assert pose_flags(facing(turn, ANTIPODAL, 1.0)) == Flag.NOT_ANTIPODAL
     assert state_flags(facing(turn, 0.0, 1.0, 0.06, 0.03)) == Flag.COLLISION
     assert state_flags(facing(turn, 0.0, 1.0, 0.06, 0.0299)) == 0
-    assert state_flags(facing(turn, 0.0, 1.0, excess=moved([-OBLIQUE_EXCESS], seed)[0])) == Flag.OBLIQUE
-    assert state_flags(facing(turn, 0.0, 1.0, excess=0.9999 * OBLIQUE_EXCESS)) == 0
+    assert state_flags(facing(turn, 0.0, 1.0, upright=moved([OBLIQUE], seed)[0])) == Flag.OBLIQUE
+    assert state_flags(facing(turn, 0.0, 1.0, upright=1.0001 * OBLIQUE)) == 0
 
 
 @seeded

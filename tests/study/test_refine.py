@@ -101,7 +101,7 @@ def test_a_grown_file_keeps_every_row(tmp_path):
             assert found[own].tobytes() == old[f"/{name}"].tobytes()
     assert torn_rows(path, big.layout) == [2 * 2 * 2]
     assert not list(tmp_path.glob("*.grown*"))
-    assert measured_seconds(small.layout, path).shape == (20,)
+    assert measured_seconds(small, path).shape == (20,)
 
 
 def filled(path, plan):
