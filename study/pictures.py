@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 INK, SOFT = "#1d2429", "#6b747b"
+ALIKE = 0.02  # relative, below which colours would draw differences that are errors
 COLOURS = {
     "payload": "viridis", "quality": "viridis", "e_n": "cividis", "pressure": "magma_r", "indentation": "plasma_r",
     "wall_stress": "inferno_r",
@@ -53,12 +54,12 @@ def _saved(drawn: Any, **options: Any) -> bytes:
 
 
 def span(values: Any) -> tuple[float, float]:
-    """Smallest and largest finite value, widened where they are one; 0 to 1 where there is none."""
+    """Smallest and largest finite value, widened where they are all but one; 0 to 1 where there is none."""
     finite = np.asarray(values)[np.isfinite(values)]
     if not finite.size:
         return 0.0, 1.0
     low, high = float(finite.min()), float(finite.max())
-    if high - low > 1e-9 * max(abs(low), abs(high)):
+    if high - low > ALIKE * max(abs(low), abs(high)):
         return low, high
     room = 0.05 * abs(high) or 0.5
     return low - room, high + room

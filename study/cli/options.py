@@ -264,7 +264,8 @@ class Parser(argparse.ArgumentParser):
             name = slip.partition("=")[0]
             kind = "option" if slip.startswith("-") else "word"
             known = list(self._option_string_actions) if kind == "option" else []
-            self.error(f"unknown {kind} '{name}'{_meant(name, known)} '{self.prog} --help' lists all")
+            ranks = " 'mpirun -n 2 softjaw ...' starts two ranks;" * (name in ("-n", "-np"))
+            self.error(f"unknown {kind} '{name}'{_meant(name, known)}{ranks} '{self.prog} --help' lists all")
         return parsed, rest
 
 

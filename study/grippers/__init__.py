@@ -139,7 +139,8 @@ def filled_in(tables: dict[str, Any], folder: Path) -> tuple[str, Any, str] | No
     try:
         keys, hand = gripper_file(gripper["preset"])
     except StudyError as error:
-        return "gripper.preset", name, f"one of {', '.join(PRESETS)}, or a file of the same form: {error}"
+        more = "" if isinstance(error.__cause__, OSError) else f": {error}"  # of no such file all is said
+        return "gripper.preset", name, f"one of {', '.join(PRESETS)}, or a file of the same form{more}"
     for key, value in keys.items():
         gripper.setdefault(key, value)
     if math.isfinite(hand.stroke_mm) and isinstance(gripper.get("pad_thickness_mm"), int | float):

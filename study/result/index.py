@@ -16,7 +16,7 @@ import h5py
 import numpy as np
 
 from softjaw.study import messages
-from softjaw.study.messages import USAGE, StudyError, beside
+from softjaw.study.messages import OTHER_FILE, USAGE, StudyError, beside
 from softjaw.study.result.hdf5 import StoredFile, opened
 from softjaw.study.result.layout import PROGRAM
 from softjaw.study.table import Row
@@ -54,9 +54,11 @@ BLANK: dict[type, Any] = {str: "", float: math.nan, int: -1}
 
 
 def index_path(file: str | Path) -> Path | None:
-    """The index that a folder or a file's name means; None for any other file."""
+    """The index that a folder or a file's name means; None for any other file; `StudyError` for a folder without."""
     path = Path(file)
     if path.is_dir():
+        if not (path / f"{INDEX}.hdf").exists():
+            raise StudyError(OTHER_FILE, f"{file}: no {INDEX}.hdf of a run of many objects; name a result file in it")
         return path / f"{INDEX}.hdf"
     return path if path.name == f"{INDEX}.hdf" else None
 

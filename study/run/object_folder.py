@@ -84,8 +84,11 @@ def folder_of(scene_file: str, overrides: Sequence[str]) -> ObjectFolder | None:
     put_overrides(data, overrides, {})
     table = data.get("object")
     mesh = table.get("mesh") if isinstance(table, dict) else None
-    if not isinstance(mesh, str):
+    if not isinstance(table, dict) or not isinstance(mesh, str):
         return None
+    if (shape := table.get("shape")) != "mesh":
+        text = f"found {shown(shape)}, expected \"mesh\" beside object.mesh, or --objects"
+        raise StudyError(USAGE, f"{scene_file}: object.shape: {text}")
     file, in_table = path.parent / mesh, mesh.lower().endswith(".csv")
     if not in_table and (not PATTERN & set(mesh) or file.is_file()):
         return None

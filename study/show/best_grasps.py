@@ -70,7 +70,7 @@ def best(
             text = f"contacts change between {low:g} and {high:g} N, or one of them is not solved"
             return Table(f"no value at {forces(ds)[k]:g} N: {text}", table.columns, ())
         solved = np.any(ds.status.values == DONE, axis=tuple(range(ds.status.ndim - 1)))
-        others_ = ", ".join(f"{f:g} N" for f in forces(ds)[solved]) or "none"
+        others_ = ", ".join(f"{f:g} N" for f in forces(ds)[solved]) or "none; 'softjaw status' says why"
         return Table(f"no candidate is solved at {forces(ds)[k]:g} N; forces with one: {others_}", table.columns, ())
     rows = [row | {"others": folded_text(ds, place)} for row, place in zip(table.rows, places, strict=False)]
     others = [Column("others", programs=False, wrap=OTHERS_WIDTH)] * any(row["others"] for row in rows)

@@ -35,8 +35,9 @@ BAR = {"vertical": True, "height": 0.36, "width": 0.045, "title_font_size": 15, 
 def save_picture(view: View, index: Index, path: Path, quantity: str, motion: str) -> None:
     """Write a case as PNG: the object on the left, its values and the limit surface on the right; needs no screen."""
     groups = [(slice(0, 2), slice(0, 2))]
-    made = pv.Plotter(off_screen=True, window_size=SIZE, shape=(2, 3), groups=groups, border=False)
-    with pv.vtk_verbosity("off"), closing(made) as plotter:  # VTK warns of every kind of screen that is not there
+    look_of = {"off_screen": True, "window_size": SIZE, "shape": (2, 3), "groups": groups, "border": False}
+    # VTK warns of every kind of screen that is not there
+    with pv.vtk_verbosity("off"), closing(pv.Plotter(**look_of)) as plotter:
         plotter.set_background("white", all_renderers=True)
         plotter.subplot(0, 2)
         lines = [view.ds.attrs["title"], *view.summary(index, quantity), "", *view.legend(index, motion)]
@@ -116,7 +117,7 @@ def _limit(plotter: Any, view: View, index: Index) -> None:
     lines(plotter, axes, INK)
     texts = [f"{name} {r:.3g} {unit}" for (name, unit), r in zip(COMPONENTS, reach, strict=True)]
     labels(plotter, axes[:, 1] * 1.05, texts, 15, shape=None)
-    title = f"limit surface of finger {weaker(view.ds, index) + 1} (CCM):\nloads that it carries without slipping"
+    title = f"limit surface of finger {weaker(view.ds, index) + 1} (CCM, fitted):\nloads that it carries without slipping"
     return _say(plotter, title)
 
 
@@ -211,7 +212,8 @@ def write_vtk(ds: xr.Dataset, path: Path, force: float | None = None) -> Path:
                 blocks[f"pads, {level:g} N"] = pads
     with beside(path) as part:  # VTK itself only prints that it cannot write
         part.touch()
-    (blocks if path.suffix.lower() == ".vtm" else body).save(path)
+    with pv.vtk_verbosity("off"):
+        (blocks if path.suffix.lower() == ".vtm" else body).save(path)
     if not path.stat().st_size:
         raise StudyError(CANNOT_WRITE, f"{path}: cannot be written; choose another place")
     return path
