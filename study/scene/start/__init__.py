@@ -74,7 +74,8 @@ def init(options: Namespace, measure: Callable[[Namespace], Measured]) -> str:
     scene, batch = (base.with_name(base.name + ending) for ending in (".toml", ".sbatch"))
     existing = [str(path) for path in (scene, batch) if path.exists()]
     if existing and not options.force:
-        text = f"{' and '.join(existing)}: exist{'s' * (len(existing) == 1)} already; choose another name with -o, or add --force"
+        verb = "exist" if existing[1:] else "exists"
+        text = f"{' and '.join(existing)}: {verb} already; choose another name with -o, or add --force"
         raise StudyError(CANNOT_WRITE, text)
     words = {"NAME": base.name, "SOFTJAW": _program()}
     mesh, notes = _about_mesh(options, scene, measure) if options.kind == "mesh" else ({}, ())
