@@ -117,7 +117,7 @@ def _limit(plotter: Any, view: View, index: Index) -> None:
     lines(plotter, axes, INK)
     texts = [f"{name} {r:.3g} {unit}" for (name, unit), r in zip(COMPONENTS, reach, strict=True)]
     labels(plotter, axes[:, 1] * 1.05, texts, 15, shape=None)
-    title = f"limit surface of finger {weaker(view.ds, index) + 1} (CCM, fitted):\nloads that it carries without slipping"
+    title = f"fitted limit surface of finger {weaker(view.ds, index) + 1} (CCM):\nloads carried without slipping"
     return _say(plotter, title)
 
 
