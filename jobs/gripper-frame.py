@@ -17,7 +17,7 @@ from softjaw.study import pictures
 from softjaw.study.case.poses import axis_poses
 from softjaw.study.export.selection import gripper_frame
 
-RADIUS, HEIGHT, LONG, SHORT, DEPTH = 20.0, 70.0, 30.0, 24.0, 75.0  # [mm]
+RADIUS, HEIGHT, LONG, SHORT, DEPTH = 20.0, 74.0, 30.0, 24.0, 75.0  # [mm]
 LOOKS = {"x": "#c05a00", "y": "#2a8c82", "z": "#12436d"}
 VIEW = np.array([[0.94, -0.34, 0.0], [0.13, 0.36, 0.92]])  # from space to the paper
 PANELS = (
@@ -39,7 +39,7 @@ def frame(axes: Any, origin: Any, rotation: Any, name: str, beside: tuple[float,
         tail, tip = VIEW @ origin, VIEW @ (origin + 20 * axis)
         look = {"arrowstyle": "-|>", "color": LOOKS[letter], "lw": 1.8, "shrinkA": 0, "shrinkB": 0}
         axes.annotate("", tip, tail, arrowprops=look)
-        axes.text(*(VIEW @ (origin + 25 * axis)), letter, color=LOOKS[letter], ha="center", va="center")
+        axes.text(*(VIEW @ (origin + 24 * axis)), letter, color=LOOKS[letter], ha="center", va="center")
     x, y = VIEW @ origin
     axes.text(x + beside[0], y + beside[1], name, fontsize=7.5)
 
@@ -55,13 +55,13 @@ def cylinder(axes: Any) -> None:
 
 def hand(axes: Any, pads: Any, R: Any, o: Any) -> None:
     """Palm and fingers behind the pads, the way to their middle, and the gripper's frame."""
-    palm = o + 0.15 * DEPTH * R[:, 2]
+    palm = o + 0.2 * DEPTH * R[:, 2]
     for rotation, pad in pads:
         back = pad - 6 * rotation[:, 2]
-        line(axes, [back, back - 0.85 * DEPTH * R[:, 2], palm], lw=2.6)
-    line(axes, [o, o + DEPTH * R[:, 2]], ls=":", color=pictures.INK)
-    x, y = VIEW @ (o + 0.6 * DEPTH * R[:, 2])
-    axes.text(x + 3, y, "depth", fontsize=7.5)
+        line(axes, [back, back - 0.8 * DEPTH * R[:, 2], palm], lw=2.6)
+    line(axes, [o + 29 * R[:, 2], o + DEPTH * R[:, 2]], ls=":", color=pictures.INK)
+    x, y = VIEW @ (o + 0.73 * DEPTH * R[:, 2])
+    axes.text(x - 4, y, "depth", fontsize=7.5, ha="right", va="center")
     frame(axes, o, R, "gripper", (5, 5) if R[2, 2] < -0.5 else (5, -8))
 
 
