@@ -85,7 +85,7 @@ class Case(GraspNumbers):
 
     @property
     def errors(self) -> dict[str, float]:
-        """Error estimates of the curved model by quantity, in its unit, from two meshes; none where there is one."""
+        """Absolute error estimates of the curved model by quantity, in its unit; none where there is one mesh."""
         known = [q for q in TABLE if q.error and q.of_error.key in self.result.values]
         return {q.name: q.error_in_unit(self.value(q.of_error.name), self.value(q.name)) for q in known}
 
