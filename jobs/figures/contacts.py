@@ -13,7 +13,7 @@ from jobs.figures import drawing
 from softjaw.study import pictures
 from softjaw.study.case.build import outer_surface
 from softjaw.study.scene import load_scene
-from softjaw.study.show.grasps import at, forces, number
+from softjaw.study.show.grasps import at, axis_text, forces, number
 from softjaw.study.show.view import solids
 from softjaw.study.show.view.model import FORCE, NEUTRAL, View
 from softjaw.study.show.view.pads import Pad
@@ -92,7 +92,7 @@ def candidates(ds: xr.Dataset) -> tuple[Any, str]:
     image = drawing.rendered(whole, seen, up, (1100, 1300))
     drawing.placed(axes[0, 0], image, f"(a) {len(marks) // 2} candidates, one grasp")
     mapped = _front(axes[0, 1], pad, top)
-    place = f"station {number(1e3 * ds.station.values[0])} mm, {number(forces(ds)[-1])} N"
+    place = f"station {number(1e3 * ds.station.values[0])} mm, {axis_text(ds, 'angle', 0)}, {number(forces(ds)[-1])} N"
     axes[0, 1].set_title(f"pressure on its pad: {place}")
     drawing.scale_beside(drawn, mapped, axes[0, 1], "pressure [kPa]")
     off = 1e3 * float(np.linalg.norm(pad.pose.to_pad(pad.origin)[:2]))

@@ -41,8 +41,8 @@ def curvature(ds: xr.Dataset) -> tuple[Any, str]:
                               color=plots.MODELS[model][1], label=f"{label}, {number(force)} N",
                               **look)  # fmt: skip
         axis.set(xlabel="a / b, semi-axis along the approach over across [-]", ylabel="1 - CCM / PCM [%]", title=title)
+        axis.legend(frameon=False, fontsize=8)
     axes[0, 0].set_title(f"(c) {AGAINST['pcm']}")
-    axes[0, 0].legend(frameon=False, fontsize=8)
     ends = {name: _overestimate(ds, name, "pcm", last)[0][order] for name in COMPONENTS}
     grows = ", ".join(f"{n} {number(ends[n][0], 2)} to {number(ends[n][-1], 2)} %" for n in ("f_y", "tau_z"))
     return drawn, (
