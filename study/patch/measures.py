@@ -297,8 +297,8 @@ def grasp_quality(
     -------
     Score
         ``quality``, the volume of the grasp wrench space (L-infinity), ``quality_l1``, and ``epsilon``, the radius of
-        the largest ball round 0 in it, for a centre of mass halfway between the contacts [-]: a lower bound that is up
-        to a fifth too small where a surface is no ellipsoid (``softjaw patch`` prints the upper one, too).
+        the largest ball round 0 in it, for a centre of mass halfway between the contacts [-]: a lower bound, a fifth
+        too small or more where a surface is no ellipsoid (``softjaw patch`` prints the upper one, too).
 
     Raises
     ------

@@ -31,22 +31,23 @@ from softjaw.study.run.progress import duration
 from softjaw.study.run.shares import makespan
 
 FACE_GRID = (13, 7)  # points of a pad's face
-# Measured on cylinders, boxes, bottles and meshes of 64 to 2304 solved elements, CPU time of one core of 2024.
-CASE, ELEMENT = 0.05, 2.2e-4  # seconds of a force: friction, fits and score; contact, for each trilinear element
+# Measured on cylinders, boxes, bottles and meshes of 64 to 2304 solved elements, CPU time of one core of 2026.
+CASE, ELEMENT = 0.06, 2.75e-4  # seconds of a force: friction, fits and score; contact, for each trilinear element
+SECTIONS_FACTOR = 1.7  # times as dear is a body of stacked sections, on whose surface places are searched
 QUADRATIC_FACTOR = 10.0  # times as dear is a triquadratic element
-START_S = 0.3  # seconds until a rank has loaded what it solves with
+START_S = 3.5  # seconds until a rank has loaded what it solves with, and at the end to pack and list
 FIRST_FORCE_FACTOR = 2.0  # times as long the first force takes, which begins with a coarse step
 REGION_S = 0.3  # seconds until the distance to a mesh is known round both pads
 # times as dear with friction that acts back, everywhere or where it is found to matter
 COUPLED = {"none": 1.0, "auto": 2.2, "tangential": 2.2}
-SCREENED_COST = 0.15  # of a force on the coarse mesh alone, over that on the scene's
-ROUNDS = 3.5  # of the cases that a list shows, each once on the scene's mesh: with others, and with finer meshes
+SCREENED_COST = 0.1  # of a force on the coarse mesh alone, over that on the scene's
+ROUNDS = 2.3  # of the cases that a list shows, each once on the scene's mesh: with others, and with finer meshes
 DEEP, HARD = 0.4, 4.0  # closing over the pad's thickness from which forces are cut into steps, and how much that costs
 
 WRITE_S = 1.5e-5  # seconds of one write of a rank, measured on one machine with a local disk
 WRITES_PER_S, BYTES_PER_S = 5e4, 1e9  # what a file system is assumed to take from all ranks together
 GOOD_EFFICIENCY = 0.8
-PRODUCTS_S = 3e-3  # seconds that `slowness` counts where cases take what is said above
+OPERATIONS_S = 3.6e-3  # seconds that `slowness` counts where cases take what is said above
 
 
 def estimated(units: Sequence[Any]) -> list[float]:
@@ -60,9 +61,9 @@ def estimated(units: Sequence[Any]) -> list[float]:
 
 
 def slowness() -> float:
-    """How long sums of products take here, over where the seconds of this module were measured."""
-    a = np.sin(np.arange(14400.0)).reshape(120, 120)  # by einsum: BLAS may have several threads
-    return min(timeit.repeat(lambda: np.einsum("ij,jk->ik", a, a), number=5, repeat=5)) / PRODUCTS_S
+    """How long small operations of numpy take here, over where the seconds of this module were measured."""
+    a = np.arange(300.0)
+    return min(timeit.repeat(lambda: [float((a * 2 + i).max()) for i in range(400)], number=2, repeat=5)) / OPERATIONS_S
 
 
 def _seconds(unit: Any, points: FloatArray, triangles: NDArray[np.int64]) -> tuple[float, float]:
@@ -73,6 +74,7 @@ def _seconds(unit: Any, points: FloatArray, triangles: NDArray[np.int64]) -> tup
     fingers = 1 if turn_of_pose(pose, other, scene.object.axis_symmetry) is not None else 2
     planes = _planes(scene, low, high, doubt(points))
     kind = QUADRATIC_FACTOR if gripper.element == "hex27" else 1.0
+    kind *= SECTIONS_FACTOR if scene.object.shape == "sections" else 1.0
     elements = kind * fingers * math.prod(gripper.elements) / 2**planes
     each = CASE + ELEMENT * elements * meshes_cost(scene) * COUPLED[scene.effects.friction_pressure_coupling]
     jaws, cell = jaws_of(scene), math.prod(gripper.pad_size[:2]) / math.prod(FACE_GRID)

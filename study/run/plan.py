@@ -39,7 +39,7 @@ from softjaw.study.scene.sections import COARSE, FINEST
 LIBRARY_BYTES, FILL_FACTOR = 4.5e8, 160.0
 # Of a wall, measured on a cup and a bottle: all that a force takes, with the coarse mesh; 16 kB are factors, the rest
 # solutions that are kept.
-SECONDS_PER_UNKNOWN, BYTES_PER_UNKNOWN = 5e-4, 9e4
+SECONDS_PER_UNKNOWN, BYTES_PER_UNKNOWN = 9e-4, 9e4
 
 
 @dataclass(frozen=True)
@@ -210,15 +210,14 @@ def _estimated_time(plan: Plan, scene: Any, ranks: int) -> str:
     on = f"on {ranks} rank{'s' * (ranks > 1)}"
     if not shells(scene):
         seconds = slowness() * makespan(plan.in_parts(estimated(plan.tried)), ranks)
-        # measured on ten objects: half for a capsule and a mug, twice for an angle of sharp edges
-        on += ", half to twice that" * bool(scene.candidates.sampled)
-        return f"about {duration(START_S + seconds)} {on}, estimated on a bed of springs"
+        # measured on 22 scenes: 0.5 to 2 times, by how far friction acts back and how thin and sharp an object is
+        return f"about {duration(START_S + seconds)} {on}, half to twice that, estimated on a bed of springs"
     pads, shell = wall_unknowns(scene)
     # between rigid candidates and shells where the scene leaves that open
     size = pads + shell if scene.effects.object.endswith("shell") else math.sqrt(pads * (pads + shell))
     forces = makespan([plan.layout.shape[-1]] * len(plan.tried), ranks)
     seconds = slowness() * SECONDS_PER_UNKNOWN * size * forces
-    return f"about {duration(START_S + seconds)} {on}, estimated from the size of pads and wall"
+    return f"about {duration(START_S + seconds)} {on}, half to twice that, estimated from the size of pads and wall"
 
 
 def free_bytes(path: Path) -> int:

@@ -99,7 +99,7 @@ class Prepared:
 def choice(monkeypatch):
     """Levels of the effects of a prepared candidate; its indicator leaves friction open."""
     monkeypatch.setattr(effects, "neglected_traction", lambda state, mu: 0.1)
-    monkeypatch.setattr(effects, "payload_alone", lambda contacts, n, task: {"maps/payload": contacts[0].payload})
+    monkeypatch.setattr(effects, "payload_alone", lambda contacts, task: {"maps/payload": contacts[0].payload})
     monkeypatch.setattr(effects, "quality", lambda contacts, settings: 1.0)
     return lambda *arguments, **more: EffectChoice(Prepared(*arguments, **more))
 
