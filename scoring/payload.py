@@ -38,7 +38,7 @@ from scipy.spatial import ConvexHull
 from softjaw.scoring.contact import Body, FloatArray, IntArray, SoftContact, discs_of, vertices_of
 
 KINDS = ("shared", "up_to", "fixed")
-BOUND_GAP = 1e-3  # of the bounds, relative, at which the search ends
+BOUND_GAP = 1e-3  # of the bounds, relative, at which the search ends by default
 ROUNDING_FORCE = 1e-7  # of the forces of the grasp, below which a force is rounding
 MOST_PRESSED = 2.0  # times the pressure of the grasp that a load may make; beyond it the contact would be another one
 MOST_COLUMNS = 2000  # that are kept of a limit surface
@@ -69,6 +69,7 @@ def payload(
     direction: ArrayLike | None = None,
     kind: str = "shared",
     drive: ArrayLike | None = None,
+    gap: float = BOUND_GAP,
 ) -> Payload:
     """Largest force at the centre of mass that two contacts hold, along ``direction`` or the worst of all.
 
@@ -86,6 +87,8 @@ def payload(
         What happens to the normal forces: one of `KINDS`.
     drive : (2, 3) array, optional
         Force with which the gripper presses each finger [N]; by default that of its pressure.
+    gap : float
+        Of the bounds, relative, at which the search ends.
     """
     centre, P = np.asarray(centre_of_mass, float), np.asarray(pressure, float)
     length = max(float(np.linalg.norm(c.position - centre)) for c in contacts) or 1.0
@@ -97,7 +100,7 @@ def payload(
     drives = [p @ c[:3] / (p @ p) for p, c in zip(pressed, C, strict=True)]
     first, other = (_surface(contact.body, size, d) for contact, d in zip(contacts, drives, strict=True))
     grasp = C, first, other, KINDS.index(kind)
-    answer = _along(grasp, np.asarray(direction, float)) if direction is not None else _worst(grasp)
+    answer = _along(grasp, np.asarray(direction, float)) if direction is not None else _worst(grasp, gap)
     return Payload(size * answer.force, size * answer.upper, answer.direction, answer.borne)
 
 
@@ -133,7 +136,7 @@ def _along(grasp: _Grasp, d: FloatArray) -> Payload:
     return Payload(max(float(-d @ point[:3]), 0.0), max(most, 0.0), d, True)
 
 
-def _worst(grasp: _Grasp) -> Payload:
+def _worst(grasp: _Grasp, gap: float) -> Payload:
     """Largest load in every direction, and one in which a larger one is lost."""
     rows = np.hstack([np.zeros((3, 3)), np.eye(3)])
     points, bases = np.zeros((MOST_POINTS, 3)), np.zeros((MOST_POINTS, 4, 8))
@@ -152,7 +155,7 @@ def _worst(grasp: _Grasp) -> Payload:
         corners = hull.simplices.astype(np.int64)  # in no order round their facets
         inward = np.einsum("fi,fi->f", _planes(points, corners)[:, :3], hull.equations[:, :3]) < 0
         corners[inward] = corners[inward, ::-1]
-        lower, upper, u = _refined(*search, 8, corners, hull.equations, upper, u)
+        lower, upper, u = _refined(*search, 8, corners, hull.equations, upper, u, gap)
     force = min(lower, upper) if lower > ROUNDING_FORCE else 0.0
     return Payload(force, max(upper, 0.0), -u, upper >= -ROUNDING_FORCE)
 
@@ -216,7 +219,7 @@ def _looked(C, A1, A2, kind, rows, points, bases, directions, basis, n, empty, u
 
 
 @njit(cache=True)
-def _refined(C, A1, A2, kind, rows, points, bases, n, corners, planes, upper, u):
+def _refined(C, A1, A2, kind, rows, points, bases, n, corners, planes, upper, u, gap):
     """Distance of the hull's nearest facet, after a look along all that are nearer than the least support, and that.
 
     ``n`` points are known; ``corners, planes`` are the facets of their hull.
@@ -227,7 +230,7 @@ def _refined(C, A1, A2, kind, rows, points, bases, n, corners, planes, upper, u)
         plane = planes[nearest]
         # a point that the hull has already ends the search: along its nearest facet both bounds are the same
         known = (plane == before).all() or n == len(points)
-        if known or upper < ROUNDING_FORCE or -plane[3] >= upper * (1.0 - BOUND_GAP):
+        if known or upper < ROUNDING_FORCE or -plane[3] >= upper * (1.0 - gap):
             return -plane[3], upper, u
         # a programme that did not fill its rows says nothing of the support
         before, basis, along = plane, bases[corners[nearest, 0]], plane[:3].copy().reshape(1, 3)

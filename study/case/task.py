@@ -11,13 +11,15 @@ from numpy.typing import ArrayLike
 
 from softjaw.friction.wrench import friction_discs
 from softjaw.scoring.contact import DiscBody
-from softjaw.scoring.payload import Payload, payload
+from softjaw.scoring.payload import BOUND_GAP, Payload, payload
 from softjaw.study.case.build import centre_of_mass, own_frame
 from softjaw.study.case.contact import Contact
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import MODELS
 from softjaw.study.scene import Scene
 from softjaw.study.units import GRAVITY
+
+PLANAR_GAP = 3e-3  # of the bounds of a payload in the planar models, on which no choice depends
 
 
 @dataclass(frozen=True)
@@ -63,4 +65,5 @@ def _payload(contacts: Sequence[Contact], model: str, task: Task) -> Payload:
     soft = [c.soft(DiscBody(friction_discs(c.local, c.mu, model))) for c in contacts]
     pressure = [c.pressure_wrench for c in contacts]
     drive = [c.drive(p) for c, p in zip(contacts, pressure, strict=True)]
-    return payload(soft, pressure, task.centre_of_mass, task.direction, task.kind, drive)
+    gap = BOUND_GAP if model == MODELS[0] else PLANAR_GAP
+    return payload(soft, pressure, task.centre_of_mass, task.direction, task.kind, drive, gap)
