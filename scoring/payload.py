@@ -273,7 +273,7 @@ def _touching(C, A, q, exact, t, out):
                         point[1 + c] += a * D[i, c] + b * D[i, 3 + c]
             point /= max(drive @ point, 1.0 / MOST_PRESSED)
             before, h = h, point @ t
-            if h - before <= NEAR * abs(h):
+            if abs(h - before) <= NEAR * abs(h):
                 break
         if h > best:
             best, at = h, min(count[0], V.shape[1] - 1)
