@@ -1,5 +1,6 @@
 """Refinement of the stations: where the next ones go, what a grown file keeps, and the same bits on any ranks."""
 
+from dataclasses import replace
 from itertools import combinations
 from types import SimpleNamespace
 
@@ -10,6 +11,7 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from softjaw.study.case.result import CaseResult
+from softjaw.study.messages import OTHER_FILE, StudyError
 from softjaw.study.quantities import DONE, MISSING, WIDE
 from softjaw.study.result.skeleton import rewrite
 from softjaw.study.result.store import open_result, torn_rows
@@ -102,6 +104,9 @@ def test_a_grown_file_keeps_every_row(tmp_path):
     assert torn_rows(path, big.layout) == [2 * 2 * 2]
     assert not list(tmp_path.glob("*.grown*"))
     assert measured_seconds(small, path).shape == (20,)
+    with pytest.raises(StudyError, match="another scene") as refused:
+        measured_seconds(replace(small, header=replace(small.header, digest="other")), path)
+    assert refused.value.code == OTHER_FILE
 
 
 def filled(path, plan):
