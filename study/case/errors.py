@@ -41,6 +41,9 @@ OF_OVERLAP = {"closing": 2.0, "contact_area": 2.6, "p_max": 70.0}
 EDGES_ROUNDED = 1.6  # times the error of a payload on the coarse mesh alone, where the object's edges are rounded
 OF_PAIRS = {"p_max": 3.0}  # of what pairs differ by: peaks that an effect makes at an edge grow as elements shrink
 ALIGNED, LEANING = 0.2, np.radians(15.0)  # times the floor of a payload where contacts face each other; added per angle
+# Of forces along the face, which pressures alone give by balance, where friction acts back: times the floor, and of the
+# share of the load that the curvature takes off.
+ACTING, OF_LOSS = 2.0, 0.5
 PAYLOADS = ("payload", "safety_factor")  # what arms and couples leave of the friction: little of it moves all of them
 
 
@@ -64,7 +67,7 @@ class Unseen(NamedTuple):
         return cls(floor, of_width, max(c.on_edges for c in contacts), overlap)
 
     def share(self, q: Quantity, contacts: Sequence[Any], acts: bool = False) -> float:
-        """Of a quantity's value; ``acts``: whether friction acts back."""
+        """Of a quantity's value; ``acts``: whether friction acts back, or should."""
         floor = self.of_width * OF_WIDTH[q.name] if q.name in OF_WIDTH else self.floor * WIDER.get(q.name, 1.0)
         if q.name == "closing" and (pad := contacts[0].state.pad).shape.element == "hex8":
             # trilinear elements close less, the less the foam can be compressed
@@ -72,8 +75,9 @@ class Unseen(NamedTuple):
         if q.name in PAYLOADS:  # of contacts that face each other friction and the drive's force tell it, on any mesh
             floor = floor * (ALIGNED + max(angles(*contacts)) / LEANING) + BOUND_GAP
         floor += OF_OVERLAP.get(q.name, 0.0) * self.overlap**2
-        # pressures alone give forces along the face by balance, with friction that acts back they do not
-        return floor * (2.0 if acts and q.name.startswith("f_") else 1.0) + self.on_edges * OF_EDGES[q.name]
+        if acts and q.name.startswith("f_"):
+            floor = ACTING * floor + OF_LOSS * max(1.0 - c.limits["ccm"].F_N / c.limits["ccm"].S for c in contacts)
+        return floor + self.on_edges * OF_EDGES[q.name]
 
 
 ALL_SEEN = Unseen()
@@ -102,7 +106,7 @@ def mesh_errors(
         # dents of walls converge with first order: as far as the coarser mesh's is away, they are off
         share = 1.0 if "wall" in q.needs else OF_FARTHEST
         error = estimate(value, coarse_mesh[q.key], view_values, q.error, q.name in PAYLOADS, share)
-        error += unseen.share(q, fine, acts) * size
+        error += unseen.share(q, fine, acts or left_out > 0.0) * size
         if q.error == "relative" and not np.all(coarse_mesh[q.key]):
             error = max(error, 1.0)  # a payload of which the coarse mesh has nothing
         apart = [s * distance(low[q.key], high[q.key], q.error, value) for low, high, s in compared if q.key in low]
