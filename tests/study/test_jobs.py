@@ -25,7 +25,7 @@ ONE = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", sorted(set(JOBS) - {"sampled"}))  # which tests/test_readme.py checks
+@pytest.mark.parametrize("name", sorted(set(JOBS) - {"sampled"}))  # which tests/test_docs.py checks
 def test_every_shipped_scene_passes_check(name, capsys):
     assert main(["check", str(JOBS[name])]) == 0
     told = capsys.readouterr()

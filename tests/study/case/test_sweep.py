@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from softjaw.study.case import candidates, poses
 from softjaw.study.case.build import build_object
 from softjaw.study.scene import parse_scene
-from tests.fem.test_centre_line import bent
+from tests.fem.test_traced import bent
 from tests.study.scenes import OVAL, mesh_of, pose_of, scene_of, text_of
 
 Z = np.array([0.0, 0.0, 1.0])
