@@ -74,15 +74,20 @@ def test_the_fine_mesh_has_the_state_that_it_has_along_a_load_path(overrides):
             assert both[name] == pytest.approx(alone.values[name], rel=1e-8, abs=1e-9), name
 
 
-def test_a_failure_at_one_force_leaves_the_others_alone(monkeypatch):
-    at, expected = Press.at, whole(())
+def compressed_too_far(monkeypatch, fails):
+    at = Press.at
 
-    def fails(press, force, coarse):
-        if force == 2.0:
+    def tried(press, force, start):
+        if fails(press, force):
             raise ConvergenceError("the pad is compressed too far")
-        return at(press, force, coarse)
+        return at(press, force, start)
 
-    monkeypatch.setattr(Press, "at", fails)
+    monkeypatch.setattr(Press, "at", tried)
+
+
+def test_a_failure_at_one_force_leaves_the_others_alone(monkeypatch):
+    expected = whole(())
+    compressed_too_far(monkeypatch, lambda press, force: force == 2.0)
     found = refined()
     assert isinstance(found[1], CaseFailure)
     for k in (0, 2):
@@ -170,14 +175,7 @@ def test_a_refined_patch_has_the_scenes_faces_the_finer_sums_and_is_joined_by_lo
 
 
 def test_a_finer_mesh_without_a_state_loses_nothing(monkeypatch, split):
-    at = Press.at
-
-    def fails(press, force, starts):
-        if press.pad.shape.elements == FINER:
-            raise ConvergenceError("the pad is compressed too far")
-        return at(press, force, starts)
-
-    monkeypatch.setattr(Press, "at", fails)
+    compressed_too_far(monkeypatch, lambda press, force: press.pad.shape.elements == FINER)
     same = ("effects.sheet='rigid'", "effects.friction_pressure_coupling='none'")
     found, two = refined(*same, *aim(1e-3)), refined(*same)
     for k, result in found.items():

@@ -7,8 +7,7 @@ import pytest
 
 from softjaw.study.cli import main
 from softjaw.study.messages import OTHER_FILE, USAGE
-from tests.study.patch.test_patch import EXAMPLE, faceted
-from tests.study.patch_files import centres, cylinder_mesh, vtk
+from tests.study.patch.test_patch import EXAMPLE, centres, cylinder_mesh, faceted, vtk
 
 HEAD = "x_mm,y_mm,z_mm,area_mm2,nx,ny,nz,pressure_kpa"
 FACE = "0,0,0,1,0,0,1,5"
