@@ -138,8 +138,7 @@ def _direction(vector: FloatArray, scale: float = 1.0) -> FloatArray:
     length = np.linalg.norm(vector)
     if length <= CANCEL * scale:
         raise NoContactError(
-            "the normals of the patch cancel, so the contact has no direction: check that all normals point to the "
-            "same side and that the patch is one side of an object"
+            "the normals of the patch cancel: check that all point to one side and that it is one side of an object"
         )
     return vector / length
 

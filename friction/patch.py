@@ -107,8 +107,7 @@ def _finite(name: str, value: ArrayLike, shape: tuple[int, ...]) -> FloatArray:
     array = np.array(value, dtype=float)
     if array.shape != shape:
         raise ValueError(
-            f"{name} has shape {array.shape}, expected {shape}: every array needs one row per face "
-            f"(the patch has as many faces as pressures, {shape[0]})"
+            f"{name} has shape {array.shape}, expected {shape}: one row per face (the pressures give {shape[0]})"
         )
     if not np.isfinite(array).all():
         index = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])

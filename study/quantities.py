@@ -84,8 +84,7 @@ REASONS = (
     "left out on the coarse mesh alone, and part of the errors there",
 )
 MEASURED = {  # parts of an effect that the coarse mesh decides
-    "change": "Relative change of e_n (CCM) by the dearer of the two levels that were compared last, on the coarse"
-    " mesh; NaN where nothing was measured.",
+    "change": "Relative change of e_n (CCM) by the dearer of the last two levels, on the coarse mesh; NaN: unmeasured.",
     "payload_change": "The same of the payload.",
     "quality_change": "The same of the quality.",
 }
@@ -170,10 +169,10 @@ MEANS = "|P - 1|, |P^(-1/degree) - 1| (the relative error of the radius), angle 
 ROWS = (
     # maps of every case, with what is said beside them
     Quantity("quality", M, "", "grasp quality",
-             "Volume of the grasp wrench space spanned by both contacts with unit normal forces. The arms of forces are"
-             " divided by the object's extents along x, y and z of its own frame, as in the paper, torques about the "
-             "normals by the contact's length, unless [score] says otherwise. The limit surfaces are the ellipsoids "
-             "from three motions, as in the paper.", rank=2, error="relative"),
+             "Volume of the grasp wrench space of both contacts with unit normal forces. As in the paper, arms of "
+             "forces are divided by the object's extents along its own x, y and z, torques about the normals by the "
+             "contact's length (or as [score] says), and limit surfaces are ellipsoids from three motions.",
+             rank=2, error="relative"),
     Quantity("payload", M, "kg", "mass that is held",
              "Largest mass whose weight at the centre of mass both contacts hold with the normal force of this case, in"
              " whichever direction it pulls, or in that of [task]. The squeeze itself is borne first; 0 where friction"
@@ -182,8 +181,8 @@ ROWS = (
     Quantity("safety_factor", M, "", "mass that is held over mass of the object", "payload over object.mass_g.",
              symbol="safety", needs=("mass",), rank=13, error="relative"),
     Quantity("quality_fitted", M, "", "grasp quality, fitted limit surface",
-             "As quality, with the limit surface that the scene's [limit_surface] asks for, fitted to the wrenches of"
-             " many motions.", symbol="fitted", rank=9),
+             "As quality, with the limit surface of the scene's [limit_surface], fitted to wrenches of many motions.",
+             symbol="fitted", rank=9),
     Quantity("fit_error", (), "", "fit error of the fitted limit surface",
              "Mean of |P^(-1/degree) - 1|, the relative error of the radius of the fitted limit surface P = 1, over "
              "377 motions that it was not fitted to; CCM, of the finger where it is larger.", rank=10),
@@ -194,30 +193,27 @@ ROWS = (
     Quantity("overclaim_ellipsoid", (), "", "largest overclaim of the ellipsoid from three motions",
              "As overclaim, of the ellipsoid that quality is computed from."),
     Quantity("e_n", M, "m", "eccentricity parameter e_n",
-             "max tau_z / (mu S), Eq. (12) with the paper's F_N read as S, the sum of pressure times area over the "
-             "patch; of the weaker finger.", rank=3, error="relative"),
+             "max tau_z / (mu S), Eq. (12) with F_N read as S, the sum of pressure times area; of the weaker finger.",
+             rank=3, error="relative"),
     Quantity("e_n_ratio", M, "m", "eccentricity parameter, torque over force",
-             "max tau_z / max f_t, Eq. (11), with the largest friction force in the contact plane in any direction; of"
-             " the finger where it is smaller."),
+             "max tau_z / max f_t, Eq. (11), f_t the friction force in the contact plane; of the weaker finger."),
     Quantity("e_n_commanded", M, "m", "eccentricity parameter, force of the gripper",
-             "max tau_z / (mu F), Eq. (12) with the paper's F_N read as the force F that the gripper is commanded to "
-             "exert, the normal_force of the case; of the weaker finger."),
+             "max tau_z / (mu F), Eq. (12) with F_N read as F, the commanded normal_force; of the weaker finger."),
     Quantity("e_n_projected", M, "m", "eccentricity parameter, physical normal force",
-             "max tau_z / (mu F_N), with F_N the sum of pressure times area times the cosine between face normal and "
-             "contact normal; of the weaker finger."),
+             "max tau_z / (mu F_N), F_N the resultant of pressure along the contact normal; of the weaker finger."),
     Quantity("epsilon", M, "", "largest-minimum resisted wrench",
              "Radius of the largest ball around the origin inside the grasp wrench space of quality, with torques "
              "about the midpoint of the contacts. NaN where the contacts, with their arms scaled, are more than "
              "0.5 degrees from antipodal, unless score.epsilon is 'everywhere'."),
     Quantity("f_x_max", M, "N", "largest friction along x",
-             "Total friction force along the contact frame's x axis when the pad slides along x, Eqs. (6)-(8); of the"
-             " weaker finger.", rank=7, error="relative"),
+             "Friction force along the contact frame's x as the pad slides so, Eqs. (6)-(8); of the weaker finger.",
+             rank=7, error="relative"),
     Quantity("f_y_max", M, "N", "largest friction along y",
-             "Total friction force along the contact frame's y axis when the pad slides along y, Eqs. (6)-(8); of the"
-             " weaker finger.", rank=8, error="relative"),
+             "Friction force along the contact frame's y as the pad slides so, Eqs. (6)-(8); of the weaker finger.",
+             rank=8, error="relative"),
     Quantity("tau_z_max", M, "N m", "largest friction torque about z",
-             "Total friction torque about the contact normal when the pad turns about it, Eqs. (6)-(8); of the weaker"
-             " finger.", rank=4, error="relative"),
+             "Friction torque about the contact normal as the pad turns about it, Eqs. (6)-(8); of the weaker finger.",
+             rank=4, error="relative"),
     Quantity("tau_pure", (), "N m", "largest torque without a net force",
              "Largest torque about the contact normal without a force in the contact's plane; tau_z_max comes with one"
              " where the patch is not symmetric, and is larger: up to 2 max(a, b) / (a + b) times where a pad bears on"
@@ -248,8 +244,7 @@ ROWS = (
              "1 - F_N / S: what the tilt of the loaded normals takes off the normal force; both fingers together.",
              error="absolute"),
     Quantity("misalignment", (), "rad", "misalignment of the contacts",
-             "Largest of the angles between one contact normal and the other reversed, and between the line that "
-             "joins the contacts and each normal."),
+             "Largest angle between a contact normal and the other one reversed, or the line through both contacts."),
     Quantity("flags", (), "", "flags of the case", flag_definitions()),
     *(
         Quantity(f"{name}_overestimate{suffix}", (), "", f"{what}: {model} over ccm",
@@ -258,13 +253,13 @@ ROWS = (
         for name, what in (("f_x", "friction along x"), ("f_y", "friction along y"), ("tau_z", "friction torque"))
         for suffix, model, note in (
             ("", "pcm", "both scaled by S, the paper's normalisation"),
-            ("_pcm_projected", "pcm_projected", "both scaled by the physical normal force F_N; never positive: a"
-             " planar model with that force claims too little"),
+            ("_pcm_projected", "pcm_projected", "both scaled by the normal force F_N; never positive: such a planar"
+             " model claims too little"),
         )
     ),
     Quantity("pad_elements", (), "", "elements of a pad",
-             "Of the finest mesh that the case was solved on. Errors are from the two finest; faces are those of the "
-             "scene's own mesh.", needs=("finer meshes",)),
+             "Of the case's finest mesh. Errors are from the two finest; faces are those of the scene's own mesh.",
+             needs=("finer meshes",)),
     Quantity("indentation", (), "m", "indentation of the wall",
              "Largest inward displacement of the wall, less the motion of the wall as a whole.",
              needs=("wall",), rank=5, error="relative"),
@@ -288,11 +283,11 @@ ROWS = (
     Quantity("force_excess", F, "", "force along the contact normal over the gripper's, less 1", AS_MAP, "fingers"),
     Quantity("closing", F, "m", "closing displacement of the pad", AS_MAP, "fingers"),
     Quantity("frame_origin", (*F, "component"), "m", "origin of the contact frame",
-             "In the pad's frame: where the line through the centre of pressure along z meets the pad's deformed "
-             "face, loaded there or not.", "fingers"),
+             "In the pad's frame: where the line along z through the COP meets the deformed face, loaded there or not.",
+             "fingers"),
     Quantity("frame_axes", (*F, "component", "component_2"), "", "axes of the contact frame",
-             "Rows x, y, z in the pad's frame; z is the object's normal at the origin, the deformed face's own where "
-             "no load is near.", "fingers"),
+             "Rows x, y, z in the pad's frame; z: the object's normal at the origin, or the face's if no load is near.",
+             "fingers"),
     Quantity("frame_flag", F, "", "flag of the contact frame",
              "0: regular; otherwise a rule for a degenerate patch chose the frame.", "fingers"),
     Quantity("pose_rotation", (*F, "component", "component_2"), "", "rotation of the pad",
@@ -326,8 +321,8 @@ ROWS = (
     Quantity("load_steps", F, "", "load steps", "Newton solves, counted as the iterations.", "work"),
     Quantity("step_halvings", F, "", "step halvings", "Solves that failed and were repeated in half steps.", "work"),
     Quantity("mesh", (), "", "finest mesh that the case was tried on",
-             "0: half as many elements per direction as the scene's; 1: the scene's; 3: up to two finer ones, until"
-             " accuracy.target is met.", "work", needs=("finer meshes",)),
+             "0: half the scene's elements per direction; 1: the scene's; 3: up to two finer, to meet accuracy.target.",
+             "work", needs=("finer meshes",)),
     *(
         Quantity(f"seconds_{part}", (), "s", f"seconds in {part}", f"Time of the case spent in {part}.", "work")
         for part in (*PARTS, "total")
@@ -348,8 +343,8 @@ ROWS = (
              f"P(w) = 1 in w = (x, y, t) = (f_x, f_y, tau_z / rho) / (mu S), of {', '.join(MONOMIALS)} in this order;"
              " NaN where an ellipsoid was fitted.", "limit_surface"),
     Quantity("certificate", FM, "", "how the fit is known to be convex",
-             "0 the fit failed, ellipsoid from three motions used; 1 an ellipsoid; 2 the quartic came out "
-             "convex; 3 a semidefinite programme kept the quartic convex.", "limit_surface"),
+             "0 fit failed, three-motion ellipsoid used; 1 ellipsoid; 2 quartic, convex as fitted; 3 kept convex.",
+             "limit_surface"),
     Quantity("fit_flag", FM, "", "flag of the fit",
              "Sum of: 1 the wrenches lie in a plane or on a line; 2 fewer independent wrenches than coefficients; 4 its"
              " size was limited, which the wrenches alone do not; 8 rho does not suit the contact.", "limit_surface"),

@@ -126,9 +126,8 @@ def explained(error: ConvergenceError, foam: Foam, x: FloatArray, force: float) 
             f"{det:.2g}; its surface creases or its elements are too distorted to continue ({error})"
         )
     return ConvergenceError(
-        f"the foam loses ellipticity: at {force:.4g} N the smallest eigenvalue of its acoustic tensor is "
-        f"{ellipticity:.2g} of the shear modulus and the largest strain {strain:.0%}, strains localise, and no "
-        f"equilibrium was found beyond ({error})"
+        f"the foam loses ellipticity: at {force:.4g} N its acoustic tensor's least eigenvalue is {ellipticity:.2g} of "
+        f"the shear modulus, its largest strain {strain:.0%}; strains localise, no equilibrium found beyond ({error})"
     )
 
 
@@ -150,6 +149,5 @@ def refuse_fall(low: tuple[float, float], high: tuple[float, float]) -> None:
     if high[0] > low[0] and high[1] < (1.0 - 0.05) * low[1]:
         raise CheckError(
             f"the closing displacement falls from {1e3 * low[1]:.4g} mm at {low[0]:.4g} N to {1e3 * high[1]:.4g} mm at "
-            f"{high[0]:.4g} N: one of the two states is off the load path; the contact is too small "
-            "for the mesh, refine the pad"
+            f"{high[0]:.4g} N: one state is off the load path; the contact is too small for the mesh, refine the pad"
         )

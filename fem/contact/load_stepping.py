@@ -200,9 +200,8 @@ class Stepping:
             ended = NotReachedError(f"the force stays below {force:.4g} N: {reached}")
         if falls([peak[0], low[1]]):
             ended = NotReachedError(
-                f"the force stays below {force:.4g} N: it has a maximum of {peak[0]:.4g} N at a closing displacement "
-                f"of {1e3 * peak[1]:.4g} mm and falls to {low[1]:.4g} N at {1e3 * problem.closing(low[0]):.4g} mm: "
-                "the pad gives way, on this mesh"
+                f"the force stays below {force:.4g} N: it has a maximum of {peak[0]:.4g} N at {1e3 * peak[1]:.4g} mm and "
+                f"falls to {low[1]:.4g} N at {1e3 * problem.closing(low[0]):.4g} mm of closing: the pad gives way, on this mesh"
             )
         raise ended
 
@@ -241,9 +240,8 @@ class Stepping:
         if best:
             return best
         raise ConvergenceError(
-            f"found no first contact for {force:.4g} N near a closing of {closing * 1e3:.4g} mm; the pad may rest on "
-            "less than an element of its contact face: refine the pad's mesh or move the candidate. Last attempt: "
-            f"{failure}"
+            f"found no first contact for {force:.4g} N near a closing of {closing * 1e3:.4g} mm; less than an element "
+            f"may touch: refine the pad's mesh or move the candidate. Last attempt: {failure}"
         )
 
     def step_to(

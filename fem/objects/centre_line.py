@@ -104,8 +104,7 @@ def centre_line(points: FloatArray, triangles: IntArray, wavelength: float) -> C
     known = np.isfinite(middle[:, 0])
     if np.count_nonzero(known) < FEWEST:
         raise MeshError(
-            f"the mesh has closed sections at {np.count_nonzero(known)} of {HEIGHTS} heights along its axis; expected"
-            f" at least {FEWEST}: choose another axis, or give poses"
+            f"{np.count_nonzero(known)} of {HEIGHTS} sections closed, expected {FEWEST}: choose another axis, or poses"
         )
     smooth = smooth_spline(z[known], middle[known], wavelength, (z[known][0], z[known][-1]))
     inside = (z >= z[known][0]) & (z <= z[known][-1])

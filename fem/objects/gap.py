@@ -184,9 +184,8 @@ def first_touch(obj: GapFunction, pose: Pose, points: FloatArray, reach: float) 
         )
     if first > reach:
         raise NoContactError(
-            f"the pad misses the object: within {reach * 1e3:.4g} mm along the approach ({_vector(approach)}) from "
-            f"({_vector(pose.origin)}) m no point of its face comes closer than {closest * 1e3:.3g} mm; check station, "
-            "angle and the object's size and unit"
+            f"the pad misses the object by {closest * 1e3:.3g} mm within {reach * 1e3:.4g} mm along "
+            f"({_vector(approach)}) from ({_vector(pose.origin)}) m; check station, angle and the object's size, unit"
         )
     return float(first)
 

@@ -76,14 +76,12 @@ def read_triangles(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     # a reader may leave out what it cannot read without a word
     if len(mesh.faces) < faces:
         raise MeshError(
-            f"{path}: is truncated or damaged: it declares {faces} faces, {len(mesh.faces)} triangles could be read; "
-            "export it again"
+            f"{path}: is truncated or damaged: {faces} faces declared, {len(mesh.faces)} triangles read; export again"
         )
     # polygons are cut into fans, which fold over where a polygon is not convex
     if kind not in SCENES and len(mesh.faces) > faces and (mesh.face_adjacency_angles > FOLDED).any():
         raise MeshError(
-            f"{path}: has faces of more than three corners that are not convex, expected triangles; triangulate the "
-            "mesh when you export it"
+            f"{path}: has polygons that are not convex, expected triangles; triangulate the mesh when you export it"
         )
     return np.array(mesh.vertices, dtype=float), np.array(mesh.faces, dtype=np.int64)
 
@@ -215,7 +213,6 @@ def _loaded(path: Path, data: bytes) -> trimesh.Trimesh:
     astray = (faces < 0) | (faces >= len(points))
     if astray.any():
         raise MeshError(
-            f"{path}: a face refers to point {faces[astray][0]}, but there are only {len(points)} (counted from 0); "
-            "the file is damaged, export it again"
+            f"{path}: damaged, a face has point {faces[astray][0]} of only {len(points)} (from 0); export it again"
         )
     return mesh

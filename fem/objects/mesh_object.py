@@ -88,8 +88,7 @@ class MeshObject:
         distance = self._tree.along(pose.to_object(points), pose.rotation[:, 2]).min()
         if distance > reach:
             raise NoContactError(
-                f"the pad misses the object: within {reach * 1e3:.4g} mm along its approach no point of its face meets "
-                "a triangle; check station, angle and the object's size and unit"
+                f"the pad misses the object by {reach * 1e3:.4g} mm; check station, angle, object size and unit"
             )
         return float(distance)
 
@@ -136,8 +135,7 @@ class MeshObject:
         cells = COARSE * np.ceil((size / step - 1e-9 + 2 * MARGIN_CELLS) / COARSE)
         if np.prod(cells + 1) > MOST_SAMPLES:
             raise ValueError(
-                f"a grid step of {step * 1e3:.3g} mm needs {np.prod(cells + 1):.3g} samples for one pad, "
-                f"more than {MOST_SAMPLES}; raise grid_step"
+                f"grid_step {step * 1e3:.3g} mm: {np.prod(cells + 1):.3g} samples a pad, most {MOST_SAMPLES}; raise it"
             )
         sheet = facing_sheet(self._smooth, self._tree, self.closed, pose, box, step)
         axes = [0.5 * box[:, d].sum() + step * (np.arange(int(cells[d]) + 1) - 0.5 * cells[d]) for d in range(3)]
@@ -178,9 +176,9 @@ class MeshObject:
             return ""
         turn = np.degrees(smooth.turn[edges])
         return (
-            f"{len(edges)} edges between wide facets turn by {turn.min():.3g} to {turn.max():.3g} degrees and stay"
-            f" sharp; if these are facets of a round surface, it lies up to {1e3 * off.max():.2g} mm outside them:"
-            f" raise object.crease_angle_deg above {np.ceil(turn.max()):.0f}, or export a finer mesh"
+            f"{len(edges)} edges of wide facets, {turn.min():.3g} to {turn.max():.3g} degrees, stay sharp; if round"
+            f" the surface lies up to {1e3 * off.max():.2g} mm outside: raise object.crease_angle_deg above"
+            f" {np.ceil(turn.max()):.0f}, or export a finer mesh"
         )
 
     @cached_property

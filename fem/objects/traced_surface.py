@@ -83,9 +83,9 @@ def _refuse_folds(z: FloatArray, bad: NDArray[np.bool_]) -> None:
         k = np.flatnonzero(bad.any(axis=1))
         ray = int(np.argmax(bad.sum(axis=0)))
         raise MeshError(
-            f"between z = {z[k[0]]:.4g} m and {z[k[-1]]:.4g} m a ray from the mesh's centre line does not meet the "
-            f"surface exactly once, most often at {360 * ray / bad.shape[1]:.0f} degrees (a handle, fold or hollow): "
-            "cut such a part off in a mesh editor, or treat the object as rigid"
+            f"a ray from the mesh's centre line does not meet the surface exactly once: z = {z[k[0]]:.4g} to "
+            f"{z[k[-1]]:.4g} m, mostly at {360 * ray / bad.shape[1]:.0f} degrees (handle, fold or hollow); cut it off"
+            " in a mesh editor, or treat the object as rigid"
         )
 
 
@@ -135,9 +135,8 @@ def traced(mesh: MeshObject) -> tuple[OuterSurface, TraceReport]:
     if report.largest > OFF * wall.radius:
         z, angle = report.place
         raise MeshError(
-            f"near z = {z:.4g} m at {np.degrees(angle):.0f} degrees the smooth wall lies {report.largest * 1e3:.3g} mm "
-            "off the mesh (a ledge, an edge or a part that sticks out): smooth it in a mesh editor, or treat the "
-            "object as rigid"
+            f"near z = {z:.4g} m at {np.degrees(angle):.0f} degrees the smooth wall is {report.largest * 1e3:.3g} mm "
+            "off the mesh (ledge, edge or bulge): smooth it in a mesh editor, or treat the object as rigid"
         )
     return surface, report
 

@@ -145,9 +145,8 @@ class Grip(LoadPath[WallProblem]):
         # part of the force by which the ends of the load path with both kinds of gaps may differ
         if opening < INDENTED and high - low <= 0.05 * high:
             raise CheckError(
-                f"the wall seems to give way at {high:.3g} N on this mesh: with gaps of either kind its load path ends "
-                f"there (at {low:.4g} and {high:.4g} N), its opposite sides {1 - opening:.0%} of their distance "
-                f"closer; press less or take a thicker wall ({error})"
+                f"the wall seems to give way on this mesh: with gaps of either kind its load path ends ({low:.4g} and "
+                f"{high:.4g} N), its opposite sides {1 - opening:.0%} closer; press less or thicken the wall ({error})"
             ) from error
 
     def _refuse_folded(self, error: ConvergenceError, limit: float) -> None:
@@ -197,8 +196,7 @@ class Grip(LoadPath[WallProblem]):
         for ahead, speed in creep(self.problem, self.solver, start, force):
             if self.opening(self.problem.wall_state(ahead)) <= 0.0:
                 raise CheckError(
-                    f"the wall collapsed: beyond {reached:.3g} N, where its load path ends, it folds until its "
-                    f"opposite sides meet at {force:.4g} N"
+                    f"the wall collapsed: its load path ends at {reached:.3g} N; its sides meet at {force:.4g} N"
                 )
             if speed > slow:
                 continue
@@ -292,8 +290,7 @@ class Grip(LoadPath[WallProblem]):
         worst = residual[: problem.model.size].max(initial=0.0)
         if not worst <= max(WALL_BALANCE, RESIDUAL) * force:
             raise CheckError(
-                f"the state at {force:.4g} N converged but is wrong: a node of the wall is out of balance "
-                f"by {worst:.3g} N"
+                f"the state at {force:.4g} N converged but is wrong: a wall node is out of balance by {worst:.3g} N"
             )
         # the supports balance both fingers: forces across a plane of symmetry cancel, the others add up
         mirrored = np.array([*problem.model.shell.mesh.symmetry, False])

@@ -189,9 +189,8 @@ def _check_stations(scene: Scene, mesh: Any) -> None:
     if beside:
         raise StudyError(
             USAGE,
-            f"candidates: found stations off the object, {listed(beside)} mm; expected {low:g}"
-            f" to {high:g} mm, the mesh along its axis {mesh.axis}, counted from its lowest point; change the stations"
-            " or object.unit",
+            f"candidates: found stations off the object, {listed(beside)} mm; expected {low:g} to {high:g} mm along the"
+            f" mesh's axis {mesh.axis} from its lowest point; change the stations or object.unit",
         )
 
 
@@ -230,8 +229,7 @@ def mesh_notes(mesh: Any, centroid: bool = True) -> tuple[str, ...]:
     _, place, error = mesh.solid
     named = ", ".join(f"{1e3 * x:.1f}" for x in mesh.placed.to_object(place[None])[0])
     note = (
-        f"it is not closed: its centroid is estimated at ({named}) mm, to {1e3 * error:.1g} mm;"
-        " task.centre_of_mass_mm names a better one"
+        f"it is not closed: centroid estimated at ({named}) mm, to {1e3 * error:.1g} mm; or set task.centre_of_mass_mm"
     )
     return *mesh.notes, note
 

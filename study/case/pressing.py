@@ -282,9 +282,8 @@ def refuse_along_axis(fingers: Sequence[Finger]) -> None:
     steepest = max(abs(float(f.pose.rotation[2, 2])) for f in fingers)
     if steepest > np.sin(MAX_SLOPE):
         raise CheckError(
-            f"a finger approaches a thin-walled object at {np.degrees(np.arcsin(min(steepest, 1.0))):.0f} degrees to "
-            f"the planes across its axis; its wall is simulated up to {np.degrees(MAX_SLOPE):.0f} degrees: turn "
-            "the approach, or remove wall_mm"
+            f"a finger approaches a thin-walled object {np.degrees(np.arcsin(min(steepest, 1.0))):.0f} degrees off the "
+            f"planes across its axis, at most {np.degrees(MAX_SLOPE):.0f} expected: turn it, or remove wall_mm"
         )
 
 

@@ -50,9 +50,8 @@ def derived(scene: Scene) -> list[Quantity]:
     if getattr(scene.object, "wall", None) is not None:
         listed += [
             Quantity(HIGH, over, "N", "largest force that the wall bears",
-                     "Normal force per finger at which the indentation passes object.allowed_dent_mm or the stress the"
-                     " yield strength, as force_low; where neither does, the largest solved force. NaN: the wall was"
-                     " taken as rigid.", "derived"),
+                     "Normal force per finger at which indentation passes object.allowed_dent_mm or stress the yield"
+                     " strength, as force_low; else the largest solved force. NaN: wall taken as rigid.", "derived"),
             Quantity(HIGH_ERROR, over, "N", "error of the largest force that the wall bears",
                      "How much less it is where indentation and stress are larger by their stated errors.", "derived"),
         ]  # fmt: skip
