@@ -200,8 +200,8 @@ class Stepping:
             ended = NotReachedError(f"the force stays below {force:.4g} N: {reached}")
         if falls([peak[0], low[1]]):
             ended = NotReachedError(
-                f"the force stays below {force:.4g} N: it has a maximum of {peak[0]:.4g} N at {1e3 * peak[1]:.4g} mm and "
-                f"falls to {low[1]:.4g} N at {1e3 * problem.closing(low[0]):.4g} mm of closing: the pad gives way, on this mesh"
+                f"the force stays below {force:.4g} N: it has a maximum of {peak[0]:.4g} N at {1e3 * peak[1]:.4g} mm, "
+                f"then {low[1]:.4g} N at {1e3 * problem.closing(low[0]):.4g} mm closing: the pad gives way on this mesh"
             )
         raise ended
 

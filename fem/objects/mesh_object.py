@@ -88,7 +88,7 @@ class MeshObject:
         distance = self._tree.along(pose.to_object(points), pose.rotation[:, 2]).min()
         if distance > reach:
             raise NoContactError(
-                f"the pad misses the object by {reach * 1e3:.4g} mm; check station, angle, object size and unit"
+                f"the pad misses the object within {reach * 1e3:.4g} mm; check station, angle, object size and unit"
             )
         return float(distance)
 
