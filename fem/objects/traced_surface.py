@@ -83,7 +83,7 @@ def _refuse_folds(z: FloatArray, bad: NDArray[np.bool_]) -> None:
         k = np.flatnonzero(bad.any(axis=1))
         ray = int(np.argmax(bad.sum(axis=0)))
         raise MeshError(
-            f"a ray from the mesh's centre line does not meet the surface exactly once: z = {z[k[0]]:.4g} to "
+            f"a ray from the mesh's centre line does not meet the surface exactly once: z = {z[k[0]]:.4g} m to "
             f"{z[k[-1]]:.4g} m, mostly at {360 * ray / bad.shape[1]:.0f} degrees (handle, fold or hollow); cut it off"
             " in a mesh editor, or treat the object as rigid"
         )
