@@ -9,6 +9,7 @@ import subprocess
 import sys
 from contextlib import suppress
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from softjaw.study.cli import main, program
 from softjaw.study.cli.quick import petsc_overrides
 from softjaw.study.doctor import launch_environment
 from softjaw.study.messages import CANNOT_WRITE, StudyError, beside, make_folders, write_file
+from softjaw.study.run import session
 from softjaw.study.show.report import writing as report
 from tests.study.launching import ROOT, answer, launch
 from tests.study.launching import study as run_fake
@@ -237,3 +239,12 @@ def test_a_file_is_whole_or_not_there_a_device_is_written_to_and_a_file_in_the_w
     with pytest.raises(StudyError) as refused:
         write_file(tmp_path / "a" / "b", "", folders=True)
     assert refused.value.code == CANNOT_WRITE
+
+
+def test_a_file_that_is_complete_and_cannot_be_packed_is_left_as_it_is(monkeypatch, capsys):
+    def full(*_, **__):
+        raise StudyError(CANNOT_WRITE, "no space")
+
+    monkeypatch.setattr(session, "rewrite", full)
+    session.pack(session.Work(lambda *_: ()), Path("x.hdf"), SimpleNamespace(layout=None, header=None))
+    assert "x.hdf" in capsys.readouterr().err
