@@ -129,6 +129,7 @@ def friction_support(patch: ContactPatch, twist: ArrayLike, mu: float, model: st
     return checked_mu(mu) * scale * sums[:, 6]
 
 
+@lru_cache(maxsize=8)  # two contacts may share a patch, and payloads ask again for one
 def friction_discs(patch: ContactPatch, mu: float, model: str = "ccm") -> FloatArray:
     """Discs ``(n, 6)`` whose sum is the limit surface in ``(f_x, f_y, tau_z)`` [N, N, N m], two half-axes of each.
 

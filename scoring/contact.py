@@ -23,7 +23,8 @@ class Body(Protocol):
     """Limit surface in ``(f_x, f_y, tau_z)`` per unit normal force, with 0 inside or on it.
 
     A body that has ``vertices (k, 3)`` counts as their hull, one that has ``F (3, r)`` as the image of the unit ball
-    under that map, an ellipsoid about 0. One that is ``sampled`` has a volume that is not exact.
+    under that map, an ellipsoid about 0. One that is ``sampled`` has a volume that is not exact. A payload also takes
+    one that has ``discs (n, 6)`` and nothing else, which is their sum.
     """
 
     @property

@@ -324,7 +324,7 @@ def _programme(C, A1, A2, kind, along, rows, basis):
         q[:3] += along
         offset, value = y[: m - 1] @ right[: m - 1], cost @ x
         bound = _farthest(C, A1, A2, kind, q, False, point) + offset
-        if bound - value <= near * abs(bound) + 1e-9:
+        if bound - value <= near * abs(bound) + 1e-9:  # of the points that are known: now of all
             bound = _farthest(C, A1, A2, kind, q, True, point) + offset
             upper = min(upper, bound)
             if bound - value <= near * abs(bound) + 1e-9:

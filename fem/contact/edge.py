@@ -160,10 +160,11 @@ def _between_edges(variance: FloatArray, fourth: FloatArray, spacing: FloatArray
     """Length of stretches with two free edges [m], from the central moments of their loads [m^2, m^4]."""
     # the load of one node alone is spread over the node's share of the face
     variance = np.maximum(variance, spacing**2 / 12.0)
-    coarse = spacing / (2.0 * np.sqrt(variance))
+    half = 2.0 * np.sqrt(variance)  # of Hertz's contact
+    coarse = spacing / half
     beyond = np.clip(fourth / variance**2, FLATTEST, STEEPEST) - 2.0  # what Hertz's pressure has
     edged = beyond < 0.0
-    thin = ~edged / (1.0 + (THIN * thickness / (2.0 * np.sqrt(variance))) ** 4)
+    thin = ~edged / (1.0 + (THIN * thickness / half) ** 4)
     resolved = np.where(edged, EDGE_RESOLVED, RESOLVED * (1.0 + thin))
     k = 2.0 + thin / 7.0 + (beyond - thin / 7.0) / (1.0 + (coarse / resolved) ** 4)
     a, b, c = 4.0 * k - 5.0, 16.0 * k - 28.0, 16.0 * k - 32.0

@@ -104,7 +104,8 @@ def centre_line(points: FloatArray, triangles: IntArray, wavelength: float) -> C
     known = np.isfinite(middle[:, 0])
     if np.count_nonzero(known) < FEWEST:
         raise MeshError(
-            f"{np.count_nonzero(known)} of {HEIGHTS} sections closed, expected {FEWEST}: choose another axis, or poses"
+            f"{np.count_nonzero(known)} of {HEIGHTS} sections are closed, expected at least {FEWEST}:"
+            " choose another axis, or give poses"
         )
     smooth = smooth_spline(z[known], middle[known], wavelength, (z[known][0], z[known][-1]))
     inside = (z >= z[known][0]) & (z <= z[known][-1])

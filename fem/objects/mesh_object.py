@@ -135,7 +135,7 @@ class MeshObject:
         cells = COARSE * np.ceil((size / step - 1e-9 + 2 * MARGIN_CELLS) / COARSE)
         if np.prod(cells + 1) > MOST_SAMPLES:
             raise ValueError(
-                f"grid_step {step * 1e3:.3g} mm: {np.prod(cells + 1):.3g} samples a pad, most {MOST_SAMPLES}; raise it"
+                f"grid_step {step * 1e3:.3g} mm: {np.prod(cells + 1):.3g} samples, at most {MOST_SAMPLES}; raise it"
             )
         sheet = facing_sheet(self._smooth, self._tree, self.closed, pose, box, step)
         axes = [0.5 * box[:, d].sum() + step * (np.arange(int(cells[d]) + 1) - 0.5 * cells[d]) for d in range(3)]
@@ -176,7 +176,7 @@ class MeshObject:
             return ""
         turn = np.degrees(smooth.turn[edges])
         return (
-            f"{len(edges)} edges of wide facets, {turn.min():.3g} to {turn.max():.3g} degrees, stay sharp; if round"
+            f"{len(edges)} edges of wide facets, {turn.min():.3g} to {turn.max():.3g} degrees, stay sharp; if round,"
             f" the surface lies up to {1e3 * off.max():.2g} mm outside: raise object.crease_angle_deg above"
             f" {np.ceil(turn.max()):.0f}, or export a finer mesh"
         )

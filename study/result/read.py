@@ -164,7 +164,7 @@ def dataset(result: Result) -> xr.Dataset:
     variables["flags"] = xr.Variable(layout.names, flags, variables["flags"].attrs | marks)
     variables["status"] = xr.Variable(layout.names, status.astype(np.int8), _about(BY_KEY["status/code"]))
     if set(FORCE_RANGE) & variables.keys() and (status == MISSING).any():  # what is solved has its range at once
-        _fill_ranges(variables, status, parse_scene(result.scene, check_files=False))
+        _fill_ranges(variables, status, _parsed(result.scene))
     ds = xr.Dataset(variables, _coordinates(result, variables), _attributes(result))
     return with_intervals(ds) if REALISATION in ds.dims else ds
 
@@ -193,14 +193,19 @@ def scene_of(ds: xr.Dataset, index: Sequence[int] = ()) -> Scene:
 
 
 @lru_cache(maxsize=64)
+def _parsed(text: str) -> Scene:
+    return parse_scene(text, check_files=False)
+
+
+@lru_cache(maxsize=64)
 def _digest_of(text: str, _mesh: str) -> str:
     """Digest of a scene while its mesh has this one."""
-    return parse_scene(text, check_files=False).digest
+    return _parsed(text).digest
 
 
 @lru_cache(maxsize=64)
 def _scene_at(text: str, point: tuple[int, ...]) -> Scene:
-    scene = parse_scene(text, check_files=False)
+    scene = _parsed(text)
     values = {key: options[i] for (key, options), i in zip(scene.sweep.items(), point, strict=False)}
     return scene.with_values(values) if scene.sweep else scene
 

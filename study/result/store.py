@@ -22,8 +22,19 @@ from softjaw.study.messages import OTHER_FILE, StudyError, printable
 from softjaw.study.quantities import MISSING, STATES
 from softjaw.study.result import checksums
 from softjaw.study.result.hdf5 import opened, text_of
-from softjaw.study.result.layout import MOST_SESSIONS, PROGRAM, ROOT, SESSION, VERSION, Layout, header_of, layout_of
+from softjaw.study.result.layout import (
+    MOST_SESSIONS,
+    PROGRAM,
+    ROOT,
+    SESSION,
+    VERSION,
+    Header,
+    Layout,
+    header_of,
+    layout_of,
+)
 from softjaw.study.result.lock import holder
+from softjaw.study.scene.text import differences
 from softjaw.study.units import shown_text
 
 
@@ -52,6 +63,15 @@ class Result:
         # With a wrong header, the sums of the rows would be looked for in the wrong places.
         if not unchecked and str(checksums.of_header(file, self.layout)) != file.attributes(ROOT).get("checksum"):
             raise self._damaged("axes, layout, scene or definitions do not match their checksum")
+
+    def refuse_other(self, header: Header) -> None:
+        """Raise `StudyError` unless the file was made from the scene of a header."""
+        if self.digest != header.digest:
+            text = (
+                f"{self.path}: made from another scene ({self.digest[:8]}, this one is {header.digest[:8]}:"
+                f" {differences(self.scene, header.scene)}); choose another file with -o"
+            )
+            raise StudyError(OTHER_FILE, text)
 
     def read(self, path: str) -> np.ndarray:
         """A dataset by its path below ``/study`` (``e_n/pcm``), or the key of its quantity (``checks/adhesion``)."""

@@ -22,7 +22,6 @@ from softjaw.study.result.hdf5 import StoredFile, text_of
 from softjaw.study.result.layout import DONE, ROOT, SESSION, Header, Layout
 from softjaw.study.result.skeleton import HDF5_VERSIONS, report_bytes, text_bytes
 from softjaw.study.result.store import Result, open_result
-from softjaw.study.scene.text import differences
 
 MESH = "work/mesh"
 NOT_FINER = "on a finer mesh it was not solved: "
@@ -275,12 +274,7 @@ def verify(path: Path, layout: Layout, header: Header) -> bool:
     # Tried, not asked: mode bits know nothing of read-only mounts.
     os.close(os.open(path, os.O_RDWR))
     with open_result(path) as result:
-        if result.digest != header.digest:
-            text = (
-                f"{path}: made from another scene ({result.digest[:8]}, this one is {header.digest[:8]}:"
-                f" {differences(result.scene, header.scene)}); choose another file with -o"
-            )
-            raise StudyError(OTHER_FILE, text)
+        result.refuse_other(header)
         if result.layout.shape != layout.shape or result.layout.text() != layout.text():
             text = f"{path}: made by a version that stored other values; it can be read, but not resumed"
             raise StudyError(OTHER_FILE, f"{text}: choose another file with -o")

@@ -151,8 +151,7 @@ def measured_seconds(plan: Any, path: Path) -> Any:
     if not path.is_file():
         return None
     with open_result(path) as result:
-        if result.digest != plan.header.digest:
-            raise StudyError(OTHER_FILE, f"{path}: made from another scene; choose another file with -o")
+        result.refuse_other(plan.header)
         planned = np.flatnonzero(np.isin(result.axes[-3].values, plan.layout.axes[-3].values))
         seconds = np.where(result.status == FAILED, np.nan, result.read("work/seconds_total"))
         return seconds.take(planned, axis=-3).ravel()

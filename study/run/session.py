@@ -293,7 +293,10 @@ def pack(work: Work, path: Path, plan: Plan) -> None:
             writer.write_report(work.report(writer.result()))
     try:
         rewrite(path, plan.layout, plan.header, packed=True)
-    except StudyError as error:  # every number is in the file already
+    except StudyError as error:
+        if error.code != CANNOT_WRITE:
+            raise
+        # every number is in the file already
         print(f"note: {path}: complete, but not made smaller ({error})", file=sys.stderr, flush=True)
 
 

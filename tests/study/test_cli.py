@@ -17,7 +17,7 @@ import pytest
 from softjaw.study.cli import main, program
 from softjaw.study.cli.quick import petsc_overrides
 from softjaw.study.doctor import launch_environment
-from softjaw.study.messages import CANNOT_WRITE, StudyError, beside, make_folders, write_file
+from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, StudyError, beside, make_folders, write_file
 from softjaw.study.run import session
 from softjaw.study.show.report import writing as report
 from tests.study.launching import ROOT, answer, launch
@@ -241,10 +241,15 @@ def test_a_file_is_whole_or_not_there_a_device_is_written_to_and_a_file_in_the_w
     assert refused.value.code == CANNOT_WRITE
 
 
-def test_a_file_that_is_complete_and_cannot_be_packed_is_left_as_it_is(monkeypatch, capsys):
-    def full(*_, **__):
-        raise StudyError(CANNOT_WRITE, "no space")
+def test_a_file_that_is_complete_and_cannot_be_packed_is_left_as_it_is_unless_it_is_damaged(monkeypatch, capsys):
+    def pack(code):
+        def failing(*_, **__):
+            raise StudyError(code, "no space")
 
-    monkeypatch.setattr(session, "rewrite", full)
-    session.pack(session.Work(lambda *_: ()), Path("x.hdf"), SimpleNamespace(layout=None, header=None))
+        monkeypatch.setattr(session, "rewrite", failing)
+        session.pack(session.Work(lambda *_: ()), Path("x.hdf"), SimpleNamespace(layout=None, header=None))
+
+    pack(CANNOT_WRITE)
     assert "x.hdf" in capsys.readouterr().err
+    with pytest.raises(StudyError):
+        pack(OTHER_FILE)

@@ -44,10 +44,11 @@ class View:
     def __init__(self, ds: xr.Dataset, point: Index = ()) -> None:
         self.ds, self.point, self.note = ds, point, ""
         self.scene: Any = None
+        self._unread: SceneError | None = None
         try:
             self.scene = scene_of(ds, point)
         except SceneError as error:
-            self.note = f"the object is not drawn: {error}"
+            self._unread = error
         self._faces: dict[int, xr.Dataset] = {}
 
     @property
@@ -99,9 +100,11 @@ class View:
     def surface(self) -> Surface:
         """The object's surface; empty with a `note`."""
         try:
+            if self._unread:
+                raise self._unread
             surface = surface_of(self.scene, axes_of(self.ds), self._feet())
-        except (AttributeError, ValueError, OSError) as error:
-            self.note = self.note or f"the object is not drawn: {error}"
+        except (ValueError, OSError) as error:
+            self.note = f"the object is not drawn: {error}"
             return Surface(np.empty((0, 3)), np.empty((0, 3), int), np.empty(0, int), np.empty(0, int))
         return surface._replace(points=self.placed.to_object(surface.points))
 

@@ -35,9 +35,10 @@ BAR = {"vertical": True, "height": 0.36, "width": 0.045, "title_font_size": 15, 
 def save_picture(view: View, index: Index, path: Path, quantity: str, motion: str) -> None:
     """Write a case as PNG: the object on the left, its values and the limit surface on the right; needs no screen."""
     groups = [(slice(0, 2), slice(0, 2))]
-    look_of = {"off_screen": True, "window_size": SIZE, "shape": (2, 3), "groups": groups, "border": False}
-    # VTK warns of every kind of screen that is not there
-    with pv.vtk_verbosity("off"), closing(pv.Plotter(**look_of)) as plotter:
+    with (
+        pv.vtk_verbosity("off"),  # VTK warns of every kind of screen that is not there
+        closing(pv.Plotter(off_screen=True, window_size=SIZE, shape=(2, 3), groups=groups, border=False)) as plotter,
+    ):
         plotter.set_background("white", all_renderers=True)
         plotter.subplot(0, 2)
         lines = [view.ds.attrs["title"], *view.summary(index, quantity), "", *view.legend(index, motion)]
