@@ -20,7 +20,8 @@ from softjaw.study.flags import HARM, LOST, Flag, flags_in
 from softjaw.study.grippers import Hand, gripper_file
 from softjaw.study.messages import StudyError
 from softjaw.study.quantities import DONE, LEAST_FORCE, LISTED
-from softjaw.study.result.read import at_force, half_width, scene_of, stated_error, values_of
+from softjaw.study.result.interpolation import at_force
+from softjaw.study.result.read import half_width, scene_of, stated_error, values_of
 from softjaw.study.scene.text import scene_table
 
 if TYPE_CHECKING:

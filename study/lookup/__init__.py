@@ -17,24 +17,26 @@ from numpy.typing import ArrayLike
 
 from softjaw.study.case.candidates import touching_pads
 from softjaw.study.flags import Flag
-from softjaw.study.lookup.interpolation import (
-    Corners,
-    FloatArray,
-    Nodes,
-    bends,
-    blend,
-    circle,
-    claims,
-    corners,
-    error,
-    plain,
-)
 from softjaw.study.lookup.point import INSIDE, JUMP, NO_RESULT, OUTSIDE, SNAP, GraspPoint
 from softjaw.study.messages import closest
 from softjaw.study.quantities import BY_KEY, DONE, checked_model
 from softjaw.study.ranking import judge, ranked
 from softjaw.study.result.index import one_file
-from softjaw.study.result.read import KINDS, axes_of, contact_kinds, maps_in, scene_of, values_of
+from softjaw.study.result.interpolation import (
+    KINDS,
+    Corners,
+    FloatArray,
+    Nodes,
+    blend,
+    circle,
+    contact_kinds,
+    corners,
+    error,
+    force_claims,
+    place_claims,
+    plain,
+)
+from softjaw.study.result.read import axes_of, maps_in, scene_of, values_of
 from softjaw.study.result.read import open as open_dataset
 from softjaw.study.result.store import place_text
 from softjaw.study.scene import SceneError
@@ -69,7 +71,7 @@ class GraspMap:
     -----
     The error of a value is that of a straight line through a curve with the largest second derivative that the cases
     around show, with those beside them, added up over the three axes and times 1.75, along angles 5.25, along forces
-    (whose power laws are straight lines of logarithms) 3.5: a claim, below which at least 95 % of the true errors of
+    (whose power laws are straight lines of logarithms) 4.55: a claim, below which at least 95 % of the true errors of
     the main maps stay where that was measured. Between angles more than 25 degrees apart there are no values: edges
     that come to bear between them would stay unseen. Errors that the cases around state themselves
     (``accuracy.meshes = 2``; in between as the values are) are added in squares. Along an axis of two values there is
@@ -103,7 +105,7 @@ class GraspMap:
         self.done = self._grid(self.status == DONE)
         self.snapped = self.done & (self._grid(self.read("flags")) & Flag.SNAPPED > 0)
         self._tables: dict[tuple[str, str], FloatArray] = {}
-        self._bends: dict[tuple[str, str], tuple[FloatArray, bool]] = {}  # and whether those along forces are relative
+        self._claims: dict[tuple[str, str], tuple[FloatArray, bool]] = {}  # and whether those along forces are relative
         self._poses: dict[tuple[float, float], tuple[FloatArray, FloatArray]] = {}
         self.kind = self._kinds()
 
@@ -195,21 +197,17 @@ class GraspMap:
     def errors(self, name: str, model: str, at: Corners) -> FloatArray:
         """Error of `interpolated` for a quantity of the case, at many points."""
         key = name, model
-        if key not in self._bends:
+        if key not in self._claims:
             grid = self.table(name, model).reshape(self.shape)
-            bent, powers = bends(grid, self.axes, self.snapped), not (grid <= 0.0).any()  # NaN, of no case, is not
-            if powers:
-                forces = replace(self.axes[2], x=np.log(self.axes[2].x))
-                # of two forces a guess is left: how far from constant or from proportional, whatever is nearer
-                logs, axes = np.log(grid), (*self.axes[:2], forces)
-                bent[2] = np.minimum(*(bends(v, axes, self.snapped)[2] for v in (logs, logs - forces.x)))
-            self._bends[key] = claims(bent, self.shape), powers
-        bend, powers = self._bends[key]
-        if not powers:
-            return error(bend, at, (0, 1, 2))
+            along, relative = force_claims(grid, self.axes[2], self.snapped)
+            claims = np.stack([*place_claims(grid, self.axes[:2], self.snapped), along])
+            self._claims[key] = claims.reshape(3, -1), relative
+        claims, relative = self._claims[key]
+        if not relative:
+            return error(claims, at, (0, 1, 2))
         share = np.column_stack([at.share[:, :2], at.power])
-        relative = error(bend, replace(at, share=share), (2,))
-        return error(bend, at, (0, 1)) + relative * self.interpolated(name, model, at)
+        of_force = error(claims, replace(at, share=share), (2,))
+        return error(claims, at, (0, 1)) + of_force * self.interpolated(name, model, at)
 
     def states(self, at: Corners) -> np.ndarray:
         """State of many points, as `GraspPoint.state` has it."""

@@ -11,13 +11,12 @@ from softjaw.friction.patch import NEGLIGIBLE
 from softjaw.lsfit.surface import LimitSurface
 from softjaw.study.case.result import GraspNumbers
 from softjaw.study.flags import flags_in
-from softjaw.study.lookup.interpolation import Corners, FloatArray
 from softjaw.study.quantities import BOTH_ENDS, BY_KEY, FAILED, FORCE_RANGE, MAIN, MISSING
 from softjaw.study.quantities import STATES as OF_CASES
+from softjaw.study.result.interpolation import BESIDE_CASES, Corners, FloatArray
 from softjaw.study.units import shown_text
 
 INSIDE, OUTSIDE, NO_RESULT, SNAP, JUMP = range(5)
-BESIDE_CASES = 0.45  # of what interpolation claims alone, where the cases state errors: those err on the safe side, too
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -15,11 +15,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softjaw.friction.patch import FloatArray
 from softjaw.study.flags import OF_FILE, Flag
 from softjaw.study.messages import Problem
 from softjaw.study.quantities import (
-    BOTH_ENDS,
     BY_KEY,
     FINGERS,
     FORCE_RANGE,
@@ -43,7 +41,6 @@ if TYPE_CHECKING:
 
 XYZ = ("x", "y", "z")
 FIELDS = ("wall/place",)  # too large to be read with the rest
-KINDS = {"pieces": 7, "holes": 7, "rims": 1}  # what identifies a kind of contact, and the largest number that counts
 UNCERTAIN_MAPS = tuple(q.name for q in TABLE if q.group == "maps" and q.error and q.rank)
 
 
@@ -292,73 +289,9 @@ def _attributes(result: Result) -> dict[str, Any]:
     }  # fmt: skip
 
 
-# --- between solved cases ---------------------------------------------------------------------------------------------
-
-
-def contact_kinds(name: str, values: np.ndarray) -> NDArray[np.int64]:
-    """Numbers of a finger's quantity of `KINDS` that differ where contacts differ in kind; NaN counts as 0."""
-    numbers = np.nan_to_num(values).astype(np.int64)
-    if name == "rims":  # a pad that bears on both of its ends
-        return np.asarray((numbers & BOTH_ENDS) == BOTH_ENDS, np.int64)
-    return np.minimum(numbers, KINDS[name])
-
-
-def at_force(ds: xr.Dataset, force: float) -> xr.Dataset:
-    """The dataset at one force [N] between two solved ones, by power laws; flags of both. `ValueError` beyond them.
-
-    Both are in its attribute ``between``, the largest solved one in ``largest``. What has directions, or is not
-    positive, lies on straight lines. The errors hold how far power laws are from straight lines, too. A case beside one
-    that is not solved has that one's state. Across a snap-in of the wall, and between contacts that differ in kind,
-    nothing is known: it is "not computed".
-    """
-    forces = ds["normal_force"].values
-    if not forces[0] <= force <= forces[-1] or len(forces) < 2:
-        solved = ", ".join(f"{f:g}" for f in forces)
-        raise ValueError(f"{force:g} N was not solved, nor lies it between two forces that were: {solved} N")
-    k = min(int(np.searchsorted(forces, force, side="right")) - 1, len(forces) - 2)
-    share, power = ((force - forces[k]) / np.diff(forces)[k], np.log(force / forces[k]) / np.diff(np.log(forces))[k])
-    low, high = (ds.isel(normal_force=[i]).assign_coords(normal_force=[force]) for i in (k, k + 1))
-    between = low.assign_attrs(between=forces[k : k + 2].tolist(), largest=float(forces[-1]))
-    for name in (str(n) for n, v in ds.data_vars.items() if "normal_force" in v.dims):
-        dims, first, last = ds[name].dims, low[name].values, high[name].values
-        if ds[name].dtype.kind == "f":
-            values = (1 - share) * first + share * last
-            if not {"component", "monomial", "wrench"} & set(dims):
-                values = power_law(first, last, power, values)
-            between[name] = (dims, values, ds[name].attrs)
-        elif name == "flags":
-            between[name] = (dims, first | last, ds[name].attrs)
-    for q in (q for q in TABLE if q.error and q.of_error.name in between):
-        line = (1 - share) * low[q.name] + share * high[q.name]
-        apart = abs(line - between[q.name]) / (between[q.name] if q.error == "relative" else 1.0)
-        # a payload of nothing at both forces lies nowhere else
-        between[q.of_error.name] += (apart.isel(model=0, drop=True) if "model" in apart.dims else apart).fillna(0.0)
-    states = np.where(low["status"].values == DONE, high["status"].values, low["status"].values)
-    states = np.where((states == DONE) & _apart(low, high), MISSING, states)
-    between["status"] = (ds["status"].dims, states, ds["status"].attrs)
-    between["normal_force"].attrs.update(ds["normal_force"].attrs)
-    return between
-
-
-def power_law(low: FloatArray, high: FloatArray, share: float | FloatArray, line: FloatArray) -> FloatArray:
-    """Values at a share of the logarithm of the force between two positive ones; elsewhere those of a straight line."""
-    both = np.minimum(low, high) > 0.0
-    first, last = (np.log(v, out=np.zeros(both.shape), where=both) for v in (low, high))
-    return np.where(both, np.exp((1.0 - share) * first + share * last), line)
-
-
 def other_levels(count: int, k: int) -> list[int]:
     """Force levels of ``count`` whose payload is reported beside that of the ``k``-th, which is shown."""
     return sorted({0, (count - 1) // 2, count - 1} - {k})
-
-
-def _apart(low: xr.Dataset, high: xr.Dataset) -> NDArray[np.bool_]:
-    """Cases that no straight line may join."""
-    apart = (low["flags"].values ^ high["flags"].values) & int(Flag.SNAPPED) > 0
-    for name in KINDS if "finger_rims" in low else ():
-        lower, upper = (contact_kinds(name, ds[f"finger_{name}"].values) for ds in (low, high))
-        apart |= (lower != upper).any(axis=-1)
-    return np.asarray(apart, bool)
 
 
 def half_width(samples: np.ndarray) -> np.ndarray:

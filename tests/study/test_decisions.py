@@ -17,9 +17,9 @@ from softjaw.study.case.effects import DOUBT, STEPS, STIFF_PLATE, decided
 from softjaw.study.case.pressing import OBLIQUE, state_flags
 from softjaw.study.case.result import TIE
 from softjaw.study.flags import Flag
-from softjaw.study.lookup.interpolation import CLOSING_GAP_RATIO, circle
 from softjaw.study.ranking import Sure, falling, judged, largest, nearest, ranking
 from softjaw.study.result.derived import first_crossing
+from softjaw.study.result.interpolation import CLOSING_GAP_RATIO, circle
 from tests.turns import ULPS, seeded, seeds, tries
 
 scores = st.lists(st.sampled_from([0.0, 1e-3, 0.1, 0.1, 0.25, 3.0, math.nan]), min_size=1, max_size=12)

@@ -5,9 +5,9 @@ import pytest
 
 from softjaw.study.case.build import build_object
 from softjaw.study.lookup import GraspMap
-from softjaw.study.lookup.interpolation import OF_ANGLES, OF_FORCES
 from softjaw.study.lookup.point import INSIDE, JUMP, NO_RESULT, OUTSIDE, SNAP
 from softjaw.study.quantities import Axis
+from softjaw.study.result.interpolation import OF_ANGLES, OF_FORCES
 from softjaw.study.result.read import open as open_dataset
 from softjaw.study.result.read import scene_of
 from softjaw.study.show.best_grasps import best

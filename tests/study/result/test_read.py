@@ -8,7 +8,8 @@ import softjaw
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import DONE, FAILED, MISSING, STATES
 from softjaw.study.result.derived import first_crossing
-from softjaw.study.result.read import FIELDS, at_force, read_field
+from softjaw.study.result.interpolation import at_force
+from softjaw.study.result.read import FIELDS, read_field
 from softjaw.study.result.store import open_result
 from tests.study.fake_run import fake_plan, fake_result
 from tests.study.formula_results import ANGLES, FORCES, STATIONS, linear, make, written
@@ -23,16 +24,22 @@ def half(tmp_path_factory):
     return written(tmp_path_factory.mktemp("read") / "half.hdf", plan.layout, lambda _: next(rows), plan.header)
 
 
-def test_between_two_forces_a_power_law_is_met_and_how_far_a_line_is_away_is_an_error(tmp_path):
+def test_between_two_forces_values_and_errors_are_those_of_the_look_up(tmp_path):
     errors = {"e_n__error": 0.02, "curvature_loss__error": 0.01}
-    ds = softjaw.open(make(tmp_path / "a.hdf", meshes=2, curvature_loss__curvature_loss=-0.1, **errors))
-    between = at_force(ds, 3.0)
-    law, line = linear(STATIONS, 0.0, 3.0), (linear(STATIONS, 0.0, 2.0) + linear(STATIONS, 0.0, 4.0)) / 2
+    path = make(tmp_path / "a.hdf", meshes=2, curvature_loss__curvature_loss=-0.1, **errors)
+    between = at_force(softjaw.open(path), 3.0)
+    law = linear(STATIONS, 0.0, 3.0)
     assert between.e_n.sel(model="ccm", angle=0).values[:, 0] == pytest.approx(law, rel=1e-12)
-    assert between.e_n_error.sel(angle=0).values[:, 0] == pytest.approx(0.02 + (law - line) / law, rel=1e-9)
+    assert between.e_n_error.sel(angle=0).values[:, 0] == pytest.approx(0.02)
     # what is not positive lies on a straight line, and has the cases' own error
     assert between.curvature_loss.values == pytest.approx(-0.1)
     assert between.curvature_loss_error.values == pytest.approx(0.01)
+    curved = make(tmp_path / "b.hdf", lambda station, angle, force: 0.01 + 0.002 * force, meshes=2, **errors)
+    between, point = at_force(softjaw.open(curved), 3.0), softjaw.GraspMap(curved).at(STATIONS, 0.0, 3.0)
+    assert point.e_n == pytest.approx(between.e_n.sel(model="ccm", angle=0).values[:, 0], rel=1e-12)
+    stated = (between.e_n_error * between.e_n.sel(model="ccm")).sel(angle=0).values[:, 0]
+    assert point.error("e_n") == pytest.approx(stated, rel=1e-12)
+    assert (stated > 0.021 * point.e_n).all()
 
 
 def test_maps_stand_over_their_coordinates_with_units_and_definitions(tmp_path):
