@@ -298,8 +298,11 @@ def _held(ds: xr.Dataset, index: Index) -> tuple[str, str]:
     aims = task_keys(ds).get("weight_direction", "worst") != "worst"
     every = "in the direction of its weight" if aims else "pulled in any direction"
     every += f" at {forces(ds)[index[-1]]:g} N" * ("force_low" in ds)
-    known = "±: mesh and method" if np.isfinite(at(ds, "payload_error", index)) else "error not known"
-    covers = "±: uncertain inputs, 95 %" if "payload_interval" in ds else known
+    share = at(ds, "payload_error", index)
+    covers = "±: mesh and method" if np.isfinite(share) else "error not known"
+    if "payload_interval" in ds:
+        mesh = f"; mesh and method: {100 * share:.2g} %" * bool(np.isfinite(share))
+        covers = f"±: uncertain inputs, 95 %{mesh}"
     return value_text(ds, "payload", index, 3, unit=True), f"{every} ({covers})"
 
 
