@@ -18,6 +18,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 from mpi4py import MPI
+from numba.core.event import Event, Listener, register
 
 from softjaw.study.messages import CANNOT_WRITE, STOPPED, StudyError, complain, launched, make_folders
 from softjaw.study.quantities import DONE, FAILED, MISSING
@@ -222,6 +223,8 @@ class Session:
             # Any rank may be the one that finishes the file.
             writer.session = comm.bcast(writer.session)
         self._progress = _progress(objects, codes, comm.size) if comm.rank == 0 else None
+        if comm.rank == 0:
+            register("numba:compile", COMPILING)
 
     def solve(self) -> int:
         """Solve, wait for all ranks, close the file; the exit code.
@@ -311,6 +314,23 @@ def _end_all(comm: Any, claims: Claims, error: StudyError) -> None:
     """End all ranks, if there are others, because this one cannot write; the first to notice speaks."""
     if comm.size > 1:
         comm.Abort(complain(error, claims.first_to_speak()))
+
+
+class Compiling(Listener):
+    """Says once, when the first loop is compiled, why the first cases take so long."""
+
+    _said = False
+
+    def on_start(self, event: Event) -> None:
+        if not self._said:
+            print("compiling for this machine, once: a minute or two", flush=True)
+        self._said = True
+
+    def on_end(self, event: Event) -> None:
+        """Nothing."""
+
+
+COMPILING = Compiling()  # a process says it once, however many sessions it has
 
 
 def _progress(objects: Iterable[Iterable[Any]], codes: np.ndarray, ranks: int) -> Progress:
