@@ -15,7 +15,7 @@ import numpy as np
 from softjaw.study.case.build import build_object, check_object, geometry, mesh_notes, notices, with_mass
 from softjaw.study.case.candidates import check_candidates, with_sampled_grasps
 from softjaw.study.messages import USAGE, NoGraspError, StudyError, fault_of, with_ending
-from softjaw.study.run.estimate import START_S, estimated, scaling_text, slowness
+from softjaw.study.run.estimate import START_S, estimated, slowness
 from softjaw.study.run.object_folder import ObjectFolder, folder_of
 from softjaw.study.run.plan import free_bytes, gigabytes, make_plan, memory, plan_text
 from softjaw.study.run.progress import duration
@@ -91,10 +91,7 @@ def plan(options: Namespace) -> str:
     scene = with_sampled_grasps(scene_of(options))
     path = target(options)
     made = make_plan(scene, options.scene, options.overrides)
-    lines = [plan_text(made, scene, path, options.ranks[0]), *notices(scene)]
-    if len(options.ranks) > 1 or options.repeat > 1:
-        lines.append(scaling_text(made, path, options.ranks, options.repeat))
-    return hanging("\n".join(lines), terminal_width())
+    return hanging("\n".join([plan_text(made, scene, path, options.ranks), *notices(scene)]), terminal_width())
 
 
 def objects_text(folder: ObjectFolder, out: Path, ranks: Sequence[int]) -> str:

@@ -1,10 +1,7 @@
-"""Seconds of a study: of load paths on a bed of springs, before anything is solved; of measured ones on many ranks.
+"""Seconds of a study: of load paths on a bed of springs, before anything is solved; of those that are measured.
 
 A force costs what its elements cost, whose number follows from symmetry, and symmetry from what the pads meet: heights
 of the object over a coarse grid on each pad, without compiled loops, because a plan answers at once.
-
-On many ranks every case ends with its writes: one after another for the rank, and through a file system that serves all
-ranks in the order in which they come. The counter that hands out the work takes 20 us a load path, which is left out.
 """
 
 from __future__ import annotations
@@ -16,19 +13,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from softjaw.friction.patch import FloatArray
 from softjaw.study.case.build import surface_triangles
 from softjaw.study.case.candidates import meshes_cost
 from softjaw.study.case.fit import bed_closing, doubt, heights_over, jaws_of
 from softjaw.study.case.poses import turn_of_pose
-from softjaw.study.messages import OTHER_FILE, StudyError
 from softjaw.study.quantities import FAILED, LISTED
-from softjaw.study.result.layout import Layout
 from softjaw.study.result.store import open_result
-from softjaw.study.run.progress import duration
-from softjaw.study.run.shares import makespan
 
 FACE_GRID = (13, 7)  # points of a pad's face
 # Measured on cylinders, boxes, bottles and meshes of 64 to 2304 solved elements, CPU time of one core of 2026.
@@ -43,10 +36,6 @@ COUPLED = {"none": 1.0, "auto": 2.2, "tangential": 2.2}
 SCREENED_COST = 0.1  # of a force on the coarse mesh alone, over that on the scene's
 ROUNDS = 2.3  # of the cases that a list shows, each once on the scene's mesh: with others, and with finer meshes
 DEEP, HARD = 0.4, 4.0  # closing over the pad's thickness from which forces are cut into steps, and how much that costs
-
-WRITE_S = 1.5e-5  # seconds of one write of a rank, measured on one machine with a local disk
-WRITES_PER_S, BYTES_PER_S = 5e4, 1e9  # what a file system is assumed to take from all ranks together
-GOOD_EFFICIENCY = 0.8
 OPERATIONS_S = 3.6e-3  # seconds that `slowness` counts where cases take what is said above
 
 
@@ -155,70 +144,3 @@ def measured_seconds(plan: Any, path: Path) -> Any:
         planned = np.flatnonzero(np.isin(result.axes[-3].values, plan.layout.axes[-3].values))
         seconds = np.where(result.status == FAILED, np.nan, result.read("work/seconds_total"))
         return seconds.take(planned, axis=-3).ravel()
-
-
-def scaled(seconds: ArrayLike, served: ArrayLike, ranks: int, write: float, service: float) -> tuple[float, str]:
-    """Seconds until the last case is stored, and what keeps that from being shorter.
-
-    ``seconds, served`` (n,) arrays: of load paths, or of forces that ranks may divide: time of solving [s], and rows
-    that are stored. ``write, service``: time that the writes of a row take from its rank, and from the file system [s].
-
-    >>> scaled([4.0] * 64, [4] * 64, 64, 0.0, 0.0), scaled([4.0] * 64, [4] * 64, 64, 0.1, 0.1)
-    ((4.0, '-'), (25.6, 'file system'))
-    """
-    work, files = np.asarray(seconds) + write * np.asarray(served), service * float(np.sum(served))
-    time, even, longest = makespan(work.tolist(), ranks), work.sum() / ranks, work.max()
-    if files > time:
-        return files, "file system"
-    # share of the time below which something does not count as the limit
-    limits = {"longest load path": longest - even, "division of load paths": time - max(longest, even)}
-    worst = max(limits, key=lambda name: limits[name])
-    return time, worst if limits[worst] > 0.05 * time else "-"
-
-
-def row_writes(layout: Layout) -> tuple[float, float, str]:
-    """Time that the writes of a case take from its rank, and from the file system [s], and what they are, in words."""
-    columns = layout.columns
-    # besides its values: begun, checksums, state
-    size, writes = sum(int(np.prod(c.share)) * c.dtype.itemsize for c in columns), len(columns) + 3
-    text = f"{writes} writes of {size / 1e3:.3g} kB together, {1e3 * WRITE_S:g} ms each"
-    return WRITE_S * writes, max(writes / WRITES_PER_S, size / BYTES_PER_S), text
-
-
-def _parts(plan: Any, seconds: NDArray[np.float64]) -> list[tuple[float, int]]:
-    """Time of each load path, or of its forces where ranks may divide them, from the cases' ``(rows,)``, and rows."""
-    parts = []
-    for unit in plan.tried:
-        times = seconds[list(unit.rows[0])]
-        times = times[np.isfinite(times)]  # the forces above a failed one were not tried
-        each = times if unit.apart else [times.sum()] * bool(times.size)
-        parts += [(float(t), len(unit.rows) * (1 if unit.apart else times.size)) for t in each]
-    return parts
-
-
-def scaling_text(plan: Any, path: Path, ranks: Sequence[int], repeat: int) -> str:
-    """Time and efficiency of a finished study, or of one with ``repeat`` times its candidates, on so many ranks.
-
-    Raises `StudyError` if the file at ``path`` holds no times of this plan.
-    """
-    known = measured_seconds(plan, path)
-    parts = [] if known is None else _parts(plan, known) * repeat
-    if not parts:
-        raise StudyError(OTHER_FILE, f"{path}: no case was timed yet; run the study first, or give -n one number")
-    seconds, served = np.transpose(parts)
-    write, service, text = row_writes(plan.layout)
-    lines, good = [f"{'ranks':>6}  {'time':>13}  {'efficiency':>10}  limit"], [0]
-    for n in ranks:
-        time, limit = scaled(seconds, served, n, write, service)
-        efficiency = seconds.sum() / n / time
-        lines.append(f"{n:>6}  {duration(time):>13}  {efficiency:>10.1%}  {limit}")
-        good += [n] * (efficiency >= GOOD_EFFICIENCY)
-    return "\n".join([
-        f"{path}: {plan.layout.rows * repeat} cases in {len(parts)} parts, {duration(seconds.sum())} of solving",
-        f"  parts      {seconds.min():.3g} to {seconds.max():.3g} s, {seconds.mean():.3g} s in the mean",
-        f"  a case     {text}",
-        f"  assumed    {WRITES_PER_S:g} writes/s and {BYTES_PER_S / 1e6:g} MB/s to one file",
-        "  left out   starting the ranks, and cores that share caches and memory",
-        *lines,
-        f"at least {GOOD_EFFICIENCY:.0%} efficient up to {max(good)} ranks",
-    ])  # fmt: skip

@@ -152,8 +152,8 @@ def gigabytes(size: float, digits: int) -> str:
     return f"{float(f'{size:.{digits}g}') / 1e9:g} GB"
 
 
-def plan_text(plan: Plan, scene: Any, path: Path, ranks: int) -> str:
-    """Cases, units, disk, memory and time on so many ranks."""
+def plan_text(plan: Plan, scene: Any, path: Path, ranks: Sequence[int]) -> str:
+    """Cases, units and disk, memory on the first of these numbers of ranks, and time on each."""
     layout = plan.layout
     each, ranks_busy = memory(scene), sensible_ranks(plan.in_parts([unit.cost for unit in plan.tried]))
     shared = plan.served - len(plan.units)
@@ -166,7 +166,7 @@ def plan_text(plan: Plan, scene: Any, path: Path, ranks: int) -> str:
         "no grasp": _no_grasps(plan),
         "rounds": _rounds(plan, scene),
         "disk": f"{space}, {free_bytes(path) / 1e9:.1f} GB free",
-        "memory": f"roughly {gigabytes(each, 1)} on each rank, {gigabytes(each * ranks, 2)} on {ranks}",
+        "memory": f"roughly {gigabytes(each, 1)} on each rank, {gigabytes(each * ranks[0], 2)} on {ranks[0]}",
         "time": _time(plan, scene, path, ranks),
         "ranks": f"up to {ranks_busy} are busy at least 80 % of the time",
     }
@@ -196,28 +196,30 @@ def _rounds(plan: Plan, scene: Any) -> str:
     return f"up to {asked // each} more {what}, {each} cases each; not in the numbers above and below"
 
 
-def _time(plan: Plan, scene: Any, path: Path, ranks: int) -> str:
+def _time(plan: Plan, scene: Any, path: Path, ranks: Sequence[int]) -> str:
+    """Time on each of these numbers of ranks, by measured load paths where there are some."""
     seconds = measured_seconds(plan, path)
-    expected = unit_seconds(plan, seconds) if seconds is not None else []
-    if not expected:
-        return f"{_estimated_time(plan, scene, ranks)}; more accurate once a few load paths are in {path}"
-    total = duration(makespan(plan.in_parts(expected), ranks))
-    return f"about {total} on {ranks} rank{'s' * (ranks > 1)} for all cases, judged by those in {path}"
+    each, start = unit_seconds(plan, seconds) if seconds is not None else [], 0.0
+    source = f" for all cases, judged by those in {path}"
+    if not each:
+        (each, by), start = _estimated(plan, scene), START_S
+        source = f", half to twice that, estimated {by}; more accurate once a few load paths are in {path}"
+    parts = plan.in_parts(each)
+    times = (f"{duration(start + makespan(parts, n))} on {n} rank{'s' * (n > 1)}" for n in ranks)
+    return f"about {', '.join(times)}{source}"
 
 
-def _estimated_time(plan: Plan, scene: Any, ranks: int) -> str:
-    """Time before anything is solved: of elements and springs, for walls the middle between their levels."""
-    on = f"on {ranks} rank{'s' * (ranks > 1)}"
+def _estimated(plan: Plan, scene: Any) -> tuple[list[float], str]:
+    """Time of each unit before anything is solved [s], and what it follows from."""
+    scale = slowness()
     if not shells(scene):
-        seconds = slowness() * makespan(plan.in_parts(estimated(plan.tried)), ranks)
         # measured on 22 scenes: 0.5 to 2 times, by how far friction acts back and how thin and sharp an object is
-        return f"about {duration(START_S + seconds)} {on}, half to twice that, estimated on a bed of springs"
+        return [scale * seconds for seconds in estimated(plan.tried)], "on a bed of springs"
     pads, shell = wall_unknowns(scene)
     # between rigid candidates and shells where the scene leaves that open
     size = pads + shell if scene.effects.object.endswith("shell") else math.sqrt(pads * (pads + shell))
-    forces = makespan([plan.layout.shape[-1]] * len(plan.tried), ranks)
-    seconds = slowness() * SECONDS_PER_UNKNOWN * size * forces
-    return f"about {duration(START_S + seconds)} {on}, half to twice that, estimated from the size of pads and wall"
+    seconds = scale * SECONDS_PER_UNKNOWN * size * plan.layout.shape[-1]
+    return [seconds] * len(plan.tried), "from the size of pads and wall"
 
 
 def free_bytes(path: Path) -> int:

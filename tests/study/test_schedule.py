@@ -10,9 +10,9 @@ import pytest
 from softjaw.fem.objects.shapes import Sphere
 from softjaw.study.quantities import DONE, MISSING, SLIPS, WIDE
 from softjaw.study.run import estimate
-from softjaw.study.run.estimate import FIRST_FORCE_FACTOR, estimated, heights, row_writes, scaled, unit_seconds
+from softjaw.study.run.estimate import FIRST_FORCE_FACTOR, estimated, heights, unit_seconds
 from softjaw.study.run.load_path import settle
-from softjaw.study.run.plan import Plan, make_plan
+from softjaw.study.run.plan import Plan, make_plan, plan_text
 from softjaw.study.run.progress import Progress
 from softjaw.study.run.shares import by_cost, makespan, sensible_ranks, shares
 from softjaw.study.scene import load_scene
@@ -125,7 +125,7 @@ def test_ranks_are_busy_to_the_end(ranks):
     assert makespan(costs, ranks) >= even
 
 
-def test_times_follow_from_costs_and_each_limit_of_many_ranks_is_where_its_closed_form_is():
+def test_times_follow_from_costs():
     assert sensible_ranks([1.0] * 35) == 35
     assert sensible_ranks([10.0, 1.0, 1.0]) == 1
     assert sensible_ranks([]) == 1
@@ -133,18 +133,15 @@ def test_times_follow_from_costs_and_each_limit_of_many_ranks_is_where_its_close
     plan = Plan(None, None, units)
     assert unit_seconds(plan, np.array([3.0, 3.0, np.nan, 1.0, np.nan, np.nan])) == pytest.approx([6.0, 12.0, 24.0])
     assert unit_seconds(plan, np.full(6, np.nan)) == []
-    # 64 load paths of four seconds and four rows.
-    seconds, served = [4.0] * 64, [4] * 64
-    assert scaled(seconds, served, 64, 0.0, 0.0) == (pytest.approx(4.0), "-")
-    assert scaled(seconds, served, 64, 0.5, 0.0) == (pytest.approx(6.0), "-")
-    assert scaled(seconds, served, 64, 0.1, 0.1) == (pytest.approx(256 * 0.1), "file system")
-    assert scaled(seconds, served, 128, 0.0, 0.0) == (pytest.approx(4.0), "longest load path")
-    assert scaled(seconds, served, 60, 0.0, 0.0) == (pytest.approx(8.0), "division of load paths")
+    # 64 load paths of four seconds
+    assert [makespan([4.0] * 64, ranks) for ranks in (1, 60, 64, 128)] == [256.0, 8.0, 4.0, 4.0]
 
 
-def test_what_a_case_writes_does_not_grow_with_the_study():
-    few, many = (make_plan(scene_of(OVAL, f"load.normal_force_n={forces}")).layout for forces in ([1], [1, 2, 3]))
-    assert row_writes(few) == row_writes(many)
+def test_a_plan_gives_the_time_on_every_number_of_ranks(tmp_path):
+    scene = scene_of(OVAL)
+    text = plan_text(make_plan(scene), scene, tmp_path / "a.hdf", (1, 4))
+    assert " on 1 rank, " in text
+    assert " on 4 ranks, half to twice that" in text
 
 
 def test_a_case_that_an_earlier_run_left_out_is_missing_once_it_is_asked_for():
