@@ -12,7 +12,7 @@ from scipy.spatial import ConvexHull
 
 from softjaw.lsfit.form import directions
 from softjaw.lsfit.samples import pressed, sample_rank
-from softjaw.lsfit.surface import OUT_OF_SPAN, ZERO_SHARE, FloatArray, rows, supported_shadow
+from softjaw.lsfit.surface import ZERO_SHARE, FloatArray, rows, supported_shadow
 
 
 def hull_volume(W: ArrayLike) -> float:
@@ -31,9 +31,8 @@ def hull_volume(W: ArrayLike) -> float:
 class ExactSurface:
     """Limit surface of a contact as friction gives it: every wrench is the one for its motion.
 
-    The support of the body in the direction of a motion is the power ``w(t) . t`` of the wrench, exact to rounding.
-    `radius`, which needs the surface between motions, takes the hull of ``count`` wrenches and their opposites, which
-    lies inside and misses in proportion to ``1 / count``.
+    The support of the body in the direction of a motion is the power ``w(t) . t`` of the wrench, exact to rounding;
+    its volume follows from ``count`` wrenches.
 
     ``wrench`` gives wrenches ``(m, 3)`` for motions ``(m, 3)`` of any length but zero, in one set of units; ``rho`` is
     the length of the contact by which the motions of samples are spread evenly, 1 for normalised wrenches.
@@ -54,11 +53,6 @@ class ExactSurface:
         """Dimension of the body."""
         # torques by rho: the rank must not depend on the unit of length
         return sample_rank(self._hull_samples / [1.0, 1.0, self.rho])
-
-    @cached_property
-    def span(self) -> FloatArray:
-        """Orthonormal directions ``(3, rank)`` in which the body extends."""
-        return np.linalg.svd(self._hull_samples)[2][: self.rank].T
 
     @cached_property
     def volume(self) -> float:
@@ -95,31 +89,7 @@ class ExactSurface:
         """Largest reach ``(3,)`` along each component."""
         return self.support(np.eye(3))
 
-    def radius(self, u: ArrayLike) -> FloatArray:
-        """Factor that brings ``u`` onto the sampled hull, ``(m, 3) -> (m,)``; 0 out of a flat body."""
-        W, B = rows(u, 3), self.span
-        value = np.empty(len(W))
-        # a product with all facets at once would take gigabytes for thousands of wrenches
-        for part in range(0, len(W), 200):
-            value[part : part + 200] = (W[part : part + 200] @ self._facets.T).max(axis=1)
-        # facets do not see the part across a flat body
-        value[np.linalg.norm(W - W @ B @ B.T, axis=1) > OUT_OF_SPAN * np.linalg.norm(W, axis=1)] = np.inf
-        with np.errstate(divide="ignore"):
-            return 1 / value
-
     @cached_property
     def _hull_samples(self) -> FloatArray:
         W = self.samples()
         return W[pressed(W)]
-
-    @cached_property
-    def _facets(self) -> FloatArray:
-        """Normals divided by distances, ``(k, 3)``: the hull is where all products with them are at most 1."""
-        B = self.span
-        # Qhull needs two dimensions at least
-        if self.rank == 1:
-            return np.vstack([B.T, -B.T]) / np.abs(self._hull_samples @ B).max()
-        Y = self._hull_samples @ B
-        size = np.abs(Y).max(axis=0)  # a hull of very unequal lengths loses facets
-        hull = ConvexHull(np.vstack([Y, -Y]) / size)
-        return hull.equations[:, :-1] / -hull.equations[:, -1:] / size @ B.T

@@ -30,6 +30,7 @@ class FitFlag(IntFlag):
 
 
 ZERO_SHARE = 1e-12  # of the largest number of its kind: what is smaller is the rounding of zero
+PLANES = ((0, 1), (0, 2), (1, 2))  # of two of three components
 OUT_OF_SPAN = 1e-9  # of a wrench: the part across a flat body from which the body does not carry it
 
 
@@ -145,11 +146,27 @@ def supported_shadow(support: Callable[[FloatArray], FloatArray], dimension: int
 
     ``support`` takes vectors ``(m, d)``; ``h`` are its values at ``n`` equal steps of the full turn, an even number.
     """
-    t, phi = np.zeros((n, dimension)), 2 * np.pi * np.arange(n) / n
-    t[:, 0], t[:, 1] = np.cos(phi), np.sin(phi)
-    c = np.fft.rfft(support(t)) / n
+    c = np.fft.rfft(support(circle(0, 1, n, dimension))) / n
     order = np.arange(len(c))
     # the transform leaves out the conjugate half, which the first and the last order do not have
     twice = np.where((order == 0) | (2 * order == n), 1.0, 2.0)
     # by Parseval h^2 - h'^2 becomes a factor 1 - k^2, without a difference quotient
     return float(np.pi * (twice * (1 - order**2) * np.abs(c) ** 2).sum())
+
+
+def circle(i: int, j: int, count: int, dimension: int = 3) -> FloatArray:
+    """Directions at equal steps of the full turn in the plane of two components, ``(count, dimension)``."""
+    t, phi = np.zeros((count, dimension)), 2 * np.pi * np.arange(count) / count
+    t[:, i], t[:, j] = np.cos(phi), np.sin(phi)
+    return t
+
+
+def shadow_outline(
+    points: Callable[[FloatArray], FloatArray], i: int, j: int, count: int, rho: float = 1.0
+) -> FloatArray:
+    """Closed outline ``(count + 1, 2)`` of a body's shadow on the plane of two of three components.
+
+    ``points`` gives those of the body farthest along directions ``(m, 3)``; ``rho`` is its length, torque over force.
+    """
+    outline = points(circle(i, j, count) / [1.0, 1.0, rho])[:, [i, j]]
+    return np.vstack([outline, outline[:1]])

@@ -12,6 +12,7 @@ from jobs.figures import drawing
 from jobs.figures.contacts import WIDTH
 from softjaw.friction.motion import fibonacci_twists
 from softjaw.lsfit.samples import fit_error
+from softjaw.lsfit.surface import PLANES, circle, shadow_outline
 from softjaw.study import pictures
 from softjaw.study.case.limit_surface import fitted
 from softjaw.study.quantities import FINGERS
@@ -20,9 +21,7 @@ from softjaw.study.show.grasps import Index, at, axis_text, field, forces, numbe
 from softjaw.study.show.stored_surface import (
     COMPONENTS,
     NAMES,
-    PLANES,
     StoredSurface,
-    circle,
     sphere,
     stored_surface,
 )
@@ -73,8 +72,8 @@ def wrench_spaces(ds: xr.Dataset, sharp: xr.Dataset) -> tuple[Any, str]:
 
 def _shadows(panel: Any, known: dict[str, StoredSurface], i: int, j: int) -> None:
     for model, found in known.items():
-        outline = found.outline(i, j, TURN) * found.unit[[i, j]]
-        panel.plot(*np.vstack([outline, outline[:1]]).T, **drawing.model_look(model, marker=""))
+        outline = shadow_outline(found.exact.support_points, i, j, TURN) * found.unit[[i, j]]
+        panel.plot(*outline.T, **drawing.model_look(model, marker=""))
     panel.set(xlabel=NAMES[i], ylabel=NAMES[j])
     if (i, j) == (0, 1):
         panel.set_aspect("equal", adjustable="datalim")
@@ -86,7 +85,7 @@ def _gaps(panel: Any, known: dict[str, StoredSurface]) -> float:
     for (i, j), line in zip(PLANES, ("-", "--", ":"), strict=True):
         t = circle(i, j, TURN)[: TURN // 2 + 1]
         # along a motion the wrench resists as much as the body reaches: its support
-        reach = {model: np.einsum("ki,ki->k", found.wrenches(t), t) for model, found in known.items()}
+        reach = {model: found.exact.support(t) for model, found in known.items()}
         gap = 100 * (1 - reach["ccm"] / reach["pcm"])
         largest = max(largest, float(gap.max()))
         label = f"{COMPONENTS[i][0]} to {COMPONENTS[j][0]}"
@@ -126,20 +125,20 @@ def errors_on_grid(found: StoredSurface) -> dict[str, float]:
     """
     centre = 5 * np.stack(np.meshgrid(*[np.linspace(-1, 1, GRID)] * 2, indexing="ij"), axis=-1).reshape(-1, 2)
     twist = np.column_stack([centre[:, 1], -centre[:, 0], np.ones(len(centre))])
-    W, T = found.wrenches(twist), twist / np.linalg.norm(twist, axis=1, keepdims=True)
+    W, T = found.exact.support_points(twist), twist / np.linalg.norm(twist, axis=1, keepdims=True)
     surfaces = found.ellipsoid, fitted(found.ellipsoid, W, T, "quartic", "least_squares")[0]
     return {name: fit_error(surface, W, T).Erad for name, surface in zip(FITS, surfaces, strict=True)}
 
 
 def _most(found: StoredSurface) -> np.ndarray:
     """Largest of each component that the contact carries ``(3,)`` [-]."""
-    return np.abs(np.diagonal(found.wrenches(np.eye(3))))
+    return found.exact.semi_axes
 
 
 def exact_radius(found: StoredSurface, u: np.ndarray) -> np.ndarray:
     """Reach of the exact body along directions ``(m, 3)``: the nearest of the planes ``w . t <= H(t)`` ``(m,)``."""
     t = fibonacci_twists(SUPPORTS, 1.0)
-    H = np.einsum("ki,ki->k", found.wrenches(t), t)
+    H = found.exact.support(t)
     return np.concatenate([1 / (np.abs(some @ t.T) / H).max(axis=1) for some in np.array_split(u, 20)])
 
 
@@ -150,7 +149,7 @@ def _body(plotter: Any, found: StoredSurface, shape: Any, error: np.ndarray, top
     corners = np.stack([grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]], axis=2).reshape(-1, 4, 3)
     middle = 0.25 * (e[:-1, :-1] + e[1:, :-1] + e[1:, 1:] + e[:-1, 1:])
     solids.faces(plotter, corners, middle.ravel(), cmap=ERRORS, clim=(0, top))
-    wrenches = found.wrenches(fibonacci_twists(MOTIONS, 1.0)) / most
+    wrenches = found.exact.support_points(fibonacci_twists(MOTIONS, 1.0)) / most
     drawing.dots(plotter, np.vstack([wrenches, -wrenches]), 0.012, "white")
     solids.lines(plotter, np.stack([np.eye(3), 1.25 * np.eye(3)], axis=1), pictures.INK, 3)
     solids.labels(plotter, 1.33 * np.eye(3), [name for name, _ in COMPONENTS])
@@ -189,7 +188,7 @@ def on_grid_along(ds: xr.Dataset, k: int) -> dict[str, np.ndarray]:
     for place in np.ndindex(shape):
         index = (*place, k)
         surfaces = [stored_surface(ds, index, finger, "ccm", view.faces(index)) for finger in range(FINGERS)]
-        known = [errors_on_grid(found) for found in surfaces if found is not None and found.patch is not None]
+        known = [errors_on_grid(found) for found in surfaces if found is not None and found.exact is not None]
         for name in FITS:
             errors[name][place] = 100 * max((own[name] for own in known), default=np.nan)
     return errors

@@ -184,7 +184,7 @@ OPTIONS = {
     "surface": _option("--surface", choices=("three_motions", "axis_aligned", "full", "quartic"),
                        default="three_motions",
                        help="limit surface that is scored (default: three_motions, as a study's quality)"),
-    "sections": _option("-o", metavar="PICTURE", dest="picture", help="picture of the limit surface (.png or .svg)"),
+    "outlines": _option("-o", metavar="PICTURE", dest="picture", help="picture of the limit surface (.png or .svg)"),
 }  # fmt: skip
 GRIPPER = ("gripper", "approach", "wider", "frame")
 COMMANDS = {  # by what they are for, in the order of use: name, what it does, an example, its module, its options
@@ -227,7 +227,7 @@ COMMANDS = {  # by what they are for, in the order of use: name, what it does, a
         ("patch", "judge a pressure field from elsewhere: friction, score",
          "patch jobs/cylinder-pressure.csv --mu 0.8 --distance 60", "patch.answer_text",
          ("field", "pad", "deformed", "mu", "side", "unit", "pressure unit", "pressure", "flip", "other", "distance",
-          "arms", "torques", "surface", "sections", "json")),
+          "arms", "torques", "surface", "outlines", "json")),
     ),
     "this program": (
         ("schema", "JSON schema of a scene, for editors", "schema > scene.schema.json", "cli.quick", ()),

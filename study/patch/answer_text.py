@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from softjaw.friction.patch import FloatArray
+from softjaw.lsfit.surface import PLANES, shadow_outline
 from softjaw.study.messages import USAGE, StudyError, with_ending, write_file
 from softjaw.study.patch.answer import (
     DEFINITIONS,
@@ -32,8 +33,7 @@ from softjaw.study.units import shown, shown_unit
 PICTURES = (".png", ".svg")
 LINE = 110  # characters
 FRICTION_COEFFICIENT, ALONG_PAD = 0.8, np.array([1.0, 0.0, 0.0])
-AXES = ("f_x / S", "f_y / S", "tau_z / S [mm]")
-SECTIONS = ((0, 1), (0, 2), (1, 2))
+AXES, SHOWN = ("f_x / S", "f_y / S", "tau_z / S [mm]"), np.array([1.0, 1.0, 1e3])
 LOOK: dict[str, dict[str, Any]] = {
     "exact": {"color": "#1d2429", "linewidth": 2.2},
     "three_motions": {"color": "#c05a00", "linestyle": "--"},
@@ -159,34 +159,21 @@ def _between(lower: float, upper: float) -> str:
 
 
 def write_picture(patches: Sequence[EvaluatedPatch], kind: str, path: Path) -> None:
-    """Sections of all patches' limit surfaces, exact and fitted, one row each; the ending chooses the format."""
+    """Shadows of all patches' limit surfaces, exact and fitted, one row each; the ending chooses the format."""
     from softjaw.study import pictures  # loads matplotlib, which the text does not need
 
     with pictures.style():
-        drawn, axes = pictures.figure(9.0, 3.1 * len(patches), len(patches), len(SECTIONS))
+        drawn, axes = pictures.figure(9.0, 3.1 * len(patches), len(patches), len(PLANES))
         for row, patch in zip(axes, patches, strict=True):
-            for place, plane in zip(row, SECTIONS, strict=True):
+            for place, plane in zip(row, PLANES, strict=True):
                 place.axhline(0, color=pictures.SOFT, linewidth=0.4)
                 place.axvline(0, color=pictures.SOFT, linewidth=0.4)
                 for name in dict.fromkeys(["exact", "three_motions", kind]):
-                    curve = section(patch, name, plane) * [1e3 if k == 2 else 1.0 for k in plane]
-                    place.plot(*curve.T, label=name.replace("_", " "), **LOOK[name])
+                    points = patch.surface("ccm", name).support_points
+                    outline = shadow_outline(points, *plane, 360, patch.contact.rho) * SHOWN[[*plane]]
+                    place.plot(*outline.T, label=name.replace("_", " "), **LOOK[name])
                 place.set(xlabel=AXES[plane[0]], ylabel=AXES[plane[1]])
-            row[0].set_title(f"{Path(patch.read.file).name}, ccm, mu = {patch.contact.mu:g}")
+            row[0].set_title(f"{Path(patch.read.file).name}: shadows, ccm, mu = {patch.contact.mu:g}")
         axes[0, 0].legend(*axes[0, 0].get_legend_handles_labels(), frameon=False, fontsize=7.5, loc="center")
         data = {".png": pictures.as_png, ".svg": pictures.as_svg}[path.suffix.lower()](drawn)
     write_file(path, data)
-
-
-def section(patch: EvaluatedPatch, kind: str, plane: tuple[int, int]) -> FloatArray:
-    """Curve ``(361, 2)`` in which a plane of two of ``(f_x, f_y, tau_z)`` meets a surface of the CCM, per unit of S.
-
-    ``kind`` is ``exact`` or a fitted surface.
-    """
-    phi = np.linspace(0, 2 * np.pi, 361)
-    u = np.zeros((len(phi), 3))
-    u[:, plane[0]], u[:, plane[1]] = np.cos(phi), np.sin(phi)
-    u *= [1.0, 1.0, patch.contact.rho]  # torque in proportion to force, for even steps
-    with np.errstate(invalid="ignore", divide="ignore"):
-        curve = patch.surface("ccm", kind).radius(u)[:, None] * u
-    return curve[:, list(plane)]

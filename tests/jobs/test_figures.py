@@ -11,13 +11,14 @@ from jobs.figures import drawing, studies, surfaces
 from jobs.figures.__main__ import FIGURES, Figure, draw, figures_of, targets
 from softjaw.friction.motion import fibonacci_twists
 from softjaw.friction.wrench import friction_limits
+from softjaw.lsfit.body import ExactSurface
 from softjaw.lsfit.ellipsoid import Ellipsoid
 from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, SOME_FAILED, USAGE, StudyError
 from softjaw.study.ranking import judge
 from softjaw.study.result.layout import DONE
 from softjaw.study.result.read import open
 from softjaw.study.show.grasps import field
-from softjaw.study.show.stored_surface import StoredSurface
+from softjaw.study.show.stored_surface import StoredSurface, exact_surface
 from tests.generators import cylinder_grid
 from tests.study.formula_results import grid_axes, make
 from tests.study.launching import ROOT, launch
@@ -88,9 +89,9 @@ def test_a_scene_that_cannot_be_solved_is_not_drawn(tmp_path, monkeypatch, code)
 def test_the_exact_radius_is_that_of_an_ellipsoid_where_the_body_is_one(axes):
     """The wrenches of ``H(t) = |A t|`` are ``A^2 t / |A t|``; planes bound the body from outside."""
     A = np.array(axes)
-    body = SimpleNamespace(wrenches=lambda t: A**2 * t / np.linalg.norm(A * t, axis=1, keepdims=True))
+    body = ExactSurface(lambda t: A**2 * t / np.linalg.norm(A * t, axis=1, keepdims=True))
     u = np.random.default_rng(3).normal(size=(200, 3))
-    found, known = surfaces.exact_radius(body, u), 1 / np.linalg.norm(u / A, axis=1)
+    found, known = surfaces.exact_radius(SimpleNamespace(exact=body), u), 1 / np.linalg.norm(u / A, axis=1)
     assert found == pytest.approx(known, rel=2e-3)
     assert (found >= known * (1 - 1e-12)).all()
 
@@ -100,7 +101,7 @@ def test_errors_on_the_paper_s_grid_are_those_of_the_reference():
     patch = cylinder_grid(1.0, np.pi / 3, 2.0, 48, 48)
     limits = friction_limits(patch, 1.0)
     ellipsoid = Ellipsoid.of_axes(np.array(limits.per_unit_force) / [1.0, 1.0, 2.0])
-    found = surfaces.errors_on_grid(StoredSurface(np.ones(3), 2.0, ellipsoid, None, patch, "ccm"))
+    found = surfaces.errors_on_grid(StoredSurface(np.ones(3), ellipsoid, None, exact_surface(patch, "ccm", 2.0)))
     assert found["fit_error_ellipsoid"] == pytest.approx(0.003113307368265586, rel=1e-6)
     # the reference's quartic is fitted to the wrenches alone, ours to the motions, too
     assert 0.7 < found["fit_error"] / 0.0003705396009936843 < 1.0
@@ -165,7 +166,7 @@ def test_fig5_the_contact_is_asymmetric_and_the_flat_model_claims_more(coarse, d
     for name, index in (("fig5-candidate", (0, 0, 0)), ("fig4-curvature", (0, 0, 0, 1))):
         known = {m: surfaces.exact_surface(data(name), index, m) for m in surfaces.MODELS}
         t = fibonacci_twists(200, 1.0)
-        H = {m: np.einsum("ki,ki->k", found.wrenches(t), t) for m, found in known.items()}
+        H = {m: found.exact.support(t) for m, found in known.items()}
         assert (H["ccm"] <= H["pcm"] * (1 + 1e-12)).all()
 
 

@@ -7,18 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from softjaw.lsfit.surface import PLANES, shadow_outline
 from softjaw.study.page import Block, plot
 from softjaw.study.show import plots
 from softjaw.study.show.best_grasps import value_text
 from softjaw.study.show.grasps import Index, at, number, place
-from softjaw.study.show.stored_surface import (
-    NAMES,
-    PLANES,
-    StoredSurface,
-    shadow_outline,
-    stored_surface,
-    weaker,
-)
+from softjaw.study.show.stored_surface import NAMES, StoredSurface, stored_surface, weaker
 from softjaw.study.show.view.model import FORCE, SLIPS, View
 from softjaw.study.show.view.pads import Pad
 
@@ -79,7 +73,7 @@ def limit_surfaces(view: View, index: Index) -> Block | None:
         made.update_xaxes(title_text=NAMES[i], row=1, col=column).update_yaxes(title_text=NAMES[j], row=1, col=column)
     made.update_yaxes(scaleanchor="x", row=1, col=1)
     made.update_layout(legend={"y": -0.25}, margin={"t": 20})
-    exact = "Dots: exact wrenches of slip motions. " if any(s.patch for s in known.values()) else ""
+    exact = "Dots: exact wrenches of slip motions. " if any(s.exact for s in known.values()) else ""
     off = [[100 * at(ds, f"{name}{kind}", index) for name in ("overclaim", "fit_error")] for kind in ("", "_ellipsoid")]
     fitted, ellipsoid = (f"{number(worst, 2)} % (mean error {number(mean, 2)} %)" for worst, mean in off)
     claim = f"They claim too much by up to (CCM): {fitted} the fitted surface, {ellipsoid} the ellipsoid."
@@ -95,12 +89,10 @@ def _shadow(made: Any, surface: StoredSurface, model: str, i: int, j: int, colum
     common = {"row": 1, "col": column, "showlegend": column == 1, "hoverinfo": "x+y"}
     for kind, shape, dash in (("fitted", surface.chosen, "solid"), ("three motions", surface.ellipsoid, "dash")):
         if shape is not None:
-            outline = shadow_outline(shape, i, j, 120) * scale
-            x, y = np.vstack([outline, outline[:1]]).T
+            x, y = (shadow_outline(shape.support_points, i, j, 120) * scale).T
             made.add_scatter(x=x, y=y, mode="lines", name=f"{name}, {kind}", line={"color": colour, "dash": dash},
                              legendgroup=f"{model} {kind}", **common)  # fmt: skip
-    exact = surface.outline(i, j, 48)
-    if exact is not None:
-        x, y = (exact * scale).T
+    if surface.exact is not None:
+        x, y = (shadow_outline(surface.exact.support_points, i, j, 48) * scale).T
         made.add_scatter(x=x, y=y, mode="markers", name=f"{name}, exact", legendgroup=f"{model} exact", **common,
                          marker={"color": colour, "symbol": f"{symbol}-open", "size": 5})  # fmt: skip

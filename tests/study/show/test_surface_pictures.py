@@ -5,13 +5,14 @@ import pytest
 
 from softjaw.lsfit.ellipsoid import Ellipsoid
 from softjaw.lsfit.form import exponents, monomials
+from softjaw.lsfit.surface import circle, shadow_outline
 from softjaw.study.quantities import MONOMIALS
 from softjaw.study.ranking import judge
 from softjaw.study.result.layout import Layout
 from softjaw.study.result.read import open
 from softjaw.study.show.grasps import field
 from softjaw.study.show.report.contact import limit_surfaces
-from softjaw.study.show.stored_surface import circle, shadow_outline, stored_surface
+from softjaw.study.show.stored_surface import stored_surface
 from softjaw.study.show.view.model import View
 from tests.lsfit.test_surfaces import squared
 from tests.study.show.test_report import axes, make, patch
@@ -45,7 +46,7 @@ def test_monomials_are_named_in_the_order_of_the_fits():
 @pytest.mark.parametrize(("i", "j"), [(0, 1), (0, 2), (1, 2)])
 def test_shadows_of_ellipsoids_are_ellipses(i, j):
     for surface in (Ellipsoid.of_axes(SEMI), BODY):
-        outline = shadow_outline(surface, i, j, 120)
+        outline = shadow_outline(surface.support_points, i, j, 120)
         assert ((outline / SEMI[[i, j]]) ** 2).sum(axis=1) == pytest.approx(1.0, rel=1e-7)
 
 
@@ -57,11 +58,11 @@ def test_surfaces_and_exact_wrenches_are_rebuilt_from_the_file_and_shown(file):
     assert flat.ellipsoid.semi_axes == pytest.approx(SEMI)
     assert flat.chosen.radius(np.eye(3)) == pytest.approx(SEMI)
     # a plane contact slides alike in every direction, and turning it takes no more than all its load at the rim
-    sliding = flat.wrenches(circle(0, 1, 24))
+    sliding = flat.exact.support_points(circle(0, 1, 24))
     assert np.linalg.norm(sliding[:, :2], axis=1) == pytest.approx(1.0, rel=1e-9)
-    assert flat.outline(0, 1) == pytest.approx(circle(0, 1, 90)[:, :2], abs=1e-9)
-    assert 0 < flat.wrenches(np.array([[0.0, 0.0, 1.0]]))[0, 2] * RHO < 0.01 * np.sqrt(2)
-    assert np.abs(curved.outline(0, 1)).max() <= 1 + 1e-12
+    assert shadow_outline(flat.exact.support_points, 0, 1, 90)[:-1] == pytest.approx(circle(0, 1, 90)[:, :2], abs=1e-9)
+    assert 0 < flat.exact.semi_axes[2] * RHO < 0.01 * np.sqrt(2)
+    assert curved.exact.semi_axes[:2].max() <= 1 + 1e-12
     shown = limit_surfaces(View(data), (0, 0, 0))["figure"].data
     outlines = [trace for trace in shown if trace.mode == "lines" and trace.line.dash == "solid"]
     assert len(outlines) == 2 * 3  # CCM and PCM
