@@ -37,7 +37,7 @@ from softjaw.study.run.load_path import sentence, settle
 from softjaw.study.run.object_folder import ObjectFolder, key_of
 from softjaw.study.run.plan import Plan
 from softjaw.study.run.schedule import Claims
-from softjaw.study.run.session import Session, Work, file_of, finish_alone, locked, on_rank0, pack, rounds_in
+from softjaw.study.run.session import Session, Work, file_of, finish, locked, on_rank0, pack, rounds_in
 from softjaw.study.scene import Scene, SceneError, parse_scene
 from softjaw.study.scene.text import differences
 from softjaw.study.table import Row
@@ -184,7 +184,7 @@ class _ObjectsRun:
             if part.number in self._mine:
                 _, work = self._mine[part.number]
                 end = work, part.path, part.plan, writer.session, session.signal
-                self._alone(part.number, finish_alone, *end)
+                self._alone(part.number, finish, *end)
         # Nobody reads a file that is being finished.
         self._comm.Barrier()
         return code == messages.STOPPED

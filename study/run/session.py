@@ -99,8 +99,9 @@ def run_study(plan: Plan, work: Work, path: Path, comm: Any, *, retry_failed: bo
             code = _solve(plan, work, path, comm, retry_failed=False)
         if finished is None and code != STOPPED:
             on_rank0(comm, pack, work, path, plan)
-        if comm.rank == 0:
-            print_summary(work, path)
+        if comm.rank == 0 and work.summary is not None:
+            with open_result(path) as result:
+                print(work.summary(result), flush=True)
     return code
 
 
@@ -155,7 +156,7 @@ def _solve(plan: Plan, work: Work, path: Path, comm: Any, retry_failed: bool) ->
         print(_begins(path, codes, len(torn), comm.size, created), flush=True)
     code = session.solve()
     if comm.rank == 0:
-        finish_alone(work, path, plan, writer.session, session.signal)
+        finish(work, path, plan, writer.session, session.signal)
     return code
 
 
@@ -236,7 +237,9 @@ class Session:
         try:
             name = self._solve_share(claims)
         except StudyError as error:
-            _end_all(self._comm, claims, error)
+            if self._comm.size > 1:
+                # no rank can go on; the first to notice speaks
+                self._comm.Abort(complain(error, claims.first_to_speak()))
             with contextlib.suppress(OSError, RuntimeError):  # where it could not be written, it may not be closed
                 self._files.close()
             raise
@@ -269,24 +272,18 @@ class Session:
             self._progress.update(self._files.codes())
 
 
-def finish_alone(work: Work, path: Path, plan: Plan, session: int, name: str) -> None:
-    """`finish` by a process that has the file for itself."""
+def finish(work: Work, path: Path, plan: Plan, session: int, name: str) -> None:
+    """Fill the derived datasets if nothing is missing, and write how this session ended; by one process."""
     with contextlib.closing(ResultWriter(path, plan.layout, MPI.COMM_SELF, plan.wanted)) as writer:
-        writer.session = session
-        finish(work, writer, name)
-
-
-def finish(work: Work, writer: ResultWriter, name: str) -> None:
-    """Fill the derived datasets if nothing is missing, and write how this session ended; by one rank."""
-    codes = writer.codes()
-    missing, done, failed = (int(np.sum(codes == state)) for state in (MISSING, DONE, FAILED))
-    # Derived values of half a study would look like those of a whole one.
-    if work.finalise is not None and not missing:
-        work.finalise(writer)
-    reason = f"stopped by {name or 'another rank'}" if missing else "complete"
-    # Once more: libraries that were loaded for the solves are known only now.
-    versions = provenance.versions(MPI.Get_library_version())
-    writer.update_session(stop=provenance.timestamp(), reason=reason, versions=versions, done=done, failed=failed)
+        writer.session, codes = session, writer.codes()
+        missing, done, failed = (int(np.sum(codes == state)) for state in (MISSING, DONE, FAILED))
+        # Derived values of half a study would look like those of a whole one.
+        if work.finalise is not None and not missing:
+            work.finalise(writer)
+        reason = f"stopped by {name or 'another rank'}" if missing else "complete"
+        # Once more: libraries that were loaded for the solves are known only now.
+        versions = provenance.versions(MPI.Get_library_version())
+        writer.update_session(stop=provenance.timestamp(), reason=reason, versions=versions, done=done, failed=failed)
 
 
 def pack(work: Work, path: Path, plan: Plan) -> None:
@@ -301,19 +298,6 @@ def pack(work: Work, path: Path, plan: Plan) -> None:
             raise
         # every number is in the file already
         print(f"note: {path}: complete, but not made smaller ({error})", file=sys.stderr, flush=True)
-
-
-def print_summary(work: Work, path: Path) -> None:
-    """Print what the work says at its end."""
-    if work.summary is not None:
-        with open_result(path) as result:
-            print(work.summary(result), flush=True)
-
-
-def _end_all(comm: Any, claims: Claims, error: StudyError) -> None:
-    """End all ranks, if there are others, because this one cannot write; the first to notice speaks."""
-    if comm.size > 1:
-        comm.Abort(complain(error, claims.first_to_speak()))
 
 
 class Compiling(Listener):
