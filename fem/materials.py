@@ -345,14 +345,8 @@ LAWS = {"blatz_ko": 0, "hyperfoam": 1, "neo_hookean": 2, "linear": 3}
 class Material:
     """A law with its parameters and its small-strain constants.
 
-    Parameters
-    ----------
-    law : str
-        A key of ``LAWS``.
-    parameters : (k,) array
-        As the law's function documents them [Pa, -].
-    shear_modulus, poisson_ratio : float
-        Of the undeformed state [Pa], [-].
+    ``law``: a key of ``LAWS``; ``parameters (k,)``: as the law's function documents them [Pa, -]; ``shear_modulus,
+    poisson_ratio``: of the undeformed state [Pa], [-].
     """
 
     law: str

@@ -42,10 +42,7 @@ ROOM = 160 * 2**20  # bytes that are free before a library is let loose: the lar
 def take_buffers(*others: Callable[[], object]) -> None:
     """Let numpy's and scipy's BLAS take their work memory, then those that the operations ``others`` reach.
 
-    Raises
-    ------
-    MemoryError
-        Where addresses are too few for one of them.
+    Raises `MemoryError`: where addresses are too few for one of them.
     """
     small = np.eye(2)
     # the addresses are only reserved, not touched: the look costs no memory
@@ -255,14 +252,8 @@ class NonlinearSolver:
     def solve(self, x: FloatArray, tolerance: float, iterations: int | None = None) -> tuple[FloatArray, int]:
         """Solve from ``x`` until the residual's norm is below ``tolerance``; returns the solution and the iterations.
 
-        Raises
-        ------
-        ConvergenceError
-            When the solver stops for any other reason.
-        SpentError
-            When none of the iterations that the caller allows is left.
-        MemoryError
-            When there is no memory for the factors.
+        Raises `ConvergenceError`: when the solver stops for any other reason; `SpentError`: when none of the iterations
+        that the caller allows is left; `MemoryError`: when there is no memory for the factors.
         """
         if self.iterations_left <= 0:
             raise SpentError
@@ -449,10 +440,7 @@ class Factors:
     def solve(self, B: FloatArray) -> FloatArray:
         """Solutions ``X`` of ``A X = B`` for a vector ``(n,)`` or the columns of ``(n, m)``, few enough for the memory.
 
-        Raises
-        ------
-        ConvergenceError
-            When the matrix is singular.
+        Raises `ConvergenceError`: when the matrix is singular.
         """
         columns = np.asfortranarray(B.reshape(len(B), -1))
         # dense PETSc matrices take over the memory they are given, so each gets an array of its own

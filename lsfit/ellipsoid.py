@@ -24,15 +24,8 @@ class Ellipsoid(LimitSurface):
 
     A contact that cannot carry some load has a flat one: a disc, a segment or a point, and `rank` tells which.
 
-    Parameters
-    ----------
-    B : (d, r) array
-        Map with independent columns; flat if ``r < d``.
-    flag : FitFlag
-        What the reader should know.
+    ``B (d, r)``: map with independent columns; flat if ``r < d``; ``flag``: what the reader should know.
 
-    Examples
-    --------
     >>> disc = Ellipsoid.of_axes([1.0, 1.0, 0.0])
     >>> disc.rank, disc.volume, disc.holds([0.5, 0.5, 0.0]), disc.holds([0.0, 0.0, 1e-9])
     (2, 0.0, array([ True]), array([False]))

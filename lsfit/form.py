@@ -20,8 +20,6 @@ IntArray = NDArray[np.int64]
 def exponents(dimension: int, degree: int) -> IntArray:
     """Exponents of all monomials of one degree, ``(k, d)``, ``k = (d + degree - 1 choose degree)``.
 
-    Examples
-    --------
     >>> exponents(2, 2).tolist()
     [[2, 0], [1, 1], [0, 2]]
     """

@@ -28,14 +28,8 @@ from softjaw.lsfit.surface import FitError, FitFlag, FloatArray, LimitSurface, s
 class Quartic(LimitSurface):
     """Image ``{B y : P(y) <= 1}`` of the level set of a homogeneous polynomial ``P(y) = sum_k c_k y^E_k`` of degree 4.
 
-    Parameters
-    ----------
-    form : (k,) array
-        ``c``, one for each monomial, in the order of `lsfit.form.exponents`; of a closed body.
-    B : (d, r) array
-        Map with independent columns; flat if ``r < d``.
-    flag : FitFlag
-        What the reader should know.
+    ``form (k,)``: ``c``, one for each monomial, in the order of `lsfit.form.exponents`; of a closed body; ``B (d, r)``:
+    map with independent columns; flat if ``r < d``; ``flag``: what the reader should know.
     """
 
     form: FloatArray

@@ -28,6 +28,8 @@ def convex_quartic(W: ArrayLike, T: ArrayLike, gamma: float = 0.01) -> tuple[Qua
     cannot undo the proof. A body that would reach more than `MAX_REACH_RATIO` times as far as the ellipsoid of the
     samples is bounded there by a larger margin, and flagged.
 
+    Raises `FitError`: if the programme is not solved, or its result fails the certificate.
+
     Parameters
     ----------
     W : (m, d) array
@@ -44,11 +46,6 @@ def convex_quartic(W: ArrayLike, T: ArrayLike, gamma: float = 0.01) -> tuple[Qua
         In the coordinates of the wrenches; flat, and flagged, if the samples are.
     certificate : str
         ``least squares`` if the best quartic is convex by itself, else ``semidefinite programme``.
-
-    Raises
-    ------
-    FitError
-        If the programme is not solved, or its result fails the certificate.
     """
     samples = round_samples(W, T)
     r = samples.B.shape[1]

@@ -43,17 +43,10 @@ Axes = Sequence[float] | NDArray[np.float64]
 def volume_linf(V1: float, A1: float, V2: float, A2: float, d: float) -> float:
     """Volume of the L-infinity grasp wrench space, ``7/12 d^2 (V1 A2 + A1 V2)``.
 
-    Parameters
-    ----------
-    V1, V2 : float
-        Volumes of the limit surfaces in ``(f_x, f_y, tau_z)`` per unit normal force, torques divided by their length.
-    A1, A2 : float
-        Areas of their shadows on the plane of the forces.
-    d : float
-        Distance of the contacts, divided by the length for arms.
+    ``V1, V2``: volumes of the limit surfaces in ``(f_x, f_y, tau_z)`` per unit normal force, torques divided by their
+    length; ``A1, A2``: areas of their shadows on the plane of the forces; ``d``: distance of the contacts, divided by
+    the length for arms.
 
-    Notes
-    -----
     The bodies can be ellipsoids, polytopes or exact limit surfaces. The volume does not depend on where the object's
     centre of mass lies.
     """

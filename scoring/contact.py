@@ -171,14 +171,8 @@ def hull_volume(points: FloatArray) -> float:
 class SoftContact:
     """A finger's contact with the object.
 
-    Parameters
-    ----------
-    position : (3,) array
-        Origin of the contact frame [m].
-    axes : (3, 3) array
-        Rows x, y, N: unit vectors of a right-handed frame; the finger presses along N, into the object.
-    body : Body
-        Limit surface in that frame, per unit normal force.
+    ``position (3,)``: origin of the contact frame [m]; ``axes (3, 3)``: rows x, y, N: unit vectors of a right-handed
+    frame; the finger presses along N, into the object; ``body``: limit surface in that frame, per unit normal force.
     """
 
     position: FloatArray

@@ -73,6 +73,9 @@ def epsilon(
 ) -> Bounds:
     """Radius of the largest ball around 0 in the grasp wrench space, for normal forces of at most one [-].
 
+    The bounds hold up to rounding. A body that is no ellipsoid is replaced by an ellipsoid inside it for the lower
+    bound, which leaves a gap as large as its fit error; the upper bound uses its own support.
+
     Parameters
     ----------
     contacts : sequence of SoftContact
@@ -87,12 +90,6 @@ def epsilon(
         "linf": every normal force is at most one; "l1": their sum is.
     tolerance : float
         Relative gap of the bounds to work for; an absolute one of 1e-6 is enough too.
-
-    Notes
-    -----
-    The bounds hold up to rounding. A body that is no ellipsoid is replaced by an ellipsoid inside it for the lower
-    bound, which leaves a gap as large as its fit error; the upper bound uses its own support.
-
     """
     C = np.array([contact.wrench_map(object_length, contact_length, centre_of_mass) for contact in contacts])
     c, bodies = C[:, :, 0], [contact.body for contact in contacts]

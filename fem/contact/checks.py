@@ -52,6 +52,8 @@ def check(
 ) -> Checks:  # fmt: skip
     """Measures of a pad's state ``x`` at a normal force [N] on the whole pad.
 
+    Raises `CheckError`: with the law that is broken, the figure and its bound.
+
     Parameters
     ----------
     foam : Foam
@@ -65,11 +67,6 @@ def check(
         The normal force [N], and the part of it that a node may be out of balance.
     slack : float
         What every law of the contact may be off by at least, `ALTERNATING` or nothing.
-
-    Raises
-    ------
-    CheckError
-        With the law that is broken, the figure and its bound.
     """
     pad = foam.pad
     pressure, gap, points = state
@@ -106,13 +103,7 @@ def check(
 def explained(error: ConvergenceError, foam: Foam, x: FloatArray, force: float) -> ConvergenceError:
     """The error, or one that names the foam's state where that is why no further state was found.
 
-    Parameters
-    ----------
-    error : ConvergenceError
-        What the solver said.
-    foam : Foam
-    x : (size,) array
-        Last state in equilibrium, at the normal force ``force`` [N].
+    ``error``: what the solver said; ``x (size,)``: last state in equilibrium, at the normal force ``force`` [N].
     """
     det, strain, ellipticity = foam.strains(x, DIRECTIONS)
     # the reason is looked for in the last state in equilibrium: what failed beyond it has no state to look at
@@ -134,15 +125,9 @@ def explained(error: ConvergenceError, foam: Foam, x: FloatArray, force: float) 
 def refuse_fall(low: tuple[float, float], high: tuple[float, float]) -> None:
     """Refuse a state that a pad on a rigid object cannot have come to: more force means more closing displacement.
 
-    Parameters
-    ----------
-    low, high : (float, float)
-        Force [N] and closing displacement [m] of a state and of the next one.
+    ``low, high``: force [N] and closing displacement [m] of a state and of the next one.
 
-    Raises
-    ------
-    CheckError
-        If the force grew and the closing displacement fell.
+    Raises `CheckError`: if the force grew and the closing displacement fell.
     """
     # a fallback pad may follow one with other gaps, and their closings differ a little without any fault
     # share of the closing displacement from one force to the next: weighted and nodal gaps differ by less

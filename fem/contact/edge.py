@@ -39,17 +39,9 @@ EVEN, POINTED = 7.0 / 6.0, 14.0 / 9.0  # bounds of <s^2> / <s>^2 from a rim on: 
 def contact_area(patch: ContactPatch, faces: tuple[int, int], thickness: float) -> float:
     """Area of the contact with its edge reconstructed inside the faces [m^2].
 
-    Parameters
-    ----------
-    patch : ContactPatch
-        Of a whole pad as `fem.contact.extract.extract` makes it, with corners.
-    faces : (int, int)
-        Its faces along length and width.
-    thickness : float
-        Of the pad [m].
+    ``patch``: of a whole pad as `fem.contact.extract.extract` makes it, with corners; ``faces``: its faces along length
+    and width; ``thickness``: of the pad [m].
 
-    Notes
-    -----
     A face bears as far as both lines of faces through it say, that along the width and that along the length: a line
     beside an edge that it runs along is loaded as a whole, and only those across it tell how much of it bears.
     """

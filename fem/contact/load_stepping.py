@@ -289,10 +289,8 @@ class Stepping:
     def from_near(self, start: FloatArray, force: float, work: Work) -> FloatArray:
         """State at a force [N] by one Newton solve from ``start``, which has come along the path on another mesh.
 
-        Raises
-        ------
-        ConvergenceError
-            Where there is none near it, or where a path that is followed from first contact need not lead to it.
+        Raises `ConvergenceError`: where there is none near it, or where a path that is followed from first contact need
+        not lead to it.
         """
         # Newton iterations from the state of a coarser mesh; good starts take 4 to 8
         x = self.solve(start, Control(force=force), work, self.most or (8 if self.followed else None))

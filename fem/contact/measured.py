@@ -55,6 +55,9 @@ def press_measured(
 ) -> tuple[Pressed, bool]:
     """State of a pad pressed into the shape of its measured face, and whether contact is distinguished from noise.
 
+    Raises `NoContactError`: if the face is not pressed in anywhere; `ConvergenceError`, `CheckError`: if there is no
+    acceptable state.
+
     Parameters
     ----------
     face : MeasuredFace
@@ -70,13 +73,6 @@ def press_measured(
     -------
     state, judged
         In the frame at first touch, from which the backing plate has moved on by the closing displacement.
-
-    Raises
-    ------
-    NoContactError
-        If the face is not pressed in anywhere.
-    ConvergenceError, CheckError
-        If there is no acceptable state.
     """
     depth = _depth(face, pad)
     if not depth > 1e-6 * pad.shape.size[2]:

@@ -187,10 +187,7 @@ class LoadPath(ABC, Generic[ProblemT]):
     def load_path(self, forces: Sequence[float]) -> Iterator[Pressed]:
         """Equilibrium states at ascending normal forces on each whole pad [N].
 
-        Raises
-        ------
-        ConvergenceError, CheckError
-            At the first force without an acceptable state.
+        Raises `ConvergenceError`, `CheckError`: at the first force without an acceptable state.
         """
         if self.problem.friction is not None:
             yield from map(self.at, forces)
@@ -211,10 +208,7 @@ class LoadPath(ABC, Generic[ProblemT]):
         does, or the coarser mesh has jumped before, the force is approached from first contact. With friction it is
         approached from the last state of the path below it.
 
-        Raises
-        ------
-        ConvergenceError, CheckError
-            If there is no acceptable state.
+        Raises `ConvergenceError`, `CheckError`: if there is no acceptable state.
         """
         work, elapsed = Work(), self._stopwatch()
         if self.problem.friction is not None:

@@ -101,10 +101,7 @@ class Press(LoadPath[RigidProblem]):
     def at_closing(self, closing: float) -> Pressed:
         """State at a closing displacement of the backing plate [m], by steps from first contact.
 
-        Raises
-        ------
-        ConvergenceError, CheckError
-            If no pad, the fallbacks included, has an acceptable state.
+        Raises `ConvergenceError`, `CheckError`: if no pad, the fallbacks included, has an acceptable state.
         """
         work, elapsed = Work(), self._stopwatch()
         self._begin_afresh()

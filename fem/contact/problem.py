@@ -184,11 +184,7 @@ class Evaluated:
 class ContactProblem(ABC):
     """Residual of one or two pads on an object, driven by their backing plates; implements ``fem.petsc.Problem``.
 
-    Parameters
-    ----------
-    fingers : sequence of Finger
-    mu : float, optional
-        Friction coefficient; without it no friction acts back on the pressures.
+    ``mu``: friction coefficient; without it no friction acts back on the pressures.
     """
 
     complementarity, non_negative = False, slice(0)

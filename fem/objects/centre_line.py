@@ -84,17 +84,10 @@ class CentreLine:
 def centre_line(points: FloatArray, triangles: IntArray, wavelength: float) -> CentreLine:
     """Centre line of a surface whose axis is z.
 
-    Parameters
-    ----------
-    points, triangles : (n, 3), (m, 3) arrays
-        The surface [m]; outward, small holes do no harm.
-    wavelength : float
-        Waves of the line that are shorter are smoothed out [m]; half a pad is a good choice.
+    ``points, triangles (n, 3), (m, 3)``: the surface [m]; outward, small holes do no harm; ``wavelength``: waves of the
+    line that are shorter are smoothed out [m]; half a pad is a good choice.
 
-    Raises
-    ------
-    MeshError
-        Where hardly any section encloses an area.
+    Raises `MeshError`: where hardly any section encloses an area.
     """
     low, high = points[:, 2].min(), points[:, 2].max()
     # share of the height: nearer to the ends a section is the object's rounding, its middle is continued

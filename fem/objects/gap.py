@@ -134,6 +134,9 @@ def first_touch(obj: GapFunction, pose: Pose, points: FloatArray, reach: float) 
     Sphere tracing: a point may move by its signed distance without crossing the surface. All points are traced at once
     and those that are already further than the first hit are given up; each hit is then located by bisection.
 
+    Raises `NoContactError`: if no point meets the object within ``reach``, or only grazes it, or the pad starts inside
+    the object.
+
     Parameters
     ----------
     obj : GapFunction
@@ -144,11 +147,6 @@ def first_touch(obj: GapFunction, pose: Pose, points: FloatArray, reach: float) 
         Points of the pad's contact face in the pad's frame [m].
     reach : float
         Distance to give up at [m].
-
-    Raises
-    ------
-    NoContactError
-        If no point meets the object within ``reach``, or only grazes it, or the pad starts inside the object.
     """
     reach += GRAZE  # what is met just at the end of the reach is met
     start, approach = pose.to_object(points), pose.rotation[:, 2]

@@ -145,17 +145,10 @@ class MeasuredFace:
 def measured_face(points: FloatArray, cell: float) -> MeasuredFace:
     """Smooth face through measured points.
 
-    Parameters
-    ----------
-    points : (n, 2) or (n, 3) array
-        ``(y, z)`` of a contour along the pad's width, or ``(x, y, z)`` [m].
-    cell : float
-        Size of a cell of the spline [m]: what is finer is taken for noise.
+    ``points``: ``(y, z)`` of a contour along the pad's width, or ``(x, y, z)`` [m]; ``cell``: size of a cell of the
+    spline [m]: what is finer is taken for noise.
 
-    Raises
-    ------
-    ValueError
-        For too few points, and points on one line.
+    Raises `ValueError`: for too few points, and points on one line.
     """
     *places, z = points.T
     lines = [_line(place, cell) for place in places]

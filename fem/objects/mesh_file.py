@@ -47,10 +47,7 @@ def read_triangles(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
 
     The bodies of a scene come in their places. Faces of more corners are cut into triangles where they are convex.
 
-    Raises
-    ------
-    MeshError
-        The file cannot be read, is no mesh, too large or damaged.
+    Raises `MeshError`: the file cannot be read, is no mesh, too large or damaged.
     """
     import numpy as np
 

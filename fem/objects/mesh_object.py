@@ -80,10 +80,7 @@ class MeshObject:
     def first_touch(self, pose: Pose, points: FloatArray, reach: float) -> float:
         """Distance [m] along the approach to the first triangle before ``points (n, 3)`` of the pad's frame.
 
-        Raises
-        ------
-        NoContactError
-            If none of the lines meets a triangle within ``reach`` [m].
+        Raises `NoContactError`: if none of the lines meets a triangle within ``reach`` [m].
         """
         distance = self._tree.along(pose.to_object(points), pose.rotation[:, 2]).min()
         if distance > reach:

@@ -28,14 +28,8 @@ TINY = 1e-100  # zero below a logarithm
 class Section:
     """Cross-section at one height; ``b = None`` makes it as wide along y as along x.
 
-    Parameters
-    ----------
-    z, a, b : float
-        Height and semi-axes along x and y [m]; ``a = 0`` is allowed for the first and the last section.
-    exponent : float
-        2 for an ellipse, larger for a rounded rectangle; at least 2.
-    shift : (float, float)
-        Place of the middle [m].
+    ``z, a, b``: height and semi-axes along x and y [m]; ``a = 0`` is allowed for the first and the last section;
+    ``exponent``: 2 for an ellipse, larger for a rounded rectangle; at least 2; ``shift``: place of the middle [m].
     """
 
     z: float

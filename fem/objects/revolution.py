@@ -26,6 +26,8 @@ def closest() -> Any:
 class Revolution(Analytic):
     """Body that a profile sweeps round the z axis.
 
+    Raises `ValueError`: for points that make no body, with the number of the point.
+
     Parameters
     ----------
     profile : (k, 2) array
@@ -34,11 +36,6 @@ class Revolution(Analytic):
     rim : float
         Radius of the rounding at corners between straight runs and where an open end meets its flat cap [m]; smaller
         where the body is thin. An open end's cap lies beyond the last point by about this radius.
-
-    Raises
-    ------
-    ValueError
-        For points that make no body, with the number of the point.
     """
 
     profile: FloatArray

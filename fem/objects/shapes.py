@@ -73,13 +73,8 @@ class EllipticCylinder(Analytic):
     Flat caps meet the wall in a rounded edge, which is a tube round the curve that runs parallel to the ellipse inside
     it: all distances are exact, outside and inside. The curvature jumps where wall and cap meet the edge.
 
-    Parameters
-    ----------
-    a, b, length : float
-        [m]
-    rim : float
-        Radius of the rounding [m]; at most half the ellipse's smallest radius of curvature and a quarter of the length
-        are taken.
+    ``a, b, length`` [m]; ``rim``: radius of the rounding [m]; at most half the ellipse's smallest radius of curvature
+    and a quarter of the length are taken.
     """
 
     a: float

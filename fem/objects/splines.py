@@ -25,12 +25,9 @@ from softjaw.friction.patch import FloatArray
 class SplineSurface:
     """Piecewise bicubic surface; on cell ``(i, j)`` the powers of ``theta - theta_i`` and ``s - s_j``.
 
-    Parameters
-    ----------
-    theta, s : (m + 1,), (k + 1,) arrays
-        Ascending parameters of the grid lines: angle once about the axis [rad] and a length along the outline [m].
-    coefficients : (m, k, 3, 4, 4) array
-        Of the powers of ``theta`` and of ``s``, lowest first [m].
+    ``theta, s (m + 1,), (k + 1,)``: ascending parameters of the grid lines: angle once about the axis [rad] and a
+    length along the outline [m]; ``coefficients (m, k, 3, 4, 4)``: of the powers of ``theta`` and of ``s``, lowest
+    first [m].
     """
 
     theta: FloatArray

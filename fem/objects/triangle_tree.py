@@ -271,12 +271,7 @@ def area_vectors(points: FloatArray, triangles: IntArray) -> FloatArray:
 class TriangleTree:
     """Triangles that can be asked for closest points and for what a ray meets.
 
-    Parameters
-    ----------
-    points : (k, 3) array
-        Corners [m].
-    triangles : (m, 3) array of int
-        Corners of each triangle, counterclockwise from outside.
+    ``points (k, 3)``: corners [m]; ``triangles (m, 3)``: corners of each triangle, counterclockwise from outside.
     """
 
     points: FloatArray

@@ -66,10 +66,7 @@ class Triangles(NamedTuple):
 def cleaned(points: FloatArray, triangles: IntArray, unit: str = "m") -> Triangles:
     """Triangles of points ``(k, 3)`` in a unit of ``UNITS``, in metres, with notes on what was mended.
 
-    Raises
-    ------
-    MeshError
-        No triangles with finite coordinates, or an implausible size.
+    Raises `MeshError`: no triangles with finite coordinates, or an implausible size.
     """
     points, triangles = np.asarray(points, dtype=float), np.asarray(triangles)
     triangles, dropped = _finite(points, triangles)

@@ -40,10 +40,7 @@ def back_stiffness(
 ) -> BackStiffness:
     """Stiffness for nodes on the lines ``x`` and ``y`` [m]; ``symmetry`` as in `fem.pad.mesh.Pad`.
 
-    Raises
-    ------
-    ValueError
-        Where no node is on the patch that the finger holds.
+    Raises `ValueError`: where no node is on the patch that the finger holds.
     """
     shell, fixed, free = _plate(x, y, symmetry, plate)
     if not free.any():

@@ -77,12 +77,8 @@ class BackingPlate:
 class TiltingMount:
     """Rigid plate behind a pad that may tilt about the axes through its middle.
 
-    Parameters
-    ----------
-    stiffness : float
-        Moment per angle, the same about both axes [N m].
-    glue : float
-        Stiffness per area of the bond [Pa/m], high beside that of the pad.
+    ``stiffness``: moment per angle, the same about both axes [N m]; ``glue``: stiffness per area of the bond [Pa/m],
+    high beside that of the pad.
     """
 
     stiffness: float

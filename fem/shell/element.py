@@ -34,13 +34,9 @@ NO_STEP = np.empty((0, 6))
 class ShellMesh:
     """Mesh of the middle surface.
 
-    Parameters
-    ----------
-    X, D : (k, 3) arrays
-        Nodes on the middle surface and their directors, half the wall thickness times the outward unit normal [m]; the
-        outer face is ``X + D``.
-    elements : (n, 4) array
-        Node numbers, counter-clockwise seen from outside; two neighbours may be the same node.
+    ``X, D (k, 3)``: nodes on the middle surface and their directors, half the wall thickness times the outward unit
+    normal [m]; the outer face is ``X + D``; ``elements (n, 4)``: node numbers, counter-clockwise seen from outside; two
+    neighbours may be the same node.
     """
 
     X: FloatArray
@@ -87,6 +83,8 @@ def elements(
     The element's first direction crossed with its second must point to the side of ``D``. Two neighbouring nodes of an
     element may coincide (a triangle at the middle of a disc).
 
+    Raises `ValueError`: for an element without area at a Gauss point or facing against its directors.
+
     Returns
     -------
     nodes, weights, stiffness, start
@@ -96,11 +94,6 @@ def elements(
         state, from which strains are differences.
     area : (n, 4) array
         Of each Gauss point [m^2].
-
-    Raises
-    ------
-    ValueError
-        For an element without area at a Gauss point or facing against its directors.
     """
     E, nu = young_modulus, poisson_ratio
     G = E / (2.0 * (1.0 + nu))

@@ -91,15 +91,9 @@ class Facing:
 def face(wall: Wall, points: FloatArray, places: FloatArray, v: FloatArray, w: FloatArray) -> Facing:
     """What ``points (n, 3)`` face; ``places (n, 2)`` are where the search begins, and are set to what was found.
 
-    Parameters
-    ----------
-    v, w : (nodes, 3) arrays
-        Displacement of the outer face and change of the director [m].
+    ``v, w (nodes, 3)``: displacement of the outer face and change of the director [m].
 
-    Raises
-    ------
-    ArithmeticError
-        If a point close to the wall finds no place.
+    Raises `ArithmeticError`: if a point close to the wall finds no place.
     """
     facing = _search(wall, points, places, v, w)
     # a second search for the few that failed is cheaper than a safe start for all of them

@@ -37,10 +37,7 @@ def jumps(low: tuple[float, float], high: tuple[float, float]) -> bool:
     A wall that bends little by little closes about in proportion to the force. A soft pad hides from the closing
     displacement what the wall does.
 
-    Parameters
-    ----------
-    low, high : (float, float)
-        Force [N], the second one larger, and part of the opening that is gone.
+    ``low, high``: force [N], the second one larger, and part of the opening that is gone.
 
     >>> jumps((3.0, 0.05), (5.0, 0.11)), jumps((3.0, 0.05), (5.0, 0.3)), jumps((3.0, 1e-4), (5.0, 1e-3))
     (False, True, False)

@@ -62,10 +62,7 @@ class Opening:
     def watch(self, q: FloatArray, force: float) -> None:
         """Note the state at a force [N] of the fingers.
 
-        Raises
-        ------
-        CheckError
-            If the walls have met at a lower force.
+        Raises `CheckError`: if the walls have met at a lower force.
         """
         opening = self(q)
         if opening > 0.0:
@@ -83,12 +80,8 @@ def creep(
 
     There is no end: the caller stops.
 
-    Raises
-    ------
-    ConvergenceError
-        When a step of `SHORTEST_STEP` does not serve.
-    SpentError
-        When the solver has no iterations left.
+    Raises `ConvergenceError`: when a step of `SHORTEST_STEP` does not serve; `SpentError`: when the solver has no
+    iterations left.
     """
     wall, time = slice(problem.model.size), FIRST_STEP
     resistance = _resistance(problem)

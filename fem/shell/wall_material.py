@@ -15,12 +15,8 @@ from dataclasses import dataclass, replace
 class WallMaterial:
     """Isotropic elastic wall.
 
-    Parameters
-    ----------
-    young_modulus, poisson_ratio : float
-        [Pa], [-].
-    yield_strength : float, optional
-        Stress at which the wall would keep an indentation [Pa]; None where it is not known.
+    ``young_modulus, poisson_ratio`` [Pa], [-]; ``yield_strength``: stress at which the wall would keep an indentation
+    [Pa]; None where it is not known.
     """
 
     young_modulus: float

@@ -173,10 +173,7 @@ def body_mesh(
     at the last or begins at the first given section instead of on the axis; ``base_thickness`` of the flat bottom [m],
     the rim above it changes over to the wall's.
 
-    Raises
-    ------
-    ValueError
-        For a wall that is too thick for its curvature, or a base where nothing is flat.
+    Raises `ValueError`: for a wall that is too thick for its curvature, or a base where nothing is flat.
     """
     s = along(surface, size, open_bottom, open_top, _steps(surface, thickness))
     theta = around(surface, size, symmetry)

@@ -35,6 +35,8 @@ ANTIPODAL = np.radians(5.0)  # beyond this misalignment a flag says so
 class Contact:
     """A contact patch and what friction can carry there: contact frame, friction limits and ellipsoid per model.
 
+    Raises `NoContactError`, `ValueError`: for a patch without load or direction, and an ``x_hint`` along its normal.
+
     Parameters
     ----------
     patch : ContactPatch
@@ -50,11 +52,6 @@ class Contact:
 
     ``local`` is the patch in the contact frame and ``rho`` its length [m]; ``unit_limits`` are the friction limits for
     mu = 1, ``ellipsoids`` go through the three motions of ``limits``.
-
-    Raises
-    ------
-    NoContactError, ValueError
-        For a patch without load or direction, and an ``x_hint`` along its normal.
     """
 
     def __init__(

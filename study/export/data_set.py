@@ -71,10 +71,7 @@ Files = dict[str, bytes]  # of one object, by name
 def write_data_set(index: Path, out: Path, form: str, gripper: GripperFrame) -> str:
     """Write a folder's grasps as a data set into ``out``; a line that says what was written.
 
-    Raises
-    ------
-    StudyError
-        A file cannot be read or written, or no object has a grasp.
+    Raises `StudyError`: a file cannot be read or written, or no object has a grasp.
     """
     if out.resolve() == index.parent.resolve():
         raise StudyError(USAGE, f"-o: found '{out}', expected another folder than that of the results")

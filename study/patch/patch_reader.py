@@ -81,8 +81,6 @@ def split_header(header: str, pressure_name: str | None = None) -> tuple[str, st
 
     ``pressure_name`` is the header, with or without its unit, of the column that holds the pressure.
 
-    Examples
-    --------
     >>> split_header("x_mm"), split_header("Pressure [kPa]"), split_header("area"), split_header("x_inch")
     (('x', 'mm'), ('pressure', 'kpa'), ('area', None), None)
     """

@@ -118,15 +118,9 @@ class Stopper:
 def limited_memory(setting: float | str, ranks: int) -> Iterator[None]:
     """Bound the address space of this process by what it has now plus its share of what is free.
 
-    Parameters
-    ----------
-    setting : float, "auto" or "none"
-        Memory of a rank in GB, or its share of what is free now, or no bound.
-    ranks : int
-        Processes that share the memory of this machine.
+    ``setting``: memory of a rank in GB, or its share of what is free now, or no bound; ``ranks``: processes that share
+    the memory of this machine.
 
-    Notes
-    -----
     ``RLIMIT_AS`` bounds addresses, of which libraries reserve more than they use; so what stands there before the
     first case does not count.
     """

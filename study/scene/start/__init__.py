@@ -60,10 +60,7 @@ def heights(height: float, pad: float = PAD_LENGTH) -> tuple[float, ...]:
 def init(options: Namespace, measure: Callable[[Namespace], Measured]) -> str:
     """Write both files, and say what to do next; ``measure`` looks at the mesh.
 
-    Raises
-    ------
-    StudyError
-        A mesh that is missing or cannot be read, files that exist, or a folder that cannot be written.
+    Raises `StudyError`: a mesh that is missing or cannot be read, files that exist, or a folder that cannot be written.
     """
     if options.kind != "mesh" and options.mesh:
         raise StudyError(USAGE, f"--mesh: found beside '{options.kind}'; write 'softjaw init mesh --mesh ...'")
