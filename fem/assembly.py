@@ -1,7 +1,5 @@
 """From element contributions to global vectors and matrices: compressed rows whose pattern may grow, and sums."""
 
-from __future__ import annotations
-
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray

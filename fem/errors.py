@@ -1,7 +1,5 @@
 """What can go wrong in a contact solve, each with a sentence a user can act on."""
 
-from __future__ import annotations
-
 from typing import Any
 
 

@@ -12,8 +12,6 @@ Arithmetic is strict IEEE: with relaxed rules the last bits depend on whether co
 cache, and a study would not be the same to the bit; these loops gain nothing from them.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

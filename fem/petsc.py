@@ -11,8 +11,6 @@ The BLAS libraries of this process take their work memory here, while there is r
 without a word.
 """
 
-from __future__ import annotations
-
 import ctypes
 import importlib.util
 import math

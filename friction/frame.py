@@ -1,7 +1,5 @@
 """Contact frame: where the planar reading of a curved patch has its origin and its normal."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from enum import IntFlag
 

@@ -4,8 +4,6 @@ A 3-D twist is ``[v_x, v_y, omega_z]`` and a 6-D twist ``[v, omega]``, both of t
 direction of a twist matters. A translation has ``omega = 0``: no centre of rotation has to be sent to infinity.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from softjaw.friction.patch import FloatArray

@@ -1,7 +1,5 @@
 """The exact limit surface, from its samples or from the friction that gives them; no model is fitted."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property

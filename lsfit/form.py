@@ -1,7 +1,5 @@
 """Homogeneous polynomials in any number of variables, and quartic bodies ``P(w) <= 1``: volume and shadow."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from functools import lru_cache

@@ -5,8 +5,6 @@ degree 4: where it is at most ``M`` its second derivative is at most ``16 M`` (B
 rises by at most ``8 M h^2`` within the angle ``h``, which bounds what samples no farther apart can have missed.
 """
 
-from __future__ import annotations
-
 import math
 from functools import lru_cache
 

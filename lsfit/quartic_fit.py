@@ -4,8 +4,6 @@ All is done in coordinates in which the samples lie near the unit ball, so that 
 margins mean the same for every contact.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

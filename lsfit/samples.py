@@ -1,7 +1,5 @@
 """Samples of a limit surface, wrenches and the motions normal to it, free of units; how far a model is from them."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

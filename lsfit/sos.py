@@ -13,8 +13,6 @@ References: Ahmadi, Parrilo, "A convex polynomial that is not sos-convex", Mathe
 Blekherman, Parrilo, "Convex ternary quartics are SOS-convex" (2024).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import lru_cache
 

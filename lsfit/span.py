@@ -17,8 +17,6 @@ Reference: Zhou, Paolini, Bagnell, Mason, "A convex polynomial force-motion mode
 application", ICRA 2016.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import clarabel

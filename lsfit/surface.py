@@ -1,7 +1,5 @@
 """What every limit surface offers, and what can be wrong with a fit."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import replace

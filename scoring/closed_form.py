@@ -29,8 +29,6 @@ one of them: there ``F >= c`` is the sign of a concave function of ``phi`` for L
 with its trough outside. So only those zeros remain: a wrench that one contact cannot feel and the other bears alone.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

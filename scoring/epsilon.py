@@ -28,8 +28,6 @@ those the moments mix up; on its sides ``g s_i``, ``g (a . l_i)`` and the produc
 products that are not negative.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

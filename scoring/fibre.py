@@ -14,8 +14,6 @@ P has rank 2, so only the part of v in a plane counts, where the sphere has the 
 boundary of S is a curve in closed form, with ``rho < 1`` its density over the angle about v0 is.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import cached_property

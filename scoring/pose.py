@@ -21,8 +21,6 @@ over these pairs of sides of ``S_1, S_2`` (integrals of ``(1 - l)^4 l`` and of `
 7/12 and 1/30 of `scoring.closed_form`.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

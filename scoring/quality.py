@@ -1,7 +1,5 @@
 """Quality of a grasp: volumes and epsilons of two contacts that face each other, and of any two anywhere."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

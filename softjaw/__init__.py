@@ -4,8 +4,6 @@ The names below are what a script needs, and docs/python.md shows them on one pa
 asked for, so ``import softjaw`` takes no time. Only `press` and `run` need PETSc, and only `run` needs MPI.
 """
 
-from __future__ import annotations
-
 from importlib import import_module
 from typing import Any
 

@@ -3,8 +3,6 @@
 Every check that loads foreign libraries runs in a process of its own: a library that crashes or hangs is a finding.
 """
 
-from __future__ import annotations
-
 import atexit
 import os
 import shutil

@@ -1,7 +1,5 @@
 """A study from its scene to its finished file: plan, how cases are solved, what is written and said at the end."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any

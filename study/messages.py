@@ -3,8 +3,6 @@
 Files that a user asked for are whole under their name or not there.
 """
 
-from __future__ import annotations
-
 import datetime
 import difflib
 import json

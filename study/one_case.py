@@ -4,8 +4,6 @@ A grasp or a force that the scene does not have is added to its own, so the case
 path leads through the scene's forces below, and a candidate that is an image of another one is solved there.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress

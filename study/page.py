@@ -4,8 +4,6 @@ Whoever builds a page hands over plain data; the template alone makes HTML of it
 itself goes through `label`, because plotly reads a few tags in it.
 """
 
-from __future__ import annotations
-
 import base64
 import hashlib
 from collections.abc import Iterable, Sequence

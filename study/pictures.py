@@ -3,8 +3,6 @@
 Maps grow evenly in lightness, so that they can be read without colour. Nothing here needs a display.
 """
 
-from __future__ import annotations
-
 import io
 from pathlib import Path
 from typing import Any

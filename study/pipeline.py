@@ -3,8 +3,6 @@
 ``solve_unit`` follows the load path of one candidate; all that it computes is in the ``CaseResult`` of each force.
 """
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Collection, Generator, Iterator

@@ -4,8 +4,6 @@ A table is data: columns that know their unit, rows of plain values in SI units,
 composes one; a renderer knows nothing of grasps.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 import json

@@ -3,8 +3,6 @@
 No other module multiplies by 1000: scene keys end in their unit (``pad_length_mm``), quantities name their SI unit.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

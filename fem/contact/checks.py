@@ -1,7 +1,5 @@
 """Laws that a converged state must obey, whatever the solver said, and why a load path ends."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -21,8 +21,6 @@ beyond, where pressure need not vanish, ends there; to its free edge at the dist
 ``p = sqrt(1 - s / b) (c_0 + c_1 s)``.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -5,8 +5,6 @@ triquadratic ones).  A face takes point, normal and load from its quadrature poi
 the integrals of the solution: the loads add up to ``S``, their components along the approach to the normal force.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -13,8 +13,6 @@ pad's stiffness, and from the last of them to the force that is wanted. Neither 
 tangent is exact.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -18,8 +18,6 @@ else the state beyond is taken. In both cases ``jumped`` is set: this state and 
 path.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace

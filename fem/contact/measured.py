@@ -8,8 +8,6 @@ beyond, and is taken away by as much as the face may be wrong. The growth is est
 goes with the root of the closing displacement.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -8,8 +8,6 @@ jumps: they couple neighbouring pressures, and a pad's rim on a steep slope can 
 ever.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import partial
 from typing import Any

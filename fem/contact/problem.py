@@ -14,8 +14,6 @@ All rows are forces [N].  ``A_i = int N_i dA``, all integrals are over the refer
 pressure. Both pads press with the same force, each with a closing displacement of its own.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

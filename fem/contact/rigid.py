@@ -1,7 +1,5 @@
 """Contact of a pad with a rigid object: the tangent of `fem.contact.problem`, also in a symmetric form."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from copy import copy
 from typing import Any

@@ -5,8 +5,6 @@ not pull the line off. A centroid of a loop is exact for its polygon. The line i
 centroids; its tangent is the local axis that pads are turned about.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

@@ -12,8 +12,6 @@ pad's frame map them onto each other. A triangle that only slanted lines reach a
 behind its back is the back of a thin wall (the inside of a bowl's rim) and is left out.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -3,8 +3,6 @@
 Also the small pieces that the analytic objects share.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial

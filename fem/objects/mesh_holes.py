@@ -9,8 +9,6 @@ inside where it is positive: exact for parts that cross or contain each other. A
 to zero. So lines are cast along all three axes, and of each point those that come back decide.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numba import njit
 

@@ -7,8 +7,6 @@ interval). Where two lines meet in a corner, the corner is rounded. An end that 
 rounded rim and a flat cap; an end on the axis is met at right angles, so that the surface has no tip.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

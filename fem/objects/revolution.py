@@ -1,7 +1,5 @@
 """Surface of revolution: bottles, cups and bulbs from the heights and radii of a profile."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any

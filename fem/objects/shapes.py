@@ -4,8 +4,6 @@ The closed shapes here are centred on the origin; a surface of revolution keeps 
 starts at z = 0.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

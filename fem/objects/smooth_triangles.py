@@ -9,8 +9,6 @@ triangle, so neighbours stay joined without gaps. The mesh's own points stay whe
 For facets of length h on a surface of radius R the error falls from h^2 / (8 R) to about 0.02 h^4 / R^3.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -8,8 +8,6 @@ A surface is what a wall's outer face looks like before it is deformed: a tensor
 normal and curvature are known everywhere between the nodes of a shell mesh, whatever shape the points came from.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Body of stacked sections as a gap function: exact near its wall, from a fine triangulation far away."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

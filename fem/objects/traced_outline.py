@@ -5,8 +5,6 @@ order, along a line by a C2 spline and round a ring by its waves: a wave of leng
 ``1 / (1 + (wavelength / l)^6)`` of its height, one of twice the wavelength 98 %, half of it 2 %.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -8,8 +8,6 @@ are closed by rounded lids as on other bodies; there the shape of the last secti
 round body the traced surface lies inside by about two thirds of their sagitta, ``size^2 / (8 radius)``.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -6,8 +6,6 @@ surface continues all round that feature (Baerentzen and Aanaes, 2005). At the b
 such points are marked, and their sign has to come from elsewhere.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

@@ -7,8 +7,6 @@ turned alike. Where more than two meet at an edge the two that continue most smo
 there.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

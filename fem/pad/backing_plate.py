@@ -5,8 +5,6 @@ the rest bends. Its four-node shell elements have their corners on the nodes of 
 face. Displacements of the plate are taken as small.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import lru_cache
 

@@ -1,7 +1,5 @@
 """The foam of a pad: forces, stiffness and strains in terms of its unknowns."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from softjaw.fem.assembly import gather, pairs

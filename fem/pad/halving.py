@@ -1,7 +1,5 @@
 """The coarser and the finer mesh of a pad; checking and planning a scene needs no more, and does without numpy."""
 
-from __future__ import annotations
-
 TIMES = 1.25  # as many elements: with 1.4 the same target took up to twice the time, on meshes finer than it asks for
 
 

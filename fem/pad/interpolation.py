@@ -1,7 +1,5 @@
 """A state of one pad on the mesh of another: the same foam with the same size, meshed with blocks of its own."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -7,8 +7,6 @@ that the
 finger holds do; the others are free, and the backing plate connects them to the closing displacement.
 """
 
-from __future__ import annotations
-
 import math
 from functools import cached_property
 

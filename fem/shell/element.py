@@ -13,8 +13,6 @@ coupling with the others (so no thickness locking, and no inner unknowns). Terms
 Arithmetic is strict IEEE, as in ``fem.materials``.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 

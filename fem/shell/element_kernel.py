@@ -10,8 +10,6 @@ so that its first derivative is ``sum_m w_sm (c_i P_j + c_j P_i)`` and its secon
 Arithmetic is strict IEEE, as in ``fem.materials``.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray

@@ -13,8 +13,6 @@ directions change by ``dn = H (dx - N_a dv_a) + (1 - g H) G N_a dw_a``, ``H = n_
 and the gap by ``dg = e . (dx - N_a dv_a - g G N_a dw_a)``; ``e`` is nearly ``n``.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

@@ -5,8 +5,6 @@ displacement control closes the fingers in short steps, and the first state with
 gripper that closes with a growing force meets first.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any
 

@@ -8,8 +8,6 @@ where a gripper that keeps its force comes to where a wall snaps from one state 
 iterations and need not converge; what comes of it is judged by an ordinary solve.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -6,8 +6,6 @@ positive side only; finger 2 of a half model has its other half on that side of 
 turn about its approach (``flipped``), and its results are turned back.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache

@@ -10,8 +10,6 @@ A node of the wall has unknowns ``first``, the displacement of the middle, and `
 both move the outer face, and so the same force works on both.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numba import njit
 

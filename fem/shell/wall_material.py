@@ -6,8 +6,6 @@ in those of Ashby, Materials Selection in Mechanical Design. The modulus of PET 
 cautious value for blown walls, which are softer where they were stretched little; give 2.8e9 for well stretched ones.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 

@@ -9,8 +9,6 @@ grid (Zienkiewicz and Zhu, Int. J. Num. Meth. Eng. 33, 1992). Planes of symmetry
 body gives what the whole one does.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

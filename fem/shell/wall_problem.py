@@ -12,8 +12,6 @@ so the motion is relative to a wall that moves, and linear in all unknowns. The 
 it now. The tangent is exact.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """``softjaw cost``: what accuracy costs in time, by an ordinary sweep over meshes; its table and its picture."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -5,8 +5,6 @@ the first point of the object from one side and from the other. Both fields come
 need no closed mesh and no normals, and inner walls or thin parts behind do not count.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from functools import cached_property

@@ -1,7 +1,5 @@
 """From the sections of a scene to the objects that ``fem`` works with, and what is wrong with them before a run."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from functools import lru_cache

@@ -4,8 +4,6 @@ A unit is the load path of one candidate at one point of the sweep. Candidates t
 object's rotational symmetry are served by one unit. Cases are numbered like a C-ordered array over `axes`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

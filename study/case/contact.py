@@ -4,8 +4,6 @@ On the faces of a pad it has pieces, holes and loaded rims, and an equal on othe
 the patch may come from a file.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from copy import copy

@@ -4,8 +4,6 @@ The study, the cost study and the uncertainty call `evaluate`, or `quality` wher
 patch`` takes the limits and fits of the same `Contact`, and `exact_score`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

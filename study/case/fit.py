@@ -5,8 +5,6 @@ runs into whatever reaches past its back. Triangles have their extremes over a r
 at its own corners: these are exact, with no grid to fall through.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -4,8 +4,6 @@ All surfaces are fitted in ``(f_x, f_y, tau_z / rho) / (mu S)``. The wrenches ar
 for mu = 1: a contact without friction has a limit surface too, of size 0.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """From a scene to the finite element model of one finger: pad, place of first touch, symmetry, contact solver."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import Any
 

@@ -5,8 +5,6 @@ both fingers and the foam on them, as wide open as before the grasp, and prolong
 the hand comes. The distance of a point from a box is exact: the clearance is known to the spacing of the points.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import lru_cache
 from itertools import product

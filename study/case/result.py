@@ -1,7 +1,5 @@
 """What one case gives back, values to store or the reason why there are none, and how values are compared."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from typing import Any

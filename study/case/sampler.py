@@ -5,8 +5,6 @@ middles. A bed of springs gives the pressures, and these the payload that ranks 
 wider than the opening, runs into the fingers or slips comes with that state.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace

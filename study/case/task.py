@@ -1,7 +1,5 @@
 """What a grasp has to hold, and the mass that two contacts hold."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

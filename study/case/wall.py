@@ -1,7 +1,5 @@
 """Thin-walled objects in a study: their wall, the level that a candidate calls for, and what the wall bears."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import Any
 

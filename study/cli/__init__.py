@@ -1,7 +1,5 @@
 """The command line: the module that a command needs is imported when it runs, and every error becomes an exit code."""
 
-from __future__ import annotations
-
 import errno
 import os
 import sys

@@ -1,7 +1,5 @@
 """The command that writes grasps for planners and simulators."""
 
-from __future__ import annotations
-
 import sys
 from argparse import Namespace
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Words to options: every command with its options, one screen of help in the order of use, and suggestions."""
 
-from __future__ import annotations
-
 import argparse
 import math
 import shutil

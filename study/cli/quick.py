@@ -1,7 +1,5 @@
 """Commands that answer at once: what they import loads neither MPI nor PETSc nor xarray."""
 
-from __future__ import annotations
-
 import json
 import time
 from argparse import Namespace

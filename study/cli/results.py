@@ -1,7 +1,5 @@
 """Commands that read whole result files: as tables and numbers, as pages and pictures."""
 
-from __future__ import annotations
-
 from argparse import Namespace
 from functools import partial
 from pathlib import Path

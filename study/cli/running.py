@@ -1,7 +1,5 @@
 """Commands that solve."""
 
-from __future__ import annotations
-
 import sys
 from argparse import Namespace
 

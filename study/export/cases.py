@@ -1,7 +1,5 @@
 """Cases of a result file as CSV and JSON: maps, contact frames, poses and limit surfaces, one row for each."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Iterator
 from dataclasses import replace

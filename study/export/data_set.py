@@ -7,8 +7,6 @@ All formats hold the same arrays, SI units, in the frame of the object's own fil
 metres. An object's name decides its split, so that a data set that grows keeps its splits.
 """
 
-from __future__ import annotations
-
 import hashlib
 import io
 import json

@@ -28,8 +28,6 @@ finger to the other, and their sum stays. The balls press on plates in the conta
 to be seen, and for a table or walls that are added to the model, which meet its convex hull.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from softjaw.study.export.point_contact import PointContact, cell, numbers, rendered

@@ -23,8 +23,6 @@ axis, each driven by the normal force. USD's physics has no joint that couples t
 free along the closing axis, up to the friction of the drive. Couple `close1` and `close2` as your gripper's drive does.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from softjaw.study.export.point_contact import PointContact, cell, numbers, rendered

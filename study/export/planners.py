@@ -18,8 +18,6 @@ every field. Quaternions are ``{x, y, z, w}``. An empty ``frame_id`` of the pose
 MoveIt takes from its first shape; approach and retreat are along the gripper's own z axis.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import os

@@ -11,8 +11,6 @@ are the friction coefficient and r = mu e_n. The three are the semi-axes of the 
 from, over F_N. They hold at one normal force: a pad that is pressed harder has a larger patch and a larger r.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from typing import Any

@@ -4,8 +4,6 @@ Everything is in the frame of the object's own file, in SI units. The inertia is
 with the object's mass; of a surface that is not closed its convex hull is taken.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

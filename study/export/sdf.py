@@ -24,8 +24,6 @@ slide wants a force of the joint's effort from a plugin of yours. SDFormat 1.7 h
 Drake's own is written, Gazebo Classic wants a plugin.
 """
 
-from __future__ import annotations
-
 import math
 import warnings
 from xml.sax.saxutils import escape

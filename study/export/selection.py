@@ -10,8 +10,6 @@ across its closing axis, so ``approach`` says which: along the long side (x) or 
 against one of them (`study.case.reach` finds the clearest).
 """
 
-from __future__ import annotations
-
 import textwrap
 from collections import Counter
 from collections.abc import Mapping, Sequence

@@ -3,8 +3,6 @@
 Needs neither MPI nor PETSc. The file is read once and closed.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """What patches from elsewhere can carry: one record in SI units, for programs, that the text is made from."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Any
 

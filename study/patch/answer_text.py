@@ -1,7 +1,5 @@
 """``softjaw patch``: from files and options to the answer, as text with lengths in mm, as JSON or as a picture."""
 
-from __future__ import annotations
-
 import json
 from argparse import Namespace
 from collections.abc import Sequence

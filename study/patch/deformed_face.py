@@ -5,8 +5,6 @@ undeformed contact face at z = 0, so that foam that is pressed in has z < 0. A c
 along the pad.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

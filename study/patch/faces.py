@@ -1,7 +1,5 @@
 """Faces of a contact patch: their geometry from corners, and all that is wrong with them by their places in a file."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

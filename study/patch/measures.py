@@ -4,8 +4,6 @@ A patch comes in any coordinates and is brought into its contact frame: origin w
 pressure meets it, z along its normal, x along its longer direction or along ``x_axis``.
 """
 
-from __future__ import annotations
-
 import warnings
 from pathlib import Path
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Faces of a contact patch from a table (CSV), brought to SI units; what the headers of all kinds of files mean."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Faces of a contact patch from a VTK file (VTU, VTP), as ParaView exports them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

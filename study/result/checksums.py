@@ -6,8 +6,6 @@ in, and readers compare it before they believe a value. The last one of a row is
 was lost is not taken for one that was never solved.
 """
 
-from __future__ import annotations
-
 import zlib
 from collections.abc import Sequence
 from typing import Any

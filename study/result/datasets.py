@@ -1,7 +1,5 @@
 """Datasets of a result file: what every quantity becomes in HDF5, with its attributes and scales."""
 
-from __future__ import annotations
-
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -3,8 +3,6 @@
 The safe force range of a candidate is enough to hold the object's weight, and not so much that its wall is damaged.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

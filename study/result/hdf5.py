@@ -1,7 +1,5 @@
 """HDF5 files for reading: known paths alone, never another file, and one clear error for what is damaged."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager

@@ -4,8 +4,6 @@ It is written as a whole and renamed into place, so that a reader finds the old 
 dataset over ``object``; xarray opens it as `open_index` does.
 """
 
-from __future__ import annotations
-
 import io
 import math
 from collections.abc import Mapping, Sequence

@@ -4,8 +4,6 @@ The same description creates a file, checks a file that is resumed and bounds wh
 origin. A *row* is one case: its flat index over all axes, the last axis (normal force) running fastest.
 """
 
-from __future__ import annotations
-
 import json
 from collections import Counter
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """The result file of a run: written by one run at a time, and still there while it is written."""
 
-from __future__ import annotations
-
 import contextlib
 import errno
 import fcntl

@@ -1,7 +1,5 @@
 """Which program, on which machine, with which libraries: what a later reader needs to trust or repeat a result."""
 
-from __future__ import annotations
-
 import os
 import platform
 import shlex

@@ -6,8 +6,6 @@ NeXus viewers find a plot by the attributes of the groups: signals, axes and the
 where they open: two maps at the largest force, which viewers that always draw the last two axes show at once.
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 from collections.abc import Mapping, Sequence

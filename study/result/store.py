@@ -6,8 +6,6 @@ therefore lose the row it was writing, and nothing else: a row that is marked do
 solved again.
 """
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Iterator, Sequence

@@ -1,7 +1,5 @@
 """Filling a result file, on all ranks at once: nothing but independent writes to space that is there already."""
 
-from __future__ import annotations
-
 import math
 import os
 from bisect import bisect_right

@@ -4,8 +4,6 @@ A force costs what its elements cost, whose number follows from symmetry, and sy
 of the object over a coarse grid on each pad, without compiled loops, because a plan answers at once.
 """
 
-from __future__ import annotations
-
 import math
 import timeit
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """One share of the work: forces of a grasp candidate are solved from the lowest one on, missing rows are stored."""
 
-from __future__ import annotations
-
 import math
 import time
 import traceback

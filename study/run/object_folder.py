@@ -5,8 +5,6 @@ object is an ordinary scene, with its own mesh and what its line says put in. It
 alone, so that other objects may come and go: ``a-mug`` of ``a/mug.stl`` and ``*/*.stl``, or the column ``name``.
 """
 
-from __future__ import annotations
-
 import csv
 import hashlib
 import json

@@ -7,8 +7,6 @@ both steps of a batch: less than the sampling of an object, and less than a load
 ordinary one, with the same bits as a run of its own.
 """
 
-from __future__ import annotations
-
 import math
 import os
 import time

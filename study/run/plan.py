@@ -1,7 +1,5 @@
 """What a run will do, before anything is spent: layout, units of work, disk, memory and time."""
 
-from __future__ import annotations
-
 import math
 import shutil
 from collections import Counter

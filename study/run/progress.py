@@ -1,7 +1,5 @@
 """How far a run has come: one line that is rewritten on a terminal, timed lines in a log."""
 
-from __future__ import annotations
-
 import os
 import time
 from collections.abc import Callable

@@ -6,8 +6,6 @@ interval is solved. Poses have no order: around the best of them `study.run.roun
 every station has all.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any

@@ -13,8 +13,6 @@ share is halved once no neighbour is better. A peak that no grasp of the scene c
 `study.run.refine`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import product

@@ -1,7 +1,5 @@
 """Who solves what: counters in the memory that the ranks of a node share."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The ``[candidates]`` section: where to grasp, the rules of stations and poses, and grasps that are seldom meant."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from typing import Annotated, Any

@@ -1,7 +1,5 @@
 """The ``[object]`` section: one model per shape with its keys, SI values, and the rules of its values."""
 
-from __future__ import annotations
-
 import math
 from contextlib import suppress
 from itertools import pairwise

@@ -3,8 +3,6 @@
 Errors are pydantic's, by file, line and key, with the value found and what was expected.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections import Counter

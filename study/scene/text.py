@@ -1,7 +1,5 @@
 """The TOML text of a scene: reading it, writing it back, and comparing two of them."""
 
-from __future__ import annotations
-
 import json
 import re
 import tomllib

@@ -1,7 +1,5 @@
 """Two result files side by side: which settings and cases differ, and which differences exceed the stated errors."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -3,8 +3,6 @@
 Positions are in the object's frame [m]. Every display and the export for ParaView draw from here.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass

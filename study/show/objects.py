@@ -1,7 +1,5 @@
 """What the index of a folder of objects says: a table of all objects, counts with reasons, and a run as it goes."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from contextlib import suppress

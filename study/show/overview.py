@@ -1,7 +1,5 @@
 """Answer of ``check``: what a scene means."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

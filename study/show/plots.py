@@ -4,8 +4,6 @@ Every figure can be read without colour: maps grow evenly in lightness, friction
 failed cases have crosses.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What a result file holds so far: complete cases, failed ones with reasons, the rest, and how each session ended."""
 
-from __future__ import annotations
-
 import math
 import re
 from argparse import Namespace

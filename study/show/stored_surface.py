@@ -1,7 +1,5 @@
 """Limit surfaces of a case from what its file holds: the exact one through the stored faces, and the fitted ones."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

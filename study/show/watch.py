@@ -1,7 +1,5 @@
 """``softjaw watch FILE``: a live view of a run from another terminal, read from its result file or its index."""
 
-from __future__ import annotations
-
 import sys
 import time
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """``softjaw init``: a commented scene and a batch script to start from."""
 
-from __future__ import annotations
-
 import json
 import math
 import os

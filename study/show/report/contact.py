@@ -1,7 +1,5 @@
 """The contact of one case in a report: pressure and friction on the pad, and the limit surfaces that follow from it."""
 
-from __future__ import annotations
-
 from itertools import product
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Curves of a report: friction models over force, stations and sweeps; what curvature costs; how a wall gives way."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Maps of a report: every quantity over station, angle and force, CCM beside PCM."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

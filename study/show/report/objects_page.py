@@ -1,7 +1,5 @@
 """The page of a folder of objects: a picture of each with its best grasp, sorted as a reader likes, and its answer."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from softjaw.study import page

@@ -1,7 +1,5 @@
 """Tables of a report: best grasps, cases and their reasons, checks, effects, cost, definitions, provenance."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

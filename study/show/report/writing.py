@@ -4,8 +4,6 @@ The page answers in the order of a reader's questions: where to grasp, how wide 
 object and its maps; what failed and why; the best case in detail; then how it was computed. It needs no network.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import xarray as xr

@@ -3,8 +3,6 @@
 Positions are in m in the frame of the object's own file unless a unit is named.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from functools import cached_property
 from typing import Any

@@ -5,8 +5,6 @@ stands in ``layout.meta.object3d`` and `page.js` fills it in. Lengths are in mm,
 Arrays are packed as base64.
 """
 
-from __future__ import annotations
-
 import base64
 from collections.abc import Sequence
 from typing import Any

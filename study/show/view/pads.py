@@ -1,7 +1,5 @@
 """Both pads of a case: deformed faces with their pressure, sides, and friction's directions."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -3,8 +3,6 @@
 Lengths are drawn in mm and pressures in kPa; files are in SI units.
 """
 
-from __future__ import annotations
-
 from contextlib import closing
 from io import BytesIO
 from pathlib import Path
