@@ -8,6 +8,8 @@ see or miss by chance: an estimate is the largest of a cell and those around it,
 `CLAIM_FACTOR`, which was measured on cases that a map does not hold.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -306,6 +306,7 @@ class Compiling(Listener):
     _said = False
 
     def on_start(self, event: Event) -> None:
+        """Say it."""
         if not self._said:
             print("compiling for this machine, once: a minute or two", flush=True)
         self._said = True
