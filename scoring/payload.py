@@ -151,11 +151,14 @@ def _worst(grasp: _Grasp, gap: float) -> Payload:
     extent = np.linalg.svd(points[:8] - points[:8].mean(axis=0), compute_uv=False)
     lower = 0.0
     if extent[-1] > ROUNDING_FORCE and upper > ROUNDING_FORCE:
-        hull = ConvexHull(points[:8])
-        corners = hull.simplices.astype(np.int64)  # in no order round their facets
-        inward = np.einsum("fi,fi->f", _planes(points, corners)[:, :3], hull.equations[:, :3]) < 0
-        corners[inward] = corners[inward, ::-1]
-        lower, upper, u = _refined(*search, 8, corners, hull.equations, upper, u, gap)
+        n, whole = 8, False
+        while not whole:  # rounding may break the hull of a set that is thin: it is made anew from its points
+            hull = ConvexHull(points[:n])
+            corners = hull.simplices.astype(np.int64)  # in no order round their facets
+            inward = np.einsum("fi,fi->f", _planes(points, corners)[:, :3], hull.equations[:, :3]) < 0
+            corners[inward] = corners[inward, ::-1]
+            before, (lower, upper, u, n, whole) = n, _refined(*search, n, corners, hull.equations, upper, u, gap)
+            whole |= n == before
     force = min(lower, upper) if lower > ROUNDING_FORCE else 0.0
     return Payload(force, max(upper, 0.0), -u, upper >= -ROUNDING_FORCE)
 
@@ -222,7 +225,8 @@ def _looked(C, A1, A2, kind, rows, points, bases, directions, basis, n, empty, u
 def _refined(C, A1, A2, kind, rows, points, bases, n, corners, planes, upper, u, gap):
     """Distance of the hull's nearest facet, after a look along all that are nearer than the least support, and that.
 
-    ``n`` points are known; ``corners, planes`` are the facets of their hull.
+    ``n`` points are known; ``corners, planes`` are the facets of their hull. How many are known then, and whether it is
+    a hull still, come last.
     """
     before = np.zeros(4)
     while True:
@@ -230,8 +234,9 @@ def _refined(C, A1, A2, kind, rows, points, bases, n, corners, planes, upper, u,
         plane = planes[nearest]
         # a point that the hull has already ends the search: along its nearest facet both bounds are the same
         known = (plane == before).all() or n == len(points)
-        if known or upper < ROUNDING_FORCE or -plane[3] >= upper * (1.0 - gap):
-            return -plane[3], upper, u
+        whole = len(planes) == 2 * len(np.unique(corners)) - 4  # Euler's formula, of triangles
+        if known or not whole or upper < ROUNDING_FORCE or -plane[3] >= upper * (1.0 - gap):
+            return -plane[3], upper, u, n, whole
         # a programme that did not fill its rows says nothing of the support
         before, basis, along = plane, bases[corners[nearest, 0]], plane[:3].copy().reshape(1, 3)
         upper, u = _looked(C, A1, A2, kind, rows, points, bases, along, basis, n, np.inf, upper, u)
@@ -273,7 +278,7 @@ def _touching(C, A, q, exact, t, out):
                         point[1 + c] += a * D[i, c] + b * D[i, 3 + c]
             point /= max(drive @ point, 1.0 / MOST_PRESSED)
             before, h = h, point @ t
-            if abs(h - before) <= NEAR * abs(h):
+            if abs(h - before) <= 1e-9 * abs(h):
                 break
         if h > best:
             best, at = h, min(count[0], V.shape[1] - 1)

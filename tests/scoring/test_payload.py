@@ -6,13 +6,14 @@ from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 
 from softjaw.scoring.contact import DiscBody, PolytopeBody, SoftContact, fibonacci_vertices
-from softjaw.scoring.payload import BOUND_GAP, payload
+from softjaw.scoring.payload import BOUND_GAP, NEAR, payload
 from tests.scoring.grasps import contact_axes
 
 F, MU, E, D = 5.0, 0.8, 0.006, 0.06
 AXES = F * np.array([MU, MU, MU * E])
 CORNERS = PolytopeBody(np.vstack([np.diag(AXES), -np.diag(AXES)]))  # friction along one axis at a time, or mixed
 SMOOTH = PolytopeBody(fibonacci_vertices(AXES, 1000))
+FLAT = DiscBody(MU * F / 4 * np.array([[1, 0, -y, 0, 1, x] for x in (-E, E) for y in (-E, E)]))  # four faces
 MIDDLE = (0.0, 0.0, 0.0)
 
 
@@ -23,6 +24,19 @@ def pair(offset=0.0, body=CORNERS, tilt=0.0):
         SoftContact(side * np.array([D / 2, 0, -offset / 2]), contact_axes([-side * c, 0, s], y), body)
         for side in (-1, 1)
     ]
+
+
+def cap(mu):
+    """Friction of faces on a ball, under a pressure as Hertz has it."""
+    r, edge = 0.025, 0.008
+    x, y = (edge * v.ravel() for v in np.meshgrid((np.arange(20) - 9.5) / 10, (np.arange(12) - 5.5) / 6))
+    x, y = (v[np.hypot(x, y) < edge] for v in (x, y))
+    load = np.sqrt(1 - (x**2 + y**2) / edge**2)
+    normal = np.column_stack([x, y, np.sqrt(r**2 - x**2 - y**2)])
+    first = np.cross(normal, [0.0, 1, 0])
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    halves = [np.column_stack([v[:, :2], x * v[:, 1] - y * v[:, 0]]) for v in (first, np.cross(normal / r, first))]
+    return DiscBody(mu * F * (load / load.sum())[:, None] * np.hstack(halves))
 
 
 def pushes(contacts, force=F):
@@ -53,13 +67,29 @@ def test_in_the_worst_direction_the_load_also_takes_force_from_a_finger():
 
 @pytest.mark.parametrize("kind", ["shared", "fixed"])
 @pytest.mark.parametrize("lean", [0.0, 0.1, 0.3])
-def test_a_wedge_is_pressed_less_where_it_is_pulled_out_at_its_thin_end_and_more_at_the_other(kind, lean):
+@pytest.mark.parametrize("body", [CORNERS, FLAT])
+def test_a_wedge_is_pressed_less_where_it_is_pulled_out_at_its_thin_end_and_more_at_the_other(kind, lean, body):
     """N (cos a + mu sin a) = F and 2 N (mu cos a - sin a) = W; on the other side with the other sign."""
-    contacts, c, s = pair(tilt=lean), np.cos(lean), np.sin(lean)
+    contacts, c, s = pair(tilt=lean, body=body), np.cos(lean), np.sin(lean)
     drive = [[F, 0, 0], [-F, 0, 0]]
     for sign in (1, -1):
         found = payload(contacts, pushes(contacts), MIDDLE, [0, 0, sign], kind, drive)
-        assert found.force == pytest.approx(2 * F * (MU * c - sign * s) / (c + sign * MU * s), rel=1e-6)
+        assert found.force == pytest.approx(2 * F * (MU * c - sign * s) / (c + sign * MU * s), rel=1e-6 if body is CORNERS else NEAR)
+
+
+@pytest.mark.parametrize("lean", [0.15, 0.25])
+def test_alike_fingers_that_are_pulled_across_hold_the_same_with_each_force_kept_as_with_their_sum(lean):
+    contacts, drive = pair(tilt=lean, body=cap(0.6)), [[F, 0, 0], [-F, 0, 0]]
+    shared, fixed = (payload(contacts, pushes(contacts), [0, 0.01, 0], [0, 1, 1], k, drive) for k in ("shared", "fixed"))
+    assert fixed.force == pytest.approx(shared.force, rel=2 * NEAR)
+    assert fixed.force <= fixed.upper
+
+
+@pytest.mark.parametrize("mu", [0.005, 0.011, 0.026, 0.035, 0.046, 0.05])
+def test_little_friction_on_a_ball_makes_a_thin_set_whose_bounds_meet_too(mu):
+    found = held(pair(body=cap(mu)))
+    assert found.upper <= 2 * mu * F * (1 + BOUND_GAP)
+    assert 1.9 * mu * F <= found.force <= found.upper <= found.force * (1 + 1.01 * BOUND_GAP)
 
 
 @pytest.mark.parametrize("arm", [0.003, 0.02])
