@@ -74,13 +74,15 @@ def test_a_wedge_is_pressed_less_where_it_is_pulled_out_at_its_thin_end_and_more
     drive = [[F, 0, 0], [-F, 0, 0]]
     for sign in (1, -1):
         found = payload(contacts, pushes(contacts), MIDDLE, [0, 0, sign], kind, drive)
-        assert found.force == pytest.approx(2 * F * (MU * c - sign * s) / (c + sign * MU * s), rel=1e-6 if body is CORNERS else NEAR)
+        near = 1e-6 if body is CORNERS else NEAR
+        assert found.force == pytest.approx(2 * F * (MU * c - sign * s) / (c + sign * MU * s), rel=near)
 
 
 @pytest.mark.parametrize("lean", [0.15, 0.25])
 def test_alike_fingers_that_are_pulled_across_hold_the_same_with_each_force_kept_as_with_their_sum(lean):
     contacts, drive = pair(tilt=lean, body=cap(0.6)), [[F, 0, 0], [-F, 0, 0]]
-    shared, fixed = (payload(contacts, pushes(contacts), [0, 0.01, 0], [0, 1, 1], k, drive) for k in ("shared", "fixed"))
+    args = contacts, pushes(contacts), [0, 0.01, 0], [0, 1, 1]
+    shared, fixed = (payload(*args, kind, drive) for kind in ("shared", "fixed"))
     assert fixed.force == pytest.approx(shared.force, rel=2 * NEAR)
     assert fixed.force <= fixed.upper
 
