@@ -130,12 +130,12 @@ class OuterSurface:
 def of_revolution(body: Revolution) -> OuterSurface:
     """Surface of a rigid body of revolution, for a thin-walled one of the same profile."""
     # the ends are enough for circles, and points between them may lie at one height
-    return _surface(body, [Section(float(z), float(r)) for z, r in body.profile[[0, -1]]])
+    return _surface(replace(body, beyond=True), [Section(float(z), float(r)) for z, r in body.profile[[0, -1]]])
 
 
-def of_sections(sections: Sequence[Section]) -> OuterSurface:
-    """Surface through sections given from bottom to top."""
-    return _surface(Revolution(np.array([[p.z, p.a] for p in sections])), sections)
+def of_sections(sections: Sequence[Section], beyond: bool = True) -> OuterSurface:
+    """Surface through sections given from bottom to top; ``beyond`` as for `fem.objects.revolution.Revolution`."""
+    return _surface(Revolution(np.array([[p.z, p.a] for p in sections]), beyond=beyond), sections)
 
 
 def _surface(body: Revolution, sections: Sequence[Section]) -> OuterSurface:

@@ -3,8 +3,9 @@
 A cubic spline by chord length swings past straight runs: a bottle's wall given by five points would come out wavy. So
 three or more points on one line are drawn as exactly that line, and the points between two lines by a C2 cubic spline
 that leaves and meets them with their direction and without curvature (which takes one more knot in its first and last
-interval). Where two lines meet in a corner, the corner is rounded. An end that is not on the axis continues into a
-rounded rim and a flat cap; an end on the axis is met at right angles, so that the surface has no tip.
+interval). Where two lines meet in a corner, the corner is rounded. At an end that is not on the axis is a flat cap with
+a rounded rim, which takes the last of the outline; an end on the axis is met at right angles, so that the surface has
+no tip.
 """
 
 from collections.abc import Sequence
@@ -48,6 +49,13 @@ class Curve:
         for j in reversed(range(c.shape[-1])):
             value = value * h + c[..., j]
         return value
+
+    def between(self, low: float, high: float) -> "Curve":
+        """The part of the curve between two parameters, which begins at 0."""
+        inner = self.breaks[(self.breaks > low) & (self.breaks < high)]
+        s = np.concatenate([[low], inner, [high]])
+        parts = [self.derivative(s[:-1], order) / factor for order, factor in enumerate((1, 1, 2, 6))]
+        return Curve(s - low, np.stack(parts, axis=-1))
 
     def curvature(self, s: FloatArray) -> FloatArray:
         """Curvature ``(n,)`` [1/m], positive where the outside (left of the curve) is convex."""
@@ -177,17 +185,36 @@ def rounding(p: FloatArray, t: FloatArray, u: FloatArray, radius: float) -> tupl
 Ends = tuple[float, float]
 
 
-def with_lids(given: Curve, rim: float, heights: Sequence[float | None] = (None, None)) -> tuple[Curve, Ends, Ends]:
+def with_lids(given: Curve, rim: float, heights: Sequence[float | None] = ()) -> tuple[Curve, Ends, Ends]:
     """Outline with both ends carried on to the axis as `lid` does; the part of s that was given, and between the lids.
 
-    The latter are the ends of the outline where nothing is flat.
+    The latter are the ends of the outline where nothing is flat. Without ``heights`` the lids lie where the outline
+    ends, which leaves the last of it to their rims.
     """
+    if not heights:
+        given, heights = _without_rims(given, rim)
     below, above = (lid(given, height, rim, first=k == 0) for k, height in enumerate(heights))
     curve = joined([*below, given, *above])
     s, first = curve.breaks, sum(len(piece.coefficients) for piece in below)
     low, high = (bool(ends) and not ends[k].coefficients[..., 2:].any() for ends, k in ((below, 0), (above, -1)))
     wall = float(s[first]), float(s[first + len(given.coefficients)])
     return curve, wall, (float(s[1]) if low else 0.0, float(s[-2] if high else s[-1]))
+
+
+def _without_rims(curve: Curve, rim: float) -> tuple[Curve, list[float | None]]:
+    """An outline without what the rims at its ends take, and the heights of its ends.
+
+    None for an end on the axis, and for one that runs outwards, as a flange does: its rim goes round it.
+    """
+    cuts, heights = [0.0, float(curve.breaks[-1])], list[float | None]((None, None))
+    for k, outwards in enumerate((-1.0, 1.0)):
+        (z, r), d = (curve.derivative(np.array([cuts[k]]), order)[0] for order in range(2))
+        rise, widens = d / np.linalg.norm(d) * [1.0, outwards]
+        if r > 1e-9 and rise > 0.3:
+            taken = min(rim, 0.25 * r) * (1.0 + widens) / rise
+            cuts[k] -= outwards * min(taken / np.linalg.norm(d), 0.25 * float(curve.breaks[-1]))
+            heights[k] = float(z)
+    return curve.between(*cuts), heights
 
 
 def through(points: FloatArray, rim: float) -> Curve:

@@ -33,11 +33,15 @@ class Revolution(Analytic):
         on a line give exactly this line, the others a smooth curve (see ``fem.objects.profile``).
     rim : float
         Radius of the rounding at corners between straight runs and where an open end meets its flat cap [m]; smaller
-        where the body is thin. An open end's cap lies beyond the last point by about this radius.
+        where the body is thin.
+    beyond : bool
+        Whether the rim of an open end's flat cap lies beyond the last point, as that of a wall does, which reaches up
+        to there. Else the cap lies at its height.
     """
 
     profile: FloatArray
     rim: float = 0.002
+    beyond: bool = False
 
     def __post_init__(self) -> None:
         """Refuse a curve that is no body's; the points rise, and lie on the axis at the ends alone."""
@@ -47,7 +51,7 @@ class Revolution(Analytic):
     @cached_property
     def closed(self) -> tuple[Curve, tuple[float, float], tuple[float, float]]:
         """Outline, the part of it between the profile's ends, and between flat caps; see `with_lids`."""
-        return with_lids(through(self.profile, self.rim), self.rim)
+        return with_lids(through(self.profile, self.rim), self.rim, (None, None) if self.beyond else ())
 
     @property
     def curve(self) -> Curve:

@@ -28,7 +28,7 @@ ROWS, COLUMNS = 34, 56
 
 def flask() -> tuple[np.ndarray, np.ndarray]:
     """Points ``(k, 3)`` [mm] and triangles ``(m, 3)``, counterclockwise from outside."""
-    curve = Revolution(np.array(PROFILE_MM) * 1e-3).curve
+    curve = Revolution(np.array(PROFILE_MM) * 1e-3, beyond=True).curve
     s = _even_in_length_and_turn(curve, ROWS)
     z, r = 1e3 * curve.derivative(s).T
     t = np.linspace(0, 2 * np.pi, COLUMNS, endpoint=False)

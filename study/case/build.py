@@ -38,7 +38,7 @@ def build_object(shape: Any) -> GapObject:
         case "mesh":
             return geometry().mesh_object(shape)
         case "revolution":
-            return objects.Revolution(np.array(shape.profile))
+            return objects.Revolution(np.array(shape.profile), beyond=has_wall(shape))
         case "sections":
             return geometry().Stacked(outer_surface(shape))
         case "elliptic_cylinder":
@@ -130,7 +130,7 @@ def outer_surface(shape: Any) -> OuterSurface:
         return of_revolution(body)
     if shape.shape == "mesh":
         return geometry().traced_surface(shape)[0]
-    return of_sections([Section(s.z, s.a, s.b, s.exponent, s.shift) for s in shape.sections])
+    return of_sections([Section(s.z, s.a, s.b, s.exponent, s.shift) for s in shape.sections], has_wall(shape))
 
 
 def has_wall(shape: Any) -> bool:

@@ -75,7 +75,7 @@ def same(found, expected):
 
 
 def test_circles_make_the_body_of_revolution_ellipses_the_cylinder_and_splines_converge_with_the_fourth_order():
-    rigid, stacked = Revolution(np.array(PROFILE)), Stacked(of_sections([Section(z, r) for z, r in PROFILE]))
+    rigid, stacked = Revolution(np.array(PROFILE)), Stacked(of_sections([Section(*p) for p in PROFILE], beyond=False))
     x = off_the_wall(rigid)
     for body in (stacked, stacked.near(HERE, np.zeros(3), np.zeros(3))):
         same(body.gap(x), rigid.gap(x))

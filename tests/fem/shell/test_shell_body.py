@@ -25,9 +25,10 @@ PET = wall_material("pet")
 HALF_Y, QUARTER = (False, True), (True, True)
 
 
-@pytest.mark.parametrize("body", [FLASK, Revolution(np.array([[0, 0], [0, 15], [0, 30], [50, 30], [90, 20]]) / 1e3)])
-def test_a_revolved_wall_and_the_rigid_body_are_the_same(body):
+@pytest.mark.parametrize("profile", [FLASK.profile, np.array([[0, 0], [0, 15], [0, 30], [50, 30], [90, 20]]) / 1e3])
+def test_a_revolved_wall_and_the_rigid_body_are_the_same(profile):
     """Also where points of the profile lie at one height."""
+    body = Revolution(profile, beyond=True)
     surface = of_revolution(body)
     theta, s = RNG.uniform(-4, 7, 200), RNG.uniform(0, surface.end, 200)
     gap, normal, _ = body.gap(surface.jets(theta, s)[:, 0])
