@@ -44,6 +44,8 @@ ALIGNED, LEANING = 0.2, np.radians(15.0)  # times the floor of a payload where c
 # Of forces along the face, which pressures alone give by balance, where friction acts back: times the floor, and of the
 # share of the load that the curvature takes off.
 ACTING, OF_LOSS = 2.0, 0.5
+# Of that share times that of the load on edges, where the contact lies round a corner: forces and what they make.
+OF_CORNERS = {"f_x_max": 1.5, "f_y_max": 1.5, "tau_z_max": 1.0, "quality": 6.0, "payload": 2.0, "safety_factor": 2.0}
 PAYLOADS = ("payload", "safety_factor")  # what arms and couples leave of the friction: little of it moves all of them
 
 
@@ -75,8 +77,11 @@ class Unseen(NamedTuple):
         if q.name in PAYLOADS:  # of contacts that face each other friction and the drive's force tell it, on any mesh
             floor = floor * (ALIGNED + max(angles(*contacts)) / LEANING) + BOUND_GAP
         floor += OF_OVERLAP.get(q.name, 0.0) * self.overlap**2
-        if acts and q.name.startswith("f_"):
-            floor = ACTING * floor + OF_LOSS * max(1.0 - c.limits["ccm"].F_N / c.limits["ccm"].S for c in contacts)
+        of_loss = OF_LOSS * max(1.0 - c.limits["ccm"].F_N / c.limits["ccm"].S for c in contacts)
+        if acts and q.name.startswith("f_"):  # the more friction, the more of it acts back
+            floor = ACTING * max(1.0, contacts[0].mu / 0.8) * floor + of_loss
+        else:
+            floor += OF_CORNERS.get(q.name, 0.0) * self.on_edges * of_loss
         return floor + self.on_edges * OF_EDGES[q.name]
 
 

@@ -148,8 +148,8 @@ class PressedContact(Contact):
         sides = (_neighbours(each) for each in (self.patch.normal.reshape(n, m, 3), loaded, edges))
         for (a, b), (first, second), pair in zip(*sides, strict=True):
             turns, inside = np.arccos(np.clip(np.einsum("ijc,ijc->ij", a, b), -1.0, 1.0)), first & second
-            usual = np.median(turns[inside]) if inside.any() else 0.0
-            sharp = np.where(first | second, np.clip((turns - 2.0 * usual) / SHARP, 0.0, 1.0), 0.0)
+            usual = min(2.0 * np.median(turns[inside]), SHARP) if inside.any() else 0.0
+            sharp = np.where(first | second, np.clip((turns - usual) / SHARP, 0.0, 1.0), 0.0)
             for faces in pair:  # of the edge, on both of its sides
                 np.maximum(faces, sharp, out=faces)
         share = np.where(loaded, edges, 0.0).reshape(n // k, k, m // k, k).max(axis=(1, 3))

@@ -71,6 +71,18 @@ def test_errors_hold_where_the_edge_of_a_face_lies_within_an_element(width):
     assert abs(reference / value - 1) < 0.13 < 2 * found["maps/contact_area_error"] < 0.5
 
 
+def test_errors_hold_where_a_pad_lies_on_an_edge_that_an_element_hardly_resolves():
+    box = "[object]\nshape = 'box'\nsize_mm = [36, 36, 80]\nedge_radius_mm = 2.5\n" + PAD.format(40, 18, 12)
+    coupling = 'effects.friction_pressure_coupling="none"'
+    keys = ["load.normal_force_n=[3]", coupling, "candidates.angles_deg=[45]", "gripper.elements=[8, 6, 3]"]
+    scene = parse_scene(box, overrides=keys)
+    finer = {"gripper.elements": [16, 12, 6], "accuracy.meshes": 1}
+    found, true = (results_of(each)[0].values for each in (scene, scene.with_values(finer)))
+    for name in ("payload", "quality", "e_n", "f_x_max", "f_y_max", "tau_z_max", "closing", "contact_area"):
+        value, reference = (np.ravel(values[f"maps/{name}"])[0] for values in (found, true))
+        assert abs(reference / value - 1) <= found[f"maps/{name}_error"] < 0.6, name
+
+
 @pytest.mark.parametrize(("radius", "modulus"), [(5, 1000), (5, 4000), (25, 4000)])
 def test_errors_hold_where_a_contact_is_narrower_than_an_element(radius, modulus):
     """One line of nodes bears; Hertz's line contact, with half-widths of 0.22, 0.11 and 0.24 mm at 1 N."""
