@@ -148,8 +148,25 @@ def approach(obj: GapObject, pose: Pose, gripper: Gripper) -> Finger:
         ahead = extremes(touch.to_pad(obj.points), obj.triangles, size[:2])[0]
         if ahead < -ROUNDED_OFF:
             touch = Pose(touch.rotation, touch.origin + ahead * touch.rotation[:, 2])
+    else:
+        touch = _between_points(surface, touch, face)
     hole_share = obj.hole_share(touch, face, KNOWN_DEPTH * size[2]) if isinstance(obj, MeshObject) else 0.0
     return Finger(touch, surface, hole_share)
+
+
+def _between_points(surface: GapFunction, touch: Pose, face: FloatArray) -> Pose:
+    """First touch of what lies between the points of the face, too: round the one that is nearest after each step."""
+    ends = face.min(axis=0), face.max(axis=0)
+    for _ in range(3):
+        nearest = face[surface.gap(touch.to_object(face))[0].argmin()]
+        beside = np.clip(nearest + face * [2 / 40, 2 / 20, 1], *ends)  # up to the points beside it
+        ahead = float(surface.gap(touch.to_object(beside))[0].min())
+        if ahead > -0.05 * ROUNDED_OFF:
+            break
+        back = Pose(touch.rotation, touch.origin + 4.0 * ahead * touch.rotation[:, 2])
+        distance = first_touch(surface, back, beside, -8.0 * ahead)
+        touch = Pose(touch.rotation, back.origin + distance * touch.rotation[:, 2])
+    return touch
 
 
 def touching(obj: GapObject, pose: Pose, size: tuple[float, float, float]) -> Pose:

@@ -17,9 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.ndimage import maximum_filter, maximum_filter1d
 
-from softjaw.fem.objects.gap import IntArray
 from softjaw.friction.patch import NEGLIGIBLE, FloatArray
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import BOTH_ENDS, MISSING, TABLE
@@ -48,7 +46,7 @@ class Nodes:
     name: str
     units: str
     x: FloatArray
-    take: IntArray
+    take: NDArray[np.int64]
     swapped: NDArray[np.bool_]
     period: float = 0.0
     half_turn: bool = False
@@ -107,7 +105,7 @@ class Corners:
     points see the fingers exchanged.
     """
 
-    index: IntArray  # (m, 8)
+    index: NDArray[np.int64]  # (m, 8)
     weight: FloatArray  # (m, 8)
     share: FloatArray  # (m, 3)
     power: FloatArray  # (m,)
@@ -177,10 +175,18 @@ def bend(f: FloatArray, nodes: Nodes, side: NDArray[np.bool_]) -> FloatArray:
     return np.nan_to_num(bent)
 
 
+def around(values: FloatArray, axes: Sequence[int]) -> FloatArray:
+    """The largest of each of these positive values and those beside it along the axes."""
+    for a in axes:
+        padded = np.pad(values, [(int(k == a),) * 2 for k in range(values.ndim)])
+        values = np.lib.stride_tricks.sliding_window_view(padded, 3, axis=a).max(axis=-1)
+    return values
+
+
 def place_claims(table: FloatArray, axes: Sequence[Nodes], side: NDArray[np.bool_]) -> FloatArray:
     """`bend` of a table over station, angle and force along the first two, as claims: the largest around."""
     bent = [bend(table.swapaxes(a, -1), axes[a], side.swapaxes(a, -1)).swapaxes(a, -1) for a in range(2)]
-    return np.array([CLAIM_FACTOR * maximum_filter(v, 3, mode="constant") for v in (bent[0], OF_ANGLES * bent[1])])
+    return CLAIM_FACTOR * np.array([around(bent[0], range(3)), OF_ANGLES * around(bent[1], range(3))])
 
 
 def force_claims(table: FloatArray, forces: Nodes, side: NDArray[np.bool_]) -> tuple[FloatArray, bool]:
@@ -195,7 +201,7 @@ def force_claims(table: FloatArray, forces: Nodes, side: NDArray[np.bool_]) -> t
         bent = np.minimum(bend(logs, along, side), bend(logs - along.x, along, side))
     else:
         bent = bend(table, forces, side)
-    return CLAIM_FACTOR * OF_FORCES * maximum_filter1d(bent, 3, axis=-1, mode="constant"), power
+    return CLAIM_FACTOR * OF_FORCES * around(bent, [bent.ndim - 1]), power
 
 
 def error(claims: FloatArray, at: Corners, axes: Sequence[int]) -> FloatArray:

@@ -9,15 +9,17 @@ import trimesh
 
 from softjaw.study import pipeline
 from softjaw.study.case import solver
+from softjaw.study.case.build import build_object
 from softjaw.study.case.candidates import candidates, decided
 from softjaw.study.case.fit import extremes
+from softjaw.study.case.geometry import approach
 from softjaw.study.case.model import image_signs, quadrants
 from softjaw.study.case.pressing import OnRigid
 from softjaw.study.quantities import COLLIDES, MISSING, WIDE
 from softjaw.study.result.read import open as open_dataset
 from softjaw.study.result.skeleton import create
 from softjaw.study.run.plan import make_plan
-from softjaw.study.scene import parse_scene
+from softjaw.study.scene import Scene, parse_scene
 from tests.study.scenes import NO_COUPLING, OVAL, mesh_of, pose_of, scene_of, text_of, units_of
 
 TURN = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])  # the object's z is the file's x
@@ -132,6 +134,21 @@ def test_the_opening_round_a_ball_is_its_chord(shift):
     low, high = extremes(np.asarray(ball.vertices) + np.array([shift, 0, 0]), np.asarray(ball.faces), PAD[:2])
     off = max(shift - PAD[0] / 2, 0.0)
     assert high - low == pytest.approx(2 * np.sqrt(radius**2 - off**2), rel=1e-3)
+
+
+@pytest.mark.parametrize("radius", [4.0, 10.0])
+@pytest.mark.parametrize("off", [0.0, 0.55, 1.3])
+def test_a_ball_that_is_met_between_the_points_of_the_face_is_met_at_its_diameter(radius, off):
+    tables = {
+        "object": {"shape": "sphere", "radius_mm": radius}, "load": {"normal_force_n": [0.3]},
+        "gripper": {"pad_length_mm": 100, "pad_width_mm": 40}, "accuracy": {"meshes": 1},
+        "candidates": {"poses": [{"point_mm": [0, off, 0.7 * off], "approach": [1, 0, 0], "long_side": [0, 0, 1]}]},
+    }  # fmt: skip
+    scene = Scene.of_tables(tables)
+    [grasp] = candidates(scene)
+    first, second = (approach(build_object(scene.object), pose, scene.gripper).pose for pose in grasp.poses)
+    opening = (second.origin - first.origin) @ first.rotation[:, 2]
+    assert opening == pytest.approx(2e-3 * radius, abs=6e-6)  # 0.53 mm short by the points alone
 
 
 @pytest.mark.parametrize("scene", [TWO_PLACES, POSES])

@@ -113,6 +113,8 @@ def test_extents_scale_arms_contacts_that_lean_are_flagged_and_errors_are_differ
     found = [floor[f"maps/{name}_error"] for name in ("e_n", "f_x_max", "p_max")]
     edges = [0.5 * weights.OF_EDGES[name] for name in ("e_n", "f_x_max", "p_max")]
     shares = [0.01, 0.01 * weights.WIDER["f_x_max"], 0.02 * weights.OF_WIDTH["p_max"]]
+    lost = max(1.0 - contact.limits["ccm"].F_N / contact.limits["ccm"].S for contact in fine)
+    edges[1] += 0.5 * weights.OF_CORNERS["f_x_max"] * weights.OF_LOSS * lost
     assert found == pytest.approx(np.add(shares, edges))
     # of a coarse mesh alone all is in doubt, that of f_x no less: friction that is left out would move it
     alone = coarse_errors(fine, values, [fine, coarse], SETTINGS, rounded=False)
