@@ -66,7 +66,8 @@ def export(options: Namespace) -> str:
     bodies = [body_of(ds, grasp.case) for grasp in ranked]
     if options.form != "sdf" or options.output is None:
         return _written(options, [SIMULATORS[options.form](g, b) for g, b in zip(ranked, bodies, strict=True)])
-    meshes = [path.with_suffix(".stl") for path in _paths(options, len(ranked))]  # a model cannot hold one itself
+    # a model cannot hold its mesh, and NAME.stl is often the user's own
+    meshes = [path.with_name(f"{path.stem}-object.stl") for path in _paths(options, len(ranked))]
     texts = [as_sdf(g, b, mesh.name) for g, b, mesh in zip(ranked, bodies, meshes, strict=True)]
     beside = [f"written: {write_file(mesh, as_stl(b))}" for b, mesh in zip(bodies, meshes, strict=True)]
     return "\n".join([_written(options, texts), *beside])

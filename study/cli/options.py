@@ -27,7 +27,7 @@ FORMATS = {  # of export: what stands in the file
     "webdataset": "a folder of objects as shards for WebDataset (tar)",
     "moveit": "a list of moveit_msgs/Grasp for ROS 2 (YAML)",
     "mjcf": "a MuJoCo scene of one grasp that runs: object, fingers, gravity",
-    "sdf": "a model of one grasp for Gazebo Classic with ODE (its object beside it, .stl)",
+    "sdf": "a model of one grasp for Gazebo Classic with ODE (its object beside it, NAME-object.stl)",
     "physx": "a stage of one grasp for PhysX and Isaac Sim (USD, .usda)",
     "vtk": "maps on the object and all pads with their pressure, for ParaView (.vtm)",
 }

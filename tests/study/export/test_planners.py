@@ -206,9 +206,11 @@ def test_grasps_are_chosen_by_rank_force_and_least_values_and_simulators_get_a_f
     said("--format", "mjcf", "--top", 3, "-o", out)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["grasp-1.xml", "grasp-2.xml", "grasp-3.xml"]
     assert main(["export", str(path), "--format", "mjcf", "--top", "3"]) == USAGE
+    (tmp_path / "model-2.stl").write_text("mine")
     said("--format", "sdf", "--top", 2, "-o", tmp_path / "model.sdf")
-    assert (tmp_path / "model-2.stl").stat().st_size > 84
-    assert "<uri>model-2.stl</uri>" in (tmp_path / "model-2.sdf").read_text()
+    assert (tmp_path / "model-2.stl").read_text() == "mine"
+    assert (tmp_path / "model-2-object.stl").stat().st_size > 84
+    assert "<uri>model-2-object.stl</uri>" in (tmp_path / "model-2.sdf").read_text()
 
 
 @pytest.mark.parametrize("words", [
