@@ -36,6 +36,8 @@ def export(options: Namespace) -> str:
         raise StudyError(USAGE, f"--format: found '{options.form}', expected {', '.join(FORMS)} for a folder")
     if options.output is None and (index or options.form == "vtk"):
         raise StudyError(USAGE, f"--format {options.form}: name what to write with -o")
+    if options.output and Path(options.output).resolve() == Path(options.file).resolve():
+        raise StudyError(USAGE, f"-o: found '{options.output}', expected another file than the results")
     if index:
         refuse_for_folder(options, "force", "by", "model", "most", "min")
         return write_data_set(index, Path(options.output), options.form, gripper_of(options))

@@ -217,10 +217,12 @@ def test_grasps_are_chosen_by_rank_force_and_least_values_and_simulators_get_a_f
     "--format urdf", "--format moveit --force 99", "--csv --min beauty=3", "--csv --min payload",
     "--format moveit --min payload=1e9", "--format moveit --gripper three_fingers",
     "--format moveit --gripper robotiq_2f85",  # presses with 20 N at least
+    "--csv -o {path}",
 ])  # fmt: skip
 def test_what_cannot_be_written_is_refused(path, words, capsys):
-    assert main(["export", str(path), *words.split()]) == USAGE
+    assert main(["export", str(path), *words.format(path=path).split()]) == USAGE
     assert "error: " in capsys.readouterr().err
+    assert path.read_bytes()[1:4] == b"HDF"
 
 
 @pytest.mark.parametrize("value", [1e-5, -2e-300, 5e-324, 1.0, -0.0, 1e22, 0.1, 123456789.0, np.inf, -np.inf])
