@@ -8,7 +8,7 @@ from pathlib import Path
 
 from softjaw.study.cli.options import refuse_for_folder
 from softjaw.study.export.cases import as_csv, as_json
-from softjaw.study.export.data_set import FORMS, write_data_set
+from softjaw.study.export.data_set import FORMS, solved_files, write_data_set
 from softjaw.study.export.mjcf import as_mjcf
 from softjaw.study.export.physx import as_usd
 from softjaw.study.export.planners import CLOSING, as_graspgen, as_yaml
@@ -40,7 +40,8 @@ def export(options: Namespace) -> str:
         raise StudyError(USAGE, f"-o: found '{options.output}', expected another file than the results")
     if index:
         refuse_for_folder(options, "force", "by", "model", "most", "min")
-        return write_data_set(index, Path(options.output), options.form, gripper_of(options))
+        preset = next((task_keys(ds, "gripper").get("preset") for _, ds in solved_files(index)), None)
+        return write_data_set(index, Path(options.output), options.form, gripper_of(options, preset))
     if options.form in DATA_SETS:
         raise StudyError(USAGE, f"--format {options.form}: found '{options.file}', expected a folder of objects")
     ds = open(options.file)

@@ -30,7 +30,7 @@ from softjaw.study.quantities import BY_KEY, DONE, NO_GRASP, STATES
 from softjaw.study.ranking import judged, task_keys
 from softjaw.study.result.index import arrays_file, read_index
 from softjaw.study.result.read import maps_in, open, scene_of
-from softjaw.study.table import plain
+from softjaw.study.table import Row, plain
 from softjaw.study.units import UNITS
 
 VALID_SHARE = 5  # one object in so many is for validation
@@ -147,15 +147,20 @@ def _webdataset(grasps: ObjectGrasps) -> Files:
 FORMS = {"graspgen": _graspgen, "acronym": _acronym, "webdataset": _webdataset}
 
 
-def _objects(index: Path, gripper: GripperFrame) -> Iterator[ObjectGrasps]:
+def solved_files(index: Path) -> Iterator[tuple[Row, xr.Dataset]]:
+    """Rows of a folder's objects that have solved cases, each with its result file."""
     for row in read_index(index)[0]:
         path = index.parent / row["file"]
         if row["done"] > 0 and path.exists():
-            ds = open(path)
-            scale = UNITS[task_keys(ds, "object").get("unit", "m")].size
-            if not (mesh := index.parent / row["mesh"]).is_file():
-                raise StudyError(OTHER_FILE, f"{mesh}: no such file; put the mesh of '{row['object']}' back")
-            yield ObjectGrasps(row["object"], mesh, scale, row["mass"], grasp_arrays(ds, gripper))
+            yield row, open(path)
+
+
+def _objects(index: Path, gripper: GripperFrame) -> Iterator[ObjectGrasps]:
+    for row, ds in solved_files(index):
+        scale = UNITS[task_keys(ds, "object").get("unit", "m")].size
+        if not (mesh := index.parent / row["mesh"]).is_file():
+            raise StudyError(OTHER_FILE, f"{mesh}: no such file; put the mesh of '{row['object']}' back")
+        yield ObjectGrasps(row["object"], mesh, scale, row["mass"], grasp_arrays(ds, gripper))
 
 
 def grasp_arrays(ds: xr.Dataset, gripper: GripperFrame) -> Arrays:

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from softjaw.study.cli import main
+from softjaw.study.export import data_set
 from softjaw.study.export.data_set import FORMS, grasp_arrays, write_data_set
 from softjaw.study.export.selection import GripperFrame
 from softjaw.study.flags import Flag
-from softjaw.study.grippers import Hand
+from softjaw.study.grippers import Hand, gripper_file
 from softjaw.study.quantities import DONE, WIDE
 from softjaw.study.quantities import SLIPS as SLIPPING
 from softjaw.study.result.index import blank_row, write_index
@@ -121,6 +122,17 @@ def test_graspgen_has_its_fields_and_splits_acronym_its_datasets_and_shards_both
     (out / "objects/plate.stl").touch()
     assert "note: 1 " in write_data_set(folder / "index.hdf", out, "graspgen", GRIPPER)
     assert len(json.loads(found["cup.json"])["grasps"]["force"]) == COUNT
+
+
+def test_the_gripper_of_the_scene_comes_to_a_folder_too(folder, tmp_path, monkeypatch):
+    def with_preset(path):
+        ds = opened(path)
+        return ds.assign_attrs(scene=f'{ds.scene}\n[gripper]\npreset = "franka_hand"')
+
+    monkeypatch.setattr(data_set, "open", with_preset)
+    assert main(["export", str(folder), "--format", "acronym", "-o", str(tmp_path), "--approach", "x"]) == 0
+    frame = gripper_file("franka_hand")[1].frame
+    assert json.loads((tmp_path / "data-set.json").read_text())["gripper"]["name"] == frame
 
 
 def test_the_example_loads_every_object_and_a_single_file_is_no_data_set(sets, capsys, monkeypatch, folder, tmp_path):
