@@ -13,7 +13,7 @@ import json
 import tarfile
 from collections.abc import Iterator
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -160,7 +160,10 @@ def _objects(index: Path, gripper: GripperFrame) -> Iterator[ObjectGrasps]:
         scale = UNITS[task_keys(ds, "object").get("unit", "m")].size
         if not (mesh := index.parent / row["mesh"]).is_file():
             raise StudyError(OTHER_FILE, f"{mesh}: no such file; put the mesh of '{row['object']}' back")
-        yield ObjectGrasps(row["object"], mesh, scale, row["mass"], grasp_arrays(ds, gripper))
+        each = [grasp_arrays(ds, replace(gripper, approach=(way,))) for way in gripper.approach]
+        each = each or [grasp_arrays(ds, gripper)]
+        arrays = {name: np.concatenate([part[name] for part in each]) for name in each[0]}
+        yield ObjectGrasps(row["object"], mesh, scale, row["mass"], arrays)
 
 
 def grasp_arrays(ds: xr.Dataset, gripper: GripperFrame) -> Arrays:
@@ -179,7 +182,8 @@ def grasp_arrays(ds: xr.Dataset, gripper: GripperFrame) -> Arrays:
     listed += [_offered(listed[0], row) for row in ds.attrs["rejected"] if listed]
     transforms, success = np.tile(np.eye(4), (len(listed), 1, 1)), np.zeros(len(listed), bool)
     for i, case in enumerate(listed):
-        approach, depth = "minus-x", gripper.hand.depth(gripper.hand.stroke_mm / 1e3)
+        approach = (gripper.approach or gripper.hand.approaches)[0]
+        depth = gripper.hand.depth(gripper.hand.stroke_mm / 1e3)
         if i < len(solved):
             approach, hold = next(iter(holds(ds, case, gripper).items()))
             depth = hold.depth

@@ -67,6 +67,8 @@ def test_arrays_are_those_of_the_file_and_what_the_sampler_rejected_is_unsuccess
         assert matrix[:3, 3] == pytest.approx(o.mean(axis=0))
     assert arrays["semi_axes"].shape == (COUNT, 2, 3)
     ds.attrs["rejected"] = np.array([[10, 20, 30, 1, 0, 0, 0, 0, 1, SLIPPING], [0, 0, 5, 0, 1, 0, 0, 0, 1, WIDE]], "f4")
+    for gripper in (GripperFrame(Hand(closing="x"), ("y",)), GripperFrame(Hand(closing="x", approaches=["y"]), ())):
+        assert grasp_arrays(ds, gripper)["transforms"][COUNT, :3, 2] == pytest.approx([0, -1, 0])
     arrays = grasp_arrays(ds, GripperFrame(Hand(closing="x")))
     assert {len(values) for values in arrays.values()} == {COUNT + 2}
     assert arrays["state"].tolist() == [*[DONE] * COUNT, SLIPPING, WIDE]
@@ -124,15 +126,20 @@ def test_graspgen_has_its_fields_and_splits_acronym_its_datasets_and_shards_both
     assert len(json.loads(found["cup.json"])["grasps"]["force"]) == COUNT
 
 
-def test_the_gripper_of_the_scene_comes_to_a_folder_too(folder, tmp_path, monkeypatch):
+def test_the_gripper_of_the_scene_comes_to_a_folder_too_from_every_side_asked_for(folder, tmp_path, monkeypatch):
     def with_preset(path):
         ds = opened(path)
         return ds.assign_attrs(scene=f'{ds.scene}\n[gripper]\npreset = "franka_hand"')
 
     monkeypatch.setattr(data_set, "open", with_preset)
-    assert main(["export", str(folder), "--format", "acronym", "-o", str(tmp_path), "--approach", "x"]) == 0
+    ways = ["--approach", "x", "--approach", "minus-y"]
+    assert main(["export", str(folder), "--format", "acronym", "-o", str(tmp_path), *ways]) == 0
     frame = gripper_file("franka_hand")[1].frame
     assert json.loads((tmp_path / "data-set.json").read_text())["gripper"]["name"] == frame
+    with h5py.File(tmp_path / "grasps/vase_1.0.h5") as file:
+        ahead = file["grasps/transforms"][:, :3, 2]
+    R = np.repeat([geometry(i)[0][0] for i in range(len(STATIONS))], len(FORCES), axis=0)
+    assert ahead == pytest.approx(np.concatenate([R[..., 0], -R[..., 1]]))
 
 
 def test_the_example_loads_every_object_and_a_single_file_is_no_data_set(sets, capsys, monkeypatch, folder, tmp_path):
