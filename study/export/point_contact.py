@@ -139,6 +139,7 @@ def heading(grasp: RankedGrasp, body: RigidBody) -> list[str]:
         "Made by softjaw from one grasp of a result file; lengths in m, forces in N.",
         *grasp.remark.splitlines(),
         f"mass of the object: {1e3 * mass:.4g} g, {why}",
+        *["inertia: of the convex hull, for want of a closed surface"] * (not body.closed),
         "friction: the ellipsoid from three motions; the payload follows from all sampled motions",
     ]
     return [line.replace("--", "- -") for line in lines]  # two dashes would end a comment of XML

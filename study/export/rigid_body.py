@@ -1,7 +1,8 @@
 """The object of a result as simulators take it: its surface, mass, centre of mass and inertia.
 
 Everything is in the frame of the object's own file, in SI units. The inertia is that of a full body of even density
-with the object's mass; of a surface that is not closed its convex hull is taken.
+with the object's mass; of a surface that is not closed its convex hull is taken. The volume is that of
+`study.case.build`: what lies in several parts of a mesh counts once.
 """
 
 from dataclasses import dataclass
@@ -11,6 +12,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 from trimesh import Trimesh
+from trimesh.transformations import translation_matrix
 
 from softjaw.friction.patch import FloatArray
 from softjaw.study.case.build import build_object, centre_of_mass, own_frame, surface_triangles
@@ -26,9 +28,9 @@ DENSITY = 1000.0  # of an object without `object.mass_g` [kg/m^3], as simulators
 class RigidBody:
     """An object: its ``surface`` [m], ``mass`` [kg], ``centre (3,)`` of mass [m].
 
-    ``inertia (3, 3)`` is about the centre of mass [kg m^2]. ``weighed`` says whether the scene gives the mass, and
-    ``down (3,)`` is the direction of the weight, -z where the scene asks for every one. ``pad (3,)`` has the length,
-    width and thickness of the pads that hold it [m].
+    ``inertia (3, 3)`` is about the centre of mass [kg m^2], of the convex hull unless the surface is ``closed``.
+    ``weighed`` says whether the scene gives the mass, and ``down (3,)`` is the direction of the weight, -z where the
+    scene asks for every one. ``pad (3,)`` has the length, width and thickness of the pads that hold it [m].
     """
 
     surface: Trimesh
@@ -36,6 +38,7 @@ class RigidBody:
     weighed: bool
     centre: FloatArray
     inertia: FloatArray
+    closed: bool
     down: FloatArray
     pad: FloatArray
 
@@ -63,12 +66,14 @@ def body_of(ds: xr.Dataset, case: dict[str, Any]) -> RigidBody:
     centre = frame.to_object(centre_of_mass(scene, built)[None])[0]
     points = frame.to_object(np.asarray(points, float))
     surface = Trimesh(points, triangles, process=False)
-    solid = surface if getattr(built, "closed", True) else surface.convex_hull
-    mass = DENSITY * solid.volume if shape.mass is None else shape.mass
-    inertia = solid.moment_inertia * mass / solid.volume
+    closed = getattr(built, "closed", True)
+    solid = surface if closed else surface.convex_hull
+    volume = getattr(built, "solid", (0.0,))[0] or solid.volume  # a sheet encloses nothing
+    mass = DENSITY * volume if shape.mass is None else shape.mass
+    inertia = solid.moment_inertia_frame(translation_matrix(centre)) * mass / solid.volume
     down, pad = np.array(scene.task.direction or (0.0, 0.0, -1.0)), np.array(scene.gripper.pad_size)
     down /= np.linalg.norm(down)
-    return RigidBody(surface, mass, shape.mass is not None, centre, inertia, down, pad)
+    return RigidBody(surface, mass, shape.mass is not None, centre, inertia, closed, down, pad)
 
 
 def places(values: NDArray[Any]) -> str:

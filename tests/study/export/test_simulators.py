@@ -9,12 +9,15 @@ import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
 
+from softjaw.study.export import rigid_body
 from softjaw.study.export.mjcf import as_mjcf, friction, tangents
 from softjaw.study.export.physx import as_usd
 from softjaw.study.export.point_contact import carried, cell
 from softjaw.study.export.sdf import as_sdf, as_stl
 from softjaw.study.messages import StudyError
+from softjaw.study.scene.model import parse_scene
 from tests.study.export.grasp_results import E_N, FORCES, MU_X, MU_Y, all_grasps, body, geometry, slipping, write
+from tests.study.scenes import mesh_of
 
 ONE = 1e-12
 
@@ -111,6 +114,28 @@ def test_the_surface_beside_a_model_of_gazebo_is_the_object_and_physx_slips_at_t
         for depth in (0.0, 1e-3):
             assert mu * 16.0 * max(r_min, math.sqrt(r * depth)) == pytest.approx(E_N[i] * mu * 16.0)
         assert values["physxScene:solverType"] == '"TGS"'
+
+
+def test_mass_is_of_the_volume_that_the_study_knows_and_inertia_about_the_centre_of_mass(path, tmp_path, monkeypatch):
+    """A cube of 40 mm with a bar that begins in its middle, then alone, and without one of its sides."""
+    grasp = all_grasps(path, 4.0)[0]
+
+    def made(mesh, more=""):
+        mesh.export(file := tmp_path / f"{len([*tmp_path.iterdir()])}.stl")
+        text = f"[object]\n{mesh_of(file)}\n{more}[candidates]\nsampled = 1\n[load]\nnormal_force_n = [1]\n"
+        monkeypatch.setattr(rigid_body, "scene_at", lambda *_: parse_scene(text))
+        return body.__wrapped__(path)  # which is kept otherwise
+
+    cube, bar = trimesh.creation.box((40, 40, 40)), trimesh.creation.box((40, 30, 30)).apply_translation([20, 0, 0])
+    both = made(trimesh.util.concatenate([cube, bar]))
+    assert both.mass == pytest.approx(1000 * (64e-6 + 18e-6), rel=0.01)
+    d = np.array([0.005, 0.0, -0.01])
+    inertia = made(cube, "mass_g = 100\n[task]\ncentre_of_mass_mm = [5, 0, -10]\n").inertia
+    assert inertia == pytest.approx(0.1 * ((0.04**2 / 6 + d @ d) * np.eye(3) - np.outer(d, d)), rel=1e-6, abs=1e-12)
+    cube.update_faces(cube.face_normals[:, 2] < 0.5)
+    assert (both.closed, made(cube).closed) == (True, False)
+    assert made(cube).mass == pytest.approx(0.064, rel=0.02)
+    assert ["convex hull" in as_mjcf(grasp, one) for one in (both, made(cube))] == [False, True]
 
 
 def turned(q):
