@@ -214,7 +214,7 @@ def test_grasps_are_chosen_by_rank_force_and_least_values_and_simulators_get_a_f
 
 
 @pytest.mark.parametrize("words", [
-    "--format urdf", "--format moveit --force 99", "--csv --min beauty=3", "--csv --min payload",
+    "--format urdf", "--format moveit --force 99", "--csv --min beauty=3", "--csv --min payload", "--csv --min flags=1",
     "--format moveit --min payload=1e9", "--format moveit --gripper three_fingers",
     "--format moveit --gripper robotiq_2f85",  # presses with 20 N at least
     "--csv -o {path}",
