@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-from softjaw.study.cli.options import refuse_for_folder
+from softjaw.study.cli.options import GRIPPER, refuse_unused
 from softjaw.study.export.cases import as_csv, as_json
 from softjaw.study.export.data_set import FORMS, solved_files, write_data_set
 from softjaw.study.export.mjcf import as_mjcf
@@ -27,6 +27,10 @@ PLANNERS: dict[str, Callable[..., str]] = {form: partial(as_yaml, form) for form
 PLANNERS["graspgen"] = as_graspgen
 SIMULATORS = {"mjcf": as_mjcf, "sdf": as_sdf, "physx": as_usd}
 DATA_SETS = ("acronym", "webdataset")  # of folders alone
+UNUSED = {  # options that a format has no use for
+    **dict.fromkeys(TABLES, GRIPPER), **dict.fromkeys(SIMULATORS, GRIPPER[1:]), "graspgen": ("frame",),
+    "vtk": ("by", "model", "most", "min", *GRIPPER),
+}  # fmt: skip
 
 
 def export(options: Namespace) -> str:
@@ -39,11 +43,12 @@ def export(options: Namespace) -> str:
     if options.output and Path(options.output).resolve() == Path(options.file).resolve():
         raise StudyError(USAGE, f"-o: found '{options.output}', expected another file than the results")
     if index:
-        refuse_for_folder(options, "force", "by", "model", "most", "min")
+        refuse_unused(options, "force", "by", "model", "most", "min", "frame")
         preset = next((task_keys(ds, "gripper").get("preset") for _, ds in solved_files(index)), None)
         return write_data_set(index, Path(options.output), options.form, gripper_of(options, preset))
     if options.form in DATA_SETS:
         raise StudyError(USAGE, f"--format {options.form}: found '{options.file}', expected a folder of objects")
+    refuse_unused(options, *UNUSED.get(options.form, ()), form=options.form)
     ds = open(options.file)
     if options.form == "vtk":
         from softjaw.study.show.view.solids import write_vtk  # slow to load

@@ -98,12 +98,13 @@ def candidate(text: str) -> int:
     return int(text.lstrip("ps"))
 
 
-def refuse_for_folder(options: argparse.Namespace, *names: str) -> None:
-    """Refuse those of these `OPTIONS` that were given: a folder of objects has no use for them."""
+def refuse_unused(options: argparse.Namespace, *names: str, form: str = "") -> None:
+    """Refuse those of these `OPTIONS` that were given: a ``form`` of export, or a folder, has no use for them."""
+    meant = f"other formats than {form}" if form else f"one result file; '{options.file}' is a folder of objects"
     for (option, *_), settings in (OPTIONS[name] for name in names):
         default = settings.get("default")
         if getattr(options, settings.get("dest", option[2:])) != default:
-            raise StudyError(USAGE, f"{option}: is for one result file; '{options.file}' is a folder of objects")
+            raise StudyError(USAGE, f"{option}: is for {meant}")
 
 
 def _option(*names: str, **settings: Any) -> tuple[tuple[str, ...], dict[str, Any]]:
@@ -155,7 +156,8 @@ OPTIONS = {
                        " the same form: frame, joints, stroke, forces, palm and fingers"),
     "wider": _option("--wider", type=number("a number, 0 or above", 0.0), default=20.0, metavar="MM",
                      help="how far the gripper opens beyond first touch (default 20)"),
-    "frame": _option("--frame", default="object", metavar="NAME", help="name of the object's frame (default object)"),
+    "frame": _option("--frame", default="object", metavar="NAME",
+                     help="name of the object's frame, for isaac_grasp and moveit (default object)"),
     "kind": _option("kind", type=no_file, choices=tuple(KINDS), help="what to start from"),
     "name": _option("-o", metavar="NAME", dest="name", help="name of both files (default: the kind, or the mesh's)"),
     "mesh": _option("--mesh", metavar="FILE", help="mesh of the object: .stl, .obj, .ply, .off, .glb, .gltf or .3mf"),
@@ -322,6 +324,6 @@ def _add_options(parser: argparse.ArgumentParser, options: Sequence[str]) -> Non
         if settings.get("dest") == "form":
             place = form = form or parser.add_mutually_exclusive_group(required="format" in options)
         elif option in GRIPPER:
-            title = "the gripper, for isaac_grasp, graspgen and moveit"
+            title = "the gripper, for planners and data sets (--gripper also for simulators)"
             place = gripper = gripper or parser.add_argument_group(title)
         place.add_argument(*names, **settings)

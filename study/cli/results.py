@@ -4,7 +4,7 @@ from argparse import Namespace
 from functools import partial
 from pathlib import Path
 
-from softjaw.study.cli.options import refuse_for_folder
+from softjaw.study.cli.options import refuse_unused
 from softjaw.study.messages import beside, fault_of, with_ending, write_file
 from softjaw.study.quantities import LISTED
 from softjaw.study.ranking import judge
@@ -32,7 +32,7 @@ def show(options: Namespace) -> str:
     """Print the best grasps, or the objects with theirs."""
     top = LISTED if options.top is None else options.top
     if index := index_path(options.file):
-        refuse_for_folder(options, "force", "by")
+        refuse_unused(options, "force", "by")
         return rendered(objects.index_table(index, 0 if options.form and options.top is None else top), options.form)
     ds = open(options.file)
     with fault_of(options.file, ValueError):
@@ -61,7 +61,7 @@ def report(options: Namespace) -> str:
     from softjaw.study.show.report import objects_page, writing
 
     if index := index_path(options.file):
-        refuse_for_folder(options, "candidate", "at")
+        refuse_unused(options, "candidate", "at")
         return f"written: {objects_page.write_objects_page(index, Path(options.output or index.with_suffix('.html')))}"
     page = Path(options.output or Path(options.file).with_suffix(".html"))
     return f"written: {writing.write_report(Path(options.file), page, *choice(options))}"

@@ -135,7 +135,8 @@ def test_programs_get_every_row_and_what_is_for_one_file_is_refused(tmp_path, so
     export = ("export", tmp_path, "--format", "graspgen", "-o", tmp_path / "set")
     for *words, option, value in (
         ("show", tmp_path, "--force", 2), ("show", tmp_path, "--by", "e_n"), ("report", tmp_path, "--at", 3),
-        (*export, "--top", 3), (*export, "--min", "e_n=1"), (*export, "--model", "pcm"), ("compare", tmp_path, solved),
+        (*export, "--top", 3), (*export, "--min", "e_n=1"), (*export, "--model", "pcm"), (*export, "--frame", "f"),
+        ("compare", tmp_path, solved),
     ):  # fmt: skip
         code, _, errors = command(0, *words, option, value)
         assert (code, str(option) in errors) == (USAGE, True)

@@ -217,7 +217,9 @@ def test_grasps_are_chosen_by_rank_force_and_least_values_and_simulators_get_a_f
     "--format urdf", "--format moveit --force 99", "--csv --min beauty=3", "--csv --min payload", "--csv --min flags=1",
     "--format moveit --min payload=1e9", "--format moveit --gripper three_fingers",
     "--format moveit --gripper robotiq_2f85",  # presses with 20 N at least
-    "--csv -o {path}",
+    "--csv -o {path}", "--csv --approach y", "--json --gripper wsg50", "--format mjcf --wider 5",
+    "--format sdf --frame f", "--format physx --approach x", "--format graspgen --frame f",
+    *(f"--format vtk -o {{path}}.vtm --{o}" for o in ("by e_n", "top 3", "model pcm", "min e_n=3", "wider 5")),
 ])  # fmt: skip
 def test_what_cannot_be_written_is_refused(path, words, capsys):
     assert main(["export", str(path), *words.format(path=path).split()]) == USAGE
