@@ -60,8 +60,9 @@ def init(options: Namespace, measure: Callable[[Namespace], Measured]) -> str:
 
     Raises `StudyError`: a mesh that is missing or cannot be read, files that exist, or a folder that cannot be written.
     """
-    if options.kind != "mesh" and options.mesh:
-        raise StudyError(USAGE, f"--mesh: found beside '{options.kind}'; write 'softjaw init mesh --mesh ...'")
+    for name in ("mesh", "unit", "axis") if options.kind != "mesh" else ():
+        if getattr(options, name):
+            raise StudyError(USAGE, f"--{name}: found beside '{options.kind}'; write 'softjaw init mesh --mesh ...'")
     if options.mesh and (Path(options.mesh).is_dir() or "*" in options.mesh):
         fault = f"--mesh: found '{options.mesh}', expected one mesh, of which a scene is made for all"
         raise StudyError(USAGE, f"{fault}; then: softjaw run SCENE --objects {shlex.quote(options.mesh)}")

@@ -115,7 +115,8 @@ def test_nothing_is_replaced_unasked(tmp_path, there, capsys):
     (["mesh"], "a mesh needs --mesh FILE and --unit"), (["mesh", "--mesh", str(FLASK)], "a mesh needs --unit"),
     (["mesh", "--mesh", str(FLASK), "--unit", "inch"], 'the unit may be "mm"'),
     (["mesh", "--mesh", "no.stl", "--unit", "mm"], "no.stl"), (["mesh", "--mesh", "."], "--objects ."),
-    (["cup", "--mesh", str(FLASK)], "--mesh: found beside 'cup'"), (["cup", "-o", "$(rm -r .)"], "expected letters"),
+    (["cup", "--mesh", str(FLASK)], "--mesh: found beside 'cup'"), (["cup", "--axis", "x"], "--axis: "),
+    (["bottle", "--unit", "inch"], "--unit: found beside 'bottle'"), (["cup", "-o", "$(rm -r .)"], "expected letters"),
     (["cup", "-o", 'a"b'], "expected letters"),
 ])  # fmt: skip
 def test_what_cannot_be_started_is_refused_and_writes_nothing(words, told, tmp_path, capsys):
