@@ -210,5 +210,6 @@ def usable(grasps: Sequence[RankedGrasp]) -> tuple[list[RankedGrasp], str]:
     reasons = Counter(reason for grasp in grasps for reason in grasp.reasons)
     listed = ", ".join(f"{reason} ({count})" if len(reasons) > 1 else reason for reason, count in reasons.items())
     omitted = f"{len(grasps) - len(valid)} of {len(grasps)} grasps left out at {grasps[0].force:g} N" if reasons else ""
-    weak = "; --force names another" * (Flag.TOO_WEAK.word in reasons)
-    return valid, f"{omitted}: {listed}{weak}" if reasons else ""
+    # the force to use is known only where a solved one holds the object
+    more = any(g.case["flags"] & Flag.TOO_WEAK and g.maps.get("force_low", 0.0) > g.force for g in grasps)
+    return valid, f"{omitted}: {listed}{'; --force names another' * more}" if reasons else ""

@@ -1,6 +1,7 @@
 """From where the hand comes: on an elliptic cylinder of 50 x 40 x 100 mm, whose clearances are known."""
 
 from argparse import Namespace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from softjaw.study.case.reach import WAY, boxes, clearance, surface_points
 from softjaw.study.cli.exporting import gripper_of
 from softjaw.study.export.rigid_body import scene_of
 from softjaw.study.export.selection import GripperFrame, grasps, usable
+from softjaw.study.flags import Flag
 from softjaw.study.grippers import Hand, gripper_file
 from tests.study.export.grasp_results import RADIUS, STATIONS, opened, write
 
@@ -60,6 +62,14 @@ def test_what_the_gripper_cannot_take_is_left_out_with_the_reason(path, hand, wh
     assert not kept
     assert why in said
     assert said.startswith("5 of 5 ")
+
+
+def test_another_force_is_advised_only_where_one_that_was_solved_holds_the_object(path):
+    for known, advised in (({"force_low": 9.0}, True), ({"force_low": np.nan}, False), ({}, False)):
+        grasps = [replace(g, case={**g.case, "flags": Flag.TOO_WEAK, "maps": g.case["maps"] | known})
+                  for g in taken(path, Hand())]  # fmt: skip
+        kept, said = usable(grasps)
+        assert (kept, "--force" in said) == ([], advised)
 
 
 def test_boxes_clear_a_sphere_and_stand_beside_the_pads_and_the_gripper_of_the_scene_comes_unless_named(path):
