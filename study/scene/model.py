@@ -49,7 +49,11 @@ from softjaw.study.scene.text import flat, parse_toml, read_text, toml_text
 
 Option = str | int | float | bool
 WATCHING = ("monitor", "view", "converged_reason")  # PETSc options that only print
-WAYS = ("stations", "stations_mm", "poses", "sampled")  # of giving candidates: an override of one replaces the others
+WAYS = {  # of giving candidates, with what an override of each replaces
+    "stations": ("poses", "sampled"), "stations_mm": ("stations", "poses", "sampled"),
+    "poses": ("stations", "stations_mm", "angles_deg", "sampled"),
+    "sampled": ("stations", "stations_mm", "angles_deg", "poses"),
+}  # fmt: skip
 NOT_SWEPT = (  # they change which datasets a file has and how large they are, or no number of a case
     "object.shape", "object.mesh", "object.name", "object.mass_g", "object.density", "gripper.preset",
     "candidates.stations", "accuracy.meshes", "accuracy.target", "effects.wrench", "limit_surface.samples",
@@ -454,9 +458,8 @@ def put_overrides(data: dict[str, Any], overrides: Sequence[str], given: dict[Ke
                 data[section][key] = {**old, **value} if both else value
                 given[(section, key)] = place, None
                 given.setdefault((section,), (place, None)) if len(data[section]) == 1 else None
-                for way in WAYS if section == "candidates" and key in WAYS else ():
-                    # a number of stations stands beside the first and the last of them
-                    if (section, way) not in given and (key, way) != ("stations", "stations_mm"):
+                for way in WAYS.get(key, ()) if section == "candidates" else ():
+                    if (section, way) not in given:
                         data[section].pop(way, None)
     return problems
 

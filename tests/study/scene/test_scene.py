@@ -16,6 +16,7 @@ JOBS = sorted((ROOT / "jobs").glob("*.toml"))
 SPHERE = 'shape = "sphere"\nradius_mm = 30'
 BALL = f"[object]\n{SPHERE}\n\n[candidates]\nstations_mm = [0]\n\n[load]\nnormal_force_n = [1]\n"
 OUTLINE = "profile_mm = [\n  [0, 30], [50, 30],\n  [100, 20],\n  [150, 12],\n]"
+POSES = "poses=[{point_mm = [0, 0, 0], approach = [1, 0, 0], long_side = [0, 0, 1]}]"
 BOTTLE = BALL.replace(SPHERE, f'shape = "revolution"\n{OUTLINE}')
 
 
@@ -193,6 +194,12 @@ def test_overrides_replace_values_which_are_in_si_units_and_hyperfoam_fills_in_i
     assert (scene.object.radius_mm, scene.gripper.material, scene.object.name) == (40, "linear", "a ball")
     assert scene.candidates.station_values_mm == (-9, 0, 9)
     assert scene.sweep == {"friction.mu": (0.5, 1.0)}
+    turned = BALL.replace("stations_mm = [0]", "stations_mm = [0]\nangles_deg = [0, 45]")
+    for way, kept in (("sampled=5", ()), (POSES, ()), ("stations_mm=[1]", (0, 45))):
+        scene = parse_scene(turned, overrides=[f"candidates.{way}"])
+        assert scene.candidates.station_values_mm == ((1,) if kept else ())
+        assert scene.candidates.angles_deg == (kept or (0, 90))
+    assert problem(turned, "candidates.sampled=5", "candidates.angles_deg=[0, 45]").key == "candidates.angles_deg"
     given = ["load.normal_force_n=[7, 2, 4]", "candidates.angles_deg=[90, 0]", "gripper.pad_width_mm=22"]
     scene = parse_scene(BOTTLE, overrides=given)
     assert scene.load.normal_force == (2, 4, 7)
