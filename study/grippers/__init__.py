@@ -143,8 +143,11 @@ def filled_in(tables: dict[str, Any], folder: Path) -> tuple[str, Any, str] | No
         return "gripper.preset", name, f"one of {', '.join(PRESETS)}, or a file of the same form{more}"
     for key, value in keys.items():
         gripper.setdefault(key, value)
-    if math.isfinite(hand.stroke_mm) and isinstance(gripper.get("pad_thickness_mm"), int | float):
-        gripper.setdefault("max_opening_mm", hand.stroke_mm - 2 * gripper["pad_thickness_mm"])
+    thickness, most = gripper.get("pad_thickness_mm"), hand.stroke_mm / 2
+    if math.isfinite(most) and isinstance(thickness, int | float) and "max_opening_mm" not in gripper:
+        if thickness >= most:
+            return "gripper.pad_thickness_mm", thickness, f"less than {most:g} mm, of which two fill the stroke"
+        gripper["max_opening_mm"] = 2 * (most - thickness)
     load = tables.get("load")
     forces = load.get("normal_force_n") if isinstance(load, dict) else None
     low, high = hand.force_n

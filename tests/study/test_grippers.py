@@ -9,7 +9,7 @@ from softjaw.study.cli import main
 from softjaw.study.cli.options import KINDS
 from softjaw.study.grippers import PRESETS, gripper_file
 from softjaw.study.messages import USAGE, StudyError
-from softjaw.study.scene import Scene, load_scene
+from softjaw.study.scene import Scene, SceneError, load_scene
 from tests.study.launching import ROOT
 
 
@@ -34,6 +34,12 @@ def test_keys_of_the_scene_come_first_and_a_preset_may_stand_on_the_command_line
     found = loaded(tmp_path, "franka_hand", more="pad_thickness_mm = 10\npad_width_mm = 30")
     assert (found.pad_width_mm, found.pad_thickness_mm, found.max_opening_mm) == (30, 10, 60)
     assert loaded(tmp_path, "franka_hand", more="max_opening_mm = 33").max_opening_mm == 33
+    for thickness in ("40", "45"):  # of a stroke of 80 mm
+        with pytest.raises(SceneError) as error:
+            loaded(tmp_path, "franka_hand", more=f"pad_thickness_mm = {thickness}")
+        (problem,) = error.value.problems
+        assert (problem.line, problem.key, problem.found) == (6, "gripper.pad_thickness_mm", thickness)
+        assert problem.expected.startswith("less than 40 mm")
     scene = Scene.from_file(ROOT / "jobs" / "smoke.toml", ["gripper.preset=wsg50", "load.normal_force_n=[5, 10]"])
     assert scene.gripper.max_opening_mm == 100
 
