@@ -20,7 +20,7 @@ from softjaw.study.run.progress import duration
 from softjaw.study.run.shares import makespan
 from softjaw.study.scene import Scene, SceneError, load_scene, start
 from softjaw.study.scene.objects import Mesh
-from softjaw.study.show.overview import aligned, scene_text
+from softjaw.study.show.overview import aligned, listed, scene_text
 from softjaw.study.table import hanging, terminal_width
 from softjaw.study.units import in_si
 
@@ -56,21 +56,27 @@ def _measured(options: Namespace) -> start.Measured:
 def check(options: Namespace) -> str:
     """Find every error of a scene, or say what would be run."""
     if not options.folder:
-        return hanging(scene_text(_checked(scene_of(options)), options.scene), terminal_width())
+        scene = _checked(scene_of(options))
+        return hanging("\n".join([scene_text(scene, options.scene), *notices(scene)]), terminal_width())
     options.folder.check()  # what is wrong for all alike is said once
     objects, scenes, wrong, ungrasped = options.folder.objects, list[Scene](), list[str](), list[str]()
-    for listed in objects:
+    noted: dict[str, list[str]] = {}
+    for obj in objects:
         try:
-            scenes.append(_checked(options.folder.scene(listed)))
+            scenes.append(_checked(options.folder.scene(obj)))
+            for notice in notices(scenes[-1]):
+                noted.setdefault(notice, []).append(obj.name)
         except SceneError as error:
-            wrong += [str(p) if p.file == listed.place else f"{listed.place}: {p}" for p in error.problems]
+            wrong += [str(p) if p.file == obj.place else f"{obj.place}: {p}" for p in error.problems]
         except StudyError as error:
-            (ungrasped if isinstance(error, NoGraspError) else wrong).append(f"{listed.place}: {error.message}")
+            (ungrasped if isinstance(error, NoGraspError) else wrong).append(f"{obj.place}: {error.message}")
     if wrong or not scenes:
         raise StudyError(USAGE, "\n".join(wrong or ungrasped))
     text = scene_text(scenes[0], options.scene)
     text += f"\n  objects     {len(objects)}: {objects[0].name} to {objects[-1].name}; the mesh is one of them"
-    return hanging("\n".join([text, *(f"  no grasp    {reason}" for reason in ungrasped)]), terminal_width())
+    lines = [text, *(f"  no grasp    {reason}" for reason in ungrasped)]
+    lines += [notice.replace(":", f": {listed(names)}:", 1) for notice, names in noted.items()]
+    return hanging("\n".join(lines), terminal_width())
 
 
 def _checked(scene: Scene) -> Scene:

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
-from softjaw.study.case.build import axis_span, geometry, has_wall, listed_accuracy, notices
+from softjaw.study.case.build import axis_span, geometry, has_wall, listed_accuracy
 from softjaw.study.units import UNITS, shown
 
 OPEN = {"top": "open top", "both": "open at both ends", "none": "closed top"}
@@ -38,7 +38,7 @@ def scene_text(scene: Any, file: str) -> str:
         "petsc": " ".join(f"-{key} {value}" for key, value in scene.petsc.items()),
         "each case": limits_text(scene.run),
     }
-    return "\n".join([f"{file}: no errors", *aligned(rows), *notices(scene)])
+    return "\n".join([f"{file}: no errors", *aligned(rows)])
 
 
 def _meshes(accuracy: Any, which: str) -> str:

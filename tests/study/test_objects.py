@@ -85,6 +85,14 @@ def test_check_reports_every_object_with_its_line_and_a_wrong_first_one_stops_no
     code, _, errors = command(0, "check", scene, "--objects", table)
     assert (code, re.findall(r"wrong.csv:(\d+)", errors)) == (USAGE, ["2", "5"])
     assert folder_of(str(scene), ["object.mesh=wrong.csv"]).check().object.name == "bug"
+    for i, name in enumerate(("full", "open", "wide")):
+        box = trimesh.creation.box((0.03, 0.04, 0.05 + 0.01 * i))
+        box.update_faces(box.face_normals[:, 2] < 0.5 + (name == "full"))
+        (scene.parent / "open").mkdir(exist_ok=True)
+        box.export(scene.parent / f"open/{name}.stl")
+    _, text, _ = command(0, "check", scene, "--objects", scene.parent / "open", "--set", "friction.mu=5")
+    assert "warning: full, open, wide: friction.mu" in text
+    assert set(re.findall(r"note: (\w+): ", text)) == {"open", "wide"}
 
 
 @pytest.mark.parametrize(("objects", "count"), [("meshes/[al]*.stl", 3), ("odd [1]", 1), ("some.csv", 2)])
