@@ -140,7 +140,7 @@ def _acronym(grasps: ObjectGrasps) -> Files:
 
 def _webdataset(grasps: ObjectGrasps) -> Files:
     """``train-000000.tar``, ...: for each object ``NAME.json``, as GraspGen keeps it, and ``NAME.mesh.stl``."""
-    key = grasps.name.replace(".", "_")  # what follows the first dot is the kind of a file
+    key = grasps.name.replace("%", "%25").replace(".", "%2e")  # what follows the first dot is the kind of a file
     return {f"{key}.json": _as_json(grasps), f"{key}.mesh{grasps.mesh.suffix.lower()}": grasps.mesh.read_bytes()}
 
 
