@@ -60,10 +60,11 @@ def report(options: Namespace) -> str:
     # loads plotly, which tables do not need
     from softjaw.study.show.report import objects_page, writing
 
-    if index := index_path(options.file):
+    index = index_path(options.file)
+    page = with_ending("-o", options.output or (index or Path(options.file)).with_suffix(".html"), *ENDINGS["html"])
+    if index:
         refuse_unused(options, "candidate", "at")
-        return f"written: {objects_page.write_objects_page(index, Path(options.output or index.with_suffix('.html')))}"
-    page = Path(options.output or Path(options.file).with_suffix(".html"))
+        return f"written: {objects_page.write_objects_page(index, page)}"
     return f"written: {writing.write_report(Path(options.file), page, *choice(options))}"
 
 

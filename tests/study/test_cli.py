@@ -49,13 +49,14 @@ def finished(tmp_path_factory):
 
 @pytest.mark.parametrize("words", [
     "chek", "check", "plan x.toml -n 0", "show f --json --csv", "show f --top -1", "watch f --every 0",
+    "report f -o x.pdf",
     *(f"show f --force {force}" for force in ("-3", "0", "nan", "inf", "ten")),
 ])  # fmt: skip
 def test_bad_usage_is_code_2_and_names_the_option(words, capsys):
     assert main(words.split()) == 2
     said = capsys.readouterr().err
     assert "error" in said
-    assert all(word in said for word in words.split()[2:] if word in ("--every", "--force"))
+    assert all(word in said for word in words.split()[2:] if word in ("--every", "--force", "-o"))
 
 
 def test_petsc_options_belong_to_run_and_have_a_prefix(scene, capsys):
