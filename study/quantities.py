@@ -236,7 +236,7 @@ ROWS = (
     Quantity("contact_area", (), "m^2", "contact area",
              "Area under pressure, mean of both fingers; its edge is found inside the faces.", symbol="area", rank=14,
              error="relative"),
-    Quantity("p_max", (), "Pa", "largest pressure",
+    Quantity("p_max", (), "Pa", "largest fitted pressure",
              "Largest contact pressure on either finger, of a quadratic fitted to the loads within two elements of the "
              "largest one; at a sharp end of the object, where it is singular, so a mean.", rank=15, error="relative"),
     Quantity("contact_distance", (), "m", "distance of the contacts", "Distance between the contact frames' origins."),

@@ -7,6 +7,7 @@ import numpy as np
 
 from softjaw.lsfit.surface import PLANES, shadow_outline
 from softjaw.study.page import Block, plot
+from softjaw.study.quantities import BY_KEY
 from softjaw.study.show import plots
 from softjaw.study.show.best_grasps import value_text
 from softjaw.study.show.grasps import Index, at, number, place
@@ -38,7 +39,7 @@ def patch(view: View, index: Index) -> Block | None:
     made.update_yaxes(showgrid=False).update_yaxes(title_text="y [mm]", col=1)
     made.for_each_yaxis(lambda axis: axis.update(scaleanchor=axis.anchor))  # true to scale
     words = {name: value_text(view.ds, name, index, unit=True) for name in ("p_max", "contact_area")}
-    summary = f"largest pressure {words['p_max']}, contact area {words['contact_area']}"
+    summary = f"{BY_KEY['maps/p_max'].label} {words['p_max']}, contact area {words['contact_area']}"
     frame = "The pad's face in its own frame, x along the pad; faces without contact are pale."
     blue = "Blue: friction of the faces against a slip along x or a turn about z of the contact frame (white axes)."
     caption = f"{place(view.ds, index, force=True)}: {summary}. {frame} {blue}"

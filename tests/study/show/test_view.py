@@ -24,6 +24,7 @@ from softjaw.study.result.read import open, scene_of
 from softjaw.study.scene import SceneError
 from softjaw.study.show.grasps import order
 from softjaw.study.show.object_surface import NOBODY, Cells, areas, between, coloured, cut, moved, pressed
+from softjaw.study.show.report import contact
 from softjaw.study.show.report.verdict import plain_report
 from softjaw.study.show.view.model import View, quantity_of, view_of
 from softjaw.study.show.view.object3d import object_block, payload
@@ -119,6 +120,8 @@ def test_pads_stand_where_the_file_says_and_arrows_add_up_to_the_friction_of_the
     """Files keep faces of patches to 3e-5 of the largest value of their case."""
     view, index = shown
     assert index == (1, 0, 1)
+    # it is fitted to faces, so that the largest of their colours is another number
+    assert ": largest fitted pressure " in contact.patch(view, index)["caption"]
     one, two = view.pads(index)
     assert one.face[..., 0] == pytest.approx(np.full((5, 5), 0.025), abs=1e-6)
     assert two.face[..., 0] == pytest.approx(np.full((5, 5), -0.025), abs=1e-6)
