@@ -97,7 +97,7 @@ def _solved(case: HardCase, found: Outcome) -> Iterator[str]:
         yield "a map is not finite: " + ", ".join(n for n in FINITE if not np.isfinite(found.maps[n]).all())
     if strange := [part for part in parts if not case.note or not re.search(case.note, part)]:
         yield f"remarked, but not expected: {'; '.join(strange)}"
-    if case.note and not any(re.search(case.note, part) for part in parts):
+    if case.note and not any(re.search(case.note, part) for part in parts or [""]):
         yield f"'{case.note}' is not remarked"
 
 
