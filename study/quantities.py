@@ -384,7 +384,7 @@ ROWS = (
     Quantity("centroid", (*F, "face", "component"), "m", "face centroid",
              "Deformed position in the pad's frame.", "patch", needs=("patches",)),
     Quantity("normal", (*F, "face", "component"), "", "face normal",
-             "Unit normal of the deformed face, in the pad's frame.", "patch", needs=("patches",)),
+             "Unit normal of the object at the deformed face, in the pad's frame.", "patch", needs=("patches",)),
     # how the case stands
     Quantity("code", (), "", "state of the case", "Whether the case has values.", "status", meanings=STATES),
     Quantity("attempts", (), "", "times this case was begun", "Finished or not.", "status"),

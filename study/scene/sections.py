@@ -240,6 +240,12 @@ class TaskKeys(SceneSection):
         "shared", description="what a load makes of the normal forces: their sum stays, each gives way, each stays"
     )
 
+    def rules(self) -> Errors:
+        """Fingers that keep their forces hold nothing along them."""
+        if self.drive == "fixed" and self.direction is None:
+            expected = 'a direction, as fixed forces hold nothing along themselves, or another drive'
+            yield wrong("worst", expected, "weight_direction")
+
     @property
     def direction(self) -> tuple[float, float, float] | None:
         """Direction of the weight, None for every direction."""
