@@ -26,7 +26,7 @@ from softjaw.fem.objects.mesh_holes import solid
 from softjaw.fem.objects.smooth_triangles import CREASE_ANGLE, SmoothTriangles, smooth_triangles
 from softjaw.fem.objects.splines import evaluate_grid, grid_coefficients
 from softjaw.fem.objects.triangle_tree import TriangleTree
-from softjaw.fem.objects.triangles import cleaned, decimated, pieces_of
+from softjaw.fem.objects.triangles import cleaned, decimated
 from softjaw.friction.patch import FloatArray
 
 MARGIN_CELLS = 3  # least number of cells sampled beyond the box
@@ -92,8 +92,7 @@ class MeshObject:
     @cached_property
     def solid(self) -> tuple[float, FloatArray, float]:
         """Volume that the triangles enclose [m^3], as if it were full; centroid ``(3,)`` and the error of that [m]."""
-        single = self.closed and not pieces_of(self.points, self.triangles).any()
-        return solid(self.points, self.triangles, single)
+        return solid(self.points, self.triangles, self.closed)
 
     def hole_share(self, pose: Pose, points: FloatArray, depth: float) -> float:
         """Share of the lines along the approach before ``points (n, 3)`` of the pad's frame that go through a hole.
