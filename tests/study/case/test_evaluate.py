@@ -207,13 +207,22 @@ def test_a_mass_is_density_times_volume_and_what_has_no_volume_or_several_is_ref
     assert ball.object.mass == pytest.approx(1000 * 4 / 3 * math.pi * 0.03**3, rel=1e-4)
     assert ball.object.density is None
     tube = with_sampled_grasps(scene_of(OVAL, "object.density=500"))
-    assert tube.object.mass == pytest.approx(500 * math.pi * 0.025 * 0.02 * 0.12, rel=1e-4)
-    a, r = 0.03, 0.02  # at both ends of a frustum of 100 mm
-    cone = scene_of('shape = "revolution"\nprofile_mm = [[0, 30], [40, 26], [50, 25], [100, 20]]', stations="[50]")
-    assert volume(cone.object) == pytest.approx(math.pi * 0.1 / 3 * (a * a + a * r + r * r), rel=1e-9)
+    assert tube.object.mass == pytest.approx(500 * math.pi * 0.025 * 0.02 * 0.12, rel=5e-3)
     for shape, *change in (['shape = "plane"\nthickness_mm = 30'], [BALL, "sweep.object.radius_mm=[20, 30]"]):
         with pytest.raises(StudyError, match="mass_g"):
             with_sampled_grasps(scene_of(shape, "object.density=1000", *change))
+
+
+def test_the_volume_is_that_of_the_body_that_is_solved_with_its_caps_and_rounded_rims():
+    """By Pappus each rim lacks (1 - pi / 4) r^2, 0.2234 r inside the wall. A revolution: pi r^2 dz on its curve."""
+    pill = 'shape = "elliptic_cylinder"\nsemi_axis_a_mm = 5\nsemi_axis_b_mm = 5\nlength_mm = 8'
+    rims = 4 * math.pi * (5 - 2 * (10 - 3 * math.pi) / (12 - 3 * math.pi)) * (1 - math.pi / 4) * 2**2
+    assert volume(scene_of(pill, stations="[0]").object) == pytest.approx((math.pi * 25 * 8 - rims) * 1e-9, rel=5e-3)
+    for profile in ([[0, 30], [40, 26], [50, 25], [100, 20]], [[0, 10], [30, 30], [60, 20], [80, 12], [120, 12]]):
+        shape = scene_of(f'shape = "revolution"\nprofile_mm = {profile}', stations="[50]").object
+        curve = build_object(shape).curve
+        z, r = curve.derivative(np.linspace(0, curve.breaks[-1], 20001)).T
+        assert volume(shape) == pytest.approx(math.pi * np.diff(z) @ (r[1:] ** 2 + r[:-1] ** 2) / 2, rel=5e-3)
 
 
 @pytest.mark.parametrize(("loaded", "pieces", "holes", "rims"), [
