@@ -215,13 +215,15 @@ def notices(scene: Scene) -> list[str]:
 
 
 def mesh_notes(mesh: Any, centroid: bool = True) -> tuple[str, ...]:
-    """What of a mesh was mended or left open, and how well its ``centroid`` is known where it is not closed."""
-    if mesh.closed or not centroid:
+    """What of a mesh was mended or left open, and how well its ``centroid`` is known where that is an estimate."""
+    # [m]: a smaller error is rounding, or that of parts that hardly cross
+    if not centroid or (mesh.closed and mesh.solid[2] < 1e-6):
         return tuple(mesh.notes)
     _, place, error = mesh.solid
     named = ", ".join(f"{1e3 * x:.1f}" for x in mesh.placed.to_object(place[None])[0])
     note = (
-        f"it is not closed: centroid estimated at ({named}) mm, to {1e3 * error:.1g} mm; or set task.centre_of_mass_mm"
+        f"{'its parts cross' if mesh.closed else 'it is not closed'}: centroid estimated at ({named}) mm, to"
+        f" {1e3 * error:.1g} mm; or set task.centre_of_mass_mm"
     )
     return *mesh.notes, note
 
