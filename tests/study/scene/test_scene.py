@@ -66,7 +66,7 @@ WRONG_LINES = [
     ("[gripper]\ntilt_stiffness_nm_per_rad = 1\n[effects]\nsheet = 'elastic'", 12, "gripper.tilt_stiffness_nm_per_rad",
      "1.0", ""),
     ("[task]\nweight_direction = [0, 0, 0]", 12, "task.weight_direction", "[0, 0, 0]", ""),
-    ("[task]\ndrive = 'fixed'", 11, "task.weight_direction", "worst", ""),
+    ("[task]\ndrive = 'fixed'", 11, "task.weight_direction", '"worst"', ""),
     ("[petsc]\nsnes_max_it = 9", 12, "petsc.snes_max_it", "9", ""),
     ("[petsc]\ncontact_snes_view = 'ascii:/tmp/a'", 12, "petsc.contact_snes_view", '"ascii:/tmp/a"', ""),
     ("[petsc]\ncontact_pc_python_type = 'a.b'", 12, "petsc.contact_pc_python_type", '"a.b"', ""),
