@@ -7,6 +7,7 @@ rest of ``check`` takes.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
@@ -137,12 +138,7 @@ def approach(obj: GapObject, pose: Pose, gripper: Gripper) -> Finger:
     face = _contact_face(size)
     if abs(surface.gap(touch.to_object(face))[0].min()) > NEGLIGIBLE:  # smoothed: met earlier or later
         # A smoothed surface may stand before the old touch, so the pad steps back before it looks again.
-        for step in STEPS_BACK:
-            back = Pose(touch.rotation, touch.origin - step * size[2] * touch.rotation[:, 2])
-            if surface.gap(back.to_object(face))[0].min() > 0.0:
-                break
-        distance = first_touch(surface, back, face, 2 * step * size[2])
-        touch = Pose(touch.rotation, back.origin + distance * touch.rotation[:, 2])
+        touch = _from_behind(surface, touch, face, [step * size[2] for step in STEPS_BACK])
     if isinstance(obj, MeshObject):
         # the smooth surface rounds sharp edges off, and corners pass between the points of the face
         ahead = extremes(touch.to_pad(obj.points), obj.triangles, size[:2])[0]
@@ -163,10 +159,18 @@ def _between_points(surface: GapFunction, touch: Pose, face: FloatArray) -> Pose
         ahead = float(surface.gap(touch.to_object(beside))[0].min())
         if ahead > -0.05 * ROUNDED_OFF:
             break
-        back = Pose(touch.rotation, touch.origin + 4.0 * ahead * touch.rotation[:, 2])
-        distance = first_touch(surface, back, beside, -8.0 * ahead)
-        touch = Pose(touch.rotation, back.origin + distance * touch.rotation[:, 2])
+        touch = _from_behind(surface, touch, beside, [-step * ahead for step in (4.0, 32.0, 256.0)])
     return touch
+
+
+def _from_behind(surface: GapFunction, touch: Pose, points: FloatArray, steps: Sequence[float]) -> Pose:
+    """First touch of points of the face, from the first of the ``steps`` back [m] at which none of them is inside."""
+    for step in steps:
+        back = Pose(touch.rotation, touch.origin - step * touch.rotation[:, 2])
+        if surface.gap(back.to_object(points))[0].min() > 0.0:
+            break
+    distance = first_touch(surface, back, points, 2 * step)
+    return Pose(touch.rotation, back.origin + distance * touch.rotation[:, 2])
 
 
 def touching(obj: GapObject, pose: Pose, size: tuple[float, float, float]) -> Pose:
