@@ -26,6 +26,8 @@ from tests.study.launching import ROOT, launch
 
 DOCS = ROOT / "docs"
 LINK = re.compile(r"\]\(([^)#\s]*)(#[^)\s]*)?\)")
+FOLDER = ROOT / "jobs" / "examples"
+SOLVING = {"first_map": 6 * 2, "planner": 12 * 4 * 3, "stiffer_pad": 0, "lift": 1}  # and the cases in their files
 
 
 @cache
@@ -200,10 +202,6 @@ def test_every_path_that_it_names_exists():
     named = set(re.findall(r"(?<=[`(])((?:jobs|tests|docs|study)/[\w./-]+\.\w+)(?=[`)])", TEXT))
     assert len(named) > 5
     assert not [path for path in sorted(named) if not (ROOT / path).exists()]
-
-
-FOLDER = ROOT / "jobs" / "examples"
-SOLVING = {"first_map": 6 * 2, "planner": 12 * 4 * 3, "stiffer_pad": 0, "lift": 1}  # and the cases in their files
 
 
 def picture(folder, name):

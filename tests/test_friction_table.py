@@ -38,6 +38,11 @@ TABLE = json.loads((Path(__file__).parent / "data" / "friction_table.json").read
 CASES = {case["id"]: case for case in TABLE}
 MODEL = {"ccm": "ccm", "pcm_flat": "pcm", "pcm_projected": "pcm_projected"}
 X_HINT = np.array([0.0, 0.0, 1.0])  # of the contacts of a grasp, to be projected on their tangent planes
+FIELDS = {
+    None: None,
+    "1+0.8*y": lambda r: 1 + 0.8 * r[:, 1],
+    "exp(-((x-0.3)^2+y^2))": lambda r: np.exp(-((r[:, 0] - 0.3) ** 2 + r[:, 1] ** 2)),
+}
 
 
 def maxima(inputs, names, patch=None):
@@ -62,13 +67,6 @@ def wrenches(inputs, _):
     patch, mu = made.build(inputs["patch"]), inputs["mu"]
     patch = replace(patch, centroid=patch.centroid - np.array(inputs["reference_point"], float))
     return {"W": friction_wrench(patch, twists, mu), "H": friction_support(patch, twists, mu)}
-
-
-FIELDS = {
-    None: None,
-    "1+0.8*y": lambda r: 1 + 0.8 * r[:, 1],
-    "exp(-((x-0.3)^2+y^2))": lambda r: np.exp(-((r[:, 0] - 0.3) ** 2 + r[:, 1] ** 2)),
-}
 
 
 def mesh_of(inputs):

@@ -47,6 +47,23 @@ for call in (lambda: sj.press(scene, 0.0, 0.0, 1.0), lambda: sj.run(scene, sys.a
         refused.append(str(error))
 print(json.dumps([sorted(early), found, point.e_n, float(ds.e_n.max()), refused]))
 """
+PACKAGES = ("friction", "lsfit", "scoring", "fem", "study")
+FILES = [path.relative_to(ROOT) for folder in PACKAGES for path in sorted((ROOT / folder).rglob("*.py"))]
+WITH_EXAMPLES = [path for path in FILES if ">>>" in (ROOT / path).read_text(encoding="utf-8")]
+USER = """
+import softjaw as sj
+
+scene = sj.Scene.from_file("bottle.toml").with_values(**{"gripper.shear_modulus_kpa": 60})
+case = sj.press(scene, station=0.067, angle=0.0, force=5.0)
+force: tuple[float, ...] = scene.load.normal_force_n
+e_n: float = case.limits["ccm"].e_n
+error: dict[str, float] = case.errors
+point: float = sj.GraspMap("a.hdf").best(5, by="payload")[0].place[0, 0]
+code: int = sj.run(scene, "a.hdf")
+quality: float = sj.grasp_quality(case.patch, mu=0.8, distance=0.1).quality
+sj.press("x", force=1)
+sj.fit_quartic(case.patch, mu="0.8")
+"""
 
 
 def test_every_name_is_there_for_people_and_for_type_checkers():
@@ -85,11 +102,6 @@ def test_the_example_of_a_name_is_true(name, tmp_path, monkeypatch):
     assert doctest.DocTestRunner().run(example).failed == 0
 
 
-PACKAGES = ("friction", "lsfit", "scoring", "fem", "study")
-FILES = [path.relative_to(ROOT) for folder in PACKAGES for path in sorted((ROOT / folder).rglob("*.py"))]
-WITH_EXAMPLES = [path for path in FILES if ">>>" in (ROOT / path).read_text(encoding="utf-8")]
-
-
 @pytest.mark.parametrize("path", WITH_EXAMPLES, ids=str)
 def test_the_examples_of_a_module_are_true(path):
     """Those of the public names are run above, where the files are that they read."""
@@ -120,22 +132,6 @@ def test_a_run_takes_a_scene_and_a_file_with_its_ending(tmp_path):
         sj.run(sj.Scene.from_file(ROOT / "jobs" / "smoke.toml"), tmp_path / "a.h5")
     with pytest.raises(TypeError, match="Scene"):
         sj.run("smoke.toml", tmp_path / "a.hdf")
-
-
-USER = """
-import softjaw as sj
-
-scene = sj.Scene.from_file("bottle.toml").with_values(**{"gripper.shear_modulus_kpa": 60})
-case = sj.press(scene, station=0.067, angle=0.0, force=5.0)
-force: tuple[float, ...] = scene.load.normal_force_n
-e_n: float = case.limits["ccm"].e_n
-error: dict[str, float] = case.errors
-point: float = sj.GraspMap("a.hdf").best(5, by="payload")[0].place[0, 0]
-code: int = sj.run(scene, "a.hdf")
-quality: float = sj.grasp_quality(case.patch, mu=0.8, distance=0.1).quality
-sj.press("x", force=1)
-sj.fit_quartic(case.patch, mu="0.8")
-"""
 
 
 @pytest.mark.long

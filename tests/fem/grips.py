@@ -19,6 +19,7 @@ from tests.fem.reference import dense, placed
 SIZE = (0.03, 0.02, 0.02)
 COARSE = MeshSize(0.003, 0.005, 0.010)
 FOAM = 24e3  # shear modulus of the pads [Pa]
+e_n = partial(reference.e_n, model="pcm")
 
 
 @cache
@@ -59,9 +60,6 @@ def grip(
 
 def gap_at(at: Pose):
     return placed(can(), at)
-
-
-e_n = partial(reference.e_n, model="pcm")
 
 
 def stirred(problem: WallProblem, rng: np.random.Generator) -> np.ndarray:

@@ -14,6 +14,8 @@ from softjaw.fem.pad.shape import PadShape
 from softjaw.friction.frame import contact_frame, in_frame
 from softjaw.friction.wrench import friction_limits
 
+SIZE, FOAM = (0.050, 0.022, 0.015), material("blatz_ko", 0.040e6)  # of the usual pad
+
 
 def blatz_ko_energy(F, G):
     """``G/2 (I2/I3 + 2 sqrt(I3) - 5)`` in the invariants of C, as Blatz and Ko wrote it."""
@@ -144,9 +146,6 @@ def dense(problem, x=None, values=None):
         problem.tangent(x)
         values = pattern.values
     return csr_matrix((values, pattern.column, pattern.start), shape=(problem.size,) * 2).toarray()
-
-
-SIZE, FOAM = (0.050, 0.022, 0.015), material("blatz_ko", 0.040e6)  # of the usual pad
 
 
 def pad_of(elements=(8, 4, 3), symmetry=(True, True), contact="weighted", element="hex8", law=FOAM, size=SIZE, **more):

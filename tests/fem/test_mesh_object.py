@@ -22,6 +22,10 @@ TILT = np.array([[0, np.sin(0.3), np.cos(0.3)], [0, np.cos(0.3), -np.sin(0.3)], 
 BLOCK = 0.01 * np.array([(x, y, z) for z in (0, 1) for x, y in ((0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2))])
 RING = [(0, 1, 2, 3), (3, 4, 5, 0)]  # of an L-shaped block; the six corners at once are not convex
 SIDES = [(k, (k + 1) % 6, 6 + (k + 1) % 6, 6 + k) for k in range(6)]
+DAMAGED = {  # what tests/fuzz does not make of sound files
+    "junk.stl": b"hello", "empty.stl": b"", "a.step": b"ISO-10303-21;", "c.ply": b"ply\nformat ascii 1.0\n",
+    "b.obj": b"v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "c.obj": b"v 0 0 0\nv 1 0 0\nv 0 1 0\n",
+}  # fmt: skip
 
 
 def ball(level, radii=(RADIUS, RADIUS, RADIUS), centre=(0, 0, 0)):
@@ -157,12 +161,6 @@ def test_faces_that_are_not_convex_are_refused_and_the_unit_is_applied(tmp_path)
     for unit, factor in (("m", 1), ("mm", 1e-3), ("inch", 0.0254), ("cm", 0.01)):
         x, *_ = cleaned(points / factor, triangles, unit)
         assert np.ptp(x[:, 2]) == pytest.approx(np.ptp(points[:, 2]), rel=1e-12)
-
-
-DAMAGED = {  # what tests/fuzz does not make of sound files
-    "junk.stl": b"hello", "empty.stl": b"", "a.step": b"ISO-10303-21;", "c.ply": b"ply\nformat ascii 1.0\n",
-    "b.obj": b"v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "c.obj": b"v 0 0 0\nv 1 0 0\nv 0 1 0\n",
-}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", DAMAGED)

@@ -14,6 +14,12 @@ from softjaw.fem.objects.shapes import EllipticCylinder
 from softjaw.fem.objects.splines import spline_surface
 from softjaw.fem.objects.stacked import Stacked, wall_surface
 
+PROFILE = [
+    (0.0, 0.03), (0.005, 0.033), (0.03, 0.034), (0.06, 0.034), (0.09, 0.034), (0.12, 0.03), (0.15, 0.014),
+    (0.18, 0.013),
+]  # fmt: skip
+HERE = Pose(np.eye(3), np.zeros(3))
+
 
 @pytest.mark.parametrize("order", range(4))
 def test_b_splines_and_their_derivatives(order):
@@ -50,13 +56,6 @@ def test_gentle_corners_between_straight_runs_are_smooth(turn):
     assert np.abs(g - np.maximum(0, np.sin(turn) * (x[:, 2] - 0.04))).max() < min(0.03 * turn, 1e-6) + 1e-15
     assert np.arctan2(normal[:, 2], normal[:, 0]) == pytest.approx(np.clip(turn, 0, turn) / 2, abs=0.51 * turn + 1e-9)
     assert np.abs(hessian[:, [0, 0, 2], [0, 2, 2]]).max() < 1e-3 + 1100 * turn / 1e-2
-
-
-PROFILE = [
-    (0.0, 0.03), (0.005, 0.033), (0.03, 0.034), (0.06, 0.034), (0.09, 0.034), (0.12, 0.03), (0.15, 0.014),
-    (0.18, 0.013),
-]  # fmt: skip
-HERE = Pose(np.eye(3), np.zeros(3))
 
 
 def off_the_wall(body, n=400, far=0.003, heights=(0.012, 0.17)):

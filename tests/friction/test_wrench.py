@@ -27,6 +27,11 @@ from tests import generators as made
 from tests.friction.closed_forms import FORMS, mean_distance
 
 SEEDS = range(1, 21)
+# The same examples on every rank and every day, and no folder of past failures beside the project.
+REPEATABLE = settings(derandomize=True, deadline=None, database=None, max_examples=80)
+COMPONENT = st.floats(-1, 1, width=32)
+ROUNDING = 1e-13
+NAMES = ("S", "F_N", "f_x", "f_y", "tau_z")
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -111,12 +116,6 @@ def test_what_pressing_a_wedge_has_used_is_not_there_for_holding(alpha, left):
     assert (held.f_y, held.tau_z, held.e_n) == pytest.approx((limits.f_y, limits.tau_z, limits.e_n), rel=1e-14)
     turned = limits.less([0.0, 0.0, -0.25 * limits.tau_z])
     assert (turned.tau_z, turned.e_n) == pytest.approx((0.75 * limits.tau_z, 0.75 * limits.e_n), rel=1e-14)
-
-
-# The same examples on every rank and every day, and no folder of past failures beside the project.
-REPEATABLE = settings(derandomize=True, deadline=None, database=None, max_examples=80)
-COMPONENT = st.floats(-1, 1, width=32)
-ROUNDING = 1e-13
 
 
 @st.composite
@@ -259,9 +258,6 @@ def test_at_pure_torque_the_net_force_vanishes(seed):
 
     found = minimize(torque, [0.0, 0.0], jac=True, method="BFGS", options={"gtol": 1e-12})
     assert pure_torque(patch, 1.0) == pytest.approx(found.fun, rel=2e-9)
-
-
-NAMES = ("S", "F_N", "f_x", "f_y", "tau_z")
 
 
 def relative_errors(form, n):

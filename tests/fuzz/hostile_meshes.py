@@ -6,20 +6,6 @@ from tests.fuzz.readers import glb, gltf, gltf_tree, model_3mf, packed
 
 HUGE = 10**12
 DEEP = 40  # doublings: 2^40 bodies
-
-
-def accessors(**changes):
-    return [accessor | changes for accessor in gltf_tree()["accessors"]]
-
-
-def doublings(count=DEEP):
-    """Objects of a 3MF file, each of which has the one before twice."""
-    pair = '<component objectid="{0}"/><component objectid="{0}"/>'
-    return "".join(
-        f'<object id="{i + 1}" type="model"><components>{pair.format(i)}</components></object>' for i in range(1, count)
-    )
-
-
 CIRCLE = (
     '<object id="2" type="model"><components><component objectid="3"/></components></object>'
     '<object id="3" type="model"><components><component objectid="2"/></components></object>'
@@ -39,6 +25,18 @@ LINES = {
     "a.obj": b"v 0 0 0\n" * 3 + b"f " + b"1 2 3 " * 200_000,
     "b.obj": b"mtllib /etc/passwd\n" + b"v 0 0 0\n" * 3 + b"f 1 2 999999999\n",
 }  # fmt: skip
+
+
+def accessors(**changes):
+    return [accessor | changes for accessor in gltf_tree()["accessors"]]
+
+
+def doublings(count=DEEP):
+    """Objects of a 3MF file, each of which has the one before twice."""
+    pair = '<component objectid="{0}"/><component objectid="{0}"/>'
+    return "".join(
+        f'<object id="{i + 1}" type="model"><components>{pair.format(i)}</components></object>' for i in range(1, count)
+    )
 
 
 def hostile():

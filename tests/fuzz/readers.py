@@ -19,17 +19,6 @@ from softjaw.study.patch.patch_reader import Reading
 from softjaw.study.scene import SceneError, load_scene
 from tests.fuzz.edits import BINARY, TEXTUAL
 
-
-class Reader(NamedTuple):
-    """A valid file's name and bytes, the kinds of edits that fit, the reader and the errors it may raise."""
-
-    name: str
-    content: bytes
-    kinds: tuple
-    read: Callable[[Path], Any]
-    errors: tuple = (StudyError,)
-
-
 SCENE = b"""# a study
 [object]
 shape = "revolution"
@@ -58,6 +47,21 @@ TABLE = b"""x_mm,y_mm,z_mm,area_mm2,nx,ny,nz,pressure_kpa
 POINTS = 30.0 * np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]])
 FACES = np.array([[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]])  # octahedron
 ROWS = "".join([*(f"{x:g} {y:g} {z:g}\n" for x, y, z in POINTS), *(f"3 {a} {b} {c}\n" for a, b, c in FACES)])
+BODY_3MF = "<mesh><vertices>{}</vertices><triangles>{}</triangles></mesh>".format(
+    "".join(f'<vertex x="{x:g}" y="{y:g}" z="{z:g}"/>' for x, y, z in POINTS),
+    "".join(f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in FACES),
+)
+_mesh, _metres = (partial(MeshObject.from_file, unit=unit) for unit in ("mm", "m"))
+
+
+class Reader(NamedTuple):
+    """A valid file's name and bytes, the kinds of edits that fit, the reader and the errors it may raise."""
+
+    name: str
+    content: bytes
+    kinds: tuple
+    read: Callable[[Path], Any]
+    errors: tuple = (StudyError,)
 
 
 def stl(binary):
@@ -121,12 +125,6 @@ def glb(**changes):
     return b"glTF" + (2).to_bytes(4, "little") + (12 + len(body)).to_bytes(4, "little") + body
 
 
-BODY_3MF = "<mesh><vertices>{}</vertices><triangles>{}</triangles></mesh>".format(
-    "".join(f'<vertex x="{x:g}" y="{y:g}" z="{z:g}"/>' for x, y, z in POINTS),
-    "".join(f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in FACES),
-)
-
-
 def model_3mf(more="", built=1, head=""):
     """The XML of a 3MF file: the octahedron as object 1, ``more`` objects, and which one is built."""
     space = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
@@ -152,9 +150,6 @@ def _scene(path):
 
 def _patch(path):
     return read_patch(str(path), Reading("mm", "kpa"))
-
-
-_mesh, _metres = (partial(MeshObject.from_file, unit=unit) for unit in ("mm", "m"))
 
 
 def _model(path):

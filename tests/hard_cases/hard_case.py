@@ -23,6 +23,9 @@ FOLDER = Path(__file__).parent
 MAPS = {q.name: q for q in quantities(NEEDS) if q.group == "maps"}
 WHOLE = {"object": ("shape",), "candidates": tuple(WAYS)}  # keys that make a section replace its base's
 CHECKS = {"force_balance": max, "adhesion": max, "penetration": max, "min_det_f": min, "ellipticity": min}
+DATA = tomllib.loads((FOLDER / "cases.toml").read_text())
+BASES: dict[str, Any] = DATA["base"]
+TOLERANCES: dict[str, tuple[float, str]] = {name: (t["value"], t["because"]) for name, t in DATA["tolerance"].items()}
 
 
 @dataclass(frozen=True)
@@ -106,11 +109,6 @@ class Outcome:
     def text(self) -> str:
         some = self.found == "failed" and self.done.any()
         return f"failed, {self.done.sum()} of {self.done.size} solved" if some else self.found
-
-
-DATA = tomllib.loads((FOLDER / "cases.toml").read_text())
-BASES: dict[str, Any] = DATA["base"]
-TOLERANCES: dict[str, tuple[float, str]] = {name: (t["value"], t["because"]) for name, t in DATA["tolerance"].items()}
 
 
 def _source(given: dict[str, Any]) -> Source:

@@ -26,6 +26,17 @@ from tests.study.launching import ROOT, launch
 PNG = b"\x89PNG\r\n\x1a\n"
 JOBS = ROOT / "jobs"
 MOST = 250_000  # bytes of a picture on a page
+PAD = ("gripper.elements=[12, 6, 4]", "accuracy.meshes=1")
+WALL = ("accuracy.wall_element_mm=3",)
+PLACES = ("candidates.stations_mm=[33.8, 68.9, 104, 150]", "load.normal_force_n=[3, 13]")
+COARSE = {  # file: scene and overrides
+    "fig4-curvature": ("fig4-curvature", ("gripper.elements=[8, 12, 4]",)),
+    "fig5-candidate": ("fig5-candidate", (*PAD, *WALL)),
+    "fig7-force-study": ("fig7-force-study", (*PAD, *WALL, "load.normal_force_n=[1, 4, 8, 13]")),
+    "bottle": ("bottle", (*PAD, *WALL, *PLACES)),
+    "bottle, rigid": ("bottle", (*PAD, *PLACES, 'effects.object="rigid"')),
+    "cup": ("cup", (*PAD, *WALL, "candidates.stations_mm=[28, 54, 80]", "load.normal_force_n=[1, 4]")),
+}
 
 
 @pytest.mark.parametrize("figure", FIGURES, ids=lambda f: f.name)
@@ -105,19 +116,6 @@ def test_errors_on_the_paper_s_grid_are_those_of_the_reference():
     assert found["fit_error_ellipsoid"] == pytest.approx(0.003113307368265586, rel=1e-6)
     # the reference's quartic is fitted to the wrenches alone, ours to the motions, too
     assert 0.7 < found["fit_error"] / 0.0003705396009936843 < 1.0
-
-
-PAD = ("gripper.elements=[12, 6, 4]", "accuracy.meshes=1")
-WALL = ("accuracy.wall_element_mm=3",)
-PLACES = ("candidates.stations_mm=[33.8, 68.9, 104, 150]", "load.normal_force_n=[3, 13]")
-COARSE = {  # file: scene and overrides
-    "fig4-curvature": ("fig4-curvature", ("gripper.elements=[8, 12, 4]",)),
-    "fig5-candidate": ("fig5-candidate", (*PAD, *WALL)),
-    "fig7-force-study": ("fig7-force-study", (*PAD, *WALL, "load.normal_force_n=[1, 4, 8, 13]")),
-    "bottle": ("bottle", (*PAD, *WALL, *PLACES)),
-    "bottle, rigid": ("bottle", (*PAD, *PLACES, 'effects.object="rigid"')),
-    "cup": ("cup", (*PAD, *WALL, "candidates.stations_mm=[28, 54, 80]", "load.normal_force_n=[1, 4]")),
-}
 
 
 @pytest.fixture(scope="module")

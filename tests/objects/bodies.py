@@ -9,13 +9,6 @@ import trimesh
 
 SCANS = Path(__file__).parent / "scans"
 AROUND = 64
-
-
-def revolved(outline: Sequence[tuple[float, float]], around: int = AROUND) -> trimesh.Trimesh:
-    """Closed body of revolution about z from points (radius, z) [m] from pole to pole."""
-    return trimesh.creation.revolve(np.array(outline), sections=around)
-
-
 OUTLINE = [  # radius and height of a waisted body [m]
     (0.0, 0.0),
     *((0.028 * np.sin(t), 0.0112 * (1 - np.cos(t))) for t in np.linspace(0.3, np.pi / 2, 6)),
@@ -23,6 +16,11 @@ OUTLINE = [  # radius and height of a waisted body [m]
     *((0.028 * np.cos(t), 0.0988 + 0.0112 * np.sin(t)) for t in np.linspace(0.0, np.pi / 2 - 0.3, 6)),
     (0.0, 0.11),
 ]
+
+
+def revolved(outline: Sequence[tuple[float, float]], around: int = AROUND) -> trimesh.Trimesh:
+    """Closed body of revolution about z from points (radius, z) [m] from pole to pole."""
+    return trimesh.creation.revolve(np.array(outline), sections=around)
 
 
 def outline_body(outline: Sequence[tuple[float, float]] = OUTLINE) -> trimesh.Trimesh:

@@ -23,6 +23,15 @@ from tests.objects.survey import GOAL, TOUCH, by_physics, survey
 
 SEED = 3
 LOW_POLY = [name for name, (kind, _) in bad_meshes(SEED).items() if kind == "low poly"]
+JAWS = Jaws((0.05, 0.022, 0.015), stiffness=8e6, mu=0.8, force=5.0, max_opening=0.085)
+MADE = {
+    "bottle": lambda: hollow_bottle(0.2, 0.033, 0.014, 0.003),
+    "bowl": lambda: hollow_bowl(0.06, 0.004, 0.05),
+    "mug": mug,
+    "banana with holes": lambda: punctured(scan("banana"), 3),
+    "spoiled drill": lambda: spoiled(scan("drill")),
+    **{path.stem[8:]: (lambda name=path.stem: scan(name)) for path in sorted(SCANS.glob("*.stl"))},
+}
 
 
 def test_random_scenes_are_valid_bad_meshes_sixty_and_only_a_pad_behind_the_surface_starts_inside():
@@ -80,17 +89,6 @@ def test_nine_of_ten_errors_are_inside_the_stated_ones_and_these_are_not_far_too
     assert known.mean() > 0.9
     assert (true[known] <= stated[known]).mean() >= 0.9
     assert stated[known].mean() < 6.0 * true[known].mean()  # 2 to 4 on 144 scenes, ten swing
-
-
-JAWS = Jaws((0.05, 0.022, 0.015), stiffness=8e6, mu=0.8, force=5.0, max_opening=0.085)
-MADE = {
-    "bottle": lambda: hollow_bottle(0.2, 0.033, 0.014, 0.003),
-    "bowl": lambda: hollow_bowl(0.06, 0.004, 0.05),
-    "mug": mug,
-    "banana with holes": lambda: punctured(scan("banana"), 3),
-    "spoiled drill": lambda: spoiled(scan("drill")),
-    **{path.stem[8:]: (lambda name=path.stem: scan(name)) for path in sorted(SCANS.glob("*.stl"))},
-}
 
 
 @pytest.mark.parametrize("name", MADE)

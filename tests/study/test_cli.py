@@ -30,6 +30,23 @@ HEAVY = ("mpi4py", "petsc4py", "numba", "skfem", "pyvista", "matplotlib", "scipy
 OUTLINE = "jobs/bottle-rigid.toml"  # a body of revolution: its outline is drawn to be judged
 QUICK = ("--help", "init --help", "check SCENE", f"check {OUTLINE}", f"plan {OUTLINE}", "status FILE", "show FILE",
          "patch jobs/cylinder-pressure.csv --surface full")  # fmt: skip
+EXAMPLES = [
+    line.strip()
+    for made in PARSERS.values()
+    for line in str(made.epilog).splitlines()
+    if line.startswith("  ") and "softjaw " in line
+]
+PRESSURE, SMOKE = (str(ROOT / "jobs" / name) for name in ("cylinder-pressure.csv", "smoke.toml"))
+COMMANDS = {
+    "run": ("run", SMOKE, "-o", "PLACE/x.hdf"),
+    "report": ("report", "FILE", "-o", "PLACE/x.html"),
+    "view: page": ("view", "FILE", "--html", "PLACE/x.html"),
+    "view: picture": ("view", "FILE", "--screenshot", "PLACE/x.png"),
+    "export: vtk": ("export", "FILE", "--format", "vtk", "-o", "PLACE/x.vtm"),
+    "export": ("export", "FILE", "--csv", "-o", "PLACE/x.csv"),
+    "init": ("init", "bottle", "-o", "PLACE/x"),
+    "patch": ("patch", PRESSURE, "-o", "PLACE/x.png"),
+}
 
 
 @pytest.fixture
@@ -68,14 +85,6 @@ def test_petsc_options_belong_to_run_and_have_a_prefix(scene, capsys):
     for words in (["-snes_monitor"], ["1e-3"], ["-contact_snes_rtol", "1", "2"]):
         with pytest.raises(StudyError, match="PETSC_OPTIONS"):
             petsc_overrides(words)
-
-
-EXAMPLES = [
-    line.strip()
-    for made in PARSERS.values()
-    for line in str(made.epilog).splitlines()
-    if line.startswith("  ") and "softjaw " in line
-]
 
 
 @pytest.mark.parametrize("example", EXAMPLES)
@@ -162,19 +171,6 @@ def test_all_ranks_leave_a_wrong_scene_or_a_file_of_others_with_the_same_code(tm
     assert [int(line[5:]) for line in done.stdout.splitlines() if line.startswith("code ")] == [code, code]
     assert done.stderr.count("error: ") == sentences
     assert out.read_text() == "my notes"
-
-
-PRESSURE, SMOKE = (str(ROOT / "jobs" / name) for name in ("cylinder-pressure.csv", "smoke.toml"))
-COMMANDS = {
-    "run": ("run", SMOKE, "-o", "PLACE/x.hdf"),
-    "report": ("report", "FILE", "-o", "PLACE/x.html"),
-    "view: page": ("view", "FILE", "--html", "PLACE/x.html"),
-    "view: picture": ("view", "FILE", "--screenshot", "PLACE/x.png"),
-    "export: vtk": ("export", "FILE", "--format", "vtk", "-o", "PLACE/x.vtm"),
-    "export": ("export", "FILE", "--csv", "-o", "PLACE/x.csv"),
-    "init": ("init", "bottle", "-o", "PLACE/x"),
-    "patch": ("patch", PRESSURE, "-o", "PLACE/x.png"),
-}
 
 
 @pytest.fixture(scope="module")

@@ -26,6 +26,7 @@ WALL = ("object.wall_mm=0.8", "effects.object='nonlinear_shell'", "accuracy.wall
 BOTH = pytest.mark.parametrize("overrides", [(), WALL], ids=["rigid", "wall"])
 ROUGH = ("effects.friction_pressure_coupling='tangential'",)
 OWN, FINER, FINEST = (8, 4, 2), (10, 6, 3), (12, 8, 4)
+PLAIN = Levels("rigid", "rigid", "none")
 
 
 @pytest.fixture(autouse=True)
@@ -246,9 +247,6 @@ def test_a_fourth_mesh_follows_where_the_error_is_above_the_target_no_fifth_and_
     assert 0.0 < change < 0.01
     solver.put_away()
     assert whole(ROUGH)[1].values["maps/closing_error"] > change
-
-
-PLAIN = Levels("rigid", "rigid", "none")
 
 
 @pytest.fixture

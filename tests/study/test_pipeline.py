@@ -26,6 +26,28 @@ CURVED, FLAT, PROJECTED = range(len(MODELS))
 MU = 0.8
 PLATE = 'shape = "plane"\nthickness_mm = 40'
 TILTED = 2 * np.hypot(25e-3 * np.cos(np.pi / 6), 20e-3 * np.sin(np.pi / 6))  # between two tangents of the ellipse
+# Values that are zero up to rounding, with the size that rounding is to be compared with.
+SCALES = {
+    "maps/misalignment": 1.0, "fingers/frame_origin": 0.01, "fingers/pose_origin": 0.01, "fingers/frame_axes": 1.0,
+    "maps/curvature_loss": 1.0, "maps/force_excess": 1.0, "fingers/force_excess": 1.0,
+    "checks/force_balance": 1.0, "checks/adhesion": 1.0, "checks/penetration": 1.0,
+    "checks/complementarity": 1.0, "maps/payload": 1e6,  # known to 3e-3 at worst, by a search that rounding turns
+    **{f"maps/{n}_overestimate{s}": 1.0 for n in ("f_x", "f_y", "tau_z") for s in ("", "_pcm_projected")},
+}  # fmt: skip
+PRESSED_FLAT = """
+import numpy as np
+from softjaw.fem.materials import material
+from softjaw.fem.pad.mesh import Pad
+from softjaw.fem.pad.shape import PadShape
+from softjaw.fem.contact.press import Press
+
+def plane(x):
+    return -x[:, 2], np.tile([0.0, 0.0, -1.0], (len(x), 1)), np.zeros((len(x), 3, 3))
+
+shape = PadShape((0.05, 0.022, 0.015), (4, 4, 2), (1.0, 1.0, 1.0), "hex8")
+[state] = Press(Pad(shape, material("blatz_ko", 4e4), (True, True), "weighted"), plane).load_path([5.0])
+print(state.closing)
+"""
 
 
 @lru_cache(maxsize=64)
@@ -53,16 +75,6 @@ def differing(found, expected, tolerance, scale=None):
         if not name.startswith("work/") and not np.allclose(a, b, rtol=0.0, atol=tolerance * size, equal_nan=True):
             wrong.append(name)
     return wrong
-
-
-# Values that are zero up to rounding, with the size that rounding is to be compared with.
-SCALES = {
-    "maps/misalignment": 1.0, "fingers/frame_origin": 0.01, "fingers/pose_origin": 0.01, "fingers/frame_axes": 1.0,
-    "maps/curvature_loss": 1.0, "maps/force_excess": 1.0, "fingers/force_excess": 1.0,
-    "checks/force_balance": 1.0, "checks/adhesion": 1.0, "checks/penetration": 1.0,
-    "checks/complementarity": 1.0, "maps/payload": 1e6,  # known to 3e-3 at worst, by a search that rounding turns
-    **{f"maps/{n}_overestimate{s}": 1.0 for n in ("f_x", "f_y", "tau_z") for s in ("", "_pcm_projected")},
-}  # fmt: skip
 
 
 def test_on_a_plane_all_models_are_one_and_torques_without_a_force_are_the_largest_unlike_elsewhere():
@@ -288,22 +300,6 @@ def test_where_weighted_gaps_have_no_solution_nodal_ones_are_taken_and_flagged(r
 def test_which_gaps_are_tried(choice, element, walled, rules):
     overrides = [f'accuracy.contact="{choice}"', f'gripper.element="{element}"']
     assert contact_rules(scene_of(OVAL, *overrides), walled) == rules
-
-
-PRESSED_FLAT = """
-import numpy as np
-from softjaw.fem.materials import material
-from softjaw.fem.pad.mesh import Pad
-from softjaw.fem.pad.shape import PadShape
-from softjaw.fem.contact.press import Press
-
-def plane(x):
-    return -x[:, 2], np.tile([0.0, 0.0, -1.0], (len(x), 1)), np.zeros((len(x), 3, 3))
-
-shape = PadShape((0.05, 0.022, 0.015), (4, 4, 2), (1.0, 1.0, 1.0), "hex8")
-[state] = Press(Pad(shape, material("blatz_ko", 4e4), (True, True), "weighted"), plane).load_path([5.0])
-print(state.closing)
-"""
 
 
 @pytest.mark.long

@@ -12,6 +12,7 @@ from tests.fem.reference import OVAL, SIZE
 
 WHOLE = (False, False)
 PARTS = [(True, False), (False, True), (True, True)]
+LENGTH, WIDTH, THICK = SIZE
 
 
 def pressed_patch(symmetry=(True, True), element="hex8", gap=OVAL, elements=(8, 4, 2), force=10.0, contact="weighted"):
@@ -89,9 +90,6 @@ def test_nodal_contact_keeps_force_and_centre(element):
     force = (patch.load[:, None] * patch.normal).sum(axis=0)
     assert force == pytest.approx([0, 0, 10], rel=1e-9, abs=1e-9)
     assert np.abs((patch.load[:, None] * patch.centroid).sum(axis=0)[:2]).max() < 1e-12
-
-
-LENGTH, WIDTH, THICK = 0.050, 0.022, 0.015
 
 
 def patch_of(pressure, n):

@@ -15,6 +15,9 @@ from tests.fem.reference import BALL, FOAM, OVAL, SIZE, pad_of
 
 GLUE = 1e4 * FOAM.young_modulus / SIZE[2]
 CYLINDER = EllipticCylinder(0.025, 0.025, 0.2)
+PLASTIC = BackingPlate(0.001, 2e9, 0.35, (0.02, 0.011))
+X, Y = tuple(np.linspace(-0.025, 0.025, 21)), tuple(np.linspace(-0.011, 0.011, 5))
+WHOLE = (False, False)
 
 
 def beside(shift):
@@ -68,11 +71,6 @@ def test_a_stiff_mount_is_a_rigid_plate_a_soft_one_bears_no_moment_and_a_pad_pre
     aside = [pressed(beside(0.002), 0.5, symmetry=own) for own in ((False, False), (True, False))]
     assert tilt(*aside[1])[0] == pytest.approx(tilt(*aside[0])[0], rel=1e-6)  # fitted to other nodes
     assert aside[1][1].closing == pytest.approx(aside[0][1].closing, rel=1e-9)
-
-
-PLASTIC = BackingPlate(0.001, 2e9, 0.35, (0.02, 0.011))
-X, Y = tuple(np.linspace(-0.025, 0.025, 21)), tuple(np.linspace(-0.011, 0.011, 5))
-WHOLE = (False, False)
 
 
 def wings(modulus):

@@ -19,6 +19,13 @@ from tests.fem.grips import check_tangent, e_n, gap_at, grip, pose, stirred, thi
 FORCES, MU = (0.5, 2.0), 0.4
 FORCE = Control(force=2.0)
 FINE = MeshSize(0.00085, 0.0025, 0.005)
+# An independent prototype with another element library: force [N] and e_n [mm] by thickness and closing [mm].
+PROTOTYPE = {
+    0.3: {1: (0.860, 8.13), 2: (1.927, 8.88), 3: (2.632, 10.30), 4: (2.875, 11.45), 5: (3.263, 11.69)},
+    0.4: {1: (1.050, 8.07), 2: (2.537, 8.66), 3: (4.246, 9.23), 4: (5.730, 9.86), 5: (6.125, 10.84)},
+}
+ROUGH = MeshSize(0.004, 0.008, 0.016)
+SYMMETRIES = [(True, True), (True, False), (False, True), (False, False)]
 
 
 @cache
@@ -142,13 +149,6 @@ def test_a_wall_that_hardly_gives_way_is_a_rigid_object():
         assert e_n(one.fingers[0]) == pytest.approx(e_n(other), rel=5e-4)
 
 
-# An independent prototype with another element library: force [N] and e_n [mm] by thickness and closing [mm].
-PROTOTYPE = {
-    0.3: {1: (0.860, 8.13), 2: (1.927, 8.88), 3: (2.632, 10.30), 4: (2.875, 11.45), 5: (3.263, 11.69)},
-    0.4: {1: (1.050, 8.07), 2: (2.537, 8.66), 3: (4.246, 9.23), 4: (5.730, 9.86), 5: (6.125, 10.84)},
-}
-
-
 @pytest.mark.long
 @pytest.mark.parametrize("thickness", [0.3, 0.4])
 def test_through_the_snap_in_as_an_independent_prototype(thickness):
@@ -164,10 +164,6 @@ def test_through_the_snap_in_as_an_independent_prototype(thickness):
             finger = held._pressed(OnPath(x, F), work, held.solver.seconds)
             assert 1e3 * e_n(finger) == pytest.approx(expected[1], rel=0.01)
     assert work.halvings == 0
-
-
-ROUGH = MeshSize(0.004, 0.008, 0.016)
-SYMMETRIES = [(True, True), (True, False), (False, True), (False, False)]
 
 
 def pressed(coarser=False, allowed=(True, True), thickness=4e-4, z=0.142):

@@ -11,6 +11,9 @@ from softjaw.fem.shell.wall_model import LinearShell, middles
 E, NU, THICKNESS = 2e9, 0.38, 0.02
 RNG = np.random.default_rng(7)
 TURN = Rotation.random(random_state=7).as_matrix()
+INNER = [[0.04, 0.02], [0.18, 0.03], [0.16, 0.08], [0.08, 0.08]]
+CORNERS = [[0, 0], [0.24, 0], [0.24, 0.12], [0, 0.12]]
+RING = [[0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7], [4, 5, 6, 7]]
 
 
 def warped(n=3):
@@ -65,11 +68,6 @@ def test_the_tangent_is_the_derivative_of_the_force_the_mixed_one_with_the_stres
     assert np.abs(one - other).max() < 1e-12 * np.abs(one).max()
     assert np.abs(double - 4 * one).max() < 1e-12 * np.abs(double).max()
     assert np.abs(dense(shell, step, step) - dense(shell, step)).max() == 0
-
-
-INNER = [[0.04, 0.02], [0.18, 0.03], [0.16, 0.08], [0.08, 0.08]]
-CORNERS = [[0, 0], [0.24, 0], [0.24, 0.12], [0, 0.12]]
-RING = [[0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7], [4, 5, 6, 7]]
 
 
 def solved_patch(prescribed):

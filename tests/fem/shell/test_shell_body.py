@@ -23,6 +23,8 @@ COARSE = MeshSize(heights=(0.03, 0.05), around=0.004, along=0.006, coarse=0.012)
 RNG = np.random.default_rng(5)
 PET = wall_material("pet")
 HALF_Y, QUARTER = (False, True), (True, True)
+R, E, F = 0.03, 2e9, 1e-4  # of the middle surface [m], [Pa]; load [N]
+PLANES = [(True, True), (False, True), (True, False), (False, False)]
 
 
 @pytest.mark.parametrize("profile", [FLASK.profile, np.array([[0, 0], [0, 15], [0, 30], [50, 30], [90, 20]]) / 1e3])
@@ -220,10 +222,6 @@ def test_wall_materials():
     assert wall_material("PP").young_modulus == 1.3e9
     assert wall_material("pet", young_modulus=2.8e9) == WallMaterial(2.8e9, 0.38, 57e6)
     assert wall_material(young_modulus=1e9, poisson_ratio=0.4).yield_strength is None
-
-
-R, E, F = 0.03, 2e9, 1e-4  # of the middle surface [m], [Pa]; load [N]
-PLANES = [(True, True), (False, True), (True, False), (False, False)]
 
 
 def tube(thickness, length, nu, around, along, planes, support="free"):

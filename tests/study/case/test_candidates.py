@@ -25,6 +25,10 @@ from tests.study.scenes import NO_COUPLING, OVAL, mesh_of, pose_of, scene_of, te
 TURN = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])  # the object's z is the file's x
 SHIFT = np.array([120.0, -45.0, 30.0])  # mm
 GRID = "stations_mm = [40]\nangles_deg = [0]\n"
+PAD = (0.05, 0.022, 0.015)
+ELLIPSE = OVAL.replace("120", "80")
+TWO_PLACES = text_of(ELLIPSE, "stations_mm = [-5, 10]\nangles_deg = [0, 90]\n", forces="[1, 2]")
+POSES = text_of(ELLIPSE, pose_of() + pose_of(approach=(0, 1, 0)), forces="[1, 2]")
 
 
 @pytest.fixture(scope="module")
@@ -105,12 +109,6 @@ def test_solutions_that_are_kept_hold_no_surface_of_a_mesh(files, monkeypatch):
         assert [surface() for surface in surfaces] == 4 * [None]
     finally:
         gc.enable()
-
-
-PAD = (0.05, 0.022, 0.015)
-ELLIPSE = OVAL.replace("120", "80")
-TWO_PLACES = text_of(ELLIPSE, "stations_mm = [-5, 10]\nangles_deg = [0, 90]\n", forces="[1, 2]")
-POSES = text_of(ELLIPSE, pose_of() + pose_of(approach=(0, 1, 0)), forces="[1, 2]")
 
 
 def states(text, *changes):

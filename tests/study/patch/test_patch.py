@@ -18,6 +18,13 @@ from softjaw.study.patch.patch_reader import Reading
 from tests.generators import cylinder_grid
 from tests.study.launching import ROOT, answer
 
+MU = 0.5
+EXAMPLE = ROOT / "jobs" / "cylinder-pressure.csv"
+SAME = {"rel": 1e-9, "abs": 1e-12}
+PATCH = sj.read_pressure(EXAMPLE)
+FLAT = sj.ContactPatch([[0.01, 0, 0], [-0.01, 0, 0]], [1e-4] * 2, [[0, 0, 1]] * 2, [1e4] * 2)
+OPPOSED = replace(FLAT, normal=np.array([[0, 0, 1.0], [0, 0.3, -1.0]]), pressure=np.array([1e4, 5e3]))
+
 
 def cylinder_mesh(R=0.03, alpha=np.pi / 3, L=0.04, n=15, m=9, triangles=False):
     """Points ``(k, 3)`` and quadrilaterals (or triangles) of a cylinder along x; normals point to +z."""
@@ -57,11 +64,6 @@ def vtk(path, points, cells, on_cells=(), on_points=(), kinds=None):
             data[name] = np.asarray(values)
     grid.save(path, binary=False)
     return path
-
-
-MU = 0.5
-EXAMPLE = ROOT / "jobs" / "cylinder-pressure.csv"
-SAME = {"rel": 1e-9, "abs": 1e-12}
 
 
 def told(*words):
@@ -251,11 +253,6 @@ def test_a_grasp_across_its_line_hangs_on_no_rounding():
             facing(turn, Y)  # the second one looks away, the first one neither way
         with pytest.raises(ValueError, match="each other"):
             facing(turn, [0, 1, -1e-5])
-
-
-PATCH = sj.read_pressure(EXAMPLE)
-FLAT = sj.ContactPatch([[0.01, 0, 0], [-0.01, 0, 0]], [1e-4] * 2, [[0, 0, 1]] * 2, [1e4] * 2)
-OPPOSED = replace(FLAT, normal=np.array([[0, 0, 1.0], [0, 0.3, -1.0]]), pressure=np.array([1e4, 5e3]))
 
 
 def test_they_are_the_numbers_of_the_command_and_do_not_depend_on_the_coordinates():

@@ -24,6 +24,21 @@ from tests.study.scenes import OVAL, text_of, units_of
 SCENE = text_of(f"{OVAL}\nmass_g = 50", stations="[-5, 0]", forces="[1, 2]", elements="[4, 4, 2]")
 PLAIN = ("status", "status --json", "show", "export --csv", "export --json")
 COMMANDS = {line: tuple(line.split()) for line in PLAIN} | {"show --csv": ("show", "--csv", "--force", "1")}
+READ = [  # datasets, and who must notice
+    ("study/e_n/ccm", ["show", "show --csv", "export --csv", "export --json", "compare", "lookup"]),
+    ("study/quality/ccm", ["show", "export --csv", "lookup"]),
+    ("study/status/code", [*COMMANDS, "compare", "lookup"]),
+    ("study/status/message", ["status", "export --csv"]),
+    ("study/fingers/pose_origin", ["export --csv", "export --json"]),
+    ("study/limit_surface/coefficients", ["export --csv", "lookup"]),
+    ("study/derived/force_low", ["show", "lookup"]),
+    ("study/axes/station", [*COMMANDS, "compare", "lookup"]),
+    ("study/axes/normal_force", [*COMMANDS, "compare", "lookup"]),
+    ("study/scene", [*COMMANDS, "compare", "lookup"]),
+    ("study/header", [*COMMANDS, "compare", "lookup"]),
+    ("study/provenance/sessions", ["status", "status --json"]),
+    ("study/checksums/rows", ["show", "lookup"]),
+]
 
 
 @pytest.fixture(scope="module")
@@ -148,23 +163,6 @@ def test_damage_anywhere_is_refused_or_changes_no_number(copy, answers, spoil, c
         copy.write_bytes(sound)
     assert refused >= count or spoil is not flipped  # most of these hit what somebody reads
     assert dict(answers(copy)) == expected
-
-
-READ = [  # datasets, and who must notice
-    ("study/e_n/ccm", ["show", "show --csv", "export --csv", "export --json", "compare", "lookup"]),
-    ("study/quality/ccm", ["show", "export --csv", "lookup"]),
-    ("study/status/code", [*COMMANDS, "compare", "lookup"]),
-    ("study/status/message", ["status", "export --csv"]),
-    ("study/fingers/pose_origin", ["export --csv", "export --json"]),
-    ("study/limit_surface/coefficients", ["export --csv", "lookup"]),
-    ("study/derived/force_low", ["show", "lookup"]),
-    ("study/axes/station", [*COMMANDS, "compare", "lookup"]),
-    ("study/axes/normal_force", [*COMMANDS, "compare", "lookup"]),
-    ("study/scene", [*COMMANDS, "compare", "lookup"]),
-    ("study/header", [*COMMANDS, "compare", "lookup"]),
-    ("study/provenance/sessions", ["status", "status --json"]),
-    ("study/checksums/rows", ["show", "lookup"]),
-]
 
 
 @pytest.mark.parametrize(("name", "readers"), READ)

@@ -22,6 +22,8 @@ from tests.study.scenes import pose_of
 
 FORCES = np.array([1.0, 5.0])
 WIDE = ("mass", "wall", "two meshes")
+WALL = '[object]\nshape = "box"\nsize_mm = [300, 40, 300]\nedge_radius_mm = 2\n[gripper]\npreset = "franka_hand"\n'
+WALL += "[load]\nnormal_force_n = [1, 5]\n" + "".join(pose_of((x, 0, 0), (0, 1, 0), (1, 0, 0)) for x in (0, 140))
 
 
 def study(quality, flags=0.0, labels=None, status=DONE, needs=()):
@@ -227,10 +229,6 @@ def test_grasps_less_than_half_a_pad_apart_share_a_line_unless_they_are_rolled()
     assert [(place.best, place.near, place.images) for place in places] == [(0, [1], []), (2, [], []), (3, [], [])]
     assert places[0].within == pytest.approx(0.02, rel=1e-9)
     assert len(distinct(ds, order, np.array([5.0, 4, 3, 2]), 0, top=2)) == 2
-
-
-WALL = '[object]\nshape = "box"\nsize_mm = [300, 40, 300]\nedge_radius_mm = 2\n[gripper]\npreset = "franka_hand"\n'
-WALL += "[load]\nnormal_force_n = [1, 5]\n" + "".join(pose_of((x, 0, 0), (0, 1, 0), (1, 0, 0)) for x in (0, 140))
 
 
 @pytest.mark.parametrize(("scene", "order"), [(WALL, [1.0, 0.0]), (WALL.replace("preset", "# preset"), [0.0, 1.0])])
