@@ -15,9 +15,8 @@ from softjaw.study.result.store import open_result
 from softjaw.study.scene import SceneError, load_scene, parse_scene
 from tests.fuzz.lies import LIES
 from tests.fuzz.readers import QUICK, obj, ply, stl
-from tests.study.formula_results import make
+from tests.study.formula_results import make, sealed
 from tests.study.launching import softjaw
-from tests.study.sealing import sealed
 
 BALL = '[object]\nshape = "sphere"\nradius_mm = 30\n[candidates]\nstations_mm = [0]\n[load]\nnormal_force_n = [2]\n'
 MESH = BALL.replace('shape = "sphere"\nradius_mm = 30', 'shape = "mesh"\nmesh = "FILE"\nunit = "mm"')

@@ -29,8 +29,8 @@ from softjaw.study.show.report.verdict import plain_report
 from softjaw.study.show.view.model import View, quantity_of, view_of
 from softjaw.study.show.view.object3d import object_block, payload
 from softjaw.study.show.view.pads import corners_of, pads_of
+from tests.study.formula_results import sealed
 from tests.study.scenes import mesh_of, text_of
-from tests.study.sealing import sealed
 from tests.study.view_files import CLOSING, FAILED, GRID, PRESSURE, SIZE, make, quality
 
 RING = 0.14181  # circumference of an ellipse with semi-axes 25 and 20 mm [m]

@@ -11,8 +11,7 @@ from softjaw.study.messages import OTHER_FILE
 from softjaw.study.quantities import DONE, FAILED, MISSING
 from softjaw.study.show import watch as view
 from softjaw.study.show.watch import INTERRUPTED, file_look, watch
-from tests.study.formula_results import grid_axes, make
-from tests.study.sealing import sealed
+from tests.study.formula_results import grid_axes, make, sealed
 
 SIZE = 4 * 6 * 4  # cases of the file
 
