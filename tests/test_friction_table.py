@@ -30,7 +30,7 @@ from softjaw.scoring.epsilon import epsilon
 from softjaw.scoring.pose import pose_volume
 from softjaw.scoring.quality import score
 from tests import generators as made
-from tests.lsfit.test_zhou import as_they_are, objective
+from tests.lsfit.test_span import as_they_are, objective
 from tests.oracles import body_volume, least_squares_quartic
 from tests.scoring.grasps import contact_axes
 

@@ -1,13 +1,14 @@
-"""The exact limit surface of a few points: its volume in closed form."""
+"""The exact limit surface: its measures, and of a few points its volume in closed form."""
 
 from itertools import combinations
 
 import numpy as np
 import pytest
 
-from softjaw.friction.wrench import friction_wrench
+from softjaw.friction.wrench import friction_limits, friction_wrench
 from softjaw.lsfit.body import ExactSurface, hull_volume
-from tests.generators import points_patch
+from tests.generators import disc_polar, points_patch
+from tests.oracles import body_volume, samples
 
 
 def body_of(patch, rho, count):
@@ -82,3 +83,16 @@ def test_the_volume_is_that_of_the_sum_of_the_points_discs(points, count):
         body, V = body_of(patch, 2.0, 2000), sum_volume(discs(patch, 2.0), 60)
         assert body.volume == pytest.approx(V, rel=2e-2 if points < 5 else 4e-3)
         assert hull_volume(body.samples()) < V * (1 + 1e-6)
+
+
+def test_the_exact_surface_has_the_measures_of_its_samples_and_that_of_one_face_is_flat():
+    patch = disc_polar(1, 20, 48)
+    body = body_of(patch, 2.0, 2000)
+    limits = np.array(friction_limits(patch, 1.0).per_unit_force) / [1, 1, 2]
+    np.testing.assert_allclose(body.semi_axes, limits, rtol=1e-12)
+    assert body.shadow_area == pytest.approx(np.pi, rel=1e-12)
+    finer = body_volume(samples(patch, 2000)[0], samples(patch, 8000)[0])
+    assert body.volume == pytest.approx(finer, rel=2e-4)
+    body = body_of(points_patch([[0, 0]], [2.0]), 2.0, 500)
+    assert (body.rank, body.volume) == (2, 0)
+    assert body.shadow_area == pytest.approx(np.pi, rel=1e-12)

@@ -10,7 +10,6 @@ from scipy.optimize import brentq
 
 from softjaw.friction.wrench import friction_limits
 from softjaw.lsfit import sos
-from softjaw.lsfit.body import ExactSurface
 from softjaw.lsfit.ellipsoid import Ellipsoid, axis_aligned_ellipsoid, full_ellipsoid
 from softjaw.lsfit.form import directions
 from softjaw.lsfit.quartic_fit import convex_quartic
@@ -187,20 +186,3 @@ def test_quartics_of_other_dimensions_are_certified(d):
     surface = wrenches_alone(W)[0]
     a, b = (u * surface.radius(u)[:, None] for u in np.random.default_rng(d).normal(size=(2, 300, d)))
     assert surface.holds((a + b) / 2).all()
-
-
-def exact(patch, count=2000):
-    return ExactSurface(lambda t: samples(patch, rho=2.0, twist=t / [1, 1, 2.0])[0], count=count)
-
-
-def test_the_exact_surface_has_the_measures_of_its_samples_and_that_of_one_face_is_flat():
-    patch = disc_polar(1, 20, 48)
-    body = exact(patch)
-    limits = np.array(friction_limits(patch, 1.0).per_unit_force) / [1, 1, 2]
-    np.testing.assert_allclose(body.semi_axes, limits, rtol=1e-12)
-    assert body.shadow_area == pytest.approx(np.pi, rel=1e-12)
-    finer = body_volume(samples(patch, 2000)[0], samples(patch, 8000)[0])
-    assert body.volume == pytest.approx(finer, rel=2e-4)
-    body = exact(points_patch([[0, 0]], [2.0]), count=500)
-    assert (body.rank, body.volume) == (2, 0)
-    assert body.shadow_area == pytest.approx(np.pi, rel=1e-12)
