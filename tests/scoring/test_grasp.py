@@ -10,25 +10,21 @@ from softjaw.scoring.contact import PolytopeBody, SoftContact, fibonacci_vertice
 from softjaw.scoring.pose import pose_volume
 from softjaw.scoring.quality import ScoreFlag, grasp_score, score
 from tests.scoring import grasps
+from tests.scoring.test_decisions import LENGTHS, A, pair
 
-A, B = (0.8, 0.6, 0.015), (0.5, 0.9, 0.025)
-LENGTHS = 0.2, 0.05
-
-
-def facing(angle=0.0, bodies=(A, B), d=0.06):
-    return grasps.facing(*bodies, d, angle)
+B = (0.5, 0.9, 0.025)
 
 
 def test_facing_contacts_score_as_in_closed_form_turned_ones_are_searched_and_tilted_ones_go_on_from_them():
-    exact, values = score(A, B, 0.06, *LENGTHS), grasp_score(facing(), *LENGTHS)
+    exact, values = score(A, B, 0.06, *LENGTHS), grasp_score(pair(A, B), *LENGTHS)
     assert values.method == "antipodal"
     names = ("quality", "quality_l1", "epsilon", "epsilon_l1")
     np.testing.assert_allclose([getattr(values, n) for n in names], [getattr(exact, n) for n in names], rtol=1e-12)
-    beside = grasp_score(facing(), *LENGTHS, centre_of_mass=(0.01, 0, 0))
+    beside = grasp_score(pair(A, B), *LENGTHS, centre_of_mass=(0.01, 0, 0))
     a, b = (np.divide(axes, [1, 1, LENGTHS[1]]) for axes in (A, B))
     closed = [epsilon(a, b, -0.04 / LENGTHS[0], 0.02 / LENGTHS[0]) for epsilon in (epsilon_linf, epsilon_l1)]
     np.testing.assert_allclose([beside.epsilon, beside.epsilon_l1], closed, rtol=1e-12)
-    one, two = facing()
+    one, two = pair(A, B)
     x, y, N = two.axes
     turned, back = (SoftContact(two.position, np.array([x + s * y, y - s * x, 2**0.5 * N]) / 2**0.5, two.body)
                     for s in (1, -1))  # fmt: skip
@@ -39,15 +35,15 @@ def test_facing_contacts_score_as_in_closed_form_turned_ones_are_searched_and_ti
         assert 0 < found.epsilon < 1
         scores.append(found.epsilon)
     assert scores[0] == pytest.approx(scores[1], rel=1e-4)  # mirror images; to the tolerance of the search
-    inside, outside = (grasp_score(facing(angle), *LENGTHS, with_epsilon=False) for angle in (0.9e-4, 1.1e-4))
+    inside, outside = (grasp_score(pair(A, B, angle), *LENGTHS, with_epsilon=False) for angle in (0.9e-4, 1.1e-4))
     assert (inside.method, outside.method) == ("antipodal", "pose")
     for found in (inside, outside):
         assert found.quality == pytest.approx(exact.quality, rel=2e-7)
         assert found.quality_l1 == pytest.approx(exact.quality_l1, rel=2e-7)
         assert math.isnan(found.epsilon)
-    far = grasp_score(facing(0.3), *LENGTHS, with_epsilon=False)
-    assert (far.quality, far.quality_l1, far.error) == pose_volume(*facing(0.3), *LENGTHS)
-    one, _ = facing(0.2, bodies=(fibonacci_vertices(A, 50), B))
+    far = grasp_score(pair(A, B, 0.3), *LENGTHS, with_epsilon=False)
+    assert (far.quality, far.quality_l1, far.error) == pose_volume(*pair(A, B, 0.3), *LENGTHS)
+    one, _ = pair(fibonacci_vertices(A, 50), B, 0.2)
     C = one.wrench_map(*LENGTHS, centre_of_mass=(0.1, 0.2, 0.3))
     wrenches = np.vstack([np.zeros(6), np.column_stack([np.ones(50), one.body.vertices]) @ C.T])
     u = np.random.default_rng(0).normal(size=(30, 6))
