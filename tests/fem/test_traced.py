@@ -215,14 +215,8 @@ def bent(radius=0.018, bend=0.15, angle=1.0, around=48, along=80):
     middle = np.column_stack([bend * (np.cos(t) - 1), 0 * t, bend * np.sin(t)])
     out = np.column_stack([np.cos(t), 0 * t, np.sin(t)])
     points = middle[:, None] + radius * (np.cos(ring)[:, None] * out[:, None] + np.sin(ring)[:, None] * [0, 1, 0])
-    i, j = np.meshgrid(np.arange(along - 1), np.arange(around), indexing="ij")
-    a, b = (i * around + j).ravel(), (i * around + (j + 1) % around).ravel()
-    sides = np.concatenate([np.stack([a, b, a + around], 1), np.stack([b, b + around, a + around], 1)])
-    ends = [np.stack([np.full(around - 2, s), s + np.arange(1, around - 1), s + np.arange(2, around)], 1)
-            for s in (0, (along - 1) * around)]  # fmt: skip
-    mesh = trimesh.Trimesh(points.reshape(-1, 3), np.concatenate([sides, ends[0][:, ::-1], ends[1]]), process=False)
-    mesh.fix_normals()
-    return np.asarray(mesh.vertices), np.asarray(mesh.faces, dtype=np.int64)
+    mesh = grid_mesh(points)
+    return mesh.points, mesh.triangles
 
 
 def test_the_line_of_a_bent_tube_is_its_arc_and_no_handle_or_cavity_pulls_it_aside():

@@ -117,20 +117,11 @@ def test_grid_lines_are_fine_where_asked_miss_no_step_of_the_thickness_and_value
     assert np.einsum("ni,nik->nk", N, at[nodes]) == pytest.approx(expected, rel=1e-12, abs=1e-12)
 
 
-def pinched(symmetry, support="standing", surface="flask"):
-    """One newton of each of two forces towards the axis at angles 0 and pi."""
-    mesh = body_mesh(SURFACES[surface], 4e-4, COARSE, symmetry, base_thickness=1e-3)
-    body = supported(mesh, PET, support)
-    load = np.zeros((len(mesh.X), 6))
-    j = np.abs(mesh.s - mesh.surface.station(0.04)).argmin()
-    for angle, towards in ((0.0, -1.0), (np.pi, 1.0)):
-        i = np.abs(mesh.theta - angle).argmin()
-        if abs(mesh.theta[i] - angle) < 1e-6:
-            load[mesh.number[i, j], [0, 3]] = towards * (0.5 if symmetry[1] else 1.0)
-    return mesh, body, load.ravel(), mesh.number[np.abs(mesh.theta).argmin(), j]
+def flask(symmetry, support="standing"):
+    return supported(body_mesh(SURFACES["flask"], 4e-4, COARSE, symmetry, base_thickness=1e-3), PET, support)
 
 
-def reaction(body, q, load=0.0):
+def reaction(body, q, load):
     """Force of the whole body's support and weak springs on it in the equilibrium under ``load``."""
     mesh = body[0].mesh
     held = body[1] & ~mesh.symmetric
@@ -141,7 +132,9 @@ def reaction(body, q, load=0.0):
 
 
 def test_compliance_is_what_single_forces_do():
-    _, body, _, node = pinched(QUARTER)
+    body = flask(QUARTER)
+    mesh = body[0].mesh
+    node = mesh.number[np.abs(mesh.theta).argmin(), np.abs(mesh.s - mesh.surface.station(0.04)).argmin()]
     nodes = np.array([node, node + 1, node + 7])
     linear = LinearShell(*body)
     C = linear.compliance(nodes)
@@ -155,8 +148,8 @@ def test_compliance_is_what_single_forces_do():
 @pytest.mark.parametrize("support", ["free", "standing", "clamped"])
 def test_the_support_carries_what_is_left_over(support):
     """A pull along the axis, spread over the wall: springs, the foot or the bottom hold it."""
-    mesh, body, _, _ = pinched(HALF_Y, support)
-    load = np.zeros((len(mesh.X), 6))
+    body = flask(HALF_Y, support)
+    load = np.zeros((body[0].nodes, 6))
     load[:, 2] = 1e-3 * body[0].node_area / body[0].node_area.sum()
     q = LinearShell(*body).solve(load.ravel())
     assert reaction(body, q, load.ravel()) == pytest.approx([0, 0, -2e-3], rel=1e-5, abs=1e-9)
