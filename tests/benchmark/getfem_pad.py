@@ -25,11 +25,8 @@ def solved(task):
     """Force of the whole pad [N] and mean arm of the pressure [m] at each closing displacement, and what they took."""
     length, width, thickness = task["size"]
     counts = task["elements"]
-    sides = (
-        np.linspace(0, length / 2, counts[0] + 1),
-        np.linspace(0, width / 2, counts[1] + 1),
-        np.linspace(-thickness, 0, counts[2] + 1),
-    )
+    ends = (0, length / 2), (0, width / 2), (-thickness, 0)
+    sides = [np.linspace(*end, count + 1) for end, count in zip(ends, counts, strict=True)]
     gf.util_trace_level(0)
     start = time.process_time()
     mesh = gf.Mesh("cartesian", *sides)

@@ -9,15 +9,13 @@ import numpy as np
 
 from softjaw.fem.contact.press import Press
 from softjaw.fem.materials import material
-from softjaw.fem.objects.gap import Pose
 from softjaw.fem.objects.shapes import EllipticCylinder
-from softjaw.fem.pad.mesh import Pad
-from softjaw.fem.pad.shape import PadShape
-from softjaw.study.case.geometry import Finger, touching
 from tests.benchmark.table import line, title
+from tests.fem import reference
+from tests.fem.reference import SIZE
 
 PYTHON = "/usr/bin/python3"  # sees Debian's python3-getfem
-SIZE, SEMI_AXES, SHEAR = (0.050, 0.022, 0.015), (0.025, 0.0125), 20e3
+SEMI_AXES, SHEAR = (0.025, 0.0125), 20e3
 FORCES = np.linspace(1.25, 10, 8)  # N
 SAME = (48, 24, 12)  # of the whole pad, of which both solve a quarter
 CHEAPER = (((10, 6, 3), "hex8"), ((14, 8, 4), "hex8"), ((20, 10, 6), "hex8"), ((10, 6, 3), "hex27"),
@@ -27,12 +25,9 @@ FINE = ((16, 24, 6), "hex27")
 
 def pressed(elements, element):
     """Closing displacement and mean arm of the pressure at each of `FORCES` [m], iterations, unknowns, CPU time [s]."""
-    cylinder = EllipticCylinder(*SEMI_AXES, 0.2)
-    pose = Pose(np.array([[0, 0, -1.0], [0, 1, 0], [1, 0, 0]]), np.array([-1.0, 0, 0]))
-    finger = Finger(touching(cylinder, pose, SIZE), cylinder)
+    gap = reference.placed(EllipticCylinder(*SEMI_AXES, 0.2), reference.facing(SEMI_AXES[0]))
     start, rule = time.process_time(), {"hex8": "blended", "hex27": "weighted"}[element]
-    pad = Pad(PadShape(SIZE, elements, element=element), material("blatz_ko", SHEAR), (True, True), contact=rule)
-    press = Press(pad, finger.gap)
+    press = Press(reference.pad_of(elements, (True, True), rule, element, material("blatz_ko", SHEAR)), gap)
     states = list(press.load_path(FORCES))
     spent, size = time.process_time() - start, press.problem.size
     press.destroy()

@@ -17,14 +17,13 @@ import numpy as np
 from softjaw.fem import materials as element_kernel
 from softjaw.fem.contact.press import Press
 from softjaw.fem.materials import material
-from softjaw.fem.objects.gap import Pose
 from softjaw.fem.objects.shapes import EllipticCylinder
 from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.pad.shape import PadShape
-from softjaw.study.case.geometry import Finger, touching
 from softjaw.study.doctor import launch_environment
 from tests.benchmark import kernels, other_code, users
 from tests.benchmark.table import fastest, line, title
+from tests.fem import reference
 
 ROOT = Path(__file__).parents[2]
 SIZE = (0.060, 0.030, 0.015)  # pad [m]
@@ -53,11 +52,9 @@ def element_routine() -> None:
 def contact_solve() -> None:
     """Share of a contact solve that is neither factorisation nor its triangular solves."""
     title("Contact solve")
-    cylinder = EllipticCylinder(0.025, 0.025, 0.2)
-    pose = Pose(np.array([[0, 0, -1.0], [0, 1, 0], [1, 0, 0]]), np.array([-1.0, 0, 0]))
-    finger = Finger(touching(cylinder, pose, SIZE), cylinder)
+    gap = reference.placed(EllipticCylinder(0.025, 0.025, 0.2), reference.facing(0.025))
     for elements, forces, goal in (((24, 12, 6), (3.0, 10.0, 30.0), 40), ((48, 24, 12), (3.0,), 25)):
-        press = Press(Pad(PadShape(SIZE, elements), FOAMS[0]), finger.gap)
+        press = Press(Pad(PadShape(SIZE, elements), FOAMS[0]), gap)
         states = list(press.load_path(forces))
         parts = ("total", "factorisation", "assembly")
         total, factor, assembly = (sum(getattr(s.seconds, part) for s in states) for part in parts)

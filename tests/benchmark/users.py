@@ -38,19 +38,12 @@ def rock() -> trimesh.Trimesh:
 
 
 MESHES: dict[str, Callable[[], trimesh.Trimesh]] = {
-    "brick": lambda: box((0.05, 0.04, 0.09)),
-    "hexagonal bar": lambda: cylinder(0.022, 0.1, sections=6),
-    "capsule": lambda: capsule(0.09, 0.02, count=(16, 16)),
-    "low-poly ball": lambda: icosphere(2, 0.03),
-    "tube": lambda: annulus(0.018, 0.026, 0.08, sections=40),
-    "bracket": bracket,
-    "hammer": hammer,
-    "screwdriver": screwdriver,
-    "mug": mug,
-    "bottle": lambda: hollow_bottle(0.18, 0.032, 0.013, 0.003),
-    "rock": rock,
+    "brick": lambda: box((0.05, 0.04, 0.09)), "hexagonal bar": lambda: cylinder(0.022, 0.1, sections=6),
+    "capsule": lambda: capsule(0.09, 0.02, count=(16, 16)), "low-poly ball": lambda: icosphere(2, 0.03),
+    "tube": lambda: annulus(0.018, 0.026, 0.08, sections=40), "bracket": bracket, "hammer": hammer,
+    "screwdriver": screwdriver, "mug": mug, "bottle": lambda: hollow_bottle(0.18, 0.032, 0.013, 0.003), "rock": rock,
     "mustard bottle": lambda: scan("mustard"),
-}
+}  # fmt: skip
 
 
 def every_mesh() -> None:
