@@ -121,12 +121,8 @@ def lcg_patch(seed, N, slope=0.8):
     return _patch(r, 0.01 * (0.5 + a), np.column_stack([sx, sy, 1 + 0 * x]), 2 * p)
 
 
-PATCHES = {
-    f.__name__: f
-    for f in (
-        rect_grid, disc_polar, cylinder_grid, ellcyl_grid, cap_polar, heightfield, wedge, points_patch, lcg_patch,
-    )
-}  # fmt: skip
+MADE = rect_grid, disc_polar, cylinder_grid, ellcyl_grid, cap_polar, heightfield, wedge, points_patch, lcg_patch
+PATCHES = {f.__name__: f for f in MADE}
 
 
 def _ellipse(r, a, b=None):

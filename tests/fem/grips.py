@@ -40,16 +40,9 @@ def pose(theta: float, z: float, radius: float = 0.035) -> Pose:
 
 
 def grip(
-    body: ThinWalled,
-    z: float = 0.075,
-    elements: tuple[int, int, int] = (6, 4, 3),
-    allowed: tuple[bool, bool] = (True, True),
-    level: str = "nonlinear",
-    mesh: MeshSize = COARSE,
-    theta: float = 0.0,
-    radius: float = 0.035,
-    mu: float | None = None,
-) -> Grip:
+    body: ThinWalled, z=0.075, elements=(6, 4, 3), allowed=(True, True), level="nonlinear", mesh=COARSE, theta=0.0,
+    radius=0.035, mu=None,
+) -> Grip:  # fmt: skip
     poses = pose(theta, z, radius), pose(theta + np.pi, z, radius)
     held = grasp(body, poses, allowed)
     model, walls = wall_between(body, held, SIZE, mesh, linear=level == "linear")

@@ -11,18 +11,14 @@ G = 0.020e6
 TWO_TERMS = {"shear_moduli": (1.2e4, 0.8e4), "exponents": (-2.0, 8.0)}
 LAWS = {
     "blatz_ko": (material("blatz_ko", G), lambda F: reference.blatz_ko_energy(F, G)),
-    "hyperfoam": (
-        material("hyperfoam", poisson_ratio=0.3, shear_moduli=[G], exponents=[3.5]),
-        lambda F: reference.hyperfoam_energy(F, 0.3, [G], [3.5]),
-    ),
-    "two-term hyperfoam": (
-        material("hyperfoam", poisson_ratio=0.1, **TWO_TERMS),
-        lambda F: reference.hyperfoam_energy(F, 0.1, *TWO_TERMS.values()),
-    ),
+    "hyperfoam": (material("hyperfoam", poisson_ratio=0.3, shear_moduli=[G], exponents=[3.5]),
+                  lambda F: reference.hyperfoam_energy(F, 0.3, [G], [3.5])),
+    "two-term hyperfoam": (material("hyperfoam", poisson_ratio=0.1, **TWO_TERMS),
+                           lambda F: reference.hyperfoam_energy(F, 0.1, *TWO_TERMS.values())),
     "neo_hookean": (material("neo_hookean", G, 0.4), lambda F: reference.neo_hookean_energy(F, G, 0.4)),
     "nearly incompressible": (material("neo_hookean", G, 0.49), lambda F: reference.neo_hookean_energy(F, G, 0.49)),
     "linear": (material("linear", G, 0.3), lambda F: reference.linear_energy(F, G, 0.3)),
-}
+}  # fmt: skip
 FINITE = [name for name in LAWS if name != "linear"]
 TURN = Rotation.random(random_state=3).as_matrix()
 

@@ -14,16 +14,11 @@ BOTTLE = MM * np.array([
     [140, 12], [150, 12],
 ])  # fmt: skip
 SHAPES = {
-    "plane": Plane(0.02),
-    "sphere": Sphere(0.03),
-    "elliptic cylinder": EllipticCylinder(0.03, 0.012, 0.1),
-    "elliptic stub": EllipticCylinder(0.03, 0.02, 0.008),
-    "box": Box(np.array([0.05, 0.06, 0.07]), 0.008),
-    "sharp box": Box(np.array([0.05, 0.06, 0.07]), 0.0),
-    "bottle": Revolution(BOTTLE),
-    "open tube": Revolution([[0, 0.03], [0.1, 0.03]]),
-    "spindle": Revolution([[0, 0], [0.05, 0.03], [0.1, 0]]),
-}
+    "plane": Plane(0.02), "sphere": Sphere(0.03), "elliptic cylinder": EllipticCylinder(0.03, 0.012, 0.1),
+    "elliptic stub": EllipticCylinder(0.03, 0.02, 0.008), "box": Box(np.array([0.05, 0.06, 0.07]), 0.008),
+    "sharp box": Box(np.array([0.05, 0.06, 0.07]), 0.0), "bottle": Revolution(BOTTLE),
+    "open tube": Revolution([[0, 0.03], [0.1, 0.03]]), "spindle": Revolution([[0, 0], [0.05, 0.03], [0.1, 0]]),
+}  # fmt: skip
 X_AXIS, Z_AXIS = np.array([1.0, 0, 0]), np.array([0, 0, 1.0])
 
 

@@ -58,13 +58,13 @@ def cylinder_torque(a: float, b: float, tm: float, L: float, flat: bool = False)
     return 2 * integral(across, tm)
 
 
-def cap(p: Callable[[float], float], kind: str | None = None, alpha: float = ALPHA, **field: float) -> Form:
+def cap(p: Callable[[float], float], kind="uniform", order=2.0, alpha=ALPHA, **field: float) -> Form:
     """Unit spherical cap with the half angle ``alpha`` and the pressure ``p(t)`` at the polar angle ``t``."""
     S = 2 * pi * integral(lambda t: p(t) * sin(t), alpha)
     F_N = 2 * pi * integral(lambda t: p(t) * sin(t) * cos(t), alpha)
     f = 4 * integral(lambda t: p(t) * sin(t) * ellipe(sin(t) ** 2), alpha)
     tau = 2 * pi * integral(lambda t: p(t) * sin(t) ** 2, alpha)
-    return Form(lambda n: pressed(cap_polar(1, alpha, n, 4 * n), kind or "uniform", **field), S, F_N, f, f, tau)
+    return Form(lambda n: pressed(cap_polar(1, alpha, n, 4 * n), kind, **field), S, F_N, f, f, tau, order)
 
 
 def pressed(patch: ContactPatch, kind: str, **field: float) -> ContactPatch:
@@ -85,21 +85,18 @@ def rectangle(a: float, b: float) -> Form:
 
 def cylinder(model: str, alpha: float = ALPHA, L: float = 2.0) -> Form:
     """Unit cylinder along x."""
-    args = {"R": 1.0, "alpha": alpha, "L": L}
     S, F_N = 2 * alpha * L, 2 * sin(alpha) * L
     curved = model == "ccm"
     tau = cylinder_torque(1, 1, alpha, L, not curved)
-    patch = lambda n: cylinder_grid(**args, nphi=n, nx=n)  # noqa: E731
-    return Form(patch, S, F_N, S, F_N if curved else S, tau, 2.0, model)
+    return Form(lambda n: cylinder_grid(1.0, alpha, L, n, n), S, F_N, S, F_N if curved else S, tau, 2.0, model)
 
 
 def roof(model: str, tilt: float = 0.6, W: float = 1.0, L: float = 2.0) -> Form:
     """Two rectangles that meet in a ridge along x."""
     S, c = 2 * W * L, cos(tilt)
     arm = {"ccm": c * mean_distance(L, 2 * W), "pcm": mean_distance(L, 2 * W * c)}[model]
-    patch = lambda n: wedge(tilt, W, L, n, 2 * n)  # noqa: E731
     f_y = c * S if model == "ccm" else S
-    return Form(patch, S, c * S, S, f_y, arm * S, 2.0, model)
+    return Form(lambda n: wedge(tilt, W, L, n, 2 * n), S, c * S, S, f_y, arm * S, 2.0, model)
 
 
 def ring(R: float) -> Form:
@@ -120,14 +117,8 @@ FORMS = {
     "uniform ellipse": disc(2, 1, "uniform", 1, 2 / 3),
     "line": Form(lambda n: rect_grid(2.0, 1e-9, 2 * n, 1), 2e-9, 2e-9, 2e-9, 2e-9, 2e-9 * 2 / 4),
     "ring": ring(3.0),
-    "cap": cap(lambda t: 1.0),
-    "hemisphere": cap(lambda t: 1.0, alpha=pi / 2),
+    "cap": cap(lambda t: 1.0), "hemisphere": cap(lambda t: 1.0, alpha=pi / 2),
     "cap, pressure by depth": cap(lambda t: 1 - (1 - cos(t)) / DEPTH, "depth", h=DEPTH),
-    "cap, root of the depth": replace(
-        cap(lambda t: math.sqrt(max(0, 1 - (1 - cos(t)) / DEPTH)), "hertzdepth", h=DEPTH), order=1.5
-    ),
-    "cylinder": cylinder("ccm"),
-    "cylinder, flat": cylinder("pcm"),
-    "wedge": roof("ccm"),
-    "wedge, flat": roof("pcm"),
-}
+    "cap, root of the depth": cap(lambda t: math.sqrt(max(0, 1 - (1 - cos(t)) / DEPTH)), "hertzdepth", 1.5, h=DEPTH),
+    "cylinder": cylinder("ccm"), "cylinder, flat": cylinder("pcm"), "wedge": roof("ccm"), "wedge, flat": roof("pcm"),
+}  # fmt: skip

@@ -49,21 +49,14 @@ def handle(sections: int = 24) -> Mesh:
 
 
 def bottle(around: int = 32) -> Mesh:
-    return revolved(
-        [(0, 0), (0.03, 0), (0.03, 0.1), (0.026, 0.12), (0.013, 0.14), (0.013, 0.15), (0.013, 0.17), (0, 0.17)], around,
-    )
+    neck = [(0.026, 0.12), (0.013, 0.14), (0.013, 0.15), (0.013, 0.17), (0, 0.17)]
+    return revolved([(0, 0), (0.03, 0), (0.03, 0.1), *neck], around)
 
 
 SHAPES: dict[str, Maker] = {
-    "box": lambda: box((0.05, 0.04, 0.09)),
-    "plate": lambda: box((0.12, 0.008, 0.09)),
-    "L": letter,
-    "bottle": bottle,
-    "mug": mug,
-    "bowl": lambda: hollow_bowl(0.04, 0.004, 0.035),
-    "hammer": hammer,
-    "handle": handle,
-}
+    "box": lambda: box((0.05, 0.04, 0.09)), "plate": lambda: box((0.12, 0.008, 0.09)), "L": letter, "bottle": bottle,
+    "mug": mug, "bowl": lambda: hollow_bowl(0.04, 0.004, 0.035), "hammer": hammer, "handle": handle,
+}  # fmt: skip
 
 
 def soup(mesh: Mesh, seed: int = 0) -> Mesh:
@@ -153,13 +146,11 @@ def of(change: Callable[..., Mesh], names: str, **options) -> dict[str, Maker]:
 
 def crossing() -> dict[str, Maker]:
     return {
-        "hammer": hammer,
-        "mug": mug,
-        "handle": handle,
+        "hammer": hammer, "mug": mug, "handle": handle,
         "cross of boxes": lambda: joined(box((0.1, 0.03, 0.03)), box((0.03, 0.028, 0.11)), box((0.04, 0.04, 0.04))),
         "bottle with a ball": lambda: joined(bottle(), moved(icosphere(3, 0.036), z=0.07)),
         "plate with a rod": lambda: joined(SHAPES["plate"](), moved(cylinder(0.01, 0.06, sections=20), turn=90.0)),
-    }
+    }  # fmt: skip
 
 
 def convex_parts() -> dict[str, Maker]:
@@ -195,13 +186,10 @@ def low_poly() -> dict[str, Maker]:
     return {
         **of(lambda mesh: mesh, "box plate L"),
         "wedge": lambda: trimesh.convex.convex_hull([*box((0.05, 0.04, 0.09)).vertices[:5], [0.0, 0.02, 0.03]]),
-        "bottle of 12 sides": lambda: bottle(12),
-        "bottle of 6 sides": lambda: bottle(6),
-        "hammer": lambda: hammer(8),
+        "bottle of 12 sides": lambda: bottle(12), "bottle of 6 sides": lambda: bottle(6), "hammer": lambda: hammer(8),
         "screwdriver": lambda: joined(moved(cylinder(0.014, 0.09, sections=6), z=0.045),
                                       moved(cylinder(0.004, 0.1, sections=6), z=0.13)),
-        "handle": lambda: handle(8),
-        "ball": lambda: icosphere(1, 0.03),
+        "handle": lambda: handle(8), "ball": lambda: icosphere(1, 0.03),
         "can": lambda: cylinder(0.033, 0.1, sections=10),
         "mug": lambda: joined(revolved(tumbler, 10),
                               moved(trimesh.creation.torus(0.025, 0.005, major_sections=10, minor_sections=5),

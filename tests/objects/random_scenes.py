@@ -89,15 +89,11 @@ def forces(rng: np.random.Generator, pads: Table) -> list[float]:
 
 
 def span(body: Table) -> tuple[float, float]:
-    match body["shape"]:
-        case "revolution":
-            return body["profile_mm"][0][0], body["profile_mm"][-1][0]
-        case "sections":
-            return body["sections"][0]["z_mm"], body["sections"][-1]["z_mm"]
-        case "elliptic_cylinder":
-            return -body["length_mm"] / 2, body["length_mm"] / 2
-        case "box":
-            return -body["size_mm"][2] / 2, body["size_mm"][2] / 2
+    match body:
+        case {"profile_mm": [[low, _], *_, [high, _]]} | {"sections": [{"z_mm": low}, *_, {"z_mm": high}]}:
+            return low, high
+        case {"length_mm": length} | {"size_mm": [_, _, length]}:
+            return -length / 2, length / 2
     return -body["radius_mm"], body["radius_mm"]
 
 
