@@ -9,7 +9,7 @@ import pytest
 
 from softjaw.fem.shell.wall_model import LinearShell
 from tests.fem.shell import shell_problems
-from tests.fem.shell.shell_path import follow, load_steps
+from tests.fem.shell.shell_problems import follow, load_steps
 
 TABLES = json.loads((Path(__file__).parents[2] / "data" / "shell_tables.json").read_text(encoding="utf-8"))
 NONLINEAR = {
