@@ -6,6 +6,9 @@ from tests.fuzz.readers import glb, gltf, gltf_tree, model_3mf, packed
 
 HUGE = 10**12
 DEEP = 40  # doublings: 2^40 bodies
+ACCESSORS = {"huge count": {"count": HUGE}, "negative count": {"count": -1}, "far offset": {"byteOffset": HUGE}}
+PLACES = {"other file": "../../../etc/passwd", "absolute": "/etc/passwd", "device": "/dev/zero",
+          "network": "http://127.0.0.1:9/buffer.bin"}  # fmt: skip
 CIRCLE = (
     '<object id="2" type="model"><components><component objectid="3"/></components></object>'
     '<object id="3" type="model"><components><component objectid="2"/></components></object>'
@@ -45,25 +48,17 @@ def hostile():
     twice = [{"children": [i + 1, i + 1]} for i in range(DEEP)] + [{"mesh": 0}]
     fan = [{"children": list(range(1, 5000))}, *({"mesh": 0} for _ in range(4999))]
     files = {
-        "huge count.gltf": gltf(accessors=accessors(count=HUGE)),
+        **{f"{name}.gltf": gltf(accessors=accessors(**change)) for name, change in ACCESSORS.items()},
         "huge count.glb": glb(accessors=accessors(count=HUGE)),
-        "negative count.gltf": gltf(accessors=accessors(count=-1)),
-        "far offset.gltf": gltf(accessors=accessors(byteOffset=HUGE)),
         "long view.glb": glb(bufferViews=[{"buffer": 0, "byteOffset": 0, "byteLength": HUGE}] * 2),
         "sparse.gltf": gltf(accessors=[{"componentType": 5126, "count": 4 * 10**7, "type": "MAT4"}] * 2),
-        "circle.gltf": gltf(nodes=circle),
-        "circle.glb": glb(nodes=circle),
+        "circle.gltf": gltf(nodes=circle), "circle.glb": glb(nodes=circle),
         "itself.gltf": gltf(nodes=[{"mesh": 0, "children": [0]}]),
-        "doublings.gltf": gltf(nodes=twice),
-        "many places.gltf": gltf(nodes=fan),
+        "doublings.gltf": gltf(nodes=twice), "many places.gltf": gltf(nodes=fan),
         "deep.gltf": b'{"asset":' + b"[" * 100_000 + b"]" * 100_000 + b"}",
-        "other file.gltf": gltf(buffers=[{"byteLength": 168, "uri": "../../../etc/passwd"}]),
-        "absolute.gltf": gltf(buffers=[{"byteLength": 168, "uri": "/etc/passwd"}]),
-        "device.gltf": gltf(buffers=[{"byteLength": 168, "uri": "/dev/zero"}]),
-        "network.gltf": gltf(buffers=[{"byteLength": 168, "uri": "http://127.0.0.1:9/buffer.bin"}]),
+        **{f"{name}.gltf": gltf(buffers=[{"byteLength": 168, "uri": uri}]) for name, uri in PLACES.items()},
         "numbers.gltf": json.dumps(gltf_tree()).replace("72", "1e400").encode(),
-        "bomb.3mf": packed(ZEROS),
-        "bombs.3mf": packed(model_3mf(), *[ZEROS[: 50 * 2**20]] * 6),
+        "bomb.3mf": packed(ZEROS), "bombs.3mf": packed(model_3mf(), *[ZEROS[: 50 * 2**20]] * 6),
         "circle.3mf": packed(model_3mf(CIRCLE, 2)),
         "itself.3mf": packed(model_3mf(CIRCLE.replace("3", "2"), 2)),
         "doublings.3mf": packed(model_3mf(doublings(), DEEP)),
@@ -71,5 +66,5 @@ def hostile():
         "other file.3mf": packed(model_3mf(head=FILE).replace(b"30", b"&a;", 1)),
         "empty.3mf": packed(),
         "nested.3mf": packed(model_3mf("<metadata>" * 50_000 + "</metadata>" * 50_000)),
-    }
+    }  # fmt: skip
     return files | LINES

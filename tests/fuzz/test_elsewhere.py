@@ -13,13 +13,12 @@ from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.study.messages import OTHER_FILE, UNPRINTABLE, USAGE, StudyError
 from softjaw.study.result.store import open_result
 from softjaw.study.scene import SceneError, load_scene, parse_scene
-from tests.fuzz.lies import LIES
+from tests.fuzz.lies import LIES, SCENE
 from tests.fuzz.readers import QUICK, obj, ply, stl
 from tests.study.formula_results import make, sealed
 from tests.study.launching import softjaw
 
-BALL = '[object]\nshape = "sphere"\nradius_mm = 30\n[candidates]\nstations_mm = [0]\n[load]\nnormal_force_n = [2]\n'
-MESH = BALL.replace('shape = "sphere"\nradius_mm = 30', 'shape = "mesh"\nmesh = "FILE"\nunit = "mm"')
+MESH = SCENE.replace('shape = "sphere"\nradius_mm = 30', 'shape = "mesh"\nmesh = "FILE"\nunit = "mm"')
 TABLE = QUICK["table"].content
 
 
@@ -76,15 +75,15 @@ def test_a_mesh_elsewhere_is_read_and_its_place_is_shown_and_kept(tmp_path):
 @pytest.mark.parametrize("name", ["\\u001b[2J", "\\u009b2J", "a\\nb", "\\u202e", "\\u2028"])
 def test_names_hold_no_orders_for_a_terminal(name):
     with pytest.raises(SceneError, match="name"):
-        parse_scene(BALL.replace("[object]", f'[object]\nname = "{name}"'))
+        parse_scene(SCENE.replace("[object]", f'[object]\nname = "{name}"'))
 
 
 def test_nothing_of_a_scene_is_run():
     for option in ("contact_snes_python_type", "contact_ksp_view", "options_file"):
         with pytest.raises(SceneError):
-            parse_scene(BALL + f'[petsc]\n{option} = "python:os.system"\n')
+            parse_scene(SCENE + f'[petsc]\n{option} = "python:os.system"\n')
     with pytest.raises(SceneError, match="found"):
-        parse_scene(BALL.replace("30", "__import__('os')"))
+        parse_scene(SCENE.replace("30", "__import__('os')"))
 
 
 @pytest.mark.parametrize(("old", "new", "words"), [

@@ -24,21 +24,15 @@ from tests.study.scenes import OVAL, text_of, units_of
 SCENE = text_of(f"{OVAL}\nmass_g = 50", stations="[-5, 0]", forces="[1, 2]", elements="[4, 4, 2]")
 PLAIN = ("status", "status --json", "show", "export --csv", "export --json")
 COMMANDS = {line: tuple(line.split()) for line in PLAIN} | {"show --csv": ("show", "--csv", "--force", "1")}
+EVERY = (*COMMANDS, "compare", "lookup")
 READ = [  # datasets, and who must notice
-    ("study/e_n/ccm", ["show", "show --csv", "export --csv", "export --json", "compare", "lookup"]),
-    ("study/quality/ccm", ["show", "export --csv", "lookup"]),
-    ("study/status/code", [*COMMANDS, "compare", "lookup"]),
-    ("study/status/message", ["status", "export --csv"]),
-    ("study/fingers/pose_origin", ["export --csv", "export --json"]),
-    ("study/limit_surface/coefficients", ["export --csv", "lookup"]),
-    ("study/derived/force_low", ["show", "lookup"]),
-    ("study/axes/station", [*COMMANDS, "compare", "lookup"]),
-    ("study/axes/normal_force", [*COMMANDS, "compare", "lookup"]),
-    ("study/scene", [*COMMANDS, "compare", "lookup"]),
-    ("study/header", [*COMMANDS, "compare", "lookup"]),
-    ("study/provenance/sessions", ["status", "status --json"]),
-    ("study/checksums/rows", ["show", "lookup"]),
-]
+    ("e_n/ccm", ["show", "show --csv", "export --csv", "export --json", "compare", "lookup"]),
+    ("quality/ccm", ["show", "export --csv", "lookup"]), ("status/message", ["status", "export --csv"]),
+    ("fingers/pose_origin", ["export --csv", "export --json"]), ("derived/force_low", ["show", "lookup"]),
+    ("limit_surface/coefficients", ["export --csv", "lookup"]), ("checksums/rows", ["show", "lookup"]),
+    ("provenance/sessions", ["status", "status --json"]),
+    *((name, EVERY) for name in ("status/code", "axes/station", "axes/normal_force", "scene", "header")),
+]  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -86,7 +80,7 @@ def answers(whole, tmp_path, capfd):
         maps = [(name, found.at(station=-0.005, angle=0, force=1).value(name)) for name in sorted(found.quantities)]
         return 0, f"{point} {maps} {point.semi_axes()} {point.coefficients()}"
 
-    def ask(path, readers=(*COMMANDS, "compare", "lookup")):
+    def ask(path, readers=EVERY):
         for name in readers:
             if name == "lookup":
                 yield name, looked_up(path)
@@ -167,7 +161,7 @@ def test_damage_anywhere_is_refused_or_changes_no_number(copy, answers, spoil, c
 
 @pytest.mark.parametrize(("name", "readers"), READ)
 def test_whoever_reads_a_damaged_dataset_refuses(copy, answers, name, readers):
-    offset, length = data_blocks(copy)[name]
+    offset, length = data_blocks(copy)[f"study/{name}"]
     flip(copy, offset + min(3, length - 1), 5)
     all_refuse(copy, answers, readers)
 
