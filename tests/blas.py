@@ -8,12 +8,8 @@ import ctypes
 import importlib
 from pathlib import Path
 
-NEEDS = {
-    "Nehalem": {"sse4_2"},
-    "Haswell": {"avx2", "fma"},
-    "Zen": {"avx2", "fma"},
-    "SkylakeX": {"avx512f", "avx512dq", "avx512bw", "avx512vl"},
-}
+NEEDS = {"Nehalem": {"sse4_2"}, "Haswell": {"avx2", "fma"}, "Zen": {"avx2", "fma"},
+         "SkylakeX": {"avx512f", "avx512dq", "avx512bw", "avx512vl"}}  # fmt: skip
 # Builds of OpenBLAS without a kernel run that of an older CPU instead; scipy's has none for Zen.
 STANDS_IN = {"Zen": "Haswell"}
 NAMES = [f"{prefix}openblas_get_corename{suffix}" for prefix in ("", "scipy_") for suffix in ("", "64_")]

@@ -20,10 +20,9 @@ ALLOWED = {
     "scoring": {"softjaw.scoring", "clarabel"} | NUMERICS,
     "fem": {"softjaw.fem", "softjaw.friction", "skfem", "petsc4py", "pyvista", "trimesh", "vtkmodules"} | NUMERICS,
     "study": {"h5py", "jinja2", "matplotlib", "mpi4py", "plotly", "pydantic", "pydantic_core", "pyvista", "rich"}
-    | {"vtkmodules", "xarray", "threadpoolctl", "trimesh", "(computed)"}
+    | {"vtkmodules", "xarray", "threadpoolctl", "trimesh", "(computed)", *(f"softjaw.{name}" for name in OWN)}
     | NUMERICS,
 }
-ALLOWED["study"] |= {f"softjaw.{name}" for name in OWN}
 PICTURES = {"fem/objects/triangles.py", "study/show/view/solids.py"}
 DOORS = {
     "petsc4py": {"fem/petsc.py"},

@@ -24,13 +24,11 @@ from tests.fem.grips import can, e_n, grip, thin
 FLASK = Path(__file__).parents[2] / "jobs" / "objects" / "flask.stl"
 RNG = np.random.default_rng(8)
 BOTTLE = Revolution(np.array([[0, 30], [30, 30], [60, 30], [75, 29], [90, 22], [105, 14], [115, 12], [135, 12]]) / 1e3)
-LEANING = of_sections(
-    [
-        Section(0.0, 0.030, 0.022), Section(0.03, 0.032, 0.022, 2.2, (0.001, 0.0)),
-        Section(0.06, 0.031, 0.023, 2.4, (0.003, 0.001)), Section(0.09, 0.027, 0.022, 2.1, (0.006, 0.002)),
-        Section(0.12, 0.025, 0.022, 2.0, (0.010, 0.002)),
-    ]
-)
+LEANING = of_sections([
+    Section(0.0, 0.030, 0.022), Section(0.03, 0.032, 0.022, 2.2, (0.001, 0.0)),
+    Section(0.06, 0.031, 0.023, 2.4, (0.003, 0.001)), Section(0.09, 0.027, 0.022, 2.1, (0.006, 0.002)),
+    Section(0.12, 0.025, 0.022, 2.0, (0.010, 0.002)),
+])  # fmt: skip
 
 
 def grid_mesh(points):

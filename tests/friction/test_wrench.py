@@ -15,14 +15,7 @@ from scipy.special import ellipe
 from softjaw.friction import wrench
 from softjaw.friction.motion import SLIDE_X, SLIDE_Y, fibonacci_twists
 from softjaw.friction.patch import ContactPatch
-from softjaw.friction.wrench import (
-    friction_discs,
-    friction_limits,
-    friction_sums,
-    friction_support,
-    friction_wrench,
-    pure_torque,
-)
+from softjaw.friction.wrench import friction_limits, friction_support, friction_wrench, pure_torque
 from tests import generators as made
 from tests.friction.closed_forms import FORMS, mean_distance
 
@@ -40,7 +33,7 @@ def test_the_compiled_kernel_is_the_textbook_formula(seed):
     twist = np.vstack([np.random.default_rng(seed).normal(size=(20, 6)), np.eye(6)])
     columns = patch.centroid.T.copy(), patch.normal.T.copy(), patch.load
     out = np.empty((len(twist), 7))
-    friction_sums(*columns, twist, out)
+    wrench.friction_sums(*columns, twist, out)
     expected = made.friction_sums_reference(*columns, twist)
     np.testing.assert_allclose(out, expected, rtol=0, atol=1e-12 * patch.load.sum())
 
@@ -99,7 +92,7 @@ def test_the_largest_force_lies_along_the_ridge_of_a_wedge_and_in_every_directio
     (lambda p: friction_wrench(p, [[1, 0, 0, 0]], 0.5), "twist has shape"),
     (lambda p: friction_wrench(p, [[np.inf, 0, 1]], 0.5), r"twist\[0\] is .*omega = 0"),
     (lambda p: friction_wrench(p, SLIDE_X, -0.5), "mu is -0.5"), (lambda p: friction_limits(p, np.nan), "mu is nan"),
-    (lambda p: wrench.pure_torque(p, -0.5), "mu is -0.5"),
+    (lambda p: pure_torque(p, -0.5), "mu is -0.5"),
 ])  # fmt: skip
 def test_bad_arguments_are_named(call, match):
     with pytest.raises(ValueError, match=match):
@@ -156,7 +149,7 @@ def test_friction_dissipates_and_no_other_motion_gets_more_out_of_it(patch, twis
 @REPEATABLE
 @given(patches(), arrays(float, (4, 3), elements=COMPONENT))
 def test_the_limit_surface_is_a_sum_of_discs_in_the_planes_of_the_faces(model, patch, twist):
-    parts = np.einsum("mc,nkc->mnk", twist, friction_discs(patch, 0.6, model).reshape(-1, 2, 3))
+    parts = np.einsum("mc,nkc->mnk", twist, wrench.friction_discs(patch, 0.6, model).reshape(-1, 2, 3))
     size = patch.load.sum() * max(1.0, np.abs(patch.centroid).max()) * max(1.0, np.abs(twist).max())
     H = friction_support(patch, twist, 0.6, model)
     np.testing.assert_allclose(np.linalg.norm(parts, axis=2).sum(axis=1), H, rtol=0, atol=1e-13 * size)

@@ -118,13 +118,10 @@ def rounded_box():
 
 
 SURFACES = {
-    "ellipsoid": Ellipsoid.of_axes(AXES),
-    "tilted": Ellipsoid.of_matrix(tilted_matrix()),
-    "squared": squared(tilted_matrix()),
-    "fourth powers": fourth_powers(),
-    "rounded box": rounded_box(),
+    "ellipsoid": Ellipsoid.of_axes(AXES), "tilted": Ellipsoid.of_matrix(tilted_matrix()),
+    "squared": squared(tilted_matrix()), "fourth powers": fourth_powers(), "rounded box": rounded_box(),
     "image": rounded_box().mapped(np.random.default_rng(5).normal(size=(3, 3))),
-}
+}  # fmt: skip
 FLAT = {
     "ellipsoid": Ellipsoid.of_axes([1.0, 0.0, 0.2]),
     "tilted": Ellipsoid(np.array([[1.0, 0.0], [0.2, 0.0], [0.0, 0.3]])),

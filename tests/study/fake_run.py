@@ -35,7 +35,7 @@ class FakeUnit:
     finest: tuple = ()
 
 
-def fake_plan(digest="scene", stations=6, derived=True, wide=-1, rounds=(), apart=False, shift=0):
+def fake_plan(digest="scene", stations=6, wide=-1, rounds=(), apart=False, shift=0):
     """Stations x two angles x three forces; both angles of an even station are one unit, one of them is too wide."""
     from softjaw.study.quantities import WIDE, Axis, Quantity
     from softjaw.study.result.layout import Header, Layout
@@ -47,7 +47,7 @@ def fake_plan(digest="scene", stations=6, derived=True, wide=-1, rounds=(), apar
         Axis("angle", np.array([0, np.pi / 2]), "rad", "angle about the object's axis"),
         Axis("normal_force", np.array([1.0, 2.0, 5.0]), "N", "normal force per finger"),
     )
-    slope = (Quantity("slope", ("station",), "m/N", "slope", "e_n over force", "derived"),) if derived else ()
+    slope = Quantity("slope", ("station",), "m/N", "slope", "e_n over force", "derived")
     units = []
     for s, place in enumerate(places):
         # Named by what a study without rounds would call it, or by a number far from these.
@@ -59,7 +59,7 @@ def fake_plan(digest="scene", stations=6, derived=True, wide=-1, rounds=(), apar
             units.append(FakeUnit(len(units), served, float(1 + name % 3), first, apart, *no_grasp))
     labels = tuple(f"candidate {i}" for i in range(2 * len(places)))
     header = Header(digest, "a = 1\n", "fake", "fake.toml", labels=labels)
-    return Plan(Layout(axes, FACES, derived=slope, rounds=rounds), header, tuple(units))
+    return Plan(Layout(axes, FACES, derived=(slope,), rounds=rounds), header, tuple(units))
 
 
 def fake_growth(digest, stations, work):

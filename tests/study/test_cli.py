@@ -38,15 +38,13 @@ EXAMPLES = [
 ]
 PRESSURE, SMOKE = (str(ROOT / "jobs" / name) for name in ("cylinder-pressure.csv", "smoke.toml"))
 COMMANDS = {
-    "run": ("run", SMOKE, "-o", "PLACE/x.hdf"),
-    "report": ("report", "FILE", "-o", "PLACE/x.html"),
+    "run": ("run", SMOKE, "-o", "PLACE/x.hdf"), "report": ("report", "FILE", "-o", "PLACE/x.html"),
     "view: page": ("view", "FILE", "--html", "PLACE/x.html"),
     "view: picture": ("view", "FILE", "--screenshot", "PLACE/x.png"),
     "export: vtk": ("export", "FILE", "--format", "vtk", "-o", "PLACE/x.vtm"),
     "export": ("export", "FILE", "--csv", "-o", "PLACE/x.csv"),
-    "init": ("init", "bottle", "-o", "PLACE/x"),
-    "patch": ("patch", PRESSURE, "-o", "PLACE/x.png"),
-}
+    "init": ("init", "bottle", "-o", "PLACE/x"), "patch": ("patch", PRESSURE, "-o", "PLACE/x.png"),
+}  # fmt: skip
 
 
 @pytest.fixture
@@ -77,10 +75,8 @@ def test_bad_usage_is_code_2_and_names_the_option(words, capsys):
 
 
 def test_petsc_options_belong_to_run_and_have_a_prefix(scene, capsys):
-    assert petsc_overrides(["-contact_ksp_rtol", "-1", "-contact_view"]) == [
-        "petsc.contact_ksp_rtol=-1",
-        "petsc.contact_view=true",
-    ]
+    found = petsc_overrides(["-contact_ksp_rtol", "-1", "-contact_view"])
+    assert found == ["petsc.contact_ksp_rtol=-1", "petsc.contact_view=true"]
     assert main(["check", str(scene), "--", "-contact_snes_monitor"]) == 2
     for words in (["-snes_monitor"], ["1e-3"], ["-contact_snes_rtol", "1", "2"]):
         with pytest.raises(StudyError, match="PETSC_OPTIONS"):

@@ -116,13 +116,9 @@ def test_contacts_that_do_not_face_each_other_are_scored_as_they_stand_and_epsil
             expected = pose_volume(*soft_contacts(values, m), EXTENTS, 0.05, relative_error=1e-6).linf
             assert values["maps/quality"][m] == pytest.approx(expected, rel=1e-4)
         assert np.isnan(values["maps/epsilon"]).all()
-    [near, far] = (cases(OVAL, angles=f"[{a}]")[1] for a in (0, 30))
-    gain = (
-        np.array(far["maps/quality_fitted"])
-        / far["maps/quality"]
-        / (np.array(near["maps/quality_fitted"]) / near["maps/quality"])
-    )
-    assert gain == pytest.approx(1.0, abs=0.05)
+    far, near = (cases(OVAL, angles=f"[{a}]")[1] for a in (30, 0))
+    gains = [np.divide(values["maps/quality_fitted"], values["maps/quality"]) for values in (far, near)]
+    assert np.divide(*gains) == pytest.approx(1.0, abs=0.05)
     # The pose enters by ellipsoids near the quartics; the division of the quartics' own surfaces is exact to 1e-4.
     [values] = cases(OVAL, angles="[30]", forces="[5]")
     contacts = list(soft_contacts(values, CURVED))

@@ -38,12 +38,8 @@ def patch(force):
     x, y = np.meshgrid(u * SIZE[0], v * SIZE[1], indexing="ij")
     centroid = np.stack([x, y, np.zeros(GRID)], axis=-1).reshape(-1, 3)
     middle = (np.abs(x) < 0.25 * SIZE[0]) & (np.abs(y) < 0.25 * SIZE[1])
-    one = {
-        "pressure": np.where(middle, PRESSURE * force, 0.0).ravel(),
-        "area": np.full(len(centroid), SIZE[0] * SIZE[1] / len(centroid)),
-        "centroid": centroid,
-        "normal": np.broadcast_to([0.0, 0.0, 1.0], centroid.shape),
-    }
+    one = {"centroid": centroid, "normal": np.broadcast_to([0.0, 0.0, 1.0], centroid.shape)}
+    one |= {"pressure": np.where(middle, PRESSURE * force, 0.0).ravel(), "area": np.full(16, SIZE[0] * SIZE[1] / 16)}
     return {name: np.stack([values, values]) for name, values in one.items()}
 
 

@@ -76,12 +76,8 @@ def test_stations_of_a_bent_mesh_follow_its_centre_line(tmp_path):
 
 
 def test_axes_end_with_station_angle_and_force_in_si_units_and_poses_are_numbered():
-    over = [
-        "sweep.object.semi_axis_b_mm=[40, 10, 20]",
-        "sweep.gripper.material=['linear', 'blatz_ko']",
-        "sweep.friction.mu=[0.5]",
-    ]
-    axes = candidates.axes(parse_scene(CYLINDER, overrides=over))
+    over = "object.semi_axis_b_mm=[40, 10, 20]", "gripper.material=['linear', 'blatz_ko']", "friction.mu=[0.5]"
+    axes = candidates.axes(parse_scene(CYLINDER, overrides=[f"sweep.{change}" for change in over]))
     assert [a.name for a in axes] == ["semi_axis_b", "material", "mu", "station", "angle", "normal_force"]
     assert [a.units for a in axes] == ["m", "", "", "m", "rad", "N"]
     assert axes[0].values.tolist() == [0.01, 0.02, 0.04]
