@@ -52,8 +52,7 @@ def powers(**coefficients):
 BALL = powers(xxxx=1, yyyy=1, zzzz=1, xxyy=2, xxzz=2, yyzz=2)
 LCG, DISC = samples(lcg_patch(3, 50), 100), samples(disc_polar(1, 20, 48), 100)
 ONE, TWO = (samples(points_patch(*points), 100) for points in (([[0, 0]], [2.0]), ([[-1, 0], [1, 0]], [1, 1])))
-FIVE, TEN = ((x[:: 100 // n][:n] for x in LCG) for n in (5, 10))
-FIVE, TEN = tuple(FIVE), tuple(TEN)
+FIVE, TEN = (tuple(x[:: 100 // n][:n] for x in LCG) for n in (5, 10))
 HYPERBOLOID = np.array(
     [[np.hypot(1, z) * np.cos(p), np.hypot(1, z) * np.sin(p), z] for p in np.arange(12.0) for z in (-0.5, 0, 0.5)]
 )

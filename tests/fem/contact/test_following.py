@@ -66,13 +66,9 @@ def test_tangent_of_the_path_by_finite_differences(symmetry, control):
     """Of states at forces 1 % lower and higher, whose nodes in contact are the same."""
     press = press_of(symmetry=symmetry)
     low, state, high = press.load_path([19.8, 20.0, 20.2])
-    problem, work = press.problem, Work()
-    x = state.unknowns
-    if control == "closing":
-        x = press._stepping.solve(x * (1 + 1e-9), Control(closing=state.closing), work)
-    else:
-        x = press._stepping.solve(x * (1 + 1e-9), Control(force=20.0), work)
-    tangent = problem.path_tangent(x, press.solver.answer)
+    wanted = Control(closing=state.closing) if control == "closing" else Control(force=20.0)
+    x = press._stepping.solve(state.unknowns * (1 + 1e-9), wanted, Work())
+    tangent = press.problem.path_tangent(x, press.solver.answer)
     np.testing.assert_allclose(tangent, (high.unknowns - low.unknowns) / 0.4, atol=2e-3 * np.abs(tangent).max())
 
 
