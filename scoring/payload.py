@@ -151,14 +151,14 @@ def _worst(grasp: _Grasp, gap: float) -> Payload:
     extent = np.linalg.svd(points[:8] - points[:8].mean(axis=0), compute_uv=False)
     lower = 0.0
     if extent[-1] > ROUNDING_FORCE and upper > ROUNDING_FORCE:
-        n, whole = 8, False
-        while not whole:  # rounding may break the hull of a set that is thin: it is made anew from its points
+        n, convex = 8, False
+        while not convex:  # rounding may break the hull of a set that is thin: it is made anew from its points
             hull = ConvexHull(points[:n])
             corners = hull.simplices.astype(np.int64)  # in no order round their facets
             inward = np.einsum("fi,fi->f", _planes(points, corners)[:, :3], hull.equations[:, :3]) < 0
             corners[inward] = corners[inward, ::-1]
-            before, (lower, upper, u, n, whole) = n, _refined(*search, n, corners, hull.equations, upper, u, gap)
-            whole |= n == before
+            before, (lower, upper, u, n, convex) = n, _refined(*search, n, corners, hull.equations, upper, u, gap)
+            convex |= n == before
     force = min(lower, upper) if lower > ROUNDING_FORCE else 0.0
     return Payload(force, max(upper, 0.0), -u, upper >= -ROUNDING_FORCE)
 
@@ -234,9 +234,9 @@ def _refined(C, A1, A2, kind, rows, points, bases, n, corners, planes, upper, u,
         plane = planes[nearest]
         # a point that the hull has already ends the search: along its nearest facet both bounds are the same
         known = (plane == before).all() or n == len(points)
-        whole = len(planes) == 2 * len(np.unique(corners)) - 4  # Euler's formula, of triangles
-        if known or not whole or upper < ROUNDING_FORCE or -plane[3] >= upper * (1.0 - gap):
-            return -plane[3], upper, u, n, whole
+        convex = len(planes) == 2 * len(np.unique(corners)) - 4  # Euler's formula, of triangles
+        if known or not convex or upper < ROUNDING_FORCE or -plane[3] >= upper * (1.0 - gap):
+            return -plane[3], upper, u, n, convex
         # a programme that did not fill its rows says nothing of the support
         before, basis, along = plane, bases[corners[nearest, 0]], plane[:3].copy().reshape(1, 3)
         upper, u = _looked(C, A1, A2, kind, rows, points, bases, along, basis, n, np.inf, upper, u)

@@ -54,14 +54,14 @@ class Problem:
     file: str
     line: int | None
     key: str
-    found: str
+    value: str
     expected: str
     remedy: str
 
     def __str__(self) -> str:
         place = self.file if self.line is None else f"{self.file}:{self.line}"
         key, remedy = f" {self.key}:" if self.key else "", f"; {self.remedy}" if self.remedy else ""
-        return f"{place}:{key} found {self.found}, expected {self.expected}{remedy}"
+        return f"{place}:{key} found {self.value}, expected {self.expected}{remedy}"
 
 
 def printable(text: str) -> str:

@@ -211,15 +211,15 @@ def _csv_cell(value: Any) -> Any:
     return value
 
 
-def aligned(heads: Sequence[str], rows: Iterable[Sequence[str]], left: Sequence[int] = ()) -> list[str]:
-    """Lines of a table; cells and heads may have several lines, columns numbered in ``left`` begin at the left.
+def aligned(heads: Sequence[str], rows: Iterable[Sequence[str]], left_aligned: Sequence[int] = ()) -> list[str]:
+    """Lines of a table; cells and heads may have several lines, columns numbered in ``left_aligned`` begin at the left.
 
-    >>> aligned(["a", "b"], [["1", "bc"], ["23", "d"]], left=[1])
+    >>> aligned(["a", "b"], [["1", "bc"], ["23", "d"]], left_aligned=[1])
     [' a  b', ' 1  bc', '23  d']
     """
     grid = Grid(box=None, pad_edge=False, padding=(0, GAP, 0, 0))
     for i, head in enumerate(heads):
-        grid.add_column(head, justify="left" if i in left else "right", no_wrap=True)
+        grid.add_column(head, justify="left" if i in left_aligned else "right", no_wrap=True)
     for row in rows:
         grid.add_row(*row)
     # Much wider than any table, so that nothing is cut; who prints it decides on the width.

@@ -141,7 +141,7 @@ class BodyMesh(ShellMesh):
 
     @property
     def foot(self) -> IntArray:
-        """Nodes that a body standing on a table touches it with: the rim of its flat bottom."""
+        """Nodes by which a body touches a table: the rim of its flat bottom."""
         return np.unique(self.number[:, np.abs(self.s - self.surface.flat[0]).argmin()])
 
     def locate(self, t: FloatArray, p: FloatArray) -> tuple[IntArray, FloatArray]:

@@ -37,14 +37,14 @@ def height_fields(points, triangles, x, y):
     for t in range(len(triangles)):
         p, q, r = triangles[t, 0], triangles[t, 1], triangles[t, 2]
         ax, bx, cx, ay, by, cy = points[p, 0], points[q, 0], points[r, 0], points[p, 1], points[q, 1], points[r, 1]
-        left, right, near, far = min(ax, bx, cx), max(ax, bx, cx), min(ay, by, cy), max(ay, by, cy)
-        if right < x[0] or left > x[-1] or far < y[0] or near > y[-1]:
+        x_min, x_max, y_min, y_max = min(ax, bx, cx), max(ax, bx, cx), min(ay, by, cy), max(ay, by, cy)
+        if x_max < x[0] or x_min > x[-1] or y_max < y[0] or y_min > y[-1]:
             continue
         area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
         if area == 0.0:  # seen from its edge: its neighbours have the line
             continue
-        first, last = max(0, math.ceil((left - x[0]) / dx)), min(m - 1, math.floor((right - x[0]) / dx))
-        start, stop = max(0, math.ceil((near - y[0]) / dy)), min(n - 1, math.floor((far - y[0]) / dy))
+        first, last = max(0, math.ceil((x_min - x[0]) / dx)), min(m - 1, math.floor((x_max - x[0]) / dx))
+        start, stop = max(0, math.ceil((y_min - y[0]) / dy)), min(n - 1, math.floor((y_max - y[0]) / dy))
         for i in range(first, last + 1):
             for j in range(start, stop + 1):
                 u = ((bx - x[i]) * (cy - y[j]) - (by - y[j]) * (cx - x[i])) / area

@@ -238,7 +238,7 @@ class Session:
             name = self._solve_share(claims)
         except StudyError as error:
             if self._comm.size > 1:
-                # no rank can go on; the first to notice speaks
+                # no rank can continue; the first to notice speaks
                 self._comm.Abort(complain(error, claims.first_to_speak()))
             with contextlib.suppress(OSError, RuntimeError):  # where it could not be written, it may not be closed
                 self._files.close()

@@ -159,7 +159,7 @@ def outcome_of(made_scene: Callable[[], Scene], begin_only: bool = False) -> Out
         made = units(scene)
         check_candidates(scene)
     except SceneError as error:
-        told = (f"{p.key}: found {p.found}, expected {p.expected}; {p.remedy}" for p in error.problems)
+        told = (f"{p.key}: found {p.value}, expected {p.expected}; {p.remedy}" for p in error.problems)
         return Outcome("\n".join(told))
     except StudyError as error:
         return Outcome(error.message)

@@ -38,7 +38,7 @@ def test_keys_of_the_scene_come_first_and_a_preset_may_stand_on_the_command_line
         with pytest.raises(SceneError) as error:
             loaded(tmp_path, "franka_hand", more=f"pad_thickness_mm = {thickness}")
         (problem,) = error.value.problems
-        assert (problem.line, problem.key, problem.found) == (6, "gripper.pad_thickness_mm", thickness)
+        assert (problem.line, problem.key, problem.value) == (6, "gripper.pad_thickness_mm", thickness)
         assert problem.expected.startswith("less than 40 mm")
     scene = Scene.from_file(ROOT / "jobs" / "smoke.toml", ["gripper.preset=wsg50", "load.normal_force_n=[5, 10]"])
     assert scene.gripper.max_opening_mm == 100

@@ -84,7 +84,7 @@ WRONG_LINES = [
 def test_a_wrong_line_is_named_with_its_key_value_and_remedy(row):
     lines, line, key, found, remedy = row
     p = problem(f"{BALL}\n{lines}\n")
-    assert (p.file, p.line, p.key, p.found) == ("ball.toml", line, key, found)
+    assert (p.file, p.line, p.key, p.value) == ("ball.toml", line, key, found)
     assert p.expected
     assert remedy in p.remedy
     assert str(p).startswith(f"ball.toml:{line}: {key}: found {found}, expected {p.expected}")
@@ -114,7 +114,7 @@ WRONG_VALUES = [
 def test_a_wrong_value_is_named_with_its_line_and_key(row):
     old, new, line, key, found = row
     p = problem(BALL.replace(old, new, 1))
-    assert (p.line, p.key, p.found) == (line, key, found)
+    assert (p.line, p.key, p.value) == (line, key, found)
 
 
 NO_TOML = [
@@ -152,7 +152,7 @@ def test_what_is_no_toml_or_makes_no_body_is_named_by_its_line_and_key(text, lin
 ])  # fmt: skip
 def test_an_explicit_pose_must_fix_a_frame(pose, key, found):
     p = problem(BALL.replace("stations_mm = [0]", f"[[candidates.poses]]\n{pose}"))
-    assert (p.key, p.found) == (f"candidates.poses[0].{key}", found)
+    assert (p.key, p.value) == (f"candidates.poses[0].{key}", found)
     assert p.line in (6, 7, 8, 9)
 
 
@@ -185,7 +185,7 @@ def test_a_shape_without_dimensions_lists_all_that_it_needs(shape):
 ])  # fmt: skip
 def test_an_override_is_named_as_a_line_is(override, key, found):
     p = problem(BALL, override)
-    assert (p.file, p.line, p.key, p.found) == (f"--set {override}", None, key, found)
+    assert (p.file, p.line, p.key, p.value) == (f"--set {override}", None, key, found)
     assert problem(BALL, "friction.mu=1\n[x]").line is None  # which a terminal would obey
 
 
@@ -225,7 +225,7 @@ def test_overrides_replace_values_which_are_in_si_units_and_hyperfoam_fills_in_i
     assert parse_scene(BALL, overrides=["sweep.gripper.material=['linear', 'hyperfoam']"]).sweep
     assert scene.with_values(**{"gripper.shear_modulus_kpa": None}).gripper.shear_modulus_kpa == 40
     p = problem(BALL, "gripper.material=hyperfoam", "gripper.terms_kpa=[[-2, 10]]", "gripper.shear_modulus_kpa=40")
-    assert (p.key, p.found) == ("gripper.shear_modulus_kpa", "40.0")
+    assert (p.key, p.value) == ("gripper.shear_modulus_kpa", "40.0")
 
 
 @pytest.mark.parametrize("overrides", [
@@ -241,17 +241,17 @@ def test_combinations_of_a_sweep_that_make_no_scene_are_named_and_too_many_refus
     text = body('shape = "elliptic_cylinder"\nsemi_axis_a_mm = 20')
     text += '[sweep]\n"object.semi_axis_b_mm" = [20, 10]\n"object.length_mm" = [80, 3000]\n'
     p = problem(text)
-    assert (p.key, p.found) == ('sweep."object.length_mm"[1]', "3000")
+    assert (p.key, p.value) == ('sweep."object.length_mm"[1]', "3000")
     assert parse_scene(text.replace("3000", "60")).cases == 8  # 2 x 2 points of the sweep, 2 angles
     p = problem(BALL, "sweep.object.radius_mm=[10, 20]", "candidates.stations_mm=[15]", "object.radius_mm=20")
-    assert (p.key, p.found) == ('sweep."object.radius_mm"[0]', "10")
+    assert (p.key, p.value) == ('sweep."object.radius_mm"[0]', "10")
     # Each value fits the scene alone; together they make elements of 0.2 x 5 mm.
     p = problem(BALL, "sweep.gripper.pad_width_mm=[22, 2]", "sweep.gripper.pad_thickness_mm=[15, 30]")
-    assert (p.key, p.found) == ("sweep", '"gripper.pad_width_mm = 2, gripper.pad_thickness_mm = 30"')
+    assert (p.key, p.value) == ("sweep", '"gripper.pad_width_mm = 2, gripper.pad_thickness_mm = 30"')
     many = "candidates.stations=10000", "candidates.stations_mm=[-30, 30]", f"load.normal_force_n={[*range(1, 60)]}"
-    assert problem(BALL, *many).found == "1180000"
+    assert problem(BALL, *many).value == "1180000"
     swept = [f"sweep.friction.mu={[i / 100 for i in range(101)]}", f"sweep.gripper.pad_width_mm={list(range(15, 115))}"]
-    assert problem(BALL, *swept).found == "10100"
+    assert problem(BALL, *swept).value == "10100"
 
 
 @pytest.mark.parametrize(
