@@ -16,10 +16,10 @@ from collections.abc import Iterator
 import mujoco
 import numpy as np
 
-from softjaw.study.export.mjcf import as_mjcf
 from softjaw.study.export.point_contact import cell
 from softjaw.study.export.rigid_body import RigidBody, body_of
 from softjaw.study.export.selection import GripperFrame, RankedGrasp, grasps
+from softjaw.study.export.simulators import as_mjcf
 from softjaw.study.grippers import Hand
 from softjaw.study.result.read import open as open_result
 

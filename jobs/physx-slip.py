@@ -15,7 +15,6 @@ import numpy as np
 import sapien
 from sapien import physx
 
-from softjaw.study.export.physx import torsional_radius
 from softjaw.study.export.point_contact import RADIUS, PointContact, cell
 from softjaw.study.export.selection import GripperFrame, grasps
 from softjaw.study.grippers import Hand
@@ -39,7 +38,7 @@ def scene(contact: PointContact) -> tuple[sapien.Scene, physx.PhysxRigidDynamicC
     fixed.attach(physx.PhysxCollisionShapeBox([5.0, 5.0, 0.1], material))
     ball, body = sapien.Entity(), physx.PhysxRigidDynamicComponent()
     shape = physx.PhysxCollisionShapeSphere(RADIUS, material)
-    shape.set_min_patch_radius(torsional_radius(contact))
+    shape.set_min_patch_radius(contact.r / contact.mu)
     body.attach(shape)
     for entity, component, height in ((plate, fixed, 0.1), (ball, body, -RADIUS)):
         entity.add_component(component)

@@ -9,12 +9,10 @@ from pathlib import Path
 from softjaw.study.cli.options import GRIPPER, refuse_unused
 from softjaw.study.export.cases import as_csv, as_json
 from softjaw.study.export.data_set import FORMS, solved_files, write_data_set
-from softjaw.study.export.mjcf import as_mjcf
-from softjaw.study.export.physx import as_usd
 from softjaw.study.export.planners import CLOSING, as_graspgen, as_yaml
 from softjaw.study.export.rigid_body import body_of
-from softjaw.study.export.sdf import as_sdf, as_stl
 from softjaw.study.export.selection import GripperFrame, chosen, grasps, usable
+from softjaw.study.export.simulators import as_mjcf, as_sdf, as_stl, as_usd
 from softjaw.study.grippers import Hand, gripper_file
 from softjaw.study.messages import USAGE, StudyError, write_file
 from softjaw.study.ranking import task_keys

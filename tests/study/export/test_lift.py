@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import softjaw as sj
-from softjaw.study.export.mjcf import as_mjcf
 from softjaw.study.export.point_contact import SHARE, carried
 from softjaw.study.export.rigid_body import body_of
 from softjaw.study.export.selection import GripperFrame, grasps
+from softjaw.study.export.simulators import as_mjcf
 from softjaw.study.grippers import Hand
 from softjaw.study.result.read import open as open_result
 from softjaw.study.units import GRAVITY

@@ -10,10 +10,8 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from softjaw.study.export import rigid_body
-from softjaw.study.export.mjcf import as_mjcf, friction, tangents
-from softjaw.study.export.physx import as_usd
 from softjaw.study.export.point_contact import carried, cell
-from softjaw.study.export.sdf import as_sdf, as_stl
+from softjaw.study.export.simulators import as_mjcf, as_sdf, as_stl, as_usd, friction, tangents
 from softjaw.study.messages import StudyError
 from softjaw.study.scene.model import parse_scene
 from tests.study.export.grasp_results import E_N, FORCES, MU_X, MU_Y, all_grasps, body, geometry, slipping, write
