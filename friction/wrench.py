@@ -276,7 +276,11 @@ def pure_torque(patch: ContactPatch, mu: float, model: str = "ccm") -> float:
     mu = checked_mu(mu)
     arm, normal, load = model_faces(patch, model)
     size = 2.0 ** np.frexp(np.abs(arm).max())[1]  # lengths are divided by a power of two, which rounds nothing
-    least = _least_power(arm / size, normal, load, _radius(patch) / size)
+    # centres of rotation outside this radius are worse than the origin: every face costs at least its upright share of
+    # the distance, more than at the origin
+    r, upright = np.linalg.norm(patch.centroid, axis=1), np.abs(patch.normal[:, 2])
+    radius = float(patch.load @ (r * (1 + upright)) / (patch.load @ upright))
+    least = _least_power(arm / size, normal, load, radius / size)
     if math.isnan(least):
         raise ArithmeticError("pure torque not found to 1e-9: the faces of the patch differ too much in size")
     return float(mu * size * least)
@@ -303,10 +307,3 @@ def _least_power(arm, normal, load, radius):
         v = v - (1 + 2 * depth) / 3 * Pg
         P = 4 / 3 * (1 - depth**2) * (P - 2 * (1 + 2 * depth) / (3 * (1 + depth)) * np.outer(Pg, Pg))
     return math.nan
-
-
-def _radius(patch: ContactPatch) -> float:
-    """Radius around the origin that holds every centre of rotation no worse than the origin itself [m]."""
-    r, upright = np.linalg.norm(patch.centroid, axis=1), np.abs(patch.normal[:, 2])
-    # farther out every face costs at least its upright share of the distance, more than at the origin
-    return float(patch.load @ (r * (1 + upright)) / (patch.load @ upright))

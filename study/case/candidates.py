@@ -169,26 +169,14 @@ def _sampler() -> Any:
 
 @dataclass(frozen=True)
 class Unit:
-    """One load path, and the rows that it fills.
+    """One load path, number ``index`` in the order of its first row, and the rows that it fills.
 
-    Attributes
-    ----------
-    index : int
-        Number of the unit, in the order of its first row.
-    scene : Scene
-        The scene with this point of the sweep put in; its own sweep is empty.
-    candidate : Candidate
-        The candidate that is solved.
-    rows : tuple of tuples of int
-        For each candidate served, its rows, one per force, rising.
-    served, turns : tuples
-        The candidates served, ``candidate`` first, and the angle about z that takes ``candidate`` to each [rad].
-    cost : float
-        Work, in element solves; only ratios mean something.
-    state, reason : int, str
-        One of `study.quantities.NO_GRASP` and why, for a candidate that is not solved; else `MISSING`, not computed.
-    finest : tuple of int
-        Finest mesh of each force, as `study.case.solver` numbers them; empty where the scene alone says it.
+    ``scene``: with this point of the sweep put in, and no sweep of its own. ``candidate`` is the one that is solved;
+    ``served`` are those that it serves, itself first, ``turns`` the angles about z that take it to each [rad], and
+    ``rows`` for each its rows, one per force, rising. ``cost``: work, in element solves; only ratios mean something.
+    ``state, reason``: one of `study.quantities.NO_GRASP` and why, for a candidate that is not solved; else `MISSING`,
+    not computed. ``finest``: finest mesh of each force, as `study.case.solver` numbers them; empty where the scene
+    alone says it.
     """
 
     index: int
@@ -253,18 +241,8 @@ def units(scene: Scene) -> list[Unit]:
         for group in groups(places, at_point.axis_symmetry):
             rows = tuple(tuple(range(r, r + forces)) for r in ((point * count + n) * forces for n, _ in group))
             served, turns = tuple(places[n] for n, _ in group), tuple(turn for _, turn in group)
-            work = cost * narrowness(at_point, served[0])
-            made.append(Unit(len(made), at_point, served[0], rows, served, turns, work))
+            made.append(Unit(len(made), at_point, served[0], rows, served, turns, cost))
     return made
-
-
-def narrowness(scene: Scene, place: Candidate) -> float:
-    """How much narrower a bottle is at a place than at its widest: narrow places are pressed deeper, in more steps."""
-    if scene.object.shape != "revolution" or scene.candidates.poses:
-        return 1.0
-    z, r = np.transpose(scene.object.profile)
-    # A tip of no width must not make a candidate infinitely dear.
-    return float(r.max() / max(np.interp(place.station, z, r), 0.1 * r.max()))
 
 
 def path_cost(scene: Scene) -> float:

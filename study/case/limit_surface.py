@@ -84,7 +84,8 @@ def fit_surfaces(
     fits.
     """
     rho, limits = contact.rho, contact.unit_limits[model]
-    twist, wrench = sampled_wrenches(contact, model, fit_motions(samples))
+    twist = fit_motions(samples) / [1.0, 1.0, rho]
+    wrench = friction_wrench(contact.local, twist, 1.0, model)
     W, T = normalised_samples(wrench, twist, limits.S, rho)
     f_x, f_y, tau_z = limits.per_unit_force
     ellipsoid = three_motion_ellipsoid(f_x, f_y, tau_z / rho, 1.0)
@@ -98,12 +99,6 @@ def fit_surfaces(
         claims = overclaim(surface, validation[0]), too_much
         surfaces[kind] = SurfaceFit(rho, surface, certificate, wrench[:samples], *errors, *claims)
     return surfaces
-
-
-def sampled_wrenches(contact: Contact, model: str, motions: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Motions ``(m, 3)`` of a contact, given for one of length 1, and their wrenches ``(m, 6)`` for mu = 1."""
-    twist = motions / [1.0, 1.0, contact.rho]
-    return twist, friction_wrench(contact.local, twist, 1.0, model)
 
 
 @lru_cache(maxsize=8)

@@ -72,7 +72,10 @@ def compare(first: xr.Dataset, second: xr.Dataset, quantity: str = "e_n", model:
 def compare_text(table: Table, top: int = 10, width: int = PAPER) -> str:
     """What differs, in lines of at most ``width`` characters; the ``top`` largest differences (0: all) case by case."""
     facts, quantity = table.facts, str(table.facts["quantity"])
-    lines = [f"{letter}: {file}" for letter, file in facts["files"].items()] + _setting_lines(facts["settings"], width)
+    settings = [{"key": row["key"], **{f: value_text(row[f]) for f in "ab"}} for row in facts["settings"]]
+    heads = [Column("key", label="setting", wrap=width // 2), Column("a"), Column("b")]
+    lines = [f"{letter}: {file}" for letter, file in facts["files"].items()]
+    lines.append(as_text(Table("", heads, settings), width) or "settings: no difference")
     lines.append(f"common cases: {', '.join(f'{n} {words}' for words, n in facts['states'].items() if n)}")
     lines += [wrapped(line, width, more="  ") for name, axis in facts["axes"].items() for line in _left_out(name, axis)]
     columns = [Column("quantity", wrap=30), Column("mean_a", label="mean\na"), Column("mean_b", label="mean\nb"),
@@ -88,12 +91,6 @@ def compare_text(table: Table, top: int = 10, width: int = PAPER) -> str:
     heads = [replace(c, label="b-a\n[%]") if c.name == "relative" else c for c in table.columns]
     cases = replace(table, title=f"{title}the largest first", columns=heads, rows=percent)
     return "\n".join([*lines, "", as_text(summary, width), "", as_text(cases, width)])
-
-
-def _setting_lines(settings: list[Row], width: int) -> list[str]:
-    rows = [{"key": row["key"], **{f: value_text(row[f]) for f in "ab"}} for row in settings]
-    columns = [Column("key", label="setting", wrap=width // 2), Column("a"), Column("b")]
-    return [as_text(Table("", columns, rows), width) or "settings: no difference"]
 
 
 # --- axes ------------------------------------------------------------------------------------------------------------

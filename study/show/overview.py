@@ -19,6 +19,9 @@ def scene_text(scene: Any, file: str) -> str:
         where = f"at {listed([*c.station_values_mm], 'mm')} along the axis, {listed(c.angles_deg, 'deg')} about it"
     size = " x ".join(f"{shown(s, 'm'):g}" for s in g.pad_size)
     mesh = " x ".join(map(str, g.elements))
+    inputs = ", ".join(f"{key} +- {width:g}" for key, width in scene.uncertainty.spread.items())
+    limits = {"auto": "its rank's share of the free memory", "none": "any memory"}
+    memory = limits.get(scene.run.memory_gb) or f"{scene.run.memory_gb:g} GB"
     levels = [f"{key} {value}" for key, value in scene.effects.model_dump().items()]
     rows = {
         "object": f"{o.shape}{name}{_extent(o)}",
@@ -33,10 +36,10 @@ def scene_text(scene: Any, file: str) -> str:
         "refinement": f"at most {c.refine} more cases" if c.refine else "",
         "pad": f"{size} mm, {g.material}, {g.shear_modulus_kpa:g} kPa, {mesh} elements ({g.element})",
         "accuracy": _meshes(listed_accuracy(scene), "those that may be the best" if c.sampled else "every case"),
-        "intervals": _intervals(scene),
+        "intervals": f"from {inputs}; every case is solved {scene.uncertainty.samples} more times" if inputs else "",
         "effects": ", ".join(levels),
         "petsc": " ".join(f"-{key} {value}" for key, value in scene.petsc.items()),
-        "each case": limits_text(scene.run),
+        "each case": f"may take {scene.run.time_limit_s:g} s and {memory}; fails beyond that; the run continues",
     }
     return "\n".join([f"{file}: no errors", *aligned(rows)])
 
@@ -47,20 +50,6 @@ def _meshes(accuracy: Any, which: str) -> str:
         return f"{which} on two meshes" if accuracy.meshes > 1 else "one mesh, no error maps"
     goal = f"{accuracy.target_of} within {100 * accuracy.target:g} %"
     return f"{goal}: {which} on two meshes, on up to {accuracy.most_meshes} where the error asks for it"
-
-
-def limits_text(run: Any) -> str:
-    """What a single case may take before it fails."""
-    limits = {"auto": "its rank's share of the free memory", "none": "any memory"}
-    memory = limits.get(run.memory_gb) or f"{run.memory_gb:g} GB"
-    return f"may take {run.time_limit_s:g} s and {memory}; fails beyond that; the run continues"
-
-
-def _intervals(scene: Any) -> str:
-    """What the uncertainty intervals are made of, and what they take; empty where none are asked for."""
-    spread, samples = scene.uncertainty.spread, scene.uncertainty.samples
-    inputs = ", ".join(f"{key} +- {width:g}" for key, width in spread.items())
-    return f"from {inputs}; every case is solved {samples} more times" if spread else ""
 
 
 def wall_text(shape: Any) -> str:

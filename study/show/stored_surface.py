@@ -81,14 +81,12 @@ def stored_surface(
     unit = planar * np.array([1.0, 1.0, rho]) * SHOWN
     fits = (field(ds, f"limit_surface_{name}") for name in ("coefficients", "matrix"))
     chosen = fitted_surface(*(np.full(1, np.nan) if fit is None else fit[index][finger, m] for fit in fits))
-    exact = exact_surface(_patch(ds, index, finger, faces), model, float(rho)) if faces else None
-    return StoredSurface(unit, ellipsoid, chosen, exact)
-
-
-def _patch(ds: xr.Dataset, index: Index, finger: int, faces: dict[str, np.ndarray]) -> ContactPatch:
+    if not faces:
+        return StoredSurface(unit, ellipsoid, chosen, None)
     origin, R = (ds[f"finger_frame_{name}"].values[index][finger] for name in ("origin", "axes"))
     x, area, normal, p = (faces[name][finger] for name in ("centroid", "area", "normal", "pressure"))
-    return ContactPatch((x - origin) @ R.T, area, normal @ R.T, p)
+    patch = ContactPatch((x - origin) @ R.T, area, normal @ R.T, p)
+    return StoredSurface(unit, ellipsoid, chosen, exact_surface(patch, model, float(rho)))
 
 
 def exact_surface(patch: ContactPatch, model: Any, rho: float) -> ExactSurface:

@@ -73,7 +73,9 @@ def init(options: Namespace, measure: Callable[[Namespace], Measured]) -> str:
         verb = "exist" if existing[1:] else "exists"
         text = f"{' and '.join(existing)}: {verb} already; choose another name with -o, or add --force"
         raise StudyError(CANNOT_WRITE, text)
-    words = {"NAME": base.name, "SOFTJAW": _program()}
+    called = Path(sys.argv[0])  # what a batch job starts; it has no virtual environment
+    program = called.absolute() if called.name == "softjaw" else Path(sys.executable).with_name("softjaw")
+    words = {"NAME": base.name, "SOFTJAW": str(program)}
     mesh, notes = _about_mesh(options, scene, measure) if options.kind == "mesh" else ({}, ())
     for path, template in ((scene, f"{options.kind}.toml"), (batch, "run.sbatch")):
         text = _filled(template, words | mesh)
@@ -99,12 +101,6 @@ def _base(options: Namespace) -> Path:
         text = f"-o: found '{base.name}', expected letters, digits and _ . + -; write a name as in 'bottle-2'"
         raise StudyError(USAGE, text)
     return base
-
-
-def _program() -> str:
-    """The program that a batch job starts; it has no virtual environment."""
-    called = Path(sys.argv[0])
-    return str(called.absolute() if called.name == "softjaw" else Path(sys.executable).with_name("softjaw"))
 
 
 def _filled(template: str, words: dict[str, str]) -> str:

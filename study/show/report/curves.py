@@ -92,16 +92,12 @@ def _models(ds: xr.Dataset, position: int, index: Index, mu: float | None) -> Bl
 
 def differences(ds: xr.Dataset, index: Index) -> list[Block]:
     """Share of the planar models' claims that the curved contact cannot carry, along a sweep of the object's shape."""
-    if (position := shape_axis(ds)) is None or not (lines := overestimates(ds, position, index)):
-        return []
-    return [_differences(ds, name, x, lines, index) for name, x in abscissas(ds, position, index).items()]
-
-
-def shape_axis(ds: xr.Dataset) -> int | None:
-    """The longest axis that sweeps a number of the object."""
     swept = [(len(ds[name]), -p) for p, name in enumerate(ds.status.dims[:-3])
              if ds[name].units and ds[name].long_name.startswith("object.") and len(ds[name]) > 1]  # fmt: skip
-    return -max(swept)[1] if swept else None
+    position = -max(swept, default=(0, 0))[1]  # the longest axis that sweeps a number of the object
+    if not swept or not (lines := overestimates(ds, position, index)):
+        return []
+    return [_differences(ds, name, x, lines, index) for name, x in abscissas(ds, position, index).items()]
 
 
 def overestimates(ds: xr.Dataset, position: int, index: Index) -> dict[tuple[str, str], Any]:
