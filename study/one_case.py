@@ -160,7 +160,12 @@ def solved_case(
     pose: Any = None,
 ) -> Case:
     """Solve one case; arguments and errors as for `softjaw.press`."""
-    _refuse_open_questions(scene)
+    if not isinstance(scene, Scene):
+        raise TypeError(f"scene is {scene!r}: expected a Scene, as Scene.from_file(file) gives")
+    if scene.sweep:
+        key, values = next(iter(scene.sweep.items()))
+        remedy = f"choose a point of it by scene.with_values(**{{{key!r}: {values[0]!r}}})"
+        raise ValueError(f"scene has a sweep of {', '.join(scene.sweep)}, a case has one value of each; {remedy}")
     scene, number = _asked(with_mass(scene.reread()), station, angle, candidate, pose)
     forces, k = _joined(scene.load.normal_force_n, _number("force", force, "N"))
     scene = scene.with_values({"load.normal_force_n": forces})
@@ -192,16 +197,6 @@ def _outcome(unit: Any, k: int, what: str) -> CaseResult:
     if isinstance(result, CaseFailure):
         raise CaseError(f"{what}: {result.message}")
     return result
-
-
-def _refuse_open_questions(scene: Scene) -> None:
-    """A case needs a scene that says all: no sweep."""
-    if not isinstance(scene, Scene):
-        raise TypeError(f"scene is {scene!r}: expected a Scene, as Scene.from_file(file) gives")
-    if scene.sweep:
-        key, values = next(iter(scene.sweep.items()))
-        remedy = f"choose a point of it by scene.with_values(**{{{key!r}: {values[0]!r}}})"
-        raise ValueError(f"scene has a sweep of {', '.join(scene.sweep)}, a case has one value of each; {remedy}")
 
 
 def _asked(

@@ -29,7 +29,7 @@ from softjaw.study.result.layout import Header, Layout, is_case
 from softjaw.study.run.estimate import SCREENED_COST, START_S, estimated, measured_seconds, slowness, unit_seconds
 from softjaw.study.run.progress import duration
 from softjaw.study.run.refine import Rounds, added_cases, refined
-from softjaw.study.run.shares import makespan, sensible_ranks
+from softjaw.study.run.shares import makespan
 from softjaw.study.scene.sections import COARSE, FINEST
 
 # Measured on ten scenes at the end of a run: bytes of a rank with the libraries and compiled loops that it needs, and
@@ -52,12 +52,6 @@ class Plan:
     def tried(self) -> list[Any]:
         """Units that are to be solved."""
         return [unit for unit in self.units if not unit.state]
-
-    def in_parts(self, costs: Sequence[float]) -> list[float]:
-        """Costs of the units that are tried, those of one whose forces ranks may divide as that of each force."""
-        forces = self.layout.shape[-1]
-        each = [forces if unit.apart else 1 for unit in self.tried]
-        return [cost / n for cost, n in zip(costs, each, strict=True) for _ in range(n)]
 
     @property
     def wanted(self) -> np.ndarray | None:
@@ -153,7 +147,7 @@ def gigabytes(size: float, digits: int) -> str:
 def plan_text(plan: Plan, scene: Any, path: Path, ranks: Sequence[int]) -> str:
     """Cases, units and disk, memory on the first of these numbers of ranks, and time on each."""
     layout = plan.layout
-    each, ranks_busy = memory(scene), sensible_ranks(plan.in_parts([unit.cost for unit in plan.tried]))
+    each = memory(scene)
     shared = plan.served - len(plan.units)
     symmetric = f", {shared} candidates are images of others by symmetry" if shared else ""
     shapes = layout.rows * 24 * AROUND * ALONG / 1e6 if "wall" in layout.has else 0.0
@@ -166,7 +160,6 @@ def plan_text(plan: Plan, scene: Any, path: Path, ranks: Sequence[int]) -> str:
         "disk": f"{space}, {free_bytes(path) / 1e9:.1f} GB free",
         "memory": f"roughly {gigabytes(each, 1)} on each rank, {gigabytes(each * ranks[0], 2)} on {ranks[0]}",
         "time": _time(plan, scene, path, ranks),
-        "ranks": f"up to {ranks_busy} are busy at least 80 % of the time",
     }
     return "\n".join(f"  {name:<10}  {text}" for name, text in rows.items() if text)
 
@@ -202,7 +195,8 @@ def _time(plan: Plan, scene: Any, path: Path, ranks: Sequence[int]) -> str:
     if not each:
         (each, by), start = _estimated(plan, scene), START_S
         source = f", half to twice that, estimated {by}; more accurate once a few load paths are in {path}"
-    parts = plan.in_parts(each)
+    counts = [plan.layout.shape[-1] if unit.apart else 1 for unit in plan.tried]  # forces that ranks may divide
+    parts = [cost / n for cost, n in zip(each, counts, strict=True) for _ in range(n)]
     times = (f"{duration(start + makespan(parts, n))} on {n} rank{'s' * (n > 1)}" for n in ranks)
     return f"about {', '.join(times)}{source}"
 

@@ -55,18 +55,6 @@ def makespan(costs: Sequence[float], ranks: int) -> float:
     return float(busy.max())
 
 
-def sensible_ranks(costs: Sequence[float]) -> int:
-    """Largest number of ranks that are busy for at least 80 % of the time.
-
-    >>> sensible_ranks([1.0] * 10)
-    10
-    """
-    total = sum(costs)
-    # Beyond the number of costs no further rank finds work; the other bound keeps this quick.
-    good = [n for n in range(1, min(len(costs), 4096) + 1) if total >= 0.8 * n * makespan(costs, n)]
-    return max(good, default=1)
-
-
 def shares(units: Iterable[Any], codes: np.ndarray, ranks: int) -> list[Share]:
     """What is missing of some units, in the order of work, cut so that so many ranks are busy to the end.
 

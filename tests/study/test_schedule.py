@@ -14,7 +14,7 @@ from softjaw.study.run.estimate import FIRST_FORCE_FACTOR, estimated, heights, u
 from softjaw.study.run.load_path import settle
 from softjaw.study.run.plan import Plan, make_plan, plan_text
 from softjaw.study.run.progress import Progress
-from softjaw.study.run.shares import by_cost, makespan, sensible_ranks, shares
+from softjaw.study.run.shares import by_cost, makespan, shares
 from softjaw.study.scene import load_scene
 from tests.study.launching import ROOT, launch
 from tests.study.scenes import OVAL, QUICK, scene_of
@@ -126,9 +126,6 @@ def test_ranks_are_busy_to_the_end(ranks):
 
 
 def test_times_follow_from_costs():
-    assert sensible_ranks([1.0] * 35) == 35
-    assert sensible_ranks([10.0, 1.0, 1.0]) == 1
-    assert sensible_ranks([]) == 1
     units = tuple(SimpleNamespace(rows=((2 * i, 2 * i + 1),), cost=c, state=0) for i, c in enumerate([1.0, 2.0, 4.0]))
     plan = Plan(None, None, units)
     assert unit_seconds(plan, np.array([3.0, 3.0, np.nan, 1.0, np.nan, np.nan])) == pytest.approx([6.0, 12.0, 24.0])
