@@ -53,8 +53,8 @@ def with_holes_filled(points: FloatArray, triangles: IntArray) -> tuple[IntArray
 def _holes(triangles: IntArray) -> list[list[int]]:
     """Loops round the holes of triangles; none where they hardly hang together."""
     loops = border_loops(triangles)
-    # sides of holes per triangle, above which they are no holes
-    return loops if sum(map(len, loops)) <= 0.5 * len(triangles) else []
+    # a tube of one band of triangles has as many sides at its ends as triangles, but two ends
+    return loops if len(loops) <= 2 + 0.05 * len(triangles) else []
 
 
 def border_loops(triangles: IntArray) -> list[list[int]]:

@@ -141,7 +141,21 @@ def _component(
 
 
 def straight_runs(points: FloatArray) -> list[tuple[int, int, bool]]:
-    """Cut the points into runs ``(first, last, is_straight)``, straight where three or more lie on one line."""
+    """Cut the points into runs ``(first, last, is_straight)``, straight where three or more lie on one line.
+
+    So is a cap that two points give, from the axis out to a straight wall.
+    """
+    last, (z, r) = len(points) - 1, points.T
+    low, high = (bool(r[a] == 0.0 and z[a] == z[b] != z[c]) for a, b, c in ((0, 1, 2), (last, last - 1, last - 2)))
+    if last < 2 + (low and high) or not (low or high):
+        return _runs(points)
+    wall = [(i + low, j + low, flat) for i, j, flat in _runs(points[int(low) : last + 1 - int(high)])]
+    caps = [(0, 1, True)] * (low and wall[0][2]), [(last - 1, last, True)] * (high and wall[-1][2])
+    return [*caps[0], *wall, *caps[1]] if len(caps[0]) + len(caps[1]) == low + high else _runs(points)
+
+
+def _runs(points: FloatArray) -> list[tuple[int, int, bool]]:
+    """Runs of points whose caps, if they have any, have three or more."""
     runs: list[tuple[int, int, bool]] = []
     i, bent_from, last = 0, 0, len(points) - 1
     while i < last:
@@ -211,7 +225,7 @@ def _without_rims(curve: Curve, rim: float) -> tuple[Curve, list[float | None]]:
         (z, r), d = (curve.derivative(np.array([cuts[k]]), order)[0] for order in range(2))
         rise, widens = d / np.linalg.norm(d) * [1.0, outwards]
         if r > 1e-9 and rise > 0.3:
-            taken = min(rim, 0.25 * r) * (1.0 + widens) / rise
+            taken = min(rim, 0.25 * r) * min((1.0 + widens) / rise, 1.0)  # where it flares, a smaller rim
             cuts[k] -= outwards * min(taken / np.linalg.norm(d), 0.25 * float(curve.breaks[-1]))
             heights[k] = float(z)
     return curve.between(*cuts), heights

@@ -159,7 +159,8 @@ def _between_points(surface: GapFunction, touch: Pose, face: FloatArray) -> Pose
         ahead = float(surface.gap(touch.to_object(beside))[0].min())
         if ahead > -0.05 * ROUNDED_OFF:
             break
-        touch = _from_behind(surface, touch, beside, [-step * ahead for step in (4.0, 32.0, 256.0)])
+        # on a steep flank the distance to the surface says little of that along the approach
+        touch = _from_behind(surface, touch, beside, [-ahead * 2.0**k for k in range(2, 20)])
     return touch
 
 

@@ -197,9 +197,9 @@ class GraspMap:
         key = name, model
         if key not in self._claims:
             grid = self.table(name, model).reshape(self.shape)
-            along, relative = force_claims(grid, self.axes[2], self.snapped)
+            along, power = force_claims(grid, self.axes[2], self.snapped)
             claims = np.stack([*place_claims(grid, self.axes[:2], self.snapped), along])
-            self._claims[key] = claims.reshape(3, -1), relative
+            self._claims[key] = claims.reshape(3, -1), bool(power.all())
         claims, relative = self._claims[key]
         if not relative:
             return error(claims, at, (0, 1, 2))

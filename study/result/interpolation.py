@@ -189,18 +189,16 @@ def place_claims(table: FloatArray, axes: Sequence[Nodes], side: NDArray[np.bool
     return CLAIM_FACTOR * np.array([around(bent[0], range(3)), OF_ANGLES * around(bent[1], range(3))])
 
 
-def force_claims(table: FloatArray, forces: Nodes, side: NDArray[np.bool_]) -> tuple[FloatArray, bool]:
-    """`bend` along forces, the last axis, as claims: the largest beside; and whether they are relative.
+def force_claims(table: FloatArray, forces: Nodes, side: NDArray[np.bool_]) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """`bend` along forces, the last axis, as claims: the largest beside; and of which maps they are relative.
 
-    So they are, of a power law, where all values are positive. Of two forces a guess is left: how far from constant or
-    from proportional, whatever is nearer.
+    So they are, of a power law, where all values over station, angle and force are positive. Of two forces a guess is
+    left: how far from constant or from proportional, whatever is nearer.
     """
-    power = not (table <= 0.0).any()  # NaN, of no case, is not
-    if power:
-        logs, along = np.log(table), replace(forces, x=np.log(forces.x))
-        bent = np.minimum(bend(logs, along, side), bend(logs - along.x, along, side))
-    else:
-        bent = bend(table, forces, side)
+    power = ~(table <= 0.0).any(axis=(-3, -2, -1), keepdims=True)  # NaN, of no case, is not
+    logs, along = np.log(np.where(power, table, np.nan)), replace(forces, x=np.log(forces.x))
+    laws = np.minimum(bend(logs, along, side), bend(logs - along.x, along, side))
+    bent = np.where(power, laws, bend(table, forces, side))
     return CLAIM_FACTOR * OF_FORCES * around(bent, [bent.ndim - 1]), power
 
 
@@ -261,8 +259,8 @@ def at_force(ds: xr.Dataset, force: float) -> xr.Dataset:
     for q in (q for q in TABLE if q.error and q.of_error.name in between):
         value, table = (v.isel(model=0) if "model" in v.dims else v for v in (between[q.name], ds[q.name]))
         claims, relative = force_claims(table.values, plain("force", "N", forces), side)
-        at, size = power if relative else share, abs(value.values)
-        line = claims[..., [k]] * at * (1 - at) * (size if relative else 1.0)
+        at, size = np.where(relative, power, share), abs(value.values)
+        line = claims[..., [k]] * at * (1 - at) * np.where(relative, size, 1.0)
         if q.error == "relative":  # a payload of nothing at both forces lies nowhere else
             line = np.divide(line, size, out=np.zeros(line.shape), where=size > 0.0)
         known = between[q.of_error.name]

@@ -217,6 +217,18 @@ def test_an_elliptic_cylinder_ends_as_a_tube_does_rims_continue_curved_ends_and_
     assert np.abs(g[1:]).max() < 1e-15
 
 
+@pytest.mark.parametrize(("profile", "radius"), [
+    ([[0, 20], [60, 20]], 20), ([[0, 0], [0, 20], [60, 20], [60, 0]], 20), ([[0, 0], [0, 20], [60, 20]], 20),
+    ([[0, 0], [0, 10], [0, 20], [30, 20], [60, 20]], 20), ([[0, 37], [60, 13]], 35),
+    ([[0, 20], [40, 27], [60, 45]], 43), ([[0, 12], [40, 12], [50, 20], [60, 28]], 26),
+    ([[0, 0], [0, 20], [60, 30], [60, 0]], 29),
+])  # fmt: skip
+def test_a_rigid_body_ends_where_its_profile_does_with_caps_and_without_and_flares_up_to_a_rim(profile, radius):
+    (low, high) = Revolution(MM * np.array(profile)).bounds
+    assert [low[2], high[2]] == pytest.approx([0, 60 * MM], abs=1e-12)
+    assert radius * MM - 1e-12 <= high[0] <= max(r for _, r in profile) * MM + 1e-12
+
+
 @pytest.mark.parametrize("profile", [
     [[0, 0.03], [0.05, 0.03], [0.02, 0.01], [0.02, 0.06], [0.06, 0.04]],
     [[0, 0.05], [0.02, 0.002], [0.05, 0.002], [0.07, 0.05]],

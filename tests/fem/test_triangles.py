@@ -173,7 +173,10 @@ def test_the_centroid_of_an_open_body_is_within_its_stated_error(roll):
     box = trimesh.creation.box((0.17, 0.11, 0.07)).subdivide().subdivide()
     ends = np.abs(box.face_normals[:, 2]) > 0.9  # open at two opposite ends
     ball, top = BALL.copy(), BALL.triangles_center[:, 2] > 0.024
-    for body, torn, most in ((box, 3, 1e-4), (box, 150, 1e-4), (box, ends, 2e-3), (ball, 7, 1e-5), (ball, top, 2e-3)):
+    prism = trimesh.creation.cylinder(0.03, 0.1, sections=3)  # a tube of one band of triangles
+    caps = np.abs(prism.face_normals[:, 2]) > 0.9
+    boxes = (box, 3, 1e-4), (box, 150, 1e-4), (box, ends, 2e-3)
+    for body, torn, most in (*boxes, (ball, 7, 1e-5), (ball, top, 2e-3), (prism, caps, 2e-3)):
         turn = trimesh.transformations.rotation_matrix(roll, [1, 2, 3], [0.1, 0.0, 0.0])
         mesh = body.copy().apply_transform(turn)
         volume, place, error = solid(np.array(mesh.vertices), np.delete(mesh.faces, torn, axis=0), closed=False)

@@ -8,7 +8,7 @@ import softjaw
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import DONE, FAILED, MISSING, STATES
 from softjaw.study.result.derived import first_crossing
-from softjaw.study.result.interpolation import at_force
+from softjaw.study.result.interpolation import at_force, force_claims, plain
 from softjaw.study.result.read import FIELDS, read_field
 from softjaw.study.result.store import open_result
 from tests.study.fake_run import fake_plan, fake_result
@@ -40,6 +40,12 @@ def test_between_two_forces_values_and_errors_are_those_of_the_look_up(tmp_path)
     stated = (between.e_n_error * between.e_n.sel(model="ccm")).sel(angle=0).values[:, 0]
     assert point.error("e_n") == pytest.approx(stated, rel=1e-12)
     assert (stated > 0.021 * point.e_n).all()
+    # values that are not positive somewhere leave those of other maps power laws
+    law, zeros = np.array([[[1.0, 2.0, 8.0]]]), np.zeros((1, 1, 3))
+    forces, side = plain("force", "N", [1.0, 2.0, 4.0]), np.zeros((2, 1, 1, 3), bool)
+    claims, power = force_claims(np.array([law, zeros]), forces, side)
+    assert power.ravel().tolist() == [True, False]
+    assert claims[0] == pytest.approx(force_claims(law, forces, side[0])[0])
 
 
 def test_maps_stand_over_their_coordinates_with_units_and_definitions(tmp_path):
