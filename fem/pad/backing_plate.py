@@ -2,7 +2,7 @@
 
 The plate has the outline of the pad. The finger holds it on a patch in its middle, which moves by the closing alone;
 the rest bends. Its four-node shell elements have their corners on the nodes of the pad's back, which is glued to its
-face. Displacements of the plate are taken as small.
+face, and on the edges of the patch that is held. Displacements of the plate are taken as small.
 """
 
 from dataclasses import dataclass
@@ -36,18 +36,16 @@ class BackStiffness:
 def back_stiffness(
     x: tuple[float, ...], y: tuple[float, ...], symmetry: tuple[bool, bool], plate: BackingPlate
 ) -> BackStiffness:
-    """Stiffness for nodes on the lines ``x`` and ``y`` [m]; ``symmetry`` as in `fem.pad.mesh.Pad`.
-
-    Raises `ValueError`: where no node is on the patch that the finger holds.
-    """
-    shell, fixed, free = _plate(x, y, symmetry, plate)
+    """Stiffness for nodes on the lines ``x`` and ``y`` [m]; ``symmetry`` as in `fem.pad.mesh.Pad`."""
+    shell, fixed, free, number = _plate(x, y, symmetry, plate)
     if not free.any():
         return BackStiffness(free, np.zeros((1, 1)))
-    nodes = np.flatnonzero(free.any(axis=-1).ravel())
+    loose = free.any(axis=-1)
+    nodes = number[loose]
     linear = LinearShell(shell, fixed)
     C = linear.compliance(nodes)
     linear.destroy()
-    moving = free.reshape(-1, 3)[nodes].ravel()
+    moving = free[loose].ravel()
     C = C[np.ix_(moving, moving)]
     approach = np.tile([0.0, 0.0, 1.0], len(nodes))[moving]
     # the compliance is symmetric but for rounding; Cholesky needs it exactly, and so does a symmetric tangent
@@ -93,7 +91,7 @@ def relative_compliance(
 
     Zero where the finger holds every node of the backing plate.
     """
-    shell, fixed, free = _plate(x, y, symmetry, plate)
+    shell, fixed, free, _ = _plate(x, y, symmetry, plate)
     if not free.any():
         return 0.0
     load = np.zeros((shell.nodes, 6))
@@ -106,14 +104,23 @@ def relative_compliance(
 
 
 def _plate(x: tuple[float, ...], y: tuple[float, ...], symmetry: tuple[bool, bool], plate: BackingPlate):
-    """Shell of the plate, its fixed numbers ``(6 k,)`` and the free displacements of its face (rows, columns, 3)."""
-    X = np.stack([*np.meshgrid(x, y, indexing="ij"), np.zeros((len(x), len(y)))], axis=-1)
+    """Shell of the plate, its fixed numbers ``(6 k,)``; of the pad's nodes the displacements of its face that are free.
+
+    These are ``(rows, columns, 3)``; the nodes' numbers in the shell ``(rows, columns)`` come last.
+    """
+    given, half = (np.array(x), np.array(y)), 0.5 * np.array(plate.support)
+    # a line of the pad's this near to the edge of the patch is its edge; thinner elements would serve nothing
+    near = [0.05 * np.diff(line).min() for line in given]
+    lines = []
+    for line, edge, apart in zip(given, half, near, strict=True):
+        edges = [e for e in (-edge, edge) if line[0] < e < line[-1] and np.abs(line - e).min() > apart]
+        lines.append(np.sort(np.append(line, edges)))
+    X = np.stack([*np.meshgrid(*lines, indexing="ij"), np.zeros([len(line) for line in lines])], axis=-1)
     shell = Shell(patch(X, np.array([0.0, 0.0, 1.0]), plate.thickness), plate.young_modulus, plate.poisson_ratio)
-    # nodes on the rim count as held, whatever rounding makes of their place
-    rim = 0.5 * np.array(plate.support) + NEGLIGIBLE * (np.ptp(x) + np.ptp(y))
-    clamped = (np.abs(X[..., :2]) <= rim).all(axis=-1)
+    clamped = (np.abs(X[..., :2]) <= half + near).all(axis=-1)
     fixed = np.repeat(clamped[..., None], 6, axis=-1)
     for axis in range(2):
         if symmetry[axis]:
             fixed[np.abs(X[..., axis]) < NEGLIGIBLE, axis] = fixed[np.abs(X[..., axis]) < NEGLIGIBLE, 3 + axis] = True
-    return shell, fixed.ravel(), ~fixed[..., :3]
+    at = np.ix_(*(np.searchsorted(line, own) for line, own in zip(lines, given, strict=True)))
+    return shell, fixed.ravel(), ~fixed[..., :3][at], np.arange(clamped.size).reshape(clamped.shape)[at]

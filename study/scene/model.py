@@ -66,7 +66,7 @@ Rule = Callable[..., Errors]
 JOINT: dict[str, tuple[tuple[Rule, tuple[str, ...]], ...]] = {
     # What a section must satisfy together with others, which come before it: the rules, and the other sections
     "effects": ((Effects.object_rules, ("object",)),),
-    "gripper": ((Gripper.symmetry_rules, ("effects",)), (Gripper.support_rules, ("effects", "accuracy"))),
+    "gripper": ((Gripper.symmetry_rules, ("effects",)), (Gripper.plate_rules, ("effects",))),
     "friction": ((Friction.used_rules, ("effects",)),),
     "candidates": ((Candidates.rules_on, ("object",)),),
     "petsc": ((petsc_rules, ()),),

@@ -10,7 +10,6 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
-from softjaw.fem.pad.halving import halved
 from softjaw.study.grippers import PRESETS
 from softjaw.study.messages import shown
 from softjaw.study.scene.objects import Shape, Walled
@@ -153,22 +152,11 @@ class Gripper(SceneSection):
             expected = f'even numbers along length and width, {even}, or effects.model_size = "full"'
             yield wrong(n, f"{expected}, so that symmetric halves can be meshed", "elements")
 
-    def support_rules(self, effects: Effects, accuracy: Accuracy) -> Errors:
-        """The finger holds the plate by at least one node of every mesh; with even counts one is in the middle."""
-        tilts = self.tilt_stiffness_nm_per_rad is not None
-        if tilts and effects.sheet == "elastic":
+    def plate_rules(self, effects: Effects) -> Errors:
+        """A plate bends or tilts."""
+        if self.tilt_stiffness_nm_per_rad is not None and effects.sheet == "elastic":
             expected = 'effects.sheet = "rigid" or "auto": a plate that tilts is rigid itself'
             yield wrong(self.tilt_stiffness_nm_per_rad, expected, "tilt_stiffness_nm_per_rad")
-        if effects.sheet == "rigid" or tilts:
-            return
-        counts = [self.elements[:2], halved(self.elements)[:2]][: accuracy.meshes]
-        size = self.pad_length_mm, self.pad_width_mm
-        need = [max(side / n[axis] if n[axis] % 2 else 0.0 for n in counts) for axis, side in enumerate(size)]
-        pairs = zip(self.sheet_support_mm, need, strict=True)
-        if any(length < least and not math.isclose(length, least) for length, least in pairs):
-            meshes = " and ".join(f"{list(n)}" for n in counts)
-            expected = f"at least {need[0]:g} x {need[1]:g} mm, which holds nodes of meshes of {meshes} elements"
-            yield wrong(self.sheet_support_mm, f"{expected}; even numbers need less", "sheet_support_mm")
 
 
 class Friction(SceneSection):

@@ -49,8 +49,6 @@ WRONG_LINES = [
     ("[gripper]\nelements = [20, 10, 1]", 12, "gripper.elements[2]", "1", "[20, 10, 6]"),
     ("[gripper]\nelements = [21, 10, 6]", 12, "gripper.elements", "[21, 10, 6]", ""),
     ("[gripper]\nelements = [400, 400, 400]", 12, "gripper.elements", "[400, 400, 400]", ""),
-    ("[gripper]\nelements = [20, 5, 6]\nsheet_support_mm = [20, 4]\n[effects]\nmodel_size = 'full'", 13,
-     "gripper.sheet_support_mm", "[20.0, 4.0]", ""),
     ("[gripper]\npoisson_ratio = 0.3", 12, "gripper.poisson_ratio", "0.3", ""),
     ("[gripper]\nmaterial = 'linear'\npoisson_ratio = 0.5", 13, "gripper.poisson_ratio", "0.5", "0.25"),
     ("[gripper]\nterms_kpa = [[-2, 40]]", 12, "gripper.terms_kpa", "[[-2.0, 40.0]]", ""),
