@@ -151,14 +151,14 @@ def _worst(grasp: _Grasp, gap: float) -> Payload:
     extent = np.linalg.svd(points[:8] - points[:8].mean(axis=0), compute_uv=False)
     lower = 0.0
     if extent[-1] > ROUNDING_FORCE and upper > ROUNDING_FORCE:
-        n, convex = 8, False
-        while not convex:  # rounding may break the hull of a set that is thin: it is made anew from its points
+        before, n, convex = 0, 8, False
+        while not convex and n > before:  # rounding may break the hull of a thin set: it is made anew from its points
             hull = ConvexHull(points[:n])
             corners = hull.simplices.astype(np.int64)  # in no order round their facets
             inward = np.einsum("fi,fi->f", _planes(points, corners)[:, :3], hull.equations[:, :3]) < 0
             corners[inward] = corners[inward, ::-1]
-            before, (lower, upper, u, n, convex) = n, _refined(*search, n, corners, hull.equations, upper, u, gap)
-            convex |= n == before
+            before = n
+            lower, upper, u, n, convex = _refined(*search, n, corners, hull.equations, upper, u, gap)
     force = min(lower, upper) if lower > ROUNDING_FORCE else 0.0
     return Payload(force, max(upper, 0.0), -u, upper >= -ROUNDING_FORCE)
 

@@ -147,7 +147,11 @@ def solid(points: FloatArray, triangles: IntArray, closed: bool) -> tuple[float,
     loops = [] if closed else _holes(triangles)
     lids = lid_corners(points, loops) - middle
     x, balanced = np.concatenate([points[triangles] - middle, lids]), closed or _balanced(triangles, loops)
-    volume, *moments, lost = np.transpose([_along(x, size, axis, balanced) for axis in range(3)])
+    measured = np.array([_along(x, size, axis, balanced) for axis in range(3)])
+    if balanced:
+        cones = np.einsum("ij,ij->i", x[:, 0], np.cross(x[:, 1], x[:, 2])) / 6
+        measured[:, :4] += [cones.sum(), *(cones @ x.sum(axis=1) / 4)]
+    volume, *moments, lost = measured.T
     weight = (lost + 0.01) ** -2 / ((lost + 0.01) ** -2).sum()  # a direction that loses its lines hardly counts
     full, area = float(weight @ volume), np.linalg.norm(np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), axis=1) / 2
     if full <= 1e-6 * area.sum() * size.max():  # it has no inside
@@ -174,8 +178,8 @@ def _balanced(triangles: IntArray, loops: list[list[int]]) -> bool:
 def _along(x: FloatArray, size: FloatArray, axis: int, balanced: bool) -> FloatArray:
     """Volume inside, its first moments, and the share of lines that end inside ``(5,)``, by lines along an axis.
 
-    ``x (m, 3, 3)`` are corners about the middle of a box. Of a ``balanced`` surface lines only correct what the
-    divergence theorem gives. One goes through each of n x n cells, shifted from row to row by the golden section: a
+    ``x (m, 3, 3)`` are corners about the middle of a box. Of a ``balanced`` surface it is what has to be added to what
+    the divergence theorem gives. One goes through each of n x n cells, shifted from row to row by the golden section: a
     straight side of the object then cuts off its true share of them.
     """
     order, shift = [(axis + 1) % 3, (axis + 2) % 3, axis], np.arange(128) * 0.5 * (np.sqrt(5.0) - 1.0) % 1.0
@@ -185,16 +189,13 @@ def _along(x: FloatArray, size: FloatArray, axis: int, balanced: bool) -> FloatA
     k = np.lexsort((z, line))
     k = k[~ended[line[k]]]
     line, z, winding = line[k], z[k], np.cumsum(turn[k])
-    lost, cones = ended.sum() / max(crossed.sum(), 1), np.zeros(len(x))
-    inside = 1.0 * (winding != 0) / max(1 - lost, 1e-9)
-    if balanced:
-        inside, cones = (winding != 0) - winding, np.einsum("ij,ij->i", x[:, 0], np.cross(x[:, 1], x[:, 2])) / 6
+    lost = ended.sum() / max(crossed.sum(), 1)
+    inside = (winding != 0) - winding if balanced else 1.0 * (winding != 0) / max(1 - lost, 1e-9)
     k = np.flatnonzero(inside)
     i, j = np.divmod(line[k], len(shift))
     middle = np.stack([i + shift[j], j + shift[i], (z[k] + z[k + 1]) / 2], axis=1) * cell - size[order] / 2
     part = inside[k] * (z[k + 1] - z[k]) * cell[0] * cell[1]
-    moments = cones @ x.sum(axis=1) / 4 + (part @ middle)[np.argsort(order)]
-    return np.array([cones.sum() + part.sum(), *moments, lost])
+    return np.array([part.sum(), *(part @ middle)[np.argsort(order)], lost])
 
 
 @njit(cache=True)

@@ -146,12 +146,13 @@ def straight_runs(points: FloatArray) -> list[tuple[int, int, bool]]:
     So is a cap that two points give, from the axis out to a straight wall.
     """
     last, (z, r) = len(points) - 1, points.T
-    low, high = (bool(r[a] == 0.0 and z[a] == z[b] != z[c]) for a, b, c in ((0, 1, 2), (last, last - 1, last - 2)))
-    if last < 2 + (low and high) or not (low or high):
+    if last < 2:
         return _runs(points)
-    wall = [(i + low, j + low, flat) for i, j, flat in _runs(points[int(low) : last + 1 - int(high)])]
-    caps = [(0, 1, True)] * (low and wall[0][2]), [(last - 1, last, True)] * (high and wall[-1][2])
-    return [*caps[0], *wall, *caps[1]] if len(caps[0]) + len(caps[1]) == low + high else _runs(points)
+    low, high = (int(r[a] == 0.0 and z[a] == z[b] != z[c]) for a, b, c in ((0, 1, 2), (-1, -2, -3)))
+    wall = [(i + low, j + low, flat) for i, j, flat in _runs(points[low : last + 1 - high])]
+    if (low and not wall[0][2]) or (high and not wall[-1][2]):
+        return _runs(points)
+    return [*[(0, 1, True)] * low, *wall, *[(last - 1, last, True)] * high]
 
 
 def _runs(points: FloatArray) -> list[tuple[int, int, bool]]:
@@ -220,7 +221,8 @@ def _without_rims(curve: Curve, rim: float) -> tuple[Curve, list[float | None]]:
 
     None for an end on the axis, and for one that runs outwards, as a flange does: its rim goes round it.
     """
-    cuts, heights = [0.0, float(curve.breaks[-1])], list[float | None]((None, None))
+    cuts = [0.0, float(curve.breaks[-1])]
+    heights: list[float | None] = [None, None]
     for k, outwards in enumerate((-1.0, 1.0)):
         (z, r), d = (curve.derivative(np.array([cuts[k]]), order)[0] for order in range(2))
         rise, widens = d / np.linalg.norm(d) * [1.0, outwards]

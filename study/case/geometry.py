@@ -32,6 +32,7 @@ from softjaw.study.scene.sections import Gripper
 
 STEPS_BACK = (0.1, 0.4, 1.6)  # of the pad's thickness: where it stands before it is brought to the smooth surface
 ROUNDED_OFF = 2e-5  # so far a smooth surface may lie behind the triangles it is made of where a pad touches first [m]
+TOUCH_GRID = 41, 21  # points of a face; odd: planes of symmetry have some, where most objects are met first
 KNOWN_DEPTH = 0.9  # of the pad's thickness: how far round the undeformed contact face the object must be known
 
 
@@ -144,10 +145,8 @@ def approach(obj: GapObject, pose: Pose, gripper: Gripper) -> Finger:
         ahead = extremes(touch.to_pad(obj.points), obj.triangles, size[:2])[0]
         if ahead < -ROUNDED_OFF:
             touch = Pose(touch.rotation, touch.origin + ahead * touch.rotation[:, 2])
-    else:
-        touch = _between_points(surface, touch, face)
-    hole_share = obj.hole_share(touch, face, KNOWN_DEPTH * size[2]) if isinstance(obj, MeshObject) else 0.0
-    return Finger(touch, surface, hole_share)
+        return Finger(touch, surface, obj.hole_share(touch, face, KNOWN_DEPTH * size[2]))
+    return Finger(_between_points(surface, touch, face), surface)
 
 
 def _between_points(surface: GapFunction, touch: Pose, face: FloatArray) -> Pose:
@@ -155,7 +154,7 @@ def _between_points(surface: GapFunction, touch: Pose, face: FloatArray) -> Pose
     ends = face.min(axis=0), face.max(axis=0)
     for _ in range(3):
         nearest = face[surface.gap(touch.to_object(face))[0].argmin()]
-        beside = np.clip(nearest + face * [2 / 40, 2 / 20, 1], *ends)  # up to the points beside it
+        beside = np.clip(nearest + face * [*(2 / (n - 1) for n in TOUCH_GRID), 1], *ends)  # up to the points beside it
         ahead = float(surface.gap(touch.to_object(beside))[0].min())
         if ahead > -0.05 * ROUNDED_OFF:
             break
@@ -187,6 +186,6 @@ def touching(obj: GapObject, pose: Pose, size: tuple[float, float, float]) -> Po
 
 def _contact_face(size: tuple[float, float, float]) -> FloatArray:
     """Points spread over the undeformed contact face, independent of the mesh, the planes of symmetry among them."""
-    # Odd numbers of points put one on each plane of symmetry, where most objects are met first.
-    x, y = np.meshgrid(np.linspace(-0.5, 0.5, 41) * size[0], np.linspace(-0.5, 0.5, 21) * size[1], indexing="ij")
+    x, y = (np.linspace(-0.5, 0.5, n) * side for n, side in zip(TOUCH_GRID, size, strict=False))
+    x, y = np.meshgrid(x, y, indexing="ij")
     return np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])

@@ -69,9 +69,9 @@ class GraspMap:
     -----
     The error of a value is that of a straight line through a curve with the largest second derivative that the cases
     around show, with those beside them, added up over the three axes and times 1.75, along angles 5.25, along forces
-    (whose power laws are straight lines of logarithms) 4.55: a claim, below which at least 95 % of the true errors of
-    the main maps stay where that was measured. Between angles more than 25 degrees apart there are no values: edges
-    that come to bear between them would stay unseen. Errors that the cases around state themselves
+    (whose power laws are straight lines of logarithms; of the same grasp) 4.55: a claim, below which at least 95 % of
+    the true errors of the main maps stay where that was measured. Between angles more than 25 degrees apart there are
+    no values: edges that come to bear between them would stay unseen. Errors that the cases around state themselves
     (``accuracy.meshes = 2``; in between as the values are) are added in squares. Along an axis of two values there is
     no second derivative, and half of their difference stands in; along two forces half of how far a power law is from
     constant or from proportional, whatever is nearer. What is narrower than the spacing of the candidates stays unseen.

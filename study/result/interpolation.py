@@ -255,10 +255,10 @@ def at_force(ds: xr.Dataset, force: float) -> xr.Dataset:
             between[name] = (dims, values, ds[name].attrs)
         elif name == "flags":
             between[name] = (dims, first | last, ds[name].attrs)
-    side = ds["flags"].values & int(Flag.SNAPPED) > 0
+    axis, side = plain("force", "N", forces), ds["flags"].values & int(Flag.SNAPPED) > 0
     for q in (q for q in TABLE if q.error and q.of_error.name in between):
         value, table = (v.isel(model=0) if "model" in v.dims else v for v in (between[q.name], ds[q.name]))
-        claims, relative = force_claims(table.values, plain("force", "N", forces), side)
+        claims, relative = force_claims(table.values, axis, side)
         at, size = np.where(relative, power, share), abs(value.values)
         line = claims[..., [k]] * at * (1 - at) * np.where(relative, size, 1.0)
         if q.error == "relative":  # a payload of nothing at both forces lies nowhere else

@@ -18,7 +18,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 from mpi4py import MPI
-from numba.core.event import Event, Listener, register
+from numba.core.event import Event, Listener, install_listener
 
 from softjaw.study.messages import CANNOT_WRITE, STOPPED, StudyError, complain, launched, make_folders
 from softjaw.study.quantities import DONE, FAILED, MISSING
@@ -224,8 +224,6 @@ class Session:
             # Any rank may be the one that finishes the file.
             writer.session = comm.bcast(writer.session)
         self._progress = _progress(objects, codes, comm.size) if comm.rank == 0 else None
-        if comm.rank == 0:
-            register("numba:compile", COMPILING)
 
     def solve(self) -> int:
         """Solve, wait for all ranks, close the file; the exit code.
@@ -257,7 +255,8 @@ class Session:
         solver = PathSolver(self._files, self._work.solve_unit, self._work.image, claims, self._state)
         limit = self._work.time_limit
         stopper = Stopper(solver.on_stop, limit, PATIENCE * limit if limit < math.inf else None)
-        with stopper, limited_memory(self._work.memory, claims.node.size):
+        told = install_listener("numba:compile", COMPILING) if self._comm.rank == 0 else contextlib.nullcontext()
+        with stopper, limited_memory(self._work.memory, claims.node.size), told:
             for position in claims:
                 solver.solve(self._todo[position], self._codes, stopper, self._look)
             request = self._comm.Ibarrier()  # a plain barrier would keep a core busy and rank 0 silent

@@ -231,7 +231,7 @@ class TaskKeys(SceneSection):
     def rules(self) -> Errors:
         """Fingers that keep their forces hold nothing along them."""
         if self.drive == "fixed" and self.direction is None:
-            expected = 'a direction, as fixed forces hold nothing along themselves, or another drive'
+            expected = "a direction, as fixed forces hold nothing along themselves, or another drive"
             yield wrong("worst", expected, "weight_direction")
 
     @property
