@@ -164,7 +164,10 @@ def hyperfoam(F, B, J, par, P, A, work):
         return
     A[:] = 0.0
     VT = np.ascontiguousarray(V.T)
-    transposed_product(VT, VT * s.reshape(3, 1), S)
+    for a in range(3):
+        for i in range(3):
+            C[a, i] = s[a] * VT[a, i]
+    transposed_product(VT, C, S)
     shear = np.zeros((3, 3))
     for a in range(3):
         for b in range(3):
@@ -188,8 +191,9 @@ def hyperfoam(F, B, J, par, P, A, work):
                         for m in range(3):
                             A[i, j, k, m] += x * X[k, m] + y * Y[k, m]
     for i in range(3):
-        # the geometric part, the same for every component of the displacement
-        A[i, :, i, :] += S
+        for j in range(3):
+            for m in range(3):  # the geometric part, the same for every component of the displacement
+                A[i, j, i, m] += S[j, m]
 
 
 @njit(cache=True, inline="always")
@@ -234,7 +238,7 @@ def smallest_det(u, dN):
     return smallest
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True)
 def _elements(law, par, u, dN, w, nodes, r, K):
     """Residual and, where ``K`` has entries, tangent of every element; returns the smallest ``det F``."""
     tangent = K.size > 0
@@ -272,7 +276,9 @@ def _elements(law, par, u, dN, w, nodes, r, K):
         if tangent:
             for i in range(3):
                 for k in range(i):
-                    K[e, i, :, k] = K[e, k, :, i].T
+                    for a in range(nodes):
+                        for b in range(nodes):
+                            K[e, i, a, k, b] = K[e, k, b, i, a]
     return smallest
 
 

@@ -103,7 +103,9 @@ class ContactFace:
         plane_normal *= np.sign(patch.load @ (plane_normal * patch.normal).sum(axis=1))
         share = patch.load[:, None] * patch.normal + UNLOADED * patch.load.mean() * plane_normal
         # corners no farther apart than this share of a usual face's size are one
-        corner = _numbered(q.reshape(-1, 3), 1e-6 * np.median(np.ptp(q, axis=1).max(axis=1)))
+        points, apart = q.reshape(-1, 3), 1e-6 * np.median(np.ptp(q, axis=1).max(axis=1))
+        along = points @ ASLANT
+        corner = _numbered(points, along, np.argsort(along), apart)
         total = np.column_stack([np.bincount(corner, np.repeat(share, 4, axis=0)[:, k]) for k in range(3)])
         length = np.linalg.norm(total, axis=1, keepdims=True)
         return cls(q, (total / np.where(length > 0, length, 1.0))[corner].reshape(q.shape))
@@ -126,10 +128,12 @@ class ContactFace:
 
 
 @njit(cache=True)
-def _numbered(points, apart):
-    """Numbers ``(n,)`` that are the same for points ``(n, 3)`` no more than ``apart`` from each other."""
-    along, number = points @ ASLANT, np.arange(len(points))
-    order = np.argsort(along)
+def _numbered(points, along, order, apart):
+    """Numbers ``(n,)`` that are the same for points ``(n, 3)`` no more than ``apart`` from each other.
+
+    ``along (n,)``: how far they are along some direction; ``order (n,)``: that they have there.
+    """
+    number = np.arange(len(points))
     for i, a in enumerate(order):
         for b in order[i + 1 :]:
             if along[b] - along[a] > 1.001 * apart:  # the rest is for rounding

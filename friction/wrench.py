@@ -305,5 +305,8 @@ def _least_power(arm, normal, load, radius):
         # the least ellipse round the part of this one where g . (x - v) <= -depth
         Pg, depth = P @ (g / width), (T - best) / width
         v = v - (1 + 2 * depth) / 3 * Pg
-        P = 4 / 3 * (1 - depth**2) * (P - 2 * (1 + 2 * depth) / (3 * (1 + depth)) * np.outer(Pg, Pg))
+        for i in range(2):
+            for j in range(2):
+                P[i, j] -= 2 * (1 + 2 * depth) / (3 * (1 + depth)) * (Pg[i] * Pg[j])
+        P *= 4 / 3 * (1 - depth**2)
     return math.nan

@@ -178,10 +178,15 @@ def _begin(grasp: _Grasp, rows: FloatArray) -> FloatArray:
 @njit(cache=True)
 def _planes(points, corners):
     """Outward unit normal and offset ``(m, 4)`` of facets with these corners ``(m, 3)``."""
-    p = points[corners[:, 0]]
-    normal = np.cross(points[corners[:, 1]] - p, points[corners[:, 2]] - p)
-    normal /= np.sqrt((normal**2).sum(axis=1)).reshape(-1, 1)
-    return np.column_stack((normal, -(normal * p).sum(axis=1)))
+    planes = np.empty((len(corners), 4))
+    for f in range(len(corners)):
+        p, q, r = points[corners[f, 0]], points[corners[f, 1]], points[corners[f, 2]]
+        a0, a1, a2, b0, b1, b2 = q[0] - p[0], q[1] - p[1], q[2] - p[2], r[0] - p[0], r[1] - p[1], r[2] - p[2]
+        x, y, z = a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0
+        size = np.sqrt(x * x + y * y + z * z)
+        x, y, z = x / size, y / size, z / size
+        planes[f, 0], planes[f, 1], planes[f, 2], planes[f, 3] = x, y, z, -(x * p[0] + y * p[1] + z * p[2])
+    return planes
 
 
 @njit(cache=True)
@@ -191,14 +196,18 @@ def _joined(points, n, corners, planes):
     The facets that see the point give way to those between it and their rim. Where it is beyond a facet by rounding
     alone that one stays: a facet so thin would have no normal.
     """
-    keep, rim = np.ones(len(corners), np.bool_), np.zeros((n, n), np.bool_)
+    keep, rim, x = np.ones(len(corners), np.bool_), np.zeros((n, n), np.bool_), points[n]
     for f in range(len(corners)):
-        if planes[f, :3] @ points[n] + planes[f, 3] > ROUNDING_FORCE:
+        if planes[f, 0] * x[0] + planes[f, 1] * x[1] + planes[f, 2] * x[2] + planes[f, 3] > ROUNDING_FORCE:
             keep[f] = False
             for k in range(3):
                 rim[corners[f, k], corners[f, (k + 1) % 3]] = True
-    edges = np.argwhere(rim & ~rim.T)
-    new = np.column_stack((edges, np.full(len(edges), n)))
+    new, count = np.full((3 * len(corners), 3), n), 0
+    for i in range(n):
+        for j in range(n):
+            if rim[i, j] and not rim[j, i]:
+                new[count, 0], new[count, 1], count = i, j, count + 1
+    new = new[:count]
     return np.concatenate((corners[keep], new)), np.concatenate((planes[keep], _planes(points, new)))
 
 
@@ -234,7 +243,9 @@ def _refined(C, A1, A2, kind, rows, points, bases, n, corners, planes, upper, u,
         plane = planes[nearest]
         # a point that the hull has already ends the search: along its nearest facet both bounds are the same
         known = (plane == before).all() or n == len(points)
-        convex = len(planes) == 2 * len(np.unique(corners)) - 4  # Euler's formula, of triangles
+        used = np.zeros(n, np.bool_)
+        used[corners.ravel()] = True
+        convex = len(planes) == 2 * used.sum() - 4  # Euler's formula, of triangles
         if known or not convex or upper < ROUNDING_FORCE or -plane[3] >= upper * (1.0 - gap):
             return -plane[3], upper, u, n, convex
         # a programme that did not fill its rows says nothing of the support
@@ -328,12 +339,15 @@ def _programme(C, A1, A2, kind, along, rows, basis):
         q[:] = -q
         q[:3] += along
         offset, value = y[: m - 1] @ right[: m - 1], cost @ x
-        bound = _farthest(C, A1, A2, kind, q, False, point) + offset
-        if bound - value <= near * abs(bound) + 1e-9:  # of the points that are known: now of all
-            bound = _farthest(C, A1, A2, kind, q, True, point) + offset
-            upper = min(upper, bound)
-            if bound - value <= near * abs(bound) + 1e-9:
+        reached = False
+        for exact in (False, True):  # the points that are known, and where they have none, all
+            bound = _farthest(C, A1, A2, kind, q, exact, point) + offset
+            upper = min(upper, bound) if exact else upper
+            reached = bound - value <= near * abs(bound) + 1e-9
+            if not reached:
                 break
+        if reached:
+            break
         _times(rows, point, column)
         _times(inverse, column, d)
         out, most = -1, np.inf

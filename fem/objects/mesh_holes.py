@@ -206,13 +206,14 @@ def _crossings(x, shift):
     for t in range(len(x)):
         a, b, c = x[t, 0], x[t, 1], x[t, 2]
         low, high = min(a[2], b[2], c[2]), max(a[2], b[2], c[2])
-        normal = np.cross(b - a, c - a)
+        bx, by, bz, cx, cy, cz = b[0] - a[0], b[1] - a[1], b[2] - a[2], c[0] - a[0], c[1] - a[1], c[2] - a[2]
+        nx, ny, nz = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
         for i in range(int(min(a[0], b[0], c[0])), min(n - 1, int(max(a[0], b[0], c[0]))) + 1):
             for j in range(int(min(a[1], b[1], c[1])), min(n - 1, int(max(a[1], b[1], c[1]))) + 1):
                 u, v = i + shift[j], j + shift[i]
                 left = _left(a, b, u, v)
-                if normal[2] != 0.0 and left == _left(b, c, u, v) and left == _left(c, a, u, v):
-                    z = a[2] - (normal[0] * (u - a[0]) + normal[1] * (v - a[1])) / normal[2]
+                if nz != 0.0 and left == _left(b, c, u, v) and left == _left(c, a, u, v):
+                    z = a[2] - (nx * (u - a[0]) + ny * (v - a[1])) / nz
                     lines.append(i * n + j)
                     places.append(min(max(z, low), high))
                     # a surface that looks down is where the line comes in

@@ -57,15 +57,14 @@ def height_fields(points, triangles, x, y):
 
 
 @njit(cache=True)
-def slopes_of(h, dx, dy, far):
-    """Slopes ``(m, n, 2)`` of heights ``(m, n)`` that are ``dx`` and ``dy`` apart, and ``far`` where infinite."""
+def slopes_of(h, dx, dy):
+    """Slopes ``(m, n, 2)`` of heights ``(m, n)`` that are ``dx`` and ``dy`` apart."""
     (m, n), slope = h.shape, np.empty((*h.shape, 2))
-    filled = np.where(np.isfinite(h), h, far)
     for i in range(m):
         for j in range(n):
             a, b, c, d = max(i - 1, 0), min(i + 1, m - 1), max(j - 1, 0), min(j + 1, n - 1)
-            slope[i, j, 0] = (filled[b, j] - filled[a, j]) / ((b - a) * dx)
-            slope[i, j, 1] = (filled[i, d] - filled[i, c]) / ((d - c) * dy)
+            slope[i, j, 0] = (h[b, j] - h[a, j]) / ((b - a) * dx)
+            slope[i, j, 1] = (h[i, d] - h[i, c]) / ((d - c) * dy)
             # a cell whose neighbour misses the object, or lies far behind it, is at a silhouette: its slope says
             # nothing; one that is steeper than this is the object's flank
             if np.abs(slope[i, j]).max() > 3.0:
@@ -82,7 +81,7 @@ class Side:
         self.height, self.cell = np.ascontiguousarray(height - self.touch), steps[0] * steps[1]
         depth = bed_closing(self.height, jaws.force / (jaws.stiffness * self.cell))
         self.pressure = jaws.stiffness * np.maximum(depth - self.height, 0.0)
-        self.slope = slopes_of(self.height, *steps, jaws.pad[2])
+        self.slope = slopes_of(np.where(np.isfinite(self.height), self.height, jaws.pad[2]), *steps)
 
     @cached_property
     def centre(self) -> FloatArray:
