@@ -194,7 +194,7 @@ def _work(solver: CandidateSolver, solved: Solved, friction: float, begun: float
     """Work of a case: all since clock and solver stood at ``begun, before``, friction and scores since ``friction``."""
     names = (("newton_iterations", "iterations"), ("load_steps", "steps"), ("step_halvings", "halvings"))
     states, now, spent = [c.state for c in solved.fine.contacts], time.perf_counter(), solver.seconds
-    work: dict[str, Any] = {f"work/{key}": [getattr(s, name) for s in states] for key, name in names}
+    work: dict[str, Any] = {f"work/{key}": [getattr(s.work, name) for s in states] for key, name in names}
     parts = {name: getattr(spent, name) - getattr(before, name) for name in ("assembly", "factorisation")}
     parts |= {"friction": now - friction, "total": now - begun}
     parts["rest"] = 2.0 * parts["total"] - sum(parts.values())

@@ -9,10 +9,8 @@ walls that give way. Every state that is passed on has converged and has been ch
 
 from __future__ import annotations
 
-import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
-from copy import copy
 from dataclasses import dataclass, replace
 from typing import Any, Generic, TypeVar
 
@@ -26,7 +24,7 @@ from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.fem.objects.gap import Pose
 from softjaw.fem.pad.interpolation import interpolated
 from softjaw.fem.pad.mesh import Pad
-from softjaw.fem.petsc import NonlinearSolver, Seconds
+from softjaw.fem.petsc import NonlinearSolver
 from softjaw.friction.patch import FloatArray
 
 ProblemT = TypeVar("ProblemT", bound=ContactProblem)
@@ -52,7 +50,7 @@ class Pressed:
         Deformed nodes of the contact face, in the pad's frame at first touch [m].
     points : ContactPoints
         Position, normal and load of the quadrature points of the meshed contact face.
-    iterations, steps, halvings, seconds
+    work : Work
         Effort; that of two pads that are solved at once is counted with the first.
     path_dependent : bool
         Whether the pad, or the wall, has jumped before: another load path may lead to another state.
@@ -75,10 +73,7 @@ class Pressed:
     contact_face: FloatArray
     points: ContactPoints
     checks: Checks
-    iterations: int
-    steps: int
-    halvings: int
-    seconds: Seconds
+    work: Work
     path_dependent: bool = False
     instead: bool = False
     notes: tuple[str, ...] = ()
@@ -195,10 +190,10 @@ class LoadPath(ABC, Generic[ProblemT]):
         state = None
         self._begin()
         for force in forces:
-            work, elapsed = Work(), self._stopwatch()
+            work = Work()
             self.solver.iterations_left = self.MOST_ITERATIONS
             state = self._next(state, force, work)
-            yield self._pressed(state, work, elapsed())
+            yield self._pressed(state, work)
 
     def at(self, force: float, coarse: Sequence[Pressed] = ()) -> Pressed:
         """State at one normal force on each whole pad [N], whatever else has been solved.
@@ -210,17 +205,17 @@ class LoadPath(ABC, Generic[ProblemT]):
 
         Raises `ConvergenceError`, `CheckError`: if there is no acceptable state.
         """
-        work, elapsed = Work(), self._stopwatch()
+        work = Work()
         if self.problem.friction is not None:
             below = self._state_below(force)
             self._begin_afresh(below)
             work = replace(below.work) if below else work
-            return self._pressed(self._next(below.at if below else None, force, work), work, elapsed())
+            return self._pressed(self._next(below.at if below else None, force, work), work)
         self._begin_afresh()
         state = self._near(coarse, work)
         if state is None or state.force < force:
             state = self._next(state, force, work)
-        return self._pressed(state, work, elapsed())
+        return self._pressed(state, work)
 
     def _state_below(self, force: float) -> _PathState[ProblemT] | None:
         """The last state of the path below a force [N]; None where it begins above."""
@@ -253,7 +248,7 @@ class LoadPath(ABC, Generic[ProblemT]):
             if not start.path_dependent:
                 try:
                     state = self._from(start, work)
-                    self._pressed(state, work, Seconds())
+                    self._pressed(state, work)
                     return state
                 except (ConvergenceError, CheckError):
                     continue
@@ -293,7 +288,7 @@ class LoadPath(ABC, Generic[ProblemT]):
         spent = f"given up after {self.MOST_ITERATIONS} Newton iterations"
         return ConvergenceError(f"stuck at {reached:.4g} N of {force:.4g} N: {spent}")
 
-    def _pressed(self, state: OnPath, work: Work, seconds: Seconds) -> Pressed:
+    def _pressed(self, state: OnPath, work: Work) -> Pressed:
         """The state, checked."""
         problem, x, steps = self.problem, state.x, self._stepping
         residual = np.abs(problem.residual(x))
@@ -306,11 +301,10 @@ class LoadPath(ABC, Generic[ProblemT]):
             pressure, _, points = contact
             imbalance = float(residual[f.offset : f.closing_dof + 1].max()) / f.pad.share
             checks = check(f.foam, unknowns, contact, imbalance, state.force, tolerance, slack)
-            effort = work if k == 0 else Work()
             pads.append(Pressed(
                 state.force, float(x[f.closing_dof]), unknowns, f.pad, f.pose, pressure,
-                (f.pad.nodes + f.pad.displacement(unknowns))[f.pad.contact_nodes], points, checks, effort.iterations,
-                effort.steps, effort.halvings, seconds if k == 0 else Seconds(), state.jumped, instead, self._notes(),
+                (f.pad.nodes + f.pad.displacement(unknowns))[f.pad.contact_nodes], points, checks,
+                work if k == 0 else Work(), state.jumped, instead, self._notes(),
             ))  # fmt: skip
         return self._together(state, pads, residual)
 
@@ -328,16 +322,6 @@ class LoadPath(ABC, Generic[ProblemT]):
         if steps.off:
             notes.append(f"the active set alternates, accepted at a residual of {steps.off:.1e} of the force")
         return tuple(notes)
-
-    def _stopwatch(self) -> Callable[[], Seconds]:
-        """Where the time goes from now on."""
-        before, start = copy(self.solver.seconds), time.perf_counter()
-
-        def elapsed() -> Seconds:
-            now, total = self.solver.seconds, time.perf_counter() - start
-            return Seconds(now.assembly - before.assembly, now.factorisation - before.factorisation, total)
-
-        return elapsed
 
     def destroy(self) -> None:
         """Give the memory back; nothing can be solved any more."""

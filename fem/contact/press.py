@@ -101,7 +101,7 @@ class Press(LoadPath[RigidProblem]):
 
         Raises `ConvergenceError`, `CheckError`: if no pad, the fallbacks included, has an acceptable state.
         """
-        work, elapsed = Work(), self._stopwatch()
+        work = Work()
         self._begin_afresh()
         failures = list[Exception]()
         for problem in (None, *self._fallbacks):
@@ -110,7 +110,7 @@ class Press(LoadPath[RigidProblem]):
             try:
                 self.solver.iterations_left = self.MOST_ITERATIONS
                 x = self._close_to(closing, work)
-                return self._pressed(OnPath(x, self.problem.normal_force(x)), work, elapsed())
+                return self._pressed(OnPath(x, self.problem.normal_force(x)), work)
             except (ConvergenceError, CheckError) as error:
                 failures.append(error)
         raise failures[0]

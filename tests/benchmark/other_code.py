@@ -35,7 +35,7 @@ def pressed(elements, element):
         float((s.points.load * np.hypot(*np.moveaxis(s.points.position[..., :2], -1, 0))).sum() / s.points.load.sum())
         for s in states
     ]
-    return np.array([s.closing for s in states]), np.array(arms), sum(s.iterations for s in states), size, spent
+    return np.array([s.closing for s in states]), np.array(arms), sum(s.work.iterations for s in states), size, spent
 
 
 def by_getfem(closings, elements):

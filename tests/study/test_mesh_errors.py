@@ -159,7 +159,7 @@ def test_a_station_that_moves_by_two_micrometres_changes_nothing():
     for station in (170.588, 170.59):
         press = press_of(scene, approach(bottle, axis_poses(1e-3 * station, 0.0, 0.0)[0], scene.gripper), False)
         states = list(press.load_path((1.0, 2.0, 4.0, 7.0)))
-        rows.append([(1e3 * s.closing, 1e3 * reference.e_n(s), s.iterations) for s in states])
+        rows.append([(1e3 * s.closing, 1e3 * reference.e_n(s), s.work.iterations) for s in states])
         known += [(s.path_dependent, s.instead, s.notes) for s in states]
         press.destroy()
     closing, e_n, iterations = np.moveaxis(np.array(rows), 2, 0)

@@ -42,7 +42,7 @@ def figures(ratio, elements, element="hex8"):
         force = (patch.load * patch.normal[:, 2]).sum() / pressed.force
         lengths = 1e3 * pressed.closing, 1e3 * limits.e_n_projected
         rows.append((*lengths, limits.f_x / (MU * limits.F_N), 1e-6 * patch.pressure.max(), force))
-        assert pressed.halvings == 0
+        assert pressed.work.halvings == 0
     return np.array(rows).T
 
 

@@ -66,8 +66,8 @@ def test_judging_slip_by_what_was_before_changes_iterations_and_no_state(monkeyp
     (judged,) = press(OVAL, 0.4, pad_of((8, 6, 3), (False, False))).load_path([3.0])
     monkeypatch.setattr(coupling, "SHARES", ())
     (plain,) = press(OVAL, 0.4, pad_of((8, 6, 3), (False, False))).load_path([3.0])
-    assert judged.iterations != plain.iterations
-    assert judged.iterations < 1.2 * plain.iterations
+    assert judged.work.iterations != plain.work.iterations
+    assert judged.work.iterations < 1.2 * plain.work.iterations
     assert judged.closing == pytest.approx(plain.closing, rel=1e-8)
     assert np.abs(judged.pressure - plain.pressure).max() < 1e-5 * plain.pressure.max()
 

@@ -46,8 +46,8 @@ def test_every_force_by_itself_leads_to_the_state_of_the_load_path(gap, element)
     press = Press(pad, gap)
     for start, expected in zip(coarse_states(gap, element), Press(pad, gap).load_path(FORCES), strict=True):
         found = press.at(start.force, [start])
-        assert (found.steps, found.halvings, found.notes) == (1, 0, ())
-        assert found.iterations <= 7
+        assert (found.work.steps, found.work.halvings, found.notes) == (1, 0, ())
+        assert found.work.iterations <= 7
         assert relative(found.unknowns, expected.unknowns) < 1e-9
         assert relative(found.pressure, expected.pressure) < 1e-9
         assert found.checks.max_strain == pytest.approx(expected.checks.max_strain, rel=1e-9)
@@ -64,7 +64,7 @@ def test_a_start_that_does_not_serve_is_replaced_by_a_walk_from_first_contact(st
     }  # fmt: skip
     expected = fine_state(BALL, 3.0)
     found = Press(pad, BALL).at(3.0, given[start])
-    assert found.steps > 1
+    assert found.work.steps > 1
     assert relative(found.unknowns, expected.unknowns) < 1e-9
     assert not found.path_dependent
 

@@ -46,7 +46,7 @@ def test_units_do_not_matter():
     for si, other in zip(solved(), Press(mm, gap).load_path(FORCES), strict=True):
         assert other.closing * 1e-3 == pytest.approx(si.closing, rel=1e-9)
         assert relative(other.pressure * 1e6, si.pressure) < 1e-9
-        assert other.iterations == si.iterations
+        assert other.work.iterations == si.work.iterations
 
 
 def test_a_uniform_column_has_the_state_of_its_law_also_where_no_newton_step_is_needed():
@@ -132,12 +132,12 @@ def test_checks_of_a_right_state_are_small_and_a_step_that_fails_is_cut_to_the_s
     solve = short.solver.solve
     short.solver.solve = lambda x, tolerance, *limits: solve(x, tolerance, 3)
     pressed = next(ladder)
-    assert pressed.halvings > 0
-    assert pressed.steps > last.steps
+    assert pressed.work.halvings > 0
+    assert pressed.work.steps > last.work.steps
     for state in (last, pressed):
         assert state.closing == pytest.approx(free.closing, rel=1e-9)
         assert relative(state.pressure, free.pressure) < 1e-9
-    assert first.halvings == last.halvings == 0
+    assert first.work.halvings == last.work.halvings == 0
 
 
 @pytest.mark.parametrize(("options", "mu", "count"), [
@@ -173,4 +173,4 @@ def test_the_ladder_goes_on_with_the_fallback_where_the_pad_has_no_solution():
         assert pressed.pad is nodal
         assert pressed.closing == pytest.approx(expected.closing, rel=1e-9)
         assert relative(pressed.pressure, expected.pressure) < 1e-9
-    assert rest[0].halvings > 0
+    assert rest[0].work.halvings > 0

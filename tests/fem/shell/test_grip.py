@@ -161,7 +161,7 @@ def test_through_the_snap_in_as_an_independent_prototype(thickness):
         if expected:
             F = held.problem.normal_force(x)
             assert F == pytest.approx(expected[0], rel=0.035)
-            finger = held._pressed(OnPath(x, F), work, held.solver.seconds)
+            finger = held._pressed(OnPath(x, F), work)
             assert 1e3 * e_n(finger) == pytest.approx(expected[1], rel=0.01)
     assert work.halvings == 0
 
@@ -214,8 +214,8 @@ def test_every_force_by_itself_leads_to_the_state_of_the_load_path():
     fine = pressed()
     for start, expected in zip(starts(), ladder(), strict=True):
         found = fine.at(start.force, [start])
-        assert (found.fingers[0].steps, found.fingers[0].halvings) == (1, 0)
-        assert found.fingers[0].iterations <= 7
+        assert (found.fingers[0].work.steps, found.fingers[0].work.halvings) == (1, 0)
+        assert found.fingers[0].work.iterations <= 7
         assert apart(found, expected) < 1e-8
         assert found.wall.opening == pytest.approx(expected.wall.opening, rel=1e-8)
 
@@ -232,7 +232,7 @@ def test_a_start_that_does_not_serve_is_replaced_by_one_below_or_by_first_contac
         "far off": [replace(good, unknowns=far, wall=replace(good.wall, q=0 * low.wall.q))],
     }  # fmt: skip
     found = pressed().at(2.0, given[start])
-    assert found.fingers[0].steps > 1
+    assert found.fingers[0].work.steps > 1
     assert apart(found, ladder()[1]) < 1e-8
     assert not found.path_dependent
 
