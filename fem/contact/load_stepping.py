@@ -115,11 +115,6 @@ class Stepping:
     slack: float = ALTERNATING  # of the last one
     _last: _Place | None = None
 
-    def __post_init__(self) -> None:
-        """With complementarity the factors at hand are those of a part of the tangent, and tell nothing of a path."""
-        if self.followed and self.followed.complementarity:
-            self.followed = None
-
     def solve(
         self, x: FloatArray, control: Control, work: Work, most: int | None = None, slack: float = ALTERNATING
     ) -> FloatArray:

@@ -70,10 +70,11 @@ class Press(LoadPath[RigidProblem]):
     def _steps(self) -> Stepping:
         problem, rough = self.problem, self.problem.friction is not None
         self.solver.patient = False  # walls jump and settle, pads at edges stall for ever
-        # with friction there is no one path of equilibria to keep to
+        # with friction there is no one path of equilibria to keep to; with complementarity factors are those of a part
+        # of the tangent, and tell nothing of it
         return Stepping(
             problem, self.solver, watch=self._watch, near=self._keeps_laws, deepest=problem.thickness,
-            followed=None if rough else problem, passed=PASSED if rough else ALTERNATING,
+            followed=None if rough or problem.complementarity else problem, passed=PASSED if rough else ALTERNATING,
         )  # fmt: skip
 
     def _keeps_laws(self, x: FloatArray, slack: float) -> bool:
