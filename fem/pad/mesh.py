@@ -134,11 +134,8 @@ class Pad:
         per_side = self.shape.per_side
         step = per_side - 1
         grid = self.contact_nodes.reshape(self.contact_grid)
-        nx, ny = len(lines[0]) - 1, len(lines[1]) - 1
-        local = [(i, j) for i in range(per_side) for j in range(per_side)]
-        self.face_nodes = np.stack(
-            [grid[i : i + step * nx : step, j : j + step * ny : step].ravel() for i, j in local], axis=1
-        )
+        windows = np.lib.stride_tricks.sliding_window_view(grid, (per_side, per_side))
+        self.face_nodes = windows[::step, ::step].reshape(-1, per_side**2)
         area = np.outer(np.diff(lines[0]), np.diff(lines[1])).ravel()
         self.contact = contact
         self.face_N, self.side_weights = face_rule(per_side, contact)
