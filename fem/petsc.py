@@ -400,8 +400,7 @@ class NonlinearSolver:
 
     def _on_step(self, x, y) -> bool:
         factor = self.problem.shorten(x.array_r, y.array_r)
-        if factor < 1.0:
-            y.scale(factor)
+        y.scale(factor)
         return factor < 1.0
 
 
