@@ -195,9 +195,8 @@ def _loaded(path: Path, data: bytes) -> trimesh.Trimesh:
             scene = trimesh.load_scene(
                 io.BytesIO(data), file_type=kind, process=False, maintain_order=True, skip_materials=True, **options
             )
-            bodies = [
-                scene.geometry[scene.graph[node][1]] for node in scene.graph.nodes_geometry
-            ]  # once for each place
+            # once for each place
+            bodies = [scene.geometry[scene.graph[node][1]] for node in scene.graph.nodes_geometry]
             placed = sum(len(getattr(body, "faces", ())) for body in bodies)
             if placed > MOST_FACES:
                 raise ValueError(f"its bodies have {placed} faces, expected at most {MOST_FACES}")
