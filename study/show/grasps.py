@@ -14,7 +14,7 @@ from softjaw.study.flags import OF_FILE, flag_words
 from softjaw.study.quantities import FORCE_RANGE, MAIN, MODELS, STATES
 from softjaw.study.ranking import index_of, ranked
 from softjaw.study.result.layout import DONE
-from softjaw.study.result.read import axes_of
+from softjaw.study.result.read import axes_of, values_of
 from softjaw.study.result.store import place_text, value_text
 from softjaw.study.show.status import Index, grouped
 from softjaw.study.table import number, with_unit
@@ -39,11 +39,8 @@ def field(ds: xr.Dataset, name: str, model: str = "ccm") -> Any:
     """
     if name not in ds.variables:
         return None
-    variable = ds.variables[name]
-    several = "model" in variable.dims and "finger" not in variable.dims
-    values = np.asarray(variable.isel(model=MODELS.index(model)).values if several else variable.values, float)
-    if variable.dims == ds.status.dims[:-1]:
-        values = np.repeat(values[..., None], ds.status.shape[-1], axis=-1)
+    of_finger = "finger" in ds.variables[name].dims
+    values = np.asarray(ds.variables[name].values if of_finger else values_of(ds, name, model), float)
     # A map without any value is left out instead of being drawn empty.
     return values if np.isfinite(values).any() else None
 
@@ -143,8 +140,7 @@ def flagged(ds: xr.Dataset, index: Index) -> list[str]:
 
 def note(ds: xr.Dataset, index: Index, known: int = 0) -> str:
     """Why a case has no result; the checks that a solved one misses, and its flags but for ``known`` ones."""
-    state = ds.variables["status"].values[index]
-    if state != DONE:
+    if ds.variables["status"].values[index] != DONE:
         return str(ds.variables["message"].values[index])
     words = flag_words(int(ds["flags"].values[index]) & ~known)
     return ", ".join(text for text in (*flagged(ds, index), words) if text)
