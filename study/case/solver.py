@@ -192,13 +192,12 @@ class CandidateSolver:
 
         Raises `ConvergenceError, CheckError` if there is no acceptable state on the scene's mesh.
         """
-        fine = self.solve(k, FINE, levels)
+        solved = Solved([self.solve(k, FINE, levels)])
         if not forces_apart(self.scene):
-            return Solved([fine])
-        solved = Solved([fine])
+            return solved
         try:
             coarse = self.solve(k, COARSE, levels)
-            solved = Solved([fine, coarse])
+            solved = Solved([solved.fine, coarse])
             if levels.friction_pressure_coupling != "none":
                 longer = self.solve(k, LONG_STEPS, levels).contacts
                 solved = replace(solved, pairs=[(coarse.contacts, longer, OF_LONG_STEPS)])
@@ -208,7 +207,7 @@ class CandidateSolver:
                 solved = replace(solved, edges=contacts)
         except (ConvergenceError, CheckError) as failure:
             solved = replace(solved, note=(PART_OF_ERROR if solved.coarse else NO_ERROR).format(reason=failure))
-        return self._refined(solved, k, levels, left_out) if isinstance(fine.fingers, OnRigid) else solved
+        return self._refined(solved, k, levels, left_out) if isinstance(solved.fine.fingers, OnRigid) else solved
 
     @property
     def seconds(self) -> Seconds:
