@@ -75,10 +75,8 @@ def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = (), r
     check_object(scene)
     grasps.check_candidates(scene)
     digest, text = scene.digest, scene.effective_toml()
-    if rounds:
-        scene = refined(scene, rounds)
+    scene = refined(scene, rounds)
     faces = math.prod(pad_shape(scene.gripper).patch_faces) if scene.run.patches != "none" else 0
-    axes = tuple(grasps.axes(scene))
     units: Sequence[Any] = decided(grasps.units(scene))
     if scene.candidates.sampled and forces_apart(scene):
         units = [_with_meshes(unit, scene, rounds) for unit in units]
@@ -89,7 +87,7 @@ def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = (), r
         digest=digest, scene=text, title=title, scene_file=scene_file, overrides=tuple(overrides),
         petsc_options=petsc_options, labels=labels, about=_about(scene),
     )  # fmt: skip
-    layout = Layout(axes, faces, tuple(derived(scene)), has(scene), rounds)
+    layout = Layout(tuple(grasps.axes(scene)), faces, tuple(derived(scene)), has(scene), rounds)
     return Plan(layout, header, tuple(units))
 
 
