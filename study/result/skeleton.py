@@ -138,8 +138,7 @@ def _write_skeleton(file: h5py.File, layout: Layout, header: Header, packed: boo
         group = study.create_group(name)
         for key, value in attributes.items():
             _write_attribute(group.id, key, value)
-    kinds = [*((axis, "<f8") for axis in layout.axes), *((axis, "<i4") for axis in layout.counters)]
-    for axis, kind in kinds:
+    for axis, kind in [*((axis, "<f8") for axis in layout.axes), *((axis, "<i4") for axis in layout.counters)]:
         scale = study["axes"].create_dataset(axis.name, data=axis.values, dtype=kind)
         scale.attrs.update(units=axis.units, long_name=with_unit(axis.long_name, axis.units))
         if axis.options:
@@ -226,13 +225,12 @@ def _chunk(dataset: Dataset) -> tuple[int, ...]:
 def _link_maps(study: h5py.Group, layout: Layout) -> None:
     """``map``: what viewers open at, as views of the maps themselves; no value stands in the file twice."""
     at = [int(i) if i != "." else slice(None) for i in view_slice(layout)]
-    names = [layout.names[i] for i in layout.shown]
     for name in FIRST:
         values = study[f"{name}/{MODELS[0]}"]
         view = h5py.VirtualLayout(tuple(layout.shape[i] for i in layout.shown), values.dtype)
         view[...] = h5py.VirtualSource(".", values.name, values.shape)[tuple(at)]
         made = study["map"].create_virtual_dataset(name, view, fillvalue=np.nan)
-        made.attrs["interpretation"] = ("spectrum", "image")[len(names) - 1]
+        made.attrs["interpretation"] = ("spectrum", "image")[len(layout.shown) - 1]
         made.attrs.update(described(BY_KEY[f"maps/{name}"], f"maps/{name}/{MODELS[0]}"))
 
 
@@ -291,11 +289,8 @@ def groups(layout: Layout) -> dict[str, dict[str, Any]]:
     first = {"signal": FIRST[0], "auxiliary_signals": list(FIRST[1:]), "title": title}
     shown = {"NX_class": "NXdata", "axes": axes_of(layout, layout.shown)}
     attributes: dict[str, dict[str, Any]] = {"map": shown | first}
-    for q in layout.quantities:
-        if q.group != "maps" or q.of:
-            continue
-        several = {"signal": MODELS[0], "auxiliary_signals": list(MODELS[1:])}
-        signal = several if q.by_model else {"signal": q.name}
+    for q in (q for q in layout.quantities if q.group == "maps" and not q.of):
+        signal = {"signal": MODELS[0], "auxiliary_signals": list(MODELS[1:])} if q.by_model else {"signal": q.name}
         attributes[q.name] = {**plot, **signal, "title": q.label}
     attributes["status"] = {**plot, "signal": "code", "title": "state of the cases"}
     collections = ["axes", "checksums", "provenance", *{q.group for q in layout.quantities} - {"status"}]

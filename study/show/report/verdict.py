@@ -94,7 +94,6 @@ def plain_report(ds: xr.Dataset) -> str:
     blocks = [[*verdict(ds), *warnings(ds)], [grasps], reason_lines(ds)[:MOST_REASONS], [READING]]
     parts = [f"{named}: {size}" if named else size, *map("\n".join, blocks)]
     parts.append(CAVEAT.replace("the scene below", "/study/scene"))
-    text = "\n\n".join(part for part in parts if part)
     # h5dump escapes these signs; their names are longer, so they come before the lines are filled
-    lines = text.translate(ASCII).splitlines()
+    lines = "\n\n".join(filter(None, parts)).translate(ASCII).splitlines()
     return "\n".join(textwrap.fill(x, WIDTH) if len(x) > WIDTH else x for x in lines) + "\n"
