@@ -57,8 +57,7 @@ def split_unit(key: str) -> tuple[str, str]:
     >>> split_unit("pad_length_mm"), split_unit("springs_n_per_mm"), split_unit("model_size")
     (('pad_length', 'mm'), ('springs', 'n_per_mm'), ('model_size', ''))
     """
-    ends = [unit for unit in UNITS if key.endswith(f"_{unit}")]
-    unit = max(ends, key=len, default="")
+    unit = max((unit for unit in UNITS if key.endswith(f"_{unit}")), key=len, default="")
     stem = key[: -len(unit) - 1] if unit else key
     return (stem, unit) if stem else (key, "")
 

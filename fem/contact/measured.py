@@ -43,8 +43,7 @@ class LiftedFace:
         d = {(i, j): self.lift.ev(x, y, dx=i, dy=j) for i in range(3) for j in range(3 - i)}
         normal[:, 0] += d[1, 0]
         normal[:, 1] += d[0, 1]
-        second = np.stack([np.stack([d[2, 0], d[1, 1]], -1), np.stack([d[1, 1], d[0, 2]], -1)], -2)
-        hessian[:, :2, :2] += second
+        hessian[:, :2, :2] += np.stack([np.stack([d[2, 0], d[1, 1]], -1), np.stack([d[1, 1], d[0, 2]], -1)], -2)
         return g + d[0, 0], normal, hessian
 
 

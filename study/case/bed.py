@@ -86,8 +86,7 @@ class Side:
     @cached_property
     def centre(self) -> FloatArray:
         """Centre of pressure on the face ``(2,)`` [m]."""
-        total = self.pressure.sum()
-        return np.array([(self.pressure * self.x).sum(), (self.pressure * self.y).sum()]) / total
+        return np.array([(self.pressure * self.x).sum(), (self.pressure * self.y).sum()]) / self.pressure.sum()
 
     @property
     def normal(self) -> FloatArray:
@@ -121,8 +120,7 @@ class JawsOnSurface:
         # with one more even step at both ends
         wider = [side * ((np.arange(-1, n + 1) + 0.5) / n - 0.5) for side, n in zip((length, width), GRID, strict=True)]
         x, y = (part[1:-1] for part in wider)
-        local = (surface[0] - point) @ axes
-        self.local, self.triangles = np.ascontiguousarray(local), surface[1]
+        self.local, self.triangles = np.ascontiguousarray((surface[0] - point) @ axes), surface[1]
         low, high = height_fields(self.local, self.triangles, *wider)
         if not np.isfinite(low[INNER]).any():
             raise NoContactError("the pad misses the object")

@@ -63,10 +63,9 @@ def candidates(scene: Scene) -> list[Candidate]:
         ]
     middle, half = middle_of(scene), in_si("half_extent_mm", where.half_extent_mm(scene.gripper))
     notes = {s: middle.remark(s, half) if middle else "" for s in where.station_values}
-    places = product(where.station_values, where.angles)
     return [
         Candidate(s, angle, _pads(where, s, angle, middle), label, notes[s])
-        for (s, angle), label in zip(places, where.labels, strict=True)
+        for (s, angle), label in zip(product(where.station_values, where.angles), where.labels, strict=True)
     ]
 
 

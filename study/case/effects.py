@@ -261,8 +261,7 @@ class EffectChoice:
         e_n = min(c.limits["ccm"].e_n for c in contacts)
         settings = self.solver.settings
         try:
-            payload = payload_alone(contacts, settings.task)["maps/payload"]
-            return e_n, payload, quality(contacts, settings)
+            return e_n, payload_alone(contacts, settings.task)["maps/payload"], quality(contacts, settings)
         except (*TOO_SMALL, RuntimeError, ValueError):  # a contact without torque has no hull
             return e_n, nan, nan
 

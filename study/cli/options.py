@@ -102,8 +102,7 @@ def refuse_unused(options: argparse.Namespace, *names: str, form: str = "") -> N
     """Refuse those of these `OPTIONS` that were given: a ``form`` of export, or a folder, has no use for them."""
     meant = f"other formats than {form}" if form else f"one result file; '{options.file}' is a folder of objects"
     for (option, *_), settings in (OPTIONS[name] for name in names):
-        default = settings.get("default")
-        if getattr(options, settings.get("dest", option[2:])) != default:
+        if getattr(options, settings.get("dest", option[2:])) != settings.get("default"):
             raise StudyError(USAGE, f"{option}: is for {meant}")
 
 

@@ -27,8 +27,7 @@ def run(options: Namespace) -> int:
             print(objects.summary(out / "index.hdf", terminal_width()), flush=True)
         return code
     about = {"scene_file": options.scene, "overrides": [*options.overrides, *petsc_overrides(options.petsc)]}
-    again = options.retry_failed
-    return solve_scene(options.scene_read, target(options), MPI.COMM_WORLD, **about, retry_failed=again)
+    return solve_scene(options.scene_read, target(options), MPI.COMM_WORLD, **about, retry_failed=options.retry_failed)
 
 
 def cost(options: Namespace) -> int:

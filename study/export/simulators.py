@@ -86,8 +86,7 @@ def tangents(normal: FloatArray) -> FloatArray:
 
 def friction(contact: PointContact) -> tuple[float, float, float]:
     """Both slides along MuJoCo's tangents [-], and torsion [m]."""
-    first = tangents(contact.rotation[:, 2])[0]
-    along_x, along_y = np.abs(contact.rotation[:, :2].T @ first)
+    along_x, along_y = np.abs(contact.rotation[:, :2].T @ tangents(contact.rotation[:, 2])[0])
     if along_y < ALONG:
         return contact.mu_x, contact.mu_y, contact.r
     return (contact.mu_y, contact.mu_x, contact.r) if along_x < ALONG else (contact.mu, contact.mu, contact.r)

@@ -80,8 +80,7 @@ class GraspPoint(GraspNumbers):
 
     def value(self, name: str, model: str = "ccm") -> Any:
         """A quantity of the grasp, in SI units; NaN where there is none."""
-        values = self.map.interpolated(name, model, self.corners)
-        return self._shaped(np.where(self.states == INSIDE, values, np.nan))
+        return self._shaped(np.where(self.states == INSIDE, self.map.interpolated(name, model, self.corners), np.nan))
 
     def error(self, name: str, model: str = "ccm") -> Any:
         """Stated error of `value`, of the cases around and of the interpolation, in the quantity's unit.

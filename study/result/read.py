@@ -244,14 +244,13 @@ def _variable(result: Result, q: Quantity) -> xr.Variable:
     """A quantity of all cases."""
     import xarray as xr
 
-    names = result.layout.names
     if q.group == "maps" and q.by_model:
         values = np.stack([result.read(f"{q.key}/{model}") for model in MODELS], axis=-1)
     else:
         values = result.read(q.key)
     if values.dtype.kind == "f":
         values[result.status != DONE] = np.nan
-    return xr.Variable((*names, *q.dims), values, _about(q))
+    return xr.Variable((*result.layout.names, *q.dims), values, _about(q))
 
 
 def _about(q: Quantity) -> dict[str, Any]:

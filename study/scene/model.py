@@ -289,8 +289,7 @@ class Scene(SceneSection):
 
     def reread(self) -> Scene:
         """The scene with its object's file as it is now."""
-        now = type(self.object).model_validate(self.object.model_dump())
-        return self.model_copy(update={"object": now})
+        return self.model_copy(update={"object": type(self.object).model_validate(self.object.model_dump())})
 
     @classmethod
     def of_tables(cls, tables: Mapping[str, Any]) -> Scene:

@@ -124,8 +124,7 @@ class View:
 
     @cached_property
     def _places(self) -> np.ndarray:
-        places = read_field(self.ds.attrs["file"], "wall/place", **self._here(self.point)).values
-        return self.placed.to_pad(places)
+        return self.placed.to_pad(read_field(self.ds.attrs["file"], "wall/place", **self._here(self.point)).values)
 
     def displacement(self, index: Index) -> tuple[np.ndarray, float] | None:
         """Displacement of the wall's places ``(AROUND, ALONG, 3)`` and the angle they begin at, if stored."""
