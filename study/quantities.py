@@ -164,10 +164,8 @@ class Quantity:
 SINGULAR = {"fingers": "finger", "checks": "check", "effects": "effect"}
 F, M, FM = ("finger",), ("model",), ("finger", "model")
 MESHES = "Stated error, all that is numerical: mesh, steps of the load path, effects left out, edge of the contact"
-AS_MAP = "As the map, for each finger."
 MEANS = "|P - 1|, |P^(-1/degree) - 1| (the relative error of the radius), angle between gradient and motion"
-ROWS = (
-    # maps of every case, with what is said beside them
+MAP_ROWS = (  # of every case, with what is said beside them
     Quantity("quality", M, "", "grasp quality",
              "Volume of the grasp wrench space of both contacts with unit normal forces. As in the paper, arms of "
              "forces are divided by the object's extents along its own x, y and z, torques about the normals by the "
@@ -272,16 +270,13 @@ ROWS = (
     Quantity("support_force", (), "N", "force of the support",
              "What the support bears in this frictionless contact: the pads push sloping walls along their axis. Where"
              " friction, mu F_N of both fingers, cannot take it, the flag is 'slides out'.", needs=("wall",)),
+)  # fmt: skip
+OF_FINGERS = ("f_x_max", "f_y_max", "tau_z_max", "tau_pure", "e_n_ratio", "S", "F_N", "force_excess", "closing")
+ROWS = (
+    *MAP_ROWS,
     # each finger: limits, contact frame, pose of the pad
-    Quantity("f_x_max", FM, "N", "largest friction along x", AS_MAP, "fingers"),
-    Quantity("f_y_max", FM, "N", "largest friction along y", AS_MAP, "fingers"),
-    Quantity("tau_z_max", FM, "N m", "largest friction torque about z", AS_MAP, "fingers"),
-    Quantity("tau_pure", F, "N m", "largest torque without a net force", AS_MAP, "fingers"),
-    Quantity("e_n_ratio", FM, "m", "eccentricity parameter, torque over force", AS_MAP, "fingers"),
-    Quantity("S", F, "N", "pressure times area", AS_MAP, "fingers"),
-    Quantity("F_N", F, "N", "normal force", AS_MAP, "fingers"),
-    Quantity("force_excess", F, "", "force along the contact normal over the gripper's, less 1", AS_MAP, "fingers"),
-    Quantity("closing", F, "m", "closing displacement of the pad", AS_MAP, "fingers"),
+    *(Quantity(name, (*F, *q.dims), q.unit, q.label, "As the map, for each finger.", "fingers")
+      for name in OF_FINGERS for q in MAP_ROWS if q.name == name),
     Quantity("frame_origin", (*F, "component"), "m", "origin of the contact frame",
              "In the pad's frame: where the line along z through the COP meets the deformed face, loaded there or not.",
              "fingers"),
