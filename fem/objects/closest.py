@@ -97,16 +97,14 @@ def _nearest_segment(z, r, line):
 def _cubic(s, breaks, coefficients):
     """Point and first two derivatives of the piecewise cubic at ``s``: ``(z, z', z'', r, r', r'')``."""
     k = min(max(np.searchsorted(breaks, s, side="right") - 1, 0), len(breaks) - 2)
-    h, c = s - breaks[k], coefficients[k]
-    z, r = c[0], c[1]
-    return (
-        z[0] + h * (z[1] + h * (z[2] + h * z[3])),
-        z[1] + h * (2.0 * z[2] + h * 3.0 * z[3]),
-        2.0 * z[2] + 6.0 * h * z[3],
-        r[0] + h * (r[1] + h * (r[2] + h * r[3])),
-        r[1] + h * (2.0 * r[2] + h * 3.0 * r[3]),
-        2.0 * r[2] + 6.0 * h * r[3],
-    )
+    return _jet(coefficients[k, 0], s - breaks[k]) + _jet(coefficients[k, 1], s - breaks[k])
+
+
+@njit(cache=True)
+def _jet(c, h):
+    """Value and first two derivatives of a cubic."""
+    slope = c[1] + h * (2.0 * c[2] + h * 3.0 * c[3])
+    return c[0] + h * (c[1] + h * (c[2] + h * c[3])), slope, 2.0 * c[2] + 6.0 * h * c[3]
 
 
 @njit(cache=True)
