@@ -104,6 +104,14 @@ def inverted(M, out):
 
 
 @njit(cache=True)
+def _turn(M, p, q, c, s):
+    """Turn two columns of a 3 x 3 matrix into each other."""
+    for k in range(3):
+        a, b = M[k, p], M[k, q]
+        M[k, p], M[k, q] = c * a - s * b, s * a + c * b
+
+
+@njit(cache=True)
 def principal(C):
     """Eigenvalues ``(3,)`` and eigenvectors (columns) of a symmetric 3 x 3 matrix, by cyclic Jacobi rotations."""
     M, V = C.copy(), np.eye(3)
@@ -121,15 +129,9 @@ def principal(C):
                 t = (1.0 if theta >= 0 else -1.0) / (abs(theta) + np.sqrt(theta * theta + 1.0))
                 c = 1.0 / np.sqrt(t * t + 1.0)
                 s = t * c
-                for k in range(3):
-                    a, b = M[k, p], M[k, q]
-                    M[k, p], M[k, q] = c * a - s * b, s * a + c * b
-                for k in range(3):
-                    a, b = M[p, k], M[q, k]
-                    M[p, k], M[q, k] = c * a - s * b, s * a + c * b
-                for k in range(3):
-                    a, b = V[k, p], V[k, q]
-                    V[k, p], V[k, q] = c * a - s * b, s * a + c * b
+                _turn(M, p, q, c, s)
+                _turn(M.T, p, q, c, s)
+                _turn(V, p, q, c, s)
     return np.array([M[0, 0], M[1, 1], M[2, 2]]), V
 
 
