@@ -18,6 +18,7 @@ Thickness = float | Sequence[tuple[float, float]]  # of a wall [m], or pairs (z,
 LINE_SAMPLES = 4000  # of the wanted element size along a line
 GROWTH = 0.25  # of the element size, per distance from the gripped regions
 TURN = np.radians(25.0)  # largest turn of the outline within one element
+SECTION_SAMPLES = 721  # angles at which the curvature of sections is judged
 MOST_BENT = 0.8  # thickness over the radius of curvature at the edge of a lid
 
 
@@ -231,6 +232,27 @@ def _wall(surface: OuterSurface, thickness: Thickness, base: float | None, s: Fl
             f"curvature is only {1e3 / bend[k]:.4g} mm; round it more or make the wall thinner"
         )
     return t
+
+
+def refuse_thick_sections(surface: OuterSurface, thickness: Thickness) -> None:
+    """Refuse a wall that is thicker than its sections are round: its inner face would run through the axis or fold.
+
+    Raises `ValueError`. That of the outline is judged where a wall is meshed; a mesh round the body may miss corners.
+    """
+    at, s = np.meshgrid(np.linspace(0.0, 2 * np.pi, SECTION_SAMPLES), np.linspace(*surface.wall, 65))
+    at, s, step = at.ravel(), s.ravel(), 1e-4
+    along_it = surface.jets(at, s)[:, 1]
+    turn = (surface.normals(at + step, s) - surface.normals(at - step, s)) / (2.0 * step)
+    # on the axis, where sections are points, lines round the body have no direction and the outline tells
+    bend = np.einsum("ni,ni->n", turn, along_it) / np.maximum(np.einsum("ni,ni->n", along_it, along_it), NEGLIGIBLE**2)
+    t = _wall(surface, thickness, None, s)
+    if (bend * t > 1.0 - 1e-6).any():
+        k = int(np.argmax(bend * t))
+        z = surface.curve.derivative(s[k : k + 1])[0, 0]
+        raise ValueError(
+            f"the wall is {1e3 * t[k]:.4g} mm thick at z = {1e3 * z:.4g} mm, where its section's radius of curvature "
+            f"is only {1e3 / bend[k]:.4g} mm; round it more or make the wall thinner"
+        )
 
 
 def _planes(symmetry: tuple[bool, bool], theta: FloatArray, number: IntArray, nodes: int) -> FloatArray:

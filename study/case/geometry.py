@@ -23,10 +23,10 @@ from softjaw.fem.objects.outer_surface import OuterSurface
 from softjaw.fem.objects.stacked import Stacked as Stacked
 from softjaw.fem.objects.traced_surface import TraceReport, traced
 from softjaw.fem.shell.wall_material import WallMaterial, wall_material
-from softjaw.fem.shell.wall_mesh import MeshSize, along, around, body_mesh
+from softjaw.fem.shell.wall_mesh import MeshSize, along, around, body_mesh, refuse_thick_sections
 from softjaw.friction.patch import NEGLIGIBLE, FloatArray
 from softjaw.study.case.fit import extremes
-from softjaw.study.messages import fault_of
+from softjaw.study.messages import USAGE, StudyError, fault_of
 from softjaw.study.scene.objects import Mesh, Walled
 from softjaw.study.scene.sections import Gripper
 
@@ -82,12 +82,20 @@ def material_of(shape: Walled) -> WallMaterial:
 
 
 def check_wall(shape: Any, surface: OuterSurface) -> None:
-    """Refuse a wall that is too thick for the curvature of its outline, by meshing it coarsely.
+    """Refuse a wall that is too thick for the curvature of outline or sections, and a base where nothing is flat.
 
     Raises `StudyError` with the key and what is wrong with it.
     """
-    size = MeshSize(heights=surface.heights[:1] * 2, around=0.01, along=0.005, coarse=0.02)
+    # at its middle, as a wall that begins on the axis has no lines round it there
+    size = MeshSize(heights=(0.5 * sum(surface.heights),) * 2, around=0.01, along=0.005, coarse=0.02)
+    if shape.base_wall is not None and surface.flat[0] == 0.0:
+        raise StudyError(
+            USAGE,
+            f"object.base_wall_mm: found {shape.base_wall_mm:g}, expected a flat bottom: this one begins on the axis;"
+            " leave it out, or give wall_mm as pairs [z, thickness]",
+        )
     with fault_of("object.wall_mm", ValueError):
+        refuse_thick_sections(surface, shape.wall)
         body_mesh(
             surface, shape.wall, size,
             open_top=shape.open_top, open_bottom=shape.open_bottom, base_thickness=shape.base_wall,

@@ -107,10 +107,14 @@ class Walled(Shape):
                 yield wrong(high, f"pairs [z, thickness] with z rising from {low[0]:g} mm", "wall_mm", i)
         # a thinner foil is a slip of the unit; share of the smallest extent: a thicker wall is no shell
         most = 0.1 * min((high - low for low, high in self.spans_mm.values()), default=math.inf)
-        thick = [t for t in self.thicknesses_mm if not 0.01 <= t <= most]
-        if thick:
-            expected = f"a thickness from 0.01 to {most:g} mm, a tenth of the object's smallest extent"
-            yield wrong(thick[0], f"{expected}; a thicker wall is as good as rigid: leave it out", "wall_mm")
+        given = [("wall_mm", t) for t in self.thicknesses_mm]
+        given += [("base_wall_mm", self.base_wall_mm)] if self.base_wall_mm is not None else []
+        for key, value in given:
+            if not 0.01 <= value <= most:
+                expected = f"a thickness from 0.01 to {most:g} mm, a tenth of the object's smallest extent"
+                rigid = "; a thicker wall is as good as rigid: leave it out" if key == "wall_mm" and value > most else ""
+                yield wrong(value, expected + rigid, key)
+                break
         missing = [k for k in ("young_modulus_gpa", "wall_poisson_ratio") if getattr(self, k) is None]
         if self.wall_material == "custom" and missing:
             expected = f"{' and '.join(missing)} beside it, as in `wall_poisson_ratio = 0.38`"
