@@ -122,6 +122,8 @@ def _result(choice: EffectChoice, k: int, solved: Solved, unit: Any, begun: floa
         values["maps/flags"] |= wall_flags(scene, contacts[0].state, values)
     if coarse:
         values |= solved.errors(values, _state_values(coarse), settings, choice.skipped_share(k))
+        for key, more in choice.stiff_wall_errors(float(values["maps/closing"])).items():
+            values[key] += more
         # only where every case has a target: without one the sums at the end say how many cases miss the usual one
         if (target := scene.accuracy.target) is not None and not unit.finest:
             error = values[f"maps/{scene.accuracy.target_of}_error"]

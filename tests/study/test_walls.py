@@ -39,7 +39,7 @@ def solved(*arguments, **choices):
 
 def test_the_level_follows_the_indentation_and_compression_is_a_strain_too(monkeypatch):
     levels = []
-    for thickness, modulus, forces in ((1.0, 200.0, "[0.2]"), (0.7, 5.0, "[0.5]"), (0.2, 200.0, "[4]")):
+    for thickness, modulus, forces in ((1.0, 200.0, "[0.2]"), (0.7, 5.0, "[0.05]"), (0.2, 200.0, "[4]")):
         wall_ = f"object.wall_mm={thickness}", f"object.young_modulus_gpa={modulus}"
         result = solved(CUP, *wall_, forces=forces)[0]
         levels.append(result.effects["object"])
@@ -54,6 +54,17 @@ def test_the_level_follows_the_indentation_and_compression_is_a_strain_too(monke
         monkeypatch.setattr(wall, name, lambda *_, value=value: value)
     state = SimpleNamespace(wall=SimpleNamespace(q=np.zeros(6), reaction=np.zeros(3)))
     assert wall.wall_values(None, state, None)["maps/wall_strain"] == pytest.approx(3e-3)
+
+
+def test_what_a_wall_that_is_taken_as_rigid_closes_less_is_part_of_the_errors():
+    stiff = "object.wall_mm=1.0", "object.young_modulus_gpa=60.0", "accuracy.meshes=2"
+    taken, forced = (solved(CUP, *stiff, f"effects.object='{level}'", forces="[2]")[0] for level in ("auto", "rigid"))
+    shell = solved(CUP, *stiff, "effects.object='nonlinear_shell'", forces="[2]")[0]
+    assert (taken.effects["object"].level, taken.effects["object"].reason) == ("rigid", BELOW)
+    closing, without = (r.values["maps/closing_error"] for r in (taken, forced))
+    assert shell.values["maps/closing"] / taken.values["maps/closing"] - 1.0 < closing - without < 0.05
+    opening = [r.values["maps/opening_loaded_error"] for r in (taken, forced)]
+    assert opening[0] / opening[1] == pytest.approx(closing / without)
 
 
 @LONG
