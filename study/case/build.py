@@ -51,6 +51,14 @@ def build_object(shape: Any) -> GapObject:
             return objects.Plane(shape.thickness)
 
 
+def full(shape: Any) -> Any:
+    """The object's section for its extents and its weight, which count as full: it ends where its outline does.
+
+    A thin wall's lids have rims beyond, and an open end has no lid at all.
+    """
+    return shape.model_copy(update={"wall_mm": None}) if has_wall(shape) and shape.shape != "mesh" else shape
+
+
 @lru_cache(maxsize=8)
 def surface_triangles(shape: Any) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Points ``(k, 3)`` [m] and triangles ``(m, 3)`` of an object; decimating a large mesh takes time."""
@@ -70,8 +78,8 @@ def centre_of_volume(obj: Any) -> NDArray[np.float64]:
 def centroid_and_bounds(shape: Any) -> dict[str, NDArray[np.float64]]:
     """Centroid ``(3,)`` and bounds ``(2, 3)`` [m] of an object in the frame of its own file."""
     placed = own_frame(shape)
-    points = placed.to_object(np.asarray(surface_triangles(shape)[0], float))
-    centroid = placed.to_object(centre_of_volume(build_object(shape))[None])[0]
+    points = placed.to_object(np.asarray(surface_triangles(full(shape))[0], float))
+    centroid = placed.to_object(centre_of_volume(build_object(full(shape)))[None])[0]
     return {"object_centroid": centroid, "object_bounds": np.stack([points.min(axis=0), points.max(axis=0)])}
 
 
@@ -109,7 +117,9 @@ def with_mass(scene: Scene) -> Scene:
 def centre_of_mass(scene: Scene, obj: Any) -> NDArray[np.float64]:
     """Where the weight of a scene's object acts, in the object's frame ``(3,)`` [m]."""
     given = scene.task.centre_of_mass
-    return centre_of_volume(obj) if given is None else own_frame(scene.object).to_pad(np.array(given))
+    if given is not None:
+        return own_frame(scene.object).to_pad(np.array(given))
+    return centre_of_volume(build_object(full(scene.object)) if has_wall(scene.object) else obj)
 
 
 @lru_cache(maxsize=8)

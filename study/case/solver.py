@@ -19,7 +19,7 @@ from softjaw.fem.contact.path import Pressed
 from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.fem.objects.gap import Pose
 from softjaw.fem.petsc import Seconds
-from softjaw.study.case.build import build_object, forces_apart, has_wall, pad_elements
+from softjaw.study.case.build import build_object, forces_apart, full, has_wall, pad_elements
 from softjaw.study.case.contact import Contact
 from softjaw.study.case.errors import DOUBTED, Unseen, grasp_values, mesh_errors
 from softjaw.study.case.evaluate import EvaluationSettings, settings_of
@@ -150,7 +150,7 @@ class CandidateSolver:
     @cached_property
     def settings(self) -> EvaluationSettings:
         """What is computed from two contacts."""
-        return settings_of(self.scene, build_object(self.scene.object))
+        return settings_of(self.scene, build_object(full(self.scene.object)))
 
     def at_levels(self, levels: Levels) -> Scene:
         """The scene with these levels of its effects."""

@@ -67,6 +67,13 @@ def test_what_a_wall_that_is_taken_as_rigid_closes_less_is_part_of_the_errors():
     assert opening[0] / opening[1] == pytest.approx(closing / without)
 
 
+def test_a_wall_that_is_taken_as_rigid_holds_what_the_rigid_object_does():
+    wall_, rigid = solved(CUP, "effects.object='rigid'"), solved(CUP.split("wall_mm")[0])
+    for name in ("payload", "quality"):  # weight and extents end where the outline does, not at the rims of lids
+        ours, theirs = (np.array([r.values[f"maps/{name}"][0] for r in results]) for results in (wall_, rigid))
+        assert ours == pytest.approx(theirs, rel=1e-3)
+
+
 @LONG
 def test_across_an_oval_there_is_no_symmetry_and_to_force_one_is_refused():
     where = "stations_mm = [40]\nangles_deg = [45]"
