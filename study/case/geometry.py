@@ -95,6 +95,13 @@ def check_wall(shape: Any, surface: OuterSurface) -> None:
             " leave it out, or give wall_mm as pairs [z, thickness]",
         )
     with fault_of("object.wall_mm", ValueError):
+        if shape.shape == "mesh":  # of other shapes the scene knows how large they are
+            most = 100.0 * float(np.ptp(mesh_object(shape).bounds, axis=0).min())
+            if max(shape.thicknesses_mm) > most:
+                raise ValueError(
+                    f"found {max(shape.thicknesses_mm):g}, expected at most {most:.3g} mm, a tenth of the mesh's"
+                    " smallest extent; a thicker wall is as good as rigid: leave it out"
+                )
         refuse_thick_sections(surface, shape.wall)
         body_mesh(
             surface, shape.wall, size,

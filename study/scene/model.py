@@ -169,6 +169,12 @@ class Scene(SceneSection):
         walled = getattr(self.object, "wall", None) is not None
         if self.accuracy.target is not None and walled and self.effects.object != "rigid":
             yield "accuracy.target refines cases on rigid objects alone: on a simulated wall there are two meshes"
+        pairs, span = getattr(self.object, "wall_mm", None), self.object.spans_mm.get("z")
+        if isinstance(pairs, tuple) and span:
+            (low, high), first, last = span, pairs[0][0], pairs[-1][0]
+            if min(last, high) - max(first, low) < 0.5 * (high - low):
+                reach = f"pairs [z, thickness] from {first:g} to {last:g} mm on an object from {low:g} to {high:g} mm"
+                yield f"object.wall_mm: {reach}; below and above them it stays as thick as there"
         if g.poisson_ratio > 0.45 and g.element == "hex8":
             instead = f'element = "hex27" with elements = {list(halved(g.elements))}'
             yield f"gripper.poisson_ratio = {g.poisson_ratio:g} makes hex8 elements too stiff: use {instead}"

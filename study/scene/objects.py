@@ -112,8 +112,9 @@ class Walled(Shape):
         for key, value in given:
             if not 0.01 <= value <= most:
                 expected = f"a thickness from 0.01 to {most:g} mm, a tenth of the object's smallest extent"
-                rigid = "; a thicker wall is as good as rigid: leave it out" if key == "wall_mm" and value > most else ""
-                yield wrong(value, expected + rigid, key)
+                if key == "wall_mm" and value > most:
+                    expected += "; a thicker wall is as good as rigid: leave it out"
+                yield wrong(value, expected, key)
                 break
         missing = [k for k in ("young_modulus_gpa", "wall_poisson_ratio") if getattr(self, k) is None]
         if self.wall_material == "custom" and missing:

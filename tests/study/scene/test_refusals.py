@@ -39,6 +39,29 @@ def test_every_object_of_a_sweep_is_judged():
     check_object(at([60], FLASK))
 
 
+DOMED = 'shape = "revolution"\nprofile_mm = [[0, 0], [4, 18], [12, 28], [40, 30], [120, 30]]'
+NECKED = 'shape = "revolution"\nprofile_mm = [[0, 30], [40, 28], [80, 18], [120, 7], [150, 4], [160, 4], [170, 4]]'
+SQUARE = 'shape = "sections"' + "".join(
+    f"\n[[object.sections]]\nz_mm = {z}\na_mm = 35\nexponent = 20" for z in (0, 40, 80, 120)
+)
+
+
+@pytest.mark.parametrize(("body", "key", "expected"), [
+    ((DOMED, "object.wall_mm=0.5", "object.base_wall_mm=1"), "base_wall_mm", "a flat bottom"),
+    ((NECKED, "object.wall_mm=5"), "wall_mm", "section's radius of curvature is only 4 mm"),
+    ((SQUARE, "object.wall_mm=4"), "wall_mm", "section's radius of curvature is only 2.5"),
+    ((FLASK, "object.wall_mm=30"), "wall_mm", "a tenth of the mesh's smallest extent"),
+])  # fmt: skip
+def test_walls_that_their_bodies_cannot_have_are_refused(body, key, expected):
+    with pytest.raises(StudyError, match=rf"^object.{key}: .*{expected}"):
+        check_object(at([60], *body))
+
+
+@pytest.mark.parametrize(("body", "wall"), [(DOMED, 0.5), (NECKED, 2), (SQUARE, 2)])
+def test_walls_that_their_bodies_can_have_are_not(body, wall):
+    check_object(at([60], body, f"object.wall_mm={wall}"))
+
+
 @pytest.mark.parametrize("body", [BALL, CYLINDER, BOX])
 def test_a_pad_that_passes_the_object_is_named_by_its_number(body):
     """The second stands at the corner of the box round the ball."""

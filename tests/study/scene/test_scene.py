@@ -131,6 +131,7 @@ NO_TOML = [
     (BOTTLE.replace("  [100, 20],\n", ""), 3, "object.profile_mm"),
     (BOTTLE.replace("[150, 12],\n]", "[150, 12],\n]\nwall_mm = 9"), 8, "object.wall_mm"),
     (BOTTLE.replace("[150, 12],\n]", "[150, 12],\n]\nbase_wall_mm = 1"), 8, "object.base_wall_mm"),
+    (BOTTLE.replace("[150, 12],\n]", "[150, 12],\n]\nwall_mm = 1\nbase_wall_mm = 30"), 9, "object.base_wall_mm"),
     (BOTTLE.replace("[150, 12],\n]", "[150, 12],\n]\nwall_mm = 1\nwall_material = 'custom'"), 9,
      "object.wall_material"),
     (body('shape = "box"\nsize_mm = [60, 40, 120]\nedge_radius_mm = 21'), 4, "object.edge_radius_mm"),
@@ -233,6 +234,13 @@ def test_overrides_replace_values_which_are_in_si_units_and_hyperfoam_fills_in_i
 def test_values_that_are_seldom_meant_are_allowed_with_a_warning(overrides):
     assert len(parse_scene(BALL, overrides=overrides).warnings) == 1
     assert not parse_scene(BALL).warnings
+
+
+def test_a_wall_whose_thickness_is_given_for_other_heights_gets_a_warning():
+    for ends, warned in (((0, 0.15), True), ((900, 901), True), ((8, 140), False)):
+        pairs = [[z, 0.4] for z in ends]
+        text = BOTTLE.replace("[150, 12],\n]", f"[150, 12],\n]\nwall_mm = {pairs}")
+        assert any("object.wall_mm" in line for line in parse_scene(text).warnings) == warned
 
 
 def test_combinations_of_a_sweep_that_make_no_scene_are_named_and_too_many_refused():
