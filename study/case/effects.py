@@ -48,8 +48,8 @@ STIFF_PLATE, SOFT_PLATE = E_N_TARGET / 3.5, 0.05
 SMALL_TRACTION = E_N_TARGET / 0.5
 # Indentation over closing displacement up to which the e_n of a rigid wall was good to 0.5 % (54 cases), and over its
 # thickness up to which dents and stresses of a linear shell are good to 1.2 %, closing to 0.8 % and e_n to 0.2 % (16
-# cases: a quarter of the ratio, a seventh, a thirtieth). Above, nothing is measured: indentation and stress are wanted, too,
-# which a rigid wall has not and e_n does not tell; and a linear wall takes as long as a nonlinear one.
+# cases: a quarter of the ratio, a seventh, a thirtieth). Above, nothing is measured: indentation and stress are wanted,
+# too, which a rigid wall has not and e_n does not tell; and a linear wall takes as long as a nonlinear one.
 STIFF_WALL, SMALL_INDENTATION = 0.02, 0.05
 RIGID_CLOSES = 1.35  # times that indentation a rigid wall closed less at most, in 14 cases
 SURFACES = {
