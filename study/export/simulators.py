@@ -129,7 +129,8 @@ def as_sdf(grasp: RankedGrasp, body: RigidBody, mesh: str = "object.stl") -> str
             return numbers(*origin, *np.asarray(Rotation.from_matrix(rotation).as_euler("xyz")))
 
     made = cell(grasp, body.down)
-    back = made.rotation.T, -made.rotation.T @ made.origin
+    upright = Rotation.align_vectors([[0.0, 0.0, -1.0]], [body.down])[0].as_matrix() @ made.rotation.T
+    back = upright, -upright @ made.origin
     return rendered("grasp.sdf", grasp, body, pose=pose, back=back, mesh=escape(mesh), BALL=BALL)
 
 

@@ -2,6 +2,7 @@
 
 import math
 from copy import deepcopy
+from dataclasses import replace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -90,6 +91,19 @@ def test_gazebo_slips_at_the_torque_of_the_file_by_its_own_formula(path):
             assert turn == pytest.approx(cell(grasp).contacts[f - 1].rotation, abs=1e-9)
             rail = turn @ numbers(root.findall("model/joint")[f - 1].findtext("axis/xyz"))
             assert rail == pytest.approx(cell(grasp).closing * (1 if f == 1 else -1), abs=1e-9)
+
+
+@pytest.mark.parametrize("down", [[0, 0, -1], [0, 0, 1], [0.6, 0, 0.8], [0, -1, 0]])
+def test_the_weight_pulls_downwards_in_gazebo_and_straight_down_leaves_the_object_in_its_own_frame(path, down):
+    weighed = replace(body(path), down=np.array(down, float))
+    for grasp in all_grasps(path, 4.0):
+        model = ElementTree.fromstring(as_sdf(grasp, weighed)).find("model")
+        places = [numbers(model.findtext(name)) for name in ("pose", "link/pose")]
+        turns = [Rotation.from_euler("xyz", place[3:]).as_matrix() for place in places]
+        assert turns[0] @ turns[1] @ down == pytest.approx([0, 0, -1], abs=1e-9)
+        assert turns[0] @ places[1][:3] + places[0][:3] == pytest.approx([0, 0, 0], abs=1e-9)
+        if down == [0, 0, -1]:
+            assert turns[0] @ turns[1] == pytest.approx(np.eye(3), abs=1e-9)
 
 
 def test_the_surface_beside_a_model_of_gazebo_is_the_object_and_physx_slips_at_the_torque_of_the_file(path, tmp_path):
