@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 import tomllib
+from collections.abc import Collection
 from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -125,11 +126,14 @@ def gripper_file(name: str) -> tuple[dict[str, Any], Hand]:
     return tables.get("gripper", {}), hand
 
 
-def filled_in(tables: dict[str, Any], folder: Path) -> tuple[str, Any, str] | None:
+def filled_in(
+    tables: dict[str, Any], folder: Path, own: Collection[str] | None = None
+) -> tuple[str, Any, str] | None:
     """Put the keys of ``gripper.preset`` into a scene's tables, where it has none of its own; what is wrong with it.
 
     The largest opening is what the foam leaves of the stroke. An error is a key, what it has, and what was expected; a
-    gripper's own file is looked for from ``folder``, and has its whole path then.
+    gripper's own file is looked for from ``folder``, and has its whole path then. Keys other than ``own`` are filled in
+    anew; by default all that are there are the scene's own.
     """
     gripper = tables.get("gripper")
     if not isinstance(gripper, dict) or not isinstance(name := gripper.get("preset"), str):
@@ -141,6 +145,8 @@ def filled_in(tables: dict[str, Any], folder: Path) -> tuple[str, Any, str] | No
     except StudyError as error:
         more = "" if isinstance(error.__cause__, OSError) else f": {error}"  # of no such file all is said
         return "gripper.preset", name, f"one of {', '.join(PRESETS)}, or a file of the same form{more}"
+    for key in () if own is None else {*keys, "max_opening_mm"} - {*own}:
+        gripper.pop(key, None)
     for key, value in keys.items():
         gripper.setdefault(key, value)
     thickness, most = gripper.get("pad_thickness_mm"), hand.stroke_mm / 2
@@ -151,6 +157,6 @@ def filled_in(tables: dict[str, Any], folder: Path) -> tuple[str, Any, str] | No
     load = tables.get("load")
     forces = load.get("normal_force_n") if isinstance(load, dict) else None
     low, high = hand.force_n
-    listed = forces if isinstance(forces, list) else []
+    listed = forces if isinstance(forces, list | tuple) else []
     beyond = [force for force in listed if isinstance(force, int | float) and not low <= force <= high]
     return ("load.normal_force_n", beyond[0], f"{low:g} to {high:g} N, which this gripper has") if beyond else None

@@ -59,6 +59,7 @@ NOT_SWEPT = (  # they change which datasets a file has and how large they are, o
     "candidates.stations", "accuracy.meshes", "accuracy.target", "effects.wrench", "limit_surface.samples",
 )  # fmt: skip
 OF_FACES = ("gripper.element", "gripper.elements")  # keys that the number of stored faces depends on
+OF_PRESET = {"gripper.preset", "gripper.pad_thickness_mm", "load.normal_force_n"}  # keys that a preset has a say in
 NO_RESULT = ("run", "uncertainty")  # sections that change no result of a case
 MOST_GRID_POINTS, MOST_CASES = 10_000, 1_000_000
 OVERRIDE = "section.key=value with a value as in TOML, as in gripper.pad_width_mm=20 or object.name='\"cup\"'"
@@ -334,7 +335,25 @@ def put(data: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
         tables.setdefault(section, {})[name] = value
         if value is None:
             del tables[section][name]
+    _preset_again(data.get("gripper", {}), tables, values)
     return {**data, **tables, "sweep": {}}
+
+
+def _preset_again(before: Mapping[str, Any], tables: dict[str, Any], values: Mapping[str, Any]) -> None:
+    """Hold values put into tables to a gripper's preset: its pad where it is new, the opening that other foam leaves.
+
+    Raises `SceneError`: there is no such preset, or it has not this force.
+    """
+    if OF_PRESET.isdisjoint(values):
+        return
+    own = {key.removeprefix("gripper.") for key in values}
+    if "preset" not in own:
+        without = {"gripper": {key: value for key, value in before.items() if key != "max_opening_mm"}}
+        follows = not filled_in(without, Path()) and without["gripper"].items() >= before.items()
+        own |= before.keys() - ({"max_opening_mm"} if follows else set())
+    if trouble := filled_in(tables, Path(), own):
+        key, actual, expected = trouble
+        raise SceneError([Problem("scene", None, key, shown(actual), expected, "")])
 
 
 def _matching_foam(gripper: Mapping[str, Any], values: Mapping[str, Any]) -> Mapping[str, Any]:

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+import softjaw
 from softjaw.study.cli import main
 from softjaw.study.cli.options import KINDS
 from softjaw.study.grippers import PRESETS, gripper_file
@@ -42,6 +43,25 @@ def test_keys_of_the_scene_come_first_and_a_preset_may_stand_on_the_command_line
         assert problem.expected.startswith("less than 40 mm")
     scene = Scene.from_file(ROOT / "jobs" / "smoke.toml", ["gripper.preset=wsg50", "load.normal_force_n=[5, 10]"])
     assert scene.gripper.max_opening_mm == 100
+
+
+def test_a_preset_holds_for_values_that_are_put_in():
+    """Its pad where it is new, the opening that other foam leaves, and its forces; a wrong name is told."""
+    smoke = Scene.from_file(ROOT / "jobs" / "smoke.toml", ["load.normal_force_n=[5, 10]"])
+    franka = smoke.with_values(**{"gripper.preset": "franka_hand"})
+    assert (franka.gripper.pad_length_mm, franka.gripper.max_opening_mm) == (18.5, 70)
+    thick = {"gripper.pad_thickness_mm": 10.0}
+    assert franka.with_values(thick).gripper.max_opening_mm == 60
+    assert franka.with_values(**{"gripper.max_opening_mm": 33}).with_values(thick).gripper.max_opening_mm == 33
+    assert smoke.with_values(thick | {"gripper.preset": "franka_hand"}).gripper.max_opening_mm == 60
+    assert franka.with_values(**{"gripper.preset": "wsg50"}).gripper.max_opening_mm == 100
+    assert franka.with_values(**{"gripper.preset": None, "load.normal_force_n": [99]}).load.normal_force == (99.0,)
+    for values in ({"load.normal_force_n": [36]}, {"gripper.preset": "franka"}, {"gripper.pad_thickness_mm": 40}):
+        with pytest.raises(SceneError) as error:
+            franka.with_values(values)
+        assert [problem.key for problem in error.value.problems] == [*values]
+    with pytest.raises(ValueError, match="expected 1 to 35 N, which this gripper has"):
+        softjaw.press(franka, station=0.0, angle=0.0, force=80.0)
 
 
 def test_joints_are_half_the_gap_within_the_stroke_or_the_angle_of_a_linkage():
