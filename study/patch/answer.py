@@ -77,9 +77,11 @@ def contact_of(
     if not isinstance(patch, ContactPatch):
         expected = "a ContactPatch of centroid, area, normal and pressure"
         raise TypeError(f"patch is a {type(patch).__name__}: expected {expected}")
-    mu = checked_mu(mu)
+    mu, x_hint = checked_mu(mu), principal_direction(patch) if x_axis is None else np.asarray(x_axis, float)
+    if x_hint.shape != (3,) or not np.isfinite(x_hint).all():
+        raise ValueError(f"x_axis is {x_hint.tolist()}: expected three finite numbers")
     try:
-        contact = Contact(patch, mu, x_hint=principal_direction(patch) if x_axis is None else x_axis)
+        contact = Contact(patch, mu, x_hint=x_hint)
     except ValueError as error:
         raise type(error)(str(error).replace("x_hint", "x_axis")) from error
     if contact.frame.flag & FrameFlag.ORIENTATION:

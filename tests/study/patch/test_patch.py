@@ -291,6 +291,11 @@ def test_the_quality_is_that_of_the_command_with_every_surface():
 @pytest.mark.parametrize(("call", "error", "words"), [
     (lambda: sj.friction_limits([1, 2], 0.8), TypeError, "expected a ContactPatch"),
     (lambda: sj.friction_limits(FLAT, 0.8, x_axis=[0, 0, 1]), ValueError, "x_axis"),
+    (lambda: sj.friction_limits(FLAT, 0.8, x_axis=[1, 0]), ValueError, "x_axis is .*three finite numbers"),
+    (lambda: sj.friction_limits(FLAT, 0.8, x_axis=[np.nan, 0, 0]), ValueError, "x_axis is .*three finite numbers"),
+    (lambda: sj.friction_limits(FLAT, "0.8"), ValueError, "mu is 0.8: .* one finite number"),
+    (lambda: sj.friction_limits(FLAT, [0.8]), ValueError, "mu is .*one finite number"),
+    (lambda: sj.grasp_quality(FLAT, mu=0.8, distance="5"), ValueError, "distance is 5: expected a positive length"),
     (lambda: sj.friction_limits(OPPOSED, 0.8), ValueError, "oppose their neighbours"),
     (lambda: sj.friction_wrench(FLAT, [0, 0, 1], 0.8, "pcn"), ValueError, "model is 'pcn'"),
     (lambda: sj.fit_ellipsoid(FLAT, 0.8, "quartic"), ValueError, "kind is 'quartic'.*three_motions"),
