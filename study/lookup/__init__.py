@@ -5,6 +5,7 @@ Needs neither MPI nor PETSc. The file is read once and closed.
 
 import math
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -34,11 +35,13 @@ from softjaw.study.result.interpolation import (
     place_claims,
     plain,
 )
-from softjaw.study.result.read import axes_of, maps_in, scene_of, values_of
+from softjaw.study.result.read import axes_of, maps_in, scene_of, sweep_point, values_of
 from softjaw.study.result.read import open as open_dataset
 from softjaw.study.result.store import place_text
 from softjaw.study.scene import SceneError
 from softjaw.study.units import UNITS, in_si
+
+LAYOUT = ("station", "angle", "normal_force")  # dimensions of every map
 
 
 class GraspMap:
@@ -86,11 +89,14 @@ class GraspMap:
     def __init__(self, file: str | Path | xr.Dataset, where: Mapping[str, Any] | None = None) -> None:
         ds = file if isinstance(file, xr.Dataset) else open_dataset(file)
         one_file(ds.attrs["file"])
+        if lost := [name for name in LAYOUT if "status" not in ds or name not in ds.status.dims]:
+            raise ValueError(f"the dataset has lost {', '.join(lost)}: take parts with lists, as isel({lost[-1]}=[0])")
         self.file_axes = axes_of(ds)
         station, angle, force = self.file_axes[-3:]
         self.index = _sweep_point(self.file_axes[:-3], dict(where or {}))
         self.data = ds.isel(dict(zip(ds.status.dims, self.index, strict=False)), drop=True)
-        self.data = self.data.assign_attrs(point=self.index)
+        with suppress(SceneError):  # of another version
+            self.data = self.data.assign_attrs(point=sweep_point(ds, self.index))
         self.status = self.data.status.values
         #: unit and definition of everything that `value` knows
         self.quantities = {name: (unit, ds[name].definition) for name, unit in maps_in(ds).items()}
@@ -147,7 +153,7 @@ class GraspMap:
             Force [N] at which they are ranked, solved or between two, and which the points have. By default that of
             ``softjaw show``; where the object's mass is known each point then has its own force to use.
         """
-        if n < 1:
+        if not isinstance(n, int | np.integer) or n < 1:
             raise ValueError(f"n is {n}: expected a number of grasps from 1 on")
         ds = judge(self.data, force=force, by=by, top=n, lines=False)
         k, (stations, angles, _) = ds.attrs["level"], (axis.values for axis in self.file_axes[-3:])

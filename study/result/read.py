@@ -35,6 +35,7 @@ from softjaw.study.result.store import Result, open_result
 from softjaw.study.scene import Scene, SceneError, parse_scene
 from softjaw.study.scene.model import file_digest
 from softjaw.study.scene.sections import UPPER
+from softjaw.study.units import in_si
 
 if TYPE_CHECKING:
     import xarray as xr  # slow to load, and a run needs it at its end only
@@ -181,12 +182,32 @@ def scene_of(ds: xr.Dataset, index: Sequence[int] = ()) -> Scene:
     Raises `SceneError`: this version cannot read it, or its mesh has changed since.
     """
     text = ds.attrs["scene"]
-    scene = _scene_at(text, ds.attrs.get("point") or tuple(index[: len(ds.status.dims) - 3]))
+    scene = _scene_at(text, sweep_point(ds, index))
     with suppress(OSError):  # a mesh that is not there now
         if scene.object.shape == "mesh" and _digest_of(text, file_digest(scene.object.mesh)) != ds.attrs["digest"]:
             changed, remedy = f"{scene.object.mesh}, changed since", "put it back, or run the scene again"
             raise SceneError([Problem("scene", None, "object.mesh", changed, "the mesh that was solved", remedy)])
     return scene
+
+
+def sweep_point(ds: xr.Dataset, index: Sequence[int] = ()) -> tuple[int, ...]:
+    """Positions along the sweep of the scene of a point of a dataset, which may be a part of its file.
+
+    ``index`` is along the dimensions of the dataset. Raises `ValueError`: a swept coordinate is lost.
+    """
+    if "point" in ds.attrs:
+        return tuple(ds.attrs["point"])
+    names = {x.attrs.get("long_name"): str(name) for name, x in ds.coords.items()}
+    at, found = dict(zip(map(str, ds.status.dims), index, strict=False)), []
+    for key, options in _parsed(ds.attrs["scene"]).sweep.items():
+        if (name := names.get(key)) is None:
+            raise ValueError(f"the dataset has lost {key}: take parts of it without drop=True")
+        if name in ds.status.dims and name not in at:
+            break
+        value, texts = ds[name].values.ravel()[at.get(name, 0)], "options" in ds[name].attrs
+        known = range(len(options)) if texts else [in_si(key, option) for option in options]
+        found.append(int(np.abs(np.asarray(known) - value).argmin()))
+    return tuple(found)
 
 
 @lru_cache(maxsize=64)

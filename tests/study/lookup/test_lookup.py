@@ -263,6 +263,29 @@ def test_a_sweep_is_asked_at_one_of_its_points(tmp_path):
             GraspMap(path, where=where)
 
 
+def test_a_part_of_a_dataset_stands_at_its_own_point_of_the_sweep_and_what_it_has_lost_is_named(tmp_path):
+    sweep = (
+        Axis("semi_axis_b", np.array([0.01, 0.02]), "m", "object.semi_axis_b_mm"),
+        Axis("mu", np.array([0.5, 0.8]), "", "friction.mu"),
+    )
+    text = f'{SCENE}\n[sweep]\n"object.semi_axis_b_mm" = [10, 20]\n"friction.mu" = [0.5, 0.8]\n'
+    axes = grid_axes(sweep=sweep)
+    ds = open_dataset(make(tmp_path / "a.hdf", lambda b, mu, *place: b + mu + 0 * sum(place), axes, scene=text))
+    for part, where in (
+        (ds.isel(semi_axis_b=[1]), {"friction.mu": 0.5}), (ds.isel(semi_axis_b=1, mu=[0]), {}),
+        (ds.isel(semi_axis_b=[1, 0], mu=0), {"object.semi_axis_b_mm": 20}),
+    ):  # fmt: skip
+        point = GraspMap(part, where).at(0.015, np.pi / 2, 2.0)
+        assert point.e_n == pytest.approx(0.52)
+        assert abs(point.pose[1][:, 1]) == pytest.approx([0.02, 0.02], abs=1e-6)
+    for part, word in (
+        (ds.isel(normal_force=1), "lost normal_force"), (ds[["e_n"]], "lost station"),
+        (ds.isel(mu=1, drop=True), "lost friction.mu"),
+    ):  # fmt: skip
+        with pytest.raises(ValueError, match=word):
+            GraspMap(part, {"object.semi_axis_b_mm": 20} if "mu" not in part.dims else {})
+
+
 def test_limit_surfaces_come_between_those_of_the_cases_around_and_bounds_of_the_force_are_maps_too(tmp_path):
     def growing(values):  # in units of mu S
         values[..., 3, :, :, :] = known.quartic(16.0, 16.0, 16.0)  # at 8 N: half as far along every axis
