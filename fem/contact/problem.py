@@ -63,12 +63,12 @@ class ContactPoints:
     Parameters
     ----------
     position, normal : (faces, points, 3) arrays
-        Deformed points [m] and the object's outward normals there.
+        Deformed points [m] and the object's outward unit normals there.
     depth : float
         How far the deepest Gauss point of the contact face is inside the object [m]; the solve keeps nodes outside,
         each by itself or with the weighted mean round it, not every point.
     load : (faces, points) array
-        Contact pressure times reference area [N].
+        Normal force [N].
     friction : (faces, points, 3) array, optional
         Tangential force on the pad [N]; None without friction.
     """
@@ -361,7 +361,11 @@ class ContactProblem(ABC):
         load = f.pad.face_area * (pressure[f.nodes] @ f.pad.face_N.T)
         load = np.where(c.gap.reshape(load.shape) < FAR, load, 0.0)
         friction = None if c.traction is None else f.pad.face_area[..., None] * (c.traction @ f.R).reshape(place.shape)
-        points = ContactPoints(place, normal, max(0.0, -self._lowest_gap(f, x, c)), load, friction)
+        # at the ridges of a mesh the gradient of the interpolated gap is no unit vector, and the force goes with it
+        length = np.linalg.norm(normal, axis=2)
+        points = ContactPoints(
+            place, normal / length[..., None], max(0.0, -self._lowest_gap(f, x, c)), load * length, friction
+        )
         return pressure, c.weighted / f.area, points
 
     def _lowest_gap(self, f: Finger, x: FloatArray, c: Evaluated) -> float:

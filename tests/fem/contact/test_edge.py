@@ -26,6 +26,15 @@ def whole(request):
     return (request.param, *pressed_patch(WHOLE, request.param))
 
 
+def test_a_gap_whose_gradient_is_no_unit_vector_has_the_same_patch():
+    """As at the ridges of a mesh, where it is interpolated: the force goes with the gradient."""
+    *_, expected = pressed_patch()
+    *_, patch = pressed_patch(gap=lambda x: tuple(1.2 * each for each in OVAL(x)))
+    for name in ("centroid", "normal", "load", "pressure"):
+        one, other = getattr(patch, name), getattr(expected, name)
+        assert np.abs(one - other).max() < 1e-6 * np.abs(other).max(), name
+
+
 @pytest.mark.parametrize("symmetry", PARTS)
 def test_patch_of_a_part_is_that_of_the_whole_pad(whole, symmetry):
     element, *_, full = whole
