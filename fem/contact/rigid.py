@@ -86,6 +86,10 @@ class RigidProblem(ContactProblem):
         # the gradient of a sampled distance is not quite a unit vector, and only one makes I - n n^T a projection
         return c.normal / np.linalg.norm(c.normal, axis=-1)[..., None]
 
+    def point_pressure(self, f: Finger, c: Evaluated) -> FloatArray:
+        """See `ContactProblem`; the force of a gap goes with its gradient."""
+        return super().point_pressure(f, c) * np.linalg.norm(c.normal, axis=-1)
+
     def _lowest_gap(self, f: Finger, x: FloatArray, c: Evaluated) -> float:
         # nodal gaps are closed at nodes, so it is between them that the contact face may be inside
         return float(f.gap(f.points(x, self.pad.between_N).reshape(-1, 3))[0].min())
@@ -155,7 +159,8 @@ class RigidProblem(ContactProblem):
         length = np.linalg.norm(c.normal, axis=-1)[..., None]
         n = c.normal / length
         turns = (np.eye(3) - n[..., :, None] * n[..., None, :]) @ c.surface / length[..., None]
-        return by_motion + by_normal @ turns, by_pressure
+        grows = (self.point_pressure(self.finger, c)[:, None] * n / length)[..., None, :] @ c.surface
+        return by_motion + by_normal @ turns + by_pressure[..., None] * grows, by_pressure * length
 
     def _condense(self) -> FloatArray:
         """Make the entries symmetric; returns what was the column of the closing displacement, 0 under force control.

@@ -61,6 +61,14 @@ def test_coulombs_law_and_balance_hold(mu):
     assert state.checks.force_balance < 1e-8
 
 
+def test_friction_goes_with_the_force_where_the_gradient_of_the_gap_is_no_unit_vector():
+    """As at the ridges of a mesh, where the gap is interpolated."""
+    states = [next(iter(press(gap, 0.4).load_path([3.0]))) for gap in (OVAL, lambda x: tuple(1.2 * each for each in OVAL(x)))]
+    for name in ("load", "friction", "normal"):
+        one, other = (getattr(state.points, name) for state in states)
+        assert np.abs(one - other).max() < 1e-6 * np.abs(one).max(), name
+
+
 def test_judging_slip_by_what_was_before_changes_iterations_and_no_state(monkeypatch):
     """The first steps of a solve are those of another system, the residual that ends it is not."""
     (judged,) = press(OVAL, 0.4, pad_of((8, 6, 3), (False, False))).load_path([3.0])
