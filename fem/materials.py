@@ -12,7 +12,7 @@ Arithmetic is strict IEEE: with relaxed rules the last bits depend on whether co
 cache, and a study would not be the same to the bit; these loops gain nothing from them.
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -347,8 +347,7 @@ def strains(law, par, u, dN, directions):
 LAWS = {"blatz_ko": 0, "hyperfoam": 1, "neo_hookean": 2, "linear": 3}
 
 
-@dataclass(frozen=True)
-class Material:
+class Material(NamedTuple):
     """A law with its parameters and its small-strain constants.
 
     ``law``: a key of ``LAWS``; ``parameters (k,)``: as the law's function documents them [Pa, -]; ``shear_modulus,

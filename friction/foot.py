@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -73,8 +73,7 @@ def _across(N: FloatArray) -> FloatArray:
     return np.linalg.svd(N[None])[2][1:]
 
 
-@dataclass(frozen=True, eq=False)
-class ContactFace:
+class ContactFace(NamedTuple):
     """One surface of bilinear faces, loaded or not, whose normal is bilinear between the corners.
 
     Parameters

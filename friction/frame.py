@@ -1,7 +1,8 @@
 """Contact frame: where the planar reading of a curved patch has its origin and its normal."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import IntFlag
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -28,8 +29,7 @@ class FrameFlag(IntFlag):
     WINDING = 32  # the corners of some faces are wound against their normals, which were taken
 
 
-@dataclass(frozen=True, eq=False)
-class Frame:
+class Frame(NamedTuple):
     """Right-handed frame of a contact.
 
     ``origin (3,)`` is the point of the contact area on the line through the ``centre_of_pressure (3,)``, the mean of

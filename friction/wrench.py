@@ -21,8 +21,8 @@ Jaws using a Curved Contact Area Friction Model".
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -35,8 +35,7 @@ MODELS = ("ccm", "pcm", "pcm_projected")
 SEARCH_WIDTH = 1e-3  # at which the search for the direction of the largest force ends [rad]
 
 
-@dataclass(frozen=True)
-class FrictionLimits:
+class FrictionLimits(NamedTuple):
     """Largest friction of a contact in its frame, and the normal forces to judge it by.
 
     Parameters
@@ -79,7 +78,7 @@ class FrictionLimits:
         axes = (self.f_x, self.f_y, self.tau_z)
         f_x, f_y, tau_z = (max(0.0, limit - abs(float(u))) for limit, u in zip(axes, np.asarray(used), strict=True))
         share = tau_z / self.tau_z if self.tau_z > 0.0 else 1.0
-        return replace(self, f_x=f_x, f_y=f_y, tau_z=tau_z, e_n=share * self.e_n)
+        return self._replace(f_x=f_x, f_y=f_y, tau_z=tau_z, e_n=share * self.e_n)
 
     @property
     def per_unit_force(self) -> tuple[float, float, float]:

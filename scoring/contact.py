@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -74,8 +74,7 @@ class PolytopeBody:
         return PolytopeBody(self.vertices * np.asarray(factors, float))
 
 
-@dataclass(frozen=True, eq=False)
-class DiscBody:
+class DiscBody(NamedTuple):
     """Sum of discs, such as the limit surface of faces with friction.
 
     ``discs (n, 6)``: two half-axes of each, in ``(f_x, f_y, tau_z)``.
@@ -167,8 +166,7 @@ def hull_volume(points: FloatArray) -> float:
         return float(ConvexHull(even, qhull_options="QJ").volume * extent.prod())
 
 
-@dataclass(frozen=True, eq=False)
-class SoftContact:
+class SoftContact(NamedTuple):
     """A finger's contact with the object.
 
     ``position (3,)``: origin of the contact frame [m]; ``axes (3, 3)``: rows x, y, N: unit vectors of a right-handed

@@ -28,7 +28,7 @@ the answer knows its error.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -47,8 +47,7 @@ MOST_POINTS = 400  # of the section, after which the search ends with the bounds
 TORQUE_OFFSET = 1e-11  # torque at which K is taken, so that no two bases of the programme are alike
 
 
-@dataclass(frozen=True)
-class Payload:
+class Payload(NamedTuple):
     """Largest force that is held.
 
     ``force`` is that of a load at the centre of mass, as proved, 0 where the squeeze itself is not borne, ``upper``

@@ -2,8 +2,8 @@
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from enum import IntFlag
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,8 +22,7 @@ class ScoreFlag(IntFlag):
     NO_FORCE = 2  # a contact carries no friction along one of its axes
 
 
-@dataclass(frozen=True)
-class Score:
+class Score(NamedTuple):
     """Qualities of a grasp, for normal forces of one [-].
 
     ``quality`` and ``quality_l1`` are the volumes of the L-infinity and L1 grasp wrench spaces, ``epsilon`` and

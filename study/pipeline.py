@@ -179,7 +179,7 @@ def image(result: CaseResult, unit: Any, c: int) -> CaseResult:
 def _state_values(solution: Solution) -> dict[str, Any]:
     """What the solved states say beside their patches."""
     contacts = solution.contacts
-    closing, checks = [c.state.closing for c in contacts], [vars(c.state.checks) for c in contacts]
+    closing, checks = [c.state.closing for c in contacts], [c.state.checks._asdict() for c in contacts]
     values = {"maps/closing": np.mean(closing), "fingers/closing": closing}
     # of the force that the gripper commands, which the checks compare with the force along the approach
     excess = [c.force_excess for c in contacts]

@@ -3,7 +3,7 @@
 import json
 import math
 import re
-from dataclasses import astuple, replace
+from dataclasses import replace
 from pathlib import Path
 from unittest import mock
 
@@ -261,7 +261,7 @@ def colinear(inputs, description):
 def empty_faces_change_nothing(loaded, other):
     parts = (("centroid", 1), ("area", 1), ("normal", 1), ("pressure", 0))
     both = ContactPatch(*(np.concatenate([getattr(loaded, name), k * getattr(other, name)]) for name, k in parts))
-    limits, same = (astuple(friction_limits(patch, 1.0)) for patch in (loaded, both))
+    limits, same = (friction_limits(patch, 1.0) for patch in (loaded, both))
     assert same == pytest.approx(limits, rel=1e-12)  # sums over other numbers of faces may end in other bits
     one, two = contact_frame(loaded, [1, 0, 0]), contact_frame(both, [1, 0, 0])
     np.testing.assert_allclose(two.centre_of_pressure, one.centre_of_pressure, rtol=1e-12, atol=1e-15)

@@ -1,6 +1,6 @@
 """Laws that a converged state must obey, whatever the solver said, and why a load path ends."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,8 +23,7 @@ DIRECTIONS = fibonacci_twists(24, 1.0)
 BARELY_ELLIPTIC = 0.1  # eigenvalue of the acoustic tensor over the shear modulus at which foam gives way somewhere
 
 
-@dataclass(frozen=True)
-class Checks:
+class Checks(NamedTuple):
     """Measures of a converged state; the first four must be small, ``min_det_f`` positive.
 
     ``force_balance`` is relative to the force, ``adhesion`` to the largest pressure, ``penetration`` and

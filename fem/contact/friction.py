@@ -14,8 +14,7 @@ tangent is exact.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -104,8 +103,7 @@ def stick_or_slip(
     return t, by_d, by_normal, np.where(slips & (most > 0.0)[..., None], mu * along, 0.0)
 
 
-@dataclass(frozen=True)
-class Anchor:
+class Anchor(NamedTuple):
     """Last accepted state of one finger's points, in the frame of what it touches.
 
     Attributes

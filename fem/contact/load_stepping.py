@@ -20,7 +20,8 @@ path.
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -66,8 +67,7 @@ class Work:
     halvings: int = 0
 
 
-@dataclass(frozen=True)
-class _Place:
+class _Place(NamedTuple):
     """A state on the path: unknowns, force [N], largest strain, stability, and the tangent.
 
     That is the change of the unknowns per force [m/N], None where it is not known.
@@ -275,7 +275,7 @@ class Stepping:
             self.watch(x, target)
             done, cut = goal, min(1.0, 2.0 * cut) if allowed < 1.0 else cut
             # the tangent costs a triangular solve, and behind the last step nobody asks for it
-            state = replace(ahead, tangent=self._tangent(x)) if done < 1.0 else ahead
+            state = ahead._replace(tangent=self._tangent(x)) if done < 1.0 else ahead
         self._last = state
         return state.x
 
@@ -299,7 +299,7 @@ class Stepping:
         # the tangent of the path needs factors, and these are at hand only where the last solve ended
         known = self.followed is not None and self.solver.is_at(x)
         if known and self._last is not None and self._last.x is x:
-            return replace(self._last, tangent=self._tangent(x))
+            return self._last._replace(tangent=self._tangent(x))
         if self.followed and not known:
             # another problem's state is not quite this one's: solve here, or go without a tangent if that fails
             with suppress(ConvergenceError):

@@ -10,8 +10,7 @@ goes with the root of the closing displacement.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.interpolate import RectBivariateSpline
@@ -29,8 +28,7 @@ LIFT, RAMP = 3.0, 2.0  # standard errors by which the face is lifted where nothi
 LIFT_SAMPLES = 60  # of the lift along a side of the pad
 
 
-@dataclass(frozen=True, eq=False)
-class LiftedFace:
+class LiftedFace(NamedTuple):
     """A measured face that is lifted off the pad by a smooth function of the place."""
 
     face: MeasuredFace

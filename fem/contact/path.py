@@ -12,7 +12,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -30,8 +30,7 @@ from softjaw.friction.patch import FloatArray
 ProblemT = TypeVar("ProblemT", bound=ContactProblem)
 
 
-@dataclass(frozen=True)
-class Pressed:
+class Pressed(NamedTuple):
     """A pad in equilibrium on the object at one normal force, with the wall and the other pad that it shares it with.
 
     Parameters
@@ -86,8 +85,7 @@ class Pressed:
         return (self,) if self.other is None else (self, self.other)
 
 
-@dataclass(frozen=True)
-class OnPath:
+class OnPath(NamedTuple):
     """State on the load path: unknowns, force [N], and what is known of the path so far.
 
     ``jumped`` is whether it has left the path of equilibria before; of a wall ``compliance`` is that of the last step

@@ -18,7 +18,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,8 +56,7 @@ class Control:
     closing: float = 0.0
 
 
-@dataclass(frozen=True)
-class ContactPoints:
+class ContactPoints(NamedTuple):
     """Quadrature points of the meshed contact face in the pad's frame.
 
     Parameters

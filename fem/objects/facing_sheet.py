@@ -12,7 +12,7 @@ pad's frame map them onto each other. A triangle that only slanted lines reach a
 behind its back is the back of a thin wall (the inside of a bowl's rim) and is left out.
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -87,8 +87,7 @@ def _seen(which, normals, sides, directions, spacing, rotation, origin, lower, u
     return visibility
 
 
-@dataclass(frozen=True, eq=False)
-class FacingSheet:
+class FacingSheet(NamedTuple):
     """What a finger sees of a mesh: small triangles of the surface that is seen, and the whole ``mesh``.
 
     ``directions (k, 3)`` are lines of sight, away from the finger.

@@ -4,9 +4,8 @@ Also the small pieces that the analytic objects share.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +19,7 @@ SHARPNESS = 1e-12  # how well the touch is located [m]
 GRAZE = 1e-9  # depth that a point has to reach to have met the object [m]: less is a pad that may as well pass it
 
 
-@dataclass(frozen=True)
-class Pose:
+class Pose(NamedTuple):
     """Where a pad stands: ``x_object = rotation @ x_pad + origin``.
 
     Columns of the rotation are the pad's long side, its short side and its approach direction in the object's frame,

@@ -19,7 +19,7 @@ modulus ``E*`` takes pressures of ``pi E* a / l``. The points are therefore smoo
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -37,8 +37,7 @@ MOST_CELLS = 24  # of the spline along a side: points tell no more shape than th
 PASSES, CLOSE = 50, 1e-12  # of Newton's method for the nearest point; step at which it ends [m]
 
 
-@dataclass(frozen=True, eq=False)
-class Line:
+class Line(NamedTuple):
     """Clamped cubic B-splines between the ``ends`` of points on a line [m], continued by their tangents."""
 
     ends: tuple[float, float]
@@ -64,8 +63,7 @@ class Line:
         return np.asarray(D.T @ D * (edges[1] - edges[0]))
 
 
-@dataclass(frozen=True, eq=False)
-class MeasuredFace:
+class MeasuredFace(NamedTuple):
     """Face ``z = h(x, y)`` with the object above it, ``z`` along the approach, in the frame of the pad at closing 0.
 
     ``x`` is None for a contour, which is the same all along the pad; ``coefficients (p, q)`` are of the products of
@@ -94,7 +92,7 @@ class MeasuredFace:
     def lifted(self, by: float) -> MeasuredFace:
         """The same face further along the approach [m]."""
         # the splines add up to one everywhere
-        return replace(self, coefficients=self.coefficients + by)
+        return self._replace(coefficients=self.coefficients + by)
 
     def gap(self, X: ArrayLike) -> Gap:
         """Signed distance ``(n,)`` [m], normal ``(n, 3)`` towards the pad and Hessian ``(n, 3, 3)`` [1/m].

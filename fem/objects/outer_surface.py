@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,8 +25,7 @@ from softjaw.friction.patch import NEGLIGIBLE, FloatArray
 TINY = 1e-100  # zero below a logarithm
 
 
-@dataclass(frozen=True)
-class Section:
+class Section(NamedTuple):
     """Cross-section at one height; ``b = None`` makes it as wide along y as along x.
 
     ``z, a, b``: height and semi-axes along x and y [m]; ``a = 0`` is allowed for the first and the last section;

@@ -8,7 +8,7 @@ A surface is what a wall's outer face looks like before it is deformed: a tensor
 normal and curvature are known everywhere between the nodes of a shell mesh, whatever shape the points came from.
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -19,8 +19,7 @@ from softjaw.fem.objects.gap import Gap
 from softjaw.friction.patch import FloatArray
 
 
-@dataclass(frozen=True, eq=False)
-class SplineSurface:
+class SplineSurface(NamedTuple):
     """Piecewise bicubic surface; on cell ``(i, j)`` the powers of ``theta - theta_i`` and ``s - s_j``.
 
     ``theta, s (m + 1,), (k + 1,)``: ascending parameters of the grid lines: angle once about the axis [rad] and a

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,8 +84,7 @@ class Stacked(Analytic):
         return np.concatenate([X.reshape(-1, 3), ends]), triangles.astype(np.int64)
 
 
-@dataclass(frozen=True, eq=False)
-class CloseToWall:
+class CloseToWall(NamedTuple):
     """Gap function of a body for points close to its wall, as of a pad that touches it."""
 
     body: Stacked

@@ -6,7 +6,7 @@ order, along a line by a C2 spline and round a ring by its waves: a wave of leng
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -162,8 +162,7 @@ def smooth_rings(values: FloatArray, waves: FloatArray, count: int) -> FloatArra
     return np.fft.irfft(spectrum, n=count, axis=1) * (count / values.shape[1])
 
 
-@dataclass(frozen=True)
-class Wall:
+class Wall(NamedTuple):
     """Upright part of a mesh: first and last height, those of the lids, centres and mean radius [m].
 
     ``centre`` gives ``(k, 2)`` by height and order of the derivative.

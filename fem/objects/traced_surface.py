@@ -8,7 +8,7 @@ are closed by rounded lids as on other bodies; there the shape of the last secti
 round body the traced surface lies inside by about two thirds of their sagitta, ``size^2 / (8 radius)``.
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,8 +102,7 @@ def _symmetric(R: FloatArray, on_axis: FloatArray, tolerance: float) -> tuple[Fl
     return (np.repeat(mean, len(k), axis=1) if is_round else R), (symmetric[0], symmetric[1]), is_round
 
 
-@dataclass(frozen=True)
-class TraceReport:
+class TraceReport(NamedTuple):
     """What was traced, and how well.
 
     ``largest, rms``: distance of the mesh's corners and middles of triangles on the wall to the traced surface [m], and

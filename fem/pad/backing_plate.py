@@ -5,8 +5,8 @@ the rest bends. Its four-node shell elements have their corners on the nodes of 
 face, and on the edges of the patch that is held. Displacements of the plate are taken as small.
 """
 
-from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +18,7 @@ from softjaw.fem.shell.wall_model import LinearShell
 from softjaw.friction.patch import NEGLIGIBLE, FloatArray
 
 
-@dataclass(frozen=True)
-class BackStiffness:
+class BackStiffness(NamedTuple):
     """Stiffness of the backing plate on the back of one mesh.
 
     ``free (rows, columns, 3)``: displacements of the back's nodes, along x then y, that the finger and the planes of

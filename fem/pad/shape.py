@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,8 +12,7 @@ from softjaw.friction.patch import FloatArray
 PER_SIDE = {"hex8": 2, "hex27": 3}  # nodes along a side of each element
 
 
-@dataclass(frozen=True)
-class PadShape:
+class PadShape(NamedTuple):
     """Dimensions and mesh of a pad.
 
     ``size``: length (x), width (y), thickness (z) [m]; ``elements`` of the whole pad along these; ``grading``: size of
@@ -53,8 +52,7 @@ class PadShape:
         return positive if half else np.concatenate([-positive[:0:-1], positive])
 
 
-@dataclass(frozen=True)
-class BackingPlate:
+class BackingPlate(NamedTuple):
     """Plate behind a pad.
 
     Parameters
@@ -73,8 +71,7 @@ class BackingPlate:
     support: tuple[float, float]
 
 
-@dataclass(frozen=True)
-class TiltingMount:
+class TiltingMount(NamedTuple):
     """Rigid plate behind a pad that may tilt about the axes through its middle.
 
     ``stiffness``: moment per angle, the same about both axes [N m]; ``glue``: stiffness per area of the bond [Pa/m],

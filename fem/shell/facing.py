@@ -15,6 +15,7 @@ and the gap by ``dg = e . (dx - N_a dv_a - g G N_a dw_a)``; ``e`` is nearly ``n`
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -67,8 +68,7 @@ class Wall:
         return np.column_stack([t, s]), cKDTree(self.surface.at(t, s)[:, 0])
 
 
-@dataclass(frozen=True, eq=False)
-class Facing:
+class Facing(NamedTuple):
     """What ``n`` points face; symbols as in the module's formulas.
 
     ``gap``: signed distance along the director, `FAR` where the point faces no wall [m]; ``nodes, N (n, 4)``: of the
@@ -104,7 +104,7 @@ def face(wall: Wall, points: FloatArray, places: FloatArray, v: FloatArray, w: F
         second = _search(wall, points[again], fresh, v, w)
         # NaN compares as false: what is lost again keeps its first answer
         good = second.gap < FAR
-        for values, better in zip(vars(facing).values(), vars(second).values(), strict=True):
+        for values, better in zip(facing._asdict().values(), second._asdict().values(), strict=True):
             values[again[good]] = better[good]
         places[again[good]] = fresh[good]
     lost = np.flatnonzero(np.isnan(facing.gap))

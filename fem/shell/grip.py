@@ -5,8 +5,7 @@ displacement control closes the fingers in short steps, and the first state with
 gripper that closes with a growing force meets first.
 """
 
-from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -45,8 +44,7 @@ def jumps(low: tuple[float, float], high: tuple[float, float]) -> bool:
     return then > 0.01 and GIVES_WAY * (then - shut) / (more - force) > shut / force
 
 
-@dataclass(frozen=True)
-class WallState:
+class WallState(NamedTuple):
     """The wall at one force: its mesh, state ``q (6 k,)`` [m] and contact forces ``load (k, 3)`` on its nodes [N].
 
     ``reaction (3,)``: force of supports and springs on the whole object [N]; ``snapped``: whether the wall has snapped
@@ -291,5 +289,5 @@ class Grip(LoadPath[WallProblem]):
         mirrored = np.array([*problem.model.shell.mesh.symmetry, False])
         reaction = np.where(mirrored, 0.0, -load.sum(axis=0)) * 2.0 ** mirrored.sum()
         wall = WallState(problem.model.shell.mesh, q, load, reaction, state.snapped, self.opening(q))
-        first, *others = (replace(pad, wall=wall) for pad in pads)
-        return replace(first, other=others[0]) if others else first
+        first, *others = (pad._replace(wall=wall) for pad in pads)
+        return first._replace(other=others[0]) if others else first

@@ -7,8 +7,8 @@ turn about its approach (``flipped``), and its results are turned back.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,8 +70,7 @@ def _springs(mesh: BodyMesh, fixed: NDArray[np.bool_], stiffness: float) -> tupl
     return nodes, stiffness * mesh.share / len(nodes) * basis @ basis.T
 
 
-@dataclass(frozen=True, eq=False)
-class ThinWalled:
+class ThinWalled(NamedTuple):
     """Object that gives way.
 
     ``thickness`` of the wall [m], or pairs (z, thickness); ``support`` as in `supported`; ``springs``: in place of what
@@ -88,8 +87,7 @@ class ThinWalled:
     open_bottom: bool = False
 
 
-@dataclass(frozen=True)
-class Grasp:
+class Grasp(NamedTuple):
     """Both fingers at first touch in the grasp frame, turned by ``angle`` about the object's axis [rad].
 
     One pose where the plane between the fingers is one of symmetry; ``flipped``: whether a pose was turned by half a
@@ -140,7 +138,7 @@ def wall_between(body: ThinWalled, frame: Grasp, pad_size: Sequence[float], size
     low, high, half = _footprint(frame, pad_size)
     # a pad may reach beyond the wall, where the outline has no station
     low, high = (float(end) for end in np.clip([low, high], *body.surface.heights))
-    shell, fixed = _supported(body, frame, replace(size, heights=(low, high), half_width=half))
+    shell, fixed = _supported(body, frame, size._replace(heights=(low, high), half_width=half))
     meshed = shell.mesh
     wall = Wall(_surface(meshed), meshed.theta, meshed.s, meshed.number, 0.5 * meshed.thickness)
     return (LinearWall if linear else NonlinearWall)(shell, fixed), [wall] * len(frame.poses)
@@ -152,7 +150,7 @@ def object_factors(
     body: ThinWalled, angle: float, mirrors: tuple[bool, bool], size: MeshSize, half: float
 ) -> LinearShell:
     """First stiffness of the object, meshed alike along its whole wall; made once per rank."""
-    mesh_size = replace(size, heights=body.surface.heights, half_width=half)
+    mesh_size = size._replace(heights=body.surface.heights, half_width=half)
     return LinearShell(*_supported(body, Grasp(angle, (), (), mirrors), mesh_size))
 
 

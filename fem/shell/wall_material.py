@@ -6,11 +6,10 @@ in those of Ashby, Materials Selection in Mechanical Design. The modulus of PET 
 cautious value for blown walls, which are softer where they were stretched little; give 2.8e9 for well stretched ones.
 """
 
-from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 
-@dataclass(frozen=True)
-class WallMaterial:
+class WallMaterial(NamedTuple):
     """Isotropic elastic wall.
 
     ``young_modulus, poisson_ratio`` [Pa], [-]; ``yield_strength``: stress at which the wall would keep an indentation
@@ -32,4 +31,4 @@ MATERIALS = {
 def wall_material(name: str | None = None, **values: float | None) -> WallMaterial:
     """Material by name, in which every value that is given replaces the named one's; without a name, by its values."""
     given = {key: value for key, value in values.items() if value is not None}
-    return replace(MATERIALS[name.lower()], **given) if name else WallMaterial(**given)
+    return MATERIALS[name.lower()]._replace(**given) if name else WallMaterial(**given)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -22,8 +23,7 @@ SECTION_SAMPLES = 721  # angles at which the curvature of sections is judged
 MOST_BENT = 0.8  # thickness over the radius of curvature at the edge of a lid
 
 
-@dataclass(frozen=True)
-class MeshSize:
+class MeshSize(NamedTuple):
     """How fine a wall's mesh is; the gripped regions lie at the angles 0 and pi about the axis.
 
     Parameters
@@ -46,7 +46,7 @@ class MeshSize:
 
     def halved(self) -> MeshSize:
         """Half as many elements in every direction."""
-        return replace(self, around=2 * self.around, along=2 * self.along, coarse=2 * self.coarse)
+        return self._replace(around=2 * self.around, along=2 * self.along, coarse=2 * self.coarse)
 
 
 def limited(x: FloatArray, h: FloatArray, growth: float) -> FloatArray:

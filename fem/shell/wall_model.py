@@ -9,7 +9,7 @@ grid (Zienkiewicz and Zhu, Int. J. Num. Meth. Eng. 33, 1992). Planes of symmetry
 body gives what the whole one does.
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
@@ -133,8 +133,7 @@ def _matrix(size: int, entries: tuple[IntArray, IntArray], values: FloatArray) -
     return csr_matrix((values[free], (rows[free], columns[free])), shape=(size, size))
 
 
-@dataclass(frozen=True)
-class FaceState:
+class FaceState(NamedTuple):
     """Strain (Green-Lagrange, 11, 22, gamma_12) and stress (11, 22, 12 [Pa]) of one face ``(..., 3)``.
 
     Along the elements' axes: 1 along theta, 2 along s where the lines of these are at right angles.

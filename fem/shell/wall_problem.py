@@ -14,7 +14,6 @@ it now. The tangent is exact.
 
 from collections.abc import Sequence
 from copy import copy
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -192,7 +191,7 @@ class WallProblem(ContactProblem):
         if not len(pick):
             return True
         facet, point = np.divmod(pick, f.pad.face_N.shape[0])
-        facing = Facing(*(values[pick] for values in vars(c.surface).values()))
+        facing = Facing(*(values[pick] for values in c.surface))
         N, area = f.pad.face_N[point], f.pad.face_area[facet, point]
         D, dn = changes(N, f.R, facing)
         pressure = (c.lam[facet] * N).sum(axis=1)
@@ -265,11 +264,11 @@ class WallProblem(ContactProblem):
     def _untouched(self, f: Finger) -> Anchor:
         open_face = super()._untouched(f)
         n = len(open_face.at)
-        return replace(open_face, nodes=np.zeros((n, 4), np.int32), N=np.zeros((n, 4)))
+        return open_face._replace(nodes=np.zeros((n, 4), np.int32), N=np.zeros((n, 4)))
 
     def _anchor(self, f: Finger, x: FloatArray, c: Evaluated) -> Anchor:
-        faced = replace(super()._anchor(f, x, c), nodes=c.surface.nodes, N=c.surface.N)
-        return replace(faced, at=faced.at - self._displaced(x, faced))
+        faced = super()._anchor(f, x, c)._replace(nodes=c.surface.nodes, N=c.surface.N)
+        return faced._replace(at=faced.at - self._displaced(x, faced))
 
     def _moved(self, x: FloatArray, c: Evaluated, anchor: Anchor) -> FloatArray:
         return super()._moved(x, c, anchor) - self._displaced(x, anchor)

@@ -7,7 +7,6 @@ the patch may come from a file.
 import math
 from collections.abc import Sequence
 from copy import copy
-from dataclasses import replace
 from functools import cached_property
 from typing import Any, Self
 
@@ -75,7 +74,7 @@ class Contact:
     def limits(self) -> dict[str, FrictionLimits]:
         """Friction limits by friction model."""
         return {
-            name: replace(limits, f_x=self.mu * limits.f_x, f_y=self.mu * limits.f_y, tau_z=self.mu * limits.tau_z)
+            name: limits._replace(f_x=self.mu * limits.f_x, f_y=self.mu * limits.f_y, tau_z=self.mu * limits.tau_z)
             for name, limits in self.unit_limits.items()
         }
 

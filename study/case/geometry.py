@@ -116,7 +116,7 @@ def wall_lines(
 
     ``scene`` is a `Scene` whose object has a wall, ``turned`` its outer surface as the fingers see it.
     """
-    size = replace(MeshSize(*scene.accuracy.wall_sizes), heights=heights, half_width=half)
+    size = MeshSize(*scene.accuracy.wall_sizes)._replace(heights=heights, half_width=half)
     return around(turned, size, mirrors), along(turned, size, scene.object.open_bottom, scene.object.open_top)
 
 

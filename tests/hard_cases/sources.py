@@ -57,7 +57,8 @@ def second(name: str) -> Outcome | None:
         return _stated(case, FORMULAS[source.formula](scene_of(case)))
     if source.stored:
         return _stated(case, json.loads((FOLDER / source.stored).read_text())["maps"])
-    springs = ThinWalled.springs * source.force / source.length  # the weak springs of a wall are no key of the scene
+    # the weak springs of a wall are no key of the scene
+    springs = ThinWalled._field_defaults["springs"] * source.force / source.length
     with mock.patch("softjaw.study.case.wall.ThinWalled", partial(ThinWalled, springs=springs)):
         return outcome_of(lambda: scaled(scene_of(case, source.change), source.length, source.force))
 

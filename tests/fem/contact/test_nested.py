@@ -1,6 +1,5 @@
 """One force by itself, from the state of a coarser mesh: the state of the load path, whatever was solved before."""
 
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -57,10 +56,10 @@ def test_every_force_by_itself_leads_to_the_state_of_the_load_path(gap, element)
 def test_a_start_that_does_not_serve_is_replaced_by_a_walk_from_first_contact(start):
     pad, coarse = pair("hex8")
     [good] = coarse_states(BALL, forces=(3.0,))
-    far = replace(good, unknowns=good.unknowns + np.eye(coarse.size)[coarse.closing_dof] * 4e-3)
+    far = good._replace(unknowns=good.unknowns + np.eye(coarse.size)[coarse.closing_dof] * 4e-3)
     given = {
-        "none": [], "jumped": [replace(good, path_dependent=True)], "far off": [far],
-        "broken": [replace(good, unknowns=np.full(coarse.size, np.nan))],
+        "none": [], "jumped": [good._replace(path_dependent=True)], "far off": [far],
+        "broken": [good._replace(unknowns=np.full(coarse.size, np.nan))],
     }  # fmt: skip
     expected = fine_state(BALL, 3.0)
     found = Press(pad, BALL).at(3.0, given[start])

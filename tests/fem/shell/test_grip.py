@@ -1,6 +1,5 @@
 """Two fingers on a thin wall, with and without friction that acts back: tangent, balance, limits, other figures."""
 
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -139,7 +138,7 @@ def test_coulombs_law_and_balance_hold(level):
 def test_a_wall_that_hardly_gives_way_is_a_rigid_object():
     press = Press(grip(thin(), mu=MU).problem.fingers[0].pad, gap_at(pose(0.0, 0.075)), mu=MU)
     rigid = list(press.load_path(FORCES))
-    stiff = thin(1e-3, replace(wall_material("pet"), young_modulus=3e10))
+    stiff = thin(1e-3, wall_material("pet")._replace(young_modulus=3e10))
     for one, other, smooth in zip(
         grip(stiff, mu=MU).load_path(FORCES), rigid, grip(stiff).load_path(FORCES), strict=True
     ):
@@ -228,8 +227,8 @@ def test_a_start_that_does_not_serve_is_replaced_by_one_below_or_by_first_contac
     far = good.unknowns + np.eye(good.pad.size)[good.pad.closing_dof] * 9e-3
     given = {
         "none": [], "lower": [low],
-        "jumped": [replace(good, path_dependent=True), low],
-        "far off": [replace(good, unknowns=far, wall=replace(good.wall, q=0 * low.wall.q))],
+        "jumped": [good._replace(path_dependent=True), low],
+        "far off": [good._replace(unknowns=far, wall=good.wall._replace(q=0 * low.wall.q))],
     }  # fmt: skip
     found = pressed().at(2.0, given[start])
     assert found.fingers[0].work.steps > 1

@@ -270,7 +270,7 @@ def test_they_are_the_numbers_of_the_command_and_do_not_depend_on_the_coordinate
     places = turn.apply(PATCH.centroid.copy()) + np.array([0.3, -0.2, 0.1])
     moved = replace(PATCH, centroid=places, normal=turn.apply(PATCH.normal.copy()))
     one, other = (sj.friction_limits(patch, 0.8)["ccm"] for patch in (PATCH, moved))
-    assert vars(other) == pytest.approx(vars(one), rel=1e-9)
+    assert other._asdict() == pytest.approx(one._asdict(), rel=1e-9)
     motion = np.eye(3)
     here, there = (np.abs(sj.friction_wrench(patch, motion, 0.8)) for patch in (PATCH, moved))
     assert there == pytest.approx(here, abs=1e-9)  # the axes may point the other way
