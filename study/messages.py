@@ -11,9 +11,8 @@ import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 DONE, USAGE, OTHER_FILE, IN_USE, CANNOT_WRITE, SOME_FAILED, BUG, STOPPED = 0, 2, 3, 4, 5, 6, 70, 75
 MEANING = {
@@ -47,8 +46,7 @@ class NoGraspError(StudyError):
     """An object that can be read, and that no grasp fits."""
 
 
-@dataclass(frozen=True)
-class Problem:
+class Problem(NamedTuple):
     """One thing wrong with an input, with its place; ``line`` is None where no line can be named."""
 
     file: str

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -116,8 +115,7 @@ def passed_over(score: np.ndarray, flags: np.ndarray) -> tuple[list[int], str]:
     return better, " or ".join(flag.word for flag in flags_in(marks))
 
 
-@dataclass(frozen=True)
-class Sure:
+class Sure(NamedTuple):
     """Values of some grasps and how far off they may be.
 
     ``value, error`` (n,) arrays: ``error`` is the stated one; NaN where it is not known. ``samples`` (n, m) array:

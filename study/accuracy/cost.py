@@ -1,8 +1,7 @@
 """``softjaw cost``: what accuracy costs in time, by an ordinary sweep over meshes; its table and its picture."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -65,8 +64,7 @@ def _even(count: float) -> int:
 # --- what a file says -------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Setting:
+class Setting(NamedTuple):
     """One point of the sweep.
 
     ``values``: value of each swept key, in words. ``seconds``: time of a case on one core, mean over those that are

@@ -8,7 +8,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,8 +37,7 @@ from softjaw.study.units import UNITS, in_si, split_unit
 MOST_NAMED = 5  # poses that a message names
 
 
-@dataclass(frozen=True)
-class Candidate:
+class Candidate(NamedTuple):
     """One place to grasp: station along the object's axis [m], angle about it [rad].
 
     With explicit poses ``station`` is the candidate's number and ``angle`` is 0. ``note`` is what the reader of a

@@ -11,7 +11,6 @@ Effects without steps are exact, or cost next to nothing: ``settled`` says so of
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from math import inf, nan
 from typing import Any, NamedTuple
@@ -81,8 +80,7 @@ class Level(NamedTuple):
     quality_change: float = nan
 
 
-@dataclass(frozen=True)
-class Step:
+class Step(NamedTuple):
     """From one level to the next dearer one.
 
     ``low, high``: levels by their names in a scene. ``indicator``: of a choice at the ``k``-th force; NaN where it is
@@ -309,7 +307,7 @@ class EffectChoice:
         left_out = self._left_out(k) if solved.coarse else []
         both = (self._coarse_pair(name, STEPS[name][0], k) for name in left_out)
         pairs = [*solved.pairs, *((*pair, 1.0) for pair in both if pair)]
-        return replace(solved, pairs=pairs, note=join_notes(note, solved.note))
+        return solved._replace(pairs=pairs, note=join_notes(note, solved.note))
 
     def _left_out(self, k: int) -> list[str]:
         """Effects whose dearer level was measured and left out."""

@@ -6,7 +6,7 @@ at its own corners: these are exact, with no grid to fall through.
 """
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +21,7 @@ from softjaw.study.units import shown_text
 DIGITS = 4  # of lengths in messages
 
 
-@dataclass(frozen=True)
-class Jaws:
+class Jaws(NamedTuple):
     """What a grasp is looked for with: lengths [m], stiffness of the springs [Pa/m], normal force [N]."""
 
     pad: tuple[float, float, float]

@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 UNDECIDED = 1e-6  # of a limit: what is nearer to it is undecided
 TIE = 1e-6  # relative difference of values that is none: images of one grasp, or equal within rounding
@@ -24,8 +24,7 @@ class CaseResult:
     contacts: tuple[Any, ...] = ()
 
 
-@dataclass(frozen=True)
-class CaseFailure:
+class CaseFailure(NamedTuple):
     """A case without a result; ``message`` is one sentence with the cause and the remedy."""
 
     message: str

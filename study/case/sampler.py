@@ -228,7 +228,7 @@ def state_of(grip: JawsOnSurface) -> int:
     """Why a grasp is not worth a solve, or `MISSING`."""
     # foam gives way by its thickness at most to what only the rim of a pad meets, between the cells of its face
     felt, most = grip.opening + grip.jaws.pad[2], grip.jaws.max_opening
-    state, _ = fit_of(grip.local, grip.triangles, replace(grip.jaws, max_opening=min(felt, most)))
+    state, _ = fit_of(grip.local, grip.triangles, grip.jaws._replace(max_opening=min(felt, most)))
     if state == WIDE and felt < most:
         return COLLIDES
     return int(state or (SLIPS if slips(grip.misalignment[1], grip.jaws.mu) else MISSING))

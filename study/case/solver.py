@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import islice, repeat
 from typing import Any, NamedTuple, TypeVar
@@ -66,8 +66,7 @@ class Solution:
         return list(zip(*(c.views for c in self.contacts), strict=True))
 
 
-@dataclass(frozen=True, eq=False)
-class Solved:
+class Solved(NamedTuple):
     """Solutions of one case on all its meshes, the finest first, and a note on meshes that have none.
 
     The ``pairs`` of contacts on the coarse mesh differ by the steps of the load path or by an effect, with the share of
@@ -200,13 +199,13 @@ class CandidateSolver:
             solved = Solved([solved.fine, coarse])
             if levels.friction_pressure_coupling != "none":
                 longer = self.solve(k, LONG_STEPS, levels).contacts
-                solved = replace(solved, pairs=[(coarse.contacts, longer, OF_LONG_STEPS)])
+                solved = solved._replace(pairs=[(coarse.contacts, longer, OF_LONG_STEPS)])
             if self.rounder:
                 plain = levels._replace(friction_pressure_coupling="none")
                 contacts = self.solve(k, COARSE, plain).contacts, self.rounder.solve(k, FINE, plain).contacts
-                solved = replace(solved, edges=contacts)
+                solved = solved._replace(edges=contacts)
         except (ConvergenceError, CheckError) as failure:
-            solved = replace(solved, note=(PART_OF_ERROR if solved.coarse else NO_ERROR).format(reason=failure))
+            solved = solved._replace(note=(PART_OF_ERROR if solved.coarse else NO_ERROR).format(reason=failure))
         return self._refined(solved, k, levels, left_out) if isinstance(solved.fine.fingers, OnRigid) else solved
 
     @property
@@ -235,9 +234,9 @@ class CandidateSolver:
             if surely_below(self.error(solved) + left_out, target) or too_large:
                 break
             try:
-                solved = replace(solved, meshes=[self.solve(k, mesh, levels), *solved.meshes])
+                solved = solved._replace(meshes=[self.solve(k, mesh, levels), *solved.meshes])
             except (ConvergenceError, CheckError, ArithmeticError) as error:
-                return replace(solved, note=join_notes(solved.note, NOT_REFINED.format(reason=error)))
+                return solved._replace(note=join_notes(solved.note, NOT_REFINED.format(reason=error)))
         return solved
 
     def _state(self, k: int, mesh: int, levels: Levels, part: int) -> Any:

@@ -1,8 +1,7 @@
 """What a grasp has to hold, and the mass that two contacts hold."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,8 +19,7 @@ from softjaw.study.units import GRAVITY
 PLANAR_GAP = 3e-3  # of the bounds of a payload in the planar models, on which no choice depends
 
 
-@dataclass(frozen=True)
-class Task:
+class Task(NamedTuple):
     """What a grasp has to hold.
 
     ``centre_of_mass`` (3,) array: in the object's frame [m]. ``direction`` (3,) array, optional: in which the weight

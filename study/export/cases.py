@@ -2,7 +2,6 @@
 
 import json
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -101,7 +100,7 @@ def as_csv(ds: xr.Dataset, model: str = "ccm", listed: Iterable[dict[str, Any]] 
         units = [unit] * max(len(parts), 1) if isinstance(unit, str) else unit
         names = [f"{name}.{part}" for part in parts] or [name]
         of_finger += [Column(n, u) for n, u in zip(names, units, strict=True)]
-    columns += [replace(c, name=f"finger{f}.{c.name}") for f in (1, 2) for c in of_finger]
+    columns += [c._replace(name=f"finger{f}.{c.name}") for f in (1, 2) for c in of_finger]
     rows = []
     for case in cases(ds, model) if listed is None else listed:
         row = {**case["place"], **case["maps"], **case, "flags": case["flags"] & OF_FILE}

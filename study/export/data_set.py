@@ -13,9 +13,9 @@ import json
 import tarfile
 from collections.abc import Iterator
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -42,8 +42,7 @@ SURFACE = ("frame_origin", "frame_axes", "semi_axes", "unit", "coefficients", "m
 Arrays = dict[str, np.ndarray]
 
 
-@dataclass(frozen=True, eq=False)
-class ObjectGrasps:
+class ObjectGrasps(NamedTuple):
     """All grasps of one object: ``arrays`` by name with the grasp as first axis, and where its mesh is."""
 
     name: str

@@ -12,8 +12,8 @@ from, over F_N. They hold at one normal force: a pad that is pressed harder has 
 """
 
 import math
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -30,8 +30,7 @@ SHARE = 0.9  # of the payload, the most that an object without a mass weighs
 DOWN = np.array([0.0, 0.0, -1.0])
 
 
-@dataclass(frozen=True, eq=False)
-class PointContact:
+class PointContact(NamedTuple):
     """One finger: its contact frame (axes x, y, N as columns, N into the object), and its friction over ``F_N`` [N].
 
     ``pad_rotation`` and ``pad_origin`` place the pad's own frame, whose z axis is the approach.
@@ -52,8 +51,7 @@ class PointContact:
         return min(self.mu_x, self.mu_y)
 
 
-@dataclass(frozen=True, eq=False)
-class Cell:
+class Cell(NamedTuple):
     """A grasp as the small scene that simulators get: both contacts, and the frame of the object's own file.
 
     Its origin is midway between the pads' faces, and its axes are the closing axis and the long and the short side of

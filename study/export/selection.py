@@ -15,7 +15,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -51,8 +51,7 @@ class GripperFrame:
     object_frame: str = "object"
 
 
-@dataclass(frozen=True)
-class Hold:
+class Hold(NamedTuple):
     """How the gripper takes a grasp: joint values before it and in it, depth [m], and why it cannot."""
 
     open_joints: dict[str, float]

@@ -1,7 +1,7 @@
 """Faces of a contact patch: their geometry from corners, and all that is wrong with them by their places in a file."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +14,7 @@ CREDIBLE = {"centroid": (1e3, "m"), "area": (1e4, "m^2"), "pressure": (1e12, "Pa
 LONGEST_NORMAL, LEAST_LOAD = 1e6, 1e-12  # -, N
 
 
-@dataclass(frozen=True, eq=False)
-class ReadPatch:
+class ReadPatch(NamedTuple):
     """The loaded faces of a file as a patch [m, Pa].
 
     ``faces`` counts all faces; ``place`` gives the words for the place of a loaded face, ``line 7`` or ``cell 3``;

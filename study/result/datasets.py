@@ -2,8 +2,7 @@
 
 import zlib
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,8 +15,7 @@ CODE = f"{ROOT}/status/code"
 SUMS, CLOSING_SUMS = f"{ROOT}/checksums/rows", f"{ROOT}/checksums/closing"  # of rows; of what is filled after all rows
 
 
-@dataclass(frozen=True)
-class Dataset:
+class Dataset(NamedTuple):
     """One dataset: where, how large, what it is filled with, its attributes and the scale along each dimension.
 
     One of the cases has their ``key``, and as ``share`` the shape of one case.

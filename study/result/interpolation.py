@@ -12,8 +12,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -35,8 +35,7 @@ KINDS = {"pieces": 7, "holes": 7, "rims": 1}  # what identifies a kind of contac
 UPPER = np.array(list(np.ndindex(2, 2, 2)))  # which corners of a cell are its upper ones, along each axis
 
 
-@dataclass(frozen=True, eq=False)
-class Nodes:
+class Nodes(NamedTuple):
     """Nodes of one axis: coordinates ``x (k,)``, rising, and where their values stand along the file's axis.
 
     A periodic axis brings coordinates into ``[x_0, x_0 + period)`` first; with ``half_turn`` every odd multiple of the
@@ -196,7 +195,7 @@ def force_claims(table: FloatArray, forces: Nodes, side: NDArray[np.bool_]) -> t
     left: how far from constant or from proportional, whatever is nearer.
     """
     power = ~(table <= 0.0).any(axis=(-3, -2, -1), keepdims=True)  # NaN, of no case, is not
-    logs, along = np.log(np.where(power, table, np.nan)), replace(forces, x=np.log(forces.x))
+    logs, along = np.log(np.where(power, table, np.nan)), forces._replace(x=np.log(forces.x))
     laws = np.minimum(bend(logs, along, side), bend(logs - along.x, along, side))
     bent = np.where(power, laws, bend(table, forces, side))
     return CLAIM_FACTOR * OF_FORCES * around(bent, [bent.ndim - 1]), power

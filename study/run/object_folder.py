@@ -9,9 +9,8 @@ import csv
 import hashlib
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from pathlib import Path, PurePath
-from typing import Any
+from typing import Any, NamedTuple
 
 from softjaw.fem.objects.mesh_file import ENDINGS
 from softjaw.study.messages import USAGE, StudyError, shortened, shown
@@ -27,8 +26,7 @@ TEXTS = ("mesh", "name", "unit", "axis")  # columns whose cells are texts, whate
 EXPECTED = "expected a pattern that mesh files match, as `meshes/*.stl`, or a CSV file with a column `mesh`"
 
 
-@dataclass(frozen=True)
-class Listed:
+class Listed(NamedTuple):
     """One object of a folder: its name, where it is listed, its mesh, and what makes its scene, as for ``--set``."""
 
     name: str
@@ -37,8 +35,7 @@ class Listed:
     overrides: tuple[str, ...]
 
 
-@dataclass(frozen=True)
-class ObjectFolder:
+class ObjectFolder(NamedTuple):
     """The objects that a scene names together; ``overrides`` are those of all of them."""
 
     scene_file: str
@@ -55,7 +52,7 @@ class ObjectFolder:
             return load_scene(self.scene_file, self.overrides_of(listed), check_files)
         except SceneError as error:
             cells = {f"--set {shortened(text)}" for text in listed.overrides}
-            placed = [replace(p, file=listed.place) if p.file in cells else p for p in error.problems]
+            placed = [p._replace(file=listed.place) if p.file in cells else p for p in error.problems]
             raise SceneError(placed) from None
 
     def check(self) -> Scene:

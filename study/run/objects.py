@@ -13,9 +13,8 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterable
 from contextlib import suppress
-from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -48,8 +47,7 @@ T = TypeVar("T")
 Study = Callable[[Scene, tuple[str, ...]], tuple[Plan, Work]]
 
 
-@dataclass(frozen=True)
-class Part:
+class Part(NamedTuple):
     """One object of a batch as all ranks know it: its number in the folder, file, plan, and rows that are torn."""
 
     number: int
@@ -211,7 +209,7 @@ class _ObjectsRun:
         plan, work = work.grown((*plan.layout.rounds, added))
         rewrite(part.path, plan.layout, plan.header)
         self._mine[part.number] = plan, work
-        return replace(part, plan=plan, torn=())
+        return part._replace(plan=plan, torn=())
 
     def _ending(self, n: int, seconds: float, stopped: bool) -> tuple[int, Row]:
         """The row of an object as its file stands, which is packed if nothing is missing there."""

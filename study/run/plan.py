@@ -4,9 +4,9 @@ import math
 import shutil
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -40,8 +40,7 @@ LIBRARY_BYTES, FILL_FACTOR = 4.5e8, 160.0
 SECONDS_PER_UNKNOWN, BYTES_PER_UNKNOWN = 9e-4, 9e4
 
 
-@dataclass(frozen=True)
-class Plan:
+class Plan(NamedTuple):
     """What is to be done: the file's layout and header, and the units of work (``rows``, ``cost``)."""
 
     layout: Layout

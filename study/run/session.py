@@ -11,10 +11,9 @@ import os
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from mpi4py import MPI
@@ -38,8 +37,7 @@ from softjaw.study.run.shares import divided
 T = TypeVar("T")
 
 
-@dataclass(frozen=True)
-class Work:
+class Work(NamedTuple):
     """How it is done.
 
     ``solve_unit``: ``solve_unit(unit, wanted)`` yields ``(k, CaseResult | CaseFailure)`` for forces of a unit, upward:

@@ -8,16 +8,14 @@ waited for.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from softjaw.study.quantities import MISSING
 
 
-@dataclass(frozen=True)
-class Share:
+class Share(NamedTuple):
     """Forces of one unit of work that one rank solves, by number and rising."""
 
     unit: Any
@@ -31,7 +29,7 @@ class Share:
     def divided(self, parts: int) -> list[Share]:
         """The same forces in at most so many shares, of which none has more than one force more than another."""
         # dealt in turn, because the load of the coarse path and of the fine forces grows with their number
-        return [replace(self, forces=self.forces[i::parts]) for i in range(min(parts, len(self.forces)))]
+        return [self._replace(forces=self.forces[i::parts]) for i in range(min(parts, len(self.forces)))]
 
 
 def by_cost(costs: Sequence[float]) -> list[int]:

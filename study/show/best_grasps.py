@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -74,7 +73,7 @@ def best(
         return Table(f"no candidate is solved at {forces(ds)[k]:g} N; forces with one: {others_}", table.columns, ())
     rows = [row | {"others": folded_text(ds, place)} for row, place in zip(table.rows, places, strict=False)]
     others = [Column("others", programs=False, wrap=OTHERS_WIDTH)] * any(row["others"] for row in rows)
-    columns = [replace(column, drop=0) if column.name == score else column for column in table.columns]
+    columns = [column._replace(drop=0) if column.name == score else column for column in table.columns]
     columns = [*columns[:-1], *others, columns[-1]]
     what = "places" if lines else "candidates"
     title = f"best {len(listed)} {what} of {len(ranking)} solved candidates by {score} at {forces(ds)[k]:g} N"

@@ -88,7 +88,7 @@ def compare_text(table: Table, top: int = 10, width: int = PAPER) -> str:
     listed = [known[i] for i in falling(np.abs([row["difference"] for row in known]))][: top or None]
     percent = [row | {"relative": 100 * row["relative"]} for row in listed]
     title = f"{with_unit(quantity, shown_unit(map_row(quantity).unit))}: {len(listed)} of {len(known)} differences, "
-    heads = [replace(c, label="b-a\n[%]") if c.name == "relative" else c for c in table.columns]
+    heads = [c._replace(label="b-a\n[%]") if c.name == "relative" else c for c in table.columns]
     cases = replace(table, title=f"{title}the largest first", columns=heads, rows=percent)
     return "\n".join([*lines, "", as_text(summary, width), "", as_text(cases, width)])
 

@@ -1,7 +1,6 @@
 """Limit surfaces of a case from what its file holds: the exact one through the stored faces, and the fitted ones."""
 
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -24,8 +23,7 @@ NAMES = tuple(f"{name} [{unit}]" for name, unit in COMPONENTS)
 ROWS, COLUMNS = 25, 49  # directions from pole to pole, and round
 
 
-@dataclass(frozen=True)
-class StoredSurface:
+class StoredSurface(NamedTuple):
     """One finger at one case and in one friction model; surfaces are in ``(f_x, f_y, tau_z / rho) / (mu S)``.
 
     ``unit (3,)`` brings these to N, N, N mm; ``exact``, which friction gives, is None where the file holds no patch,

@@ -11,7 +11,6 @@ import argparse
 import signal
 import sys
 import time
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -32,7 +31,7 @@ def study(scene, _overrides):
         raise NoGraspError(USAGE, "nothing fits")
     work = Work(lambda *_: (), finalise=(lambda _: 1 / 0) if name == "late" else fake_run.finalise)
     more = fake_run.fake_growth(name, 2 + len(name), work).more if name == "grows" else lambda _: ()
-    work = replace(work, more=more, grown=lambda rounds: (plan_of(name, rounds), work))
+    work = work._replace(more=more, grown=lambda rounds: (plan_of(name, rounds), work))
     return plan_of(name if name != "bug" else 1 / 0), work
 
 

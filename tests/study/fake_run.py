@@ -11,7 +11,7 @@ import signal
 import sys
 import time
 import traceback
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -68,8 +68,8 @@ def fake_growth(digest, stations, work):
     given = (1e3 * np.linspace(0, 0.1, stations)).tolist()
     asked = SimpleNamespace(refine=36, station_values_mm=given)
     scene = SimpleNamespace(candidates=asked, accuracy=SimpleNamespace(refined_within=0.01))
-    work = replace(
-        work, more=lambda result: next_stations(result, scene, 2 * FORCES),
+    work = work._replace(
+        more=lambda result: next_stations(result, scene, 2 * FORCES),
         grown=lambda rounds: (fake_plan(digest, stations, rounds=rounds), work),
     )
     return work

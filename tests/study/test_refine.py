@@ -105,7 +105,7 @@ def test_a_grown_file_keeps_every_row(tmp_path):
     assert not list(tmp_path.glob("*.grown*"))
     assert measured_seconds(small, path).shape == (20,)
     with pytest.raises(StudyError, match="another scene") as refused:
-        measured_seconds(replace(small, header=replace(small.header, digest="other")), path)
+        measured_seconds(small._replace(header=replace(small.header, digest="other")), path)
     assert refused.value.code == OTHER_FILE
 
 

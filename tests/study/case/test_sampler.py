@@ -42,7 +42,7 @@ def test_height_fields_of_a_ball_are_its_caps_a_bar_is_held_across_its_short_sid
     assert np.isfinite(low).sum() == np.isfinite(high).sum() == 1
     assert (low[2, 2], high[2, 2]) == pytest.approx((-0.005, 0.005))
     # Every pad that lies flat within the 40 x 200 mm faces is as good as any other; none is across the long side.
-    grasps = antipodal_grasps(box(0.04, 0.06, 0.2), Jaws(**vars(JAWS) | {"max_opening": 0.05}), TASK, 6, samples=60)
+    grasps = antipodal_grasps(box(0.04, 0.06, 0.2), JAWS._replace(max_opening=0.05), TASK, 6, samples=60)
     good = [g for g in grasps if not g.state]
     assert good
     for g in good:
@@ -77,7 +77,7 @@ def test_inner_walls_do_not_count_large_fingers_meet_a_step_and_the_same_seed_gi
     body = surface(trimesh.util.concatenate([plate, rim]))
     points = body[0] @ axes_of(np.array([0.0, 0.0, -1.0]), np.array([1.0, 0.0, 0.0]))
     assert fit_of(points, body[1], JAWS)[0] == MISSING
-    assert fit_of(points, body[1], Jaws(**vars(JAWS) | {"finger": (0.08, 0.03)}))[0] == COLLIDES
+    assert fit_of(points, body[1], JAWS._replace(finger=(0.08, 0.03)))[0] == COLLIDES
     # A pad whose rim meets the higher one between two cells of its face.
     axes, half = axes_of(np.array([0.0, 0.0, -1.0]), np.array([1.0, 0.0, 0.0])), JAWS.pad[0] / 2
     for overlap, state in ((-2e-4, MISSING), (2e-4, COLLIDES)):
