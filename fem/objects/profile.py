@@ -9,7 +9,7 @@ no tip.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -31,8 +31,7 @@ def joint(first: FloatArray, second: Sequence[float] = (0.0, 0.0)) -> End:
     return z, r
 
 
-@dataclass(frozen=True)
-class Curve:
+class Curve(NamedTuple):
     """Piecewise cubic ``(z, r)(s)``: on piece k the powers of ``s - breaks[k]`` have ``coefficients[k] (2, 4)``."""
 
     breaks: FloatArray

@@ -9,7 +9,7 @@ triangle, so neighbours stay joined without gaps. The mesh's own points stay whe
 For facets of length h on a surface of radius R the error falls from h^2 / (8 R) to about 0.02 h^4 / R^3.
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -25,8 +25,7 @@ STEEPEST_EDGE = 0.7  # an edge that leaves its tangent plane by more (sine) is k
 SHARP = 60.0  # [deg]: edges that turn by less may still be facets of something round
 
 
-@dataclass(frozen=True, eq=False)
-class SmoothTriangles:
+class SmoothTriangles(NamedTuple):
     """Bezier points of every edge ``(e,)`` of a mesh.
 
     ``edges (e, 2)``: points of each, the smaller number first; ``edge_of (m, 3)``: edge from corner 0, 1, 2 of each

@@ -13,7 +13,6 @@ import json
 import tarfile
 from collections.abc import Iterator
 from contextlib import ExitStack
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -159,7 +158,7 @@ def _objects(index: Path, gripper: GripperFrame) -> Iterator[ObjectGrasps]:
         scale = UNITS[task_keys(ds, "object").get("unit", "m")].size
         if not (mesh := index.parent / row["mesh"]).is_file():
             raise StudyError(OTHER_FILE, f"{mesh}: no such file; put the mesh of '{row['object']}' back")
-        each = [grasp_arrays(ds, replace(gripper, approach=(way,))) for way in gripper.approach]
+        each = [grasp_arrays(ds, gripper._replace(approach=(way,))) for way in gripper.approach]
         each = each or [grasp_arrays(ds, gripper)]
         arrays = {name: np.concatenate([part[name] for part in each]) for name in each[0]}
         yield ObjectGrasps(row["object"], mesh, scale, row["mass"], arrays)

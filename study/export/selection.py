@@ -13,7 +13,7 @@ against one of them (`study.case.reach` finds the clearest).
 import textwrap
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -37,15 +37,14 @@ from softjaw.study.units import shown, shown_text
 COMMENT = 100  # characters in a line of a comment
 
 
-@dataclass(frozen=True)
-class GripperFrame:
+class GripperFrame(NamedTuple):
     """The gripper that comes to the grasps: its hand, and how it comes.
 
     ``approach`` are the directions that each grasp is written for; without any it is the one that suits it best.
     ``wider`` [m] is how much the fingers open beyond first touch before the grasp, as far as the stroke allows.
     """
 
-    hand: Hand = field(default_factory=Hand)
+    hand: Hand = Hand()
     approach: tuple[str, ...] = ("minus-x",)
     wider: float = OPENED_MORE
     object_frame: str = "object"

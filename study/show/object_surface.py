@@ -5,7 +5,6 @@ Positions are in the object's frame [m]. Every display and the export for ParaVi
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -99,8 +98,7 @@ def edges(values: np.ndarray, alone: float = 1.0) -> np.ndarray:
     return 0.5 * (beyond[1:] + beyond[:-1])
 
 
-@dataclass(frozen=True)
-class Cells:
+class Cells(NamedTuple):
     """The candidates of a map: ``stations (s,)`` [m] and ``angles (a,)`` [rad] of finger 1 about the axis z.
 
     The place of a candidate is under both fingers, so angles repeat after half a turn, or sooner on an object that

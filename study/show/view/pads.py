@@ -1,7 +1,6 @@
 """Both pads of a case: deformed faces with their pressure, sides, and friction's directions."""
 
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -16,8 +15,7 @@ LIFT = 2e-4  # how far off the object contact faces are drawn, besides where the
 Faces = dict[str, np.ndarray]
 
 
-@dataclass(frozen=True)
-class Pad:
+class Pad(NamedTuple):
     """One finger's pad in the object's frame [m, Pa].
 
     ``face (i + 1, j + 1, 3)`` are the corners of the contact faces, ``back (4, 3)`` those of the moved back in the
