@@ -61,9 +61,8 @@ def _find_petsc4py() -> None:
             if (folder / "petsc4py").is_dir():
                 sys.path.append(str(folder))
                 return
-        raise ImportError(
-            "petsc4py is missing; on Debian and Ubuntu: apt install python3-petsc4py, elsewhere set PETSC_DIR"
-        )
+        text = "petsc4py is missing; on Debian and Ubuntu: apt install python3-petsc4py, elsewhere set PETSC_DIR"
+        raise ImportError(text)
 
 
 _find_petsc4py()
@@ -267,9 +266,8 @@ class NonlinearSolver:
         except PETSc.Error as error:
             # factors that failed half way must not be taken for those of the next solve
             snes.getKSP().getPC().reset()
-            raise ConvergenceError(
-                "a linear system of the contact solve is singular: something is not supported"
-            ) from error
+            text = "a linear system of the contact solve is singular: something is not supported"
+            raise ConvergenceError(text) from error
         finally:
             snes.setTolerances(max_it=limit)
             self.iterations_left -= max(1, snes.getIterationNumber())
@@ -448,9 +446,8 @@ class Factors:
         try:
             self.factor.matSolve(rhs, solution)
         except PETSc.Error as error:  # the factorisation itself fails silently
-            raise ConvergenceError(
-                f"a linear system of {len(B)} unknowns is singular; is everything supported?"
-            ) from error
+            text = f"a linear system of {len(B)} unknowns is singular; is everything supported?"
+            raise ConvergenceError(text) from error
         X = solution.getDenseArray().copy()
         rhs.destroy()
         solution.destroy()

@@ -135,9 +135,8 @@ def contact_length(patch: ContactPatch) -> float:
 def _direction(vector: FloatArray, scale: float = 1.0) -> FloatArray:
     length = np.linalg.norm(vector)
     if length <= CANCEL * scale:
-        raise NoContactError(
-            "the normals of the patch cancel: check that all point to one side and that it is one side of an object"
-        )
+        text = "the normals of the patch cancel: check that all point to one side and that it is one side of an object"
+        raise NoContactError(text)
     return vector / length
 
 

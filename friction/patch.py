@@ -106,9 +106,8 @@ class ContactPatch:
 def _finite(name: str, value: ArrayLike, shape: tuple[int, ...]) -> FloatArray:
     array = np.array(value, dtype=float)
     if array.shape != shape:
-        raise ValueError(
-            f"{name} has shape {array.shape}, expected {shape}: one row per face (the pressures give {shape[0]})"
-        )
+        text = f"{name} has shape {array.shape}, expected {shape}: one row per face (the pressures give {shape[0]})"
+        raise ValueError(text)
     if not np.isfinite(array).all():
         index = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         text = f"{name}{list(index)} is {array[index]}: every value must be finite; repair or drop face {index[0]}"

@@ -154,9 +154,8 @@ def first_touch(obj: GapFunction, pose: Pose, points: FloatArray, reach: float) 
     t = np.zeros(len(points))
     g = gap(active, t)
     if g.min() < -GRAZE:
-        raise NoContactError(
-            f"the pad starts {-g.min() * 1e3:.3g} mm inside the object; start it further out against its approach"
-        )
+        text = f"the pad starts {-g.min() * 1e3:.3g} mm inside the object; start it further out against its approach"
+        raise NoContactError(text)
     closest, first, grazed = g.min(), np.inf, False
     while len(active):
         low = t

@@ -77,9 +77,8 @@ def read_triangles(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         )
     # polygons are cut into fans, which fold over where a polygon is not convex
     if kind not in SCENES and len(mesh.faces) > faces and (mesh.face_adjacency_angles > FOLDED).any():
-        raise MeshError(
-            f"{path}: has polygons that are not convex, expected triangles; triangulate the mesh when you export it"
-        )
+        text = f"{path}: has polygons that are not convex, expected triangles; triangulate the mesh when you export it"
+        raise MeshError(text)
     return np.array(mesh.vertices, dtype=float), np.array(mesh.faces, dtype=np.int64)
 
 
@@ -105,9 +104,8 @@ def _whole_binary_stl(path: Path, data: bytes) -> bytes:
     count = int.from_bytes(data[STL_HEAD - 4 : STL_HEAD], "little") if len(data) >= STL_HEAD else -1
     need = STL_HEAD + STL_FACET * max(count, 0)
     if count < 0 or len(data) < need:
-        raise MeshError(
-            f"{path}: truncated, or not an STL file: {len(data)} bytes, expected at least {need}; export it again"
-        )
+        text = f"{path}: truncated, or not an STL file: {len(data)} bytes, expected at least {need}; export it again"
+        raise MeshError(text)
     return data[:need]
 
 
@@ -121,9 +119,8 @@ def _plain_obj(path: Path, data: bytes) -> bytes:
     # such numbers count from the points read so far, not from the last of all
     back = re.search(rb"^f.*[ \t]-", data, re.MULTILINE)
     if back and re.search(rb"^v[ \t]", data[back.start() :], re.MULTILINE):
-        raise MeshError(
-            f"{path}: has faces that count back among its points; export it with all points before the faces"
-        )
+        text = f"{path}: has faces that count back among its points; export it with all points before the faces"
+        raise MeshError(text)
     return data
 
 
@@ -208,7 +205,6 @@ def _loaded(path: Path, data: bytes) -> trimesh.Trimesh:
         raise MeshError(f"{path}: is damaged or empty: no triangles could be read; export it again")
     astray = (faces < 0) | (faces >= len(points))
     if astray.any():
-        raise MeshError(
-            f"{path}: damaged, a face has point {faces[astray][0]} of only {len(points)} (from 0); export it again"
-        )
+        text = f"{path}: damaged, a face has point {faces[astray][0]} of only {len(points)} (from 0); export it again"
+        raise MeshError(text)
     return mesh

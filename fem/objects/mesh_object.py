@@ -84,9 +84,8 @@ class MeshObject:
         """
         distance = self._tree.along(pose.to_object(points), pose.rotation[:, 2]).min()
         if distance > reach:
-            raise NoContactError(
-                f"the pad misses the object within {reach * 1e3:.4g} mm; check station, angle, object size and unit"
-            )
+            text = f"the pad misses the object within {reach * 1e3:.4g} mm; check station, angle, object size and unit"
+            raise NoContactError(text)
         return float(distance)
 
     @cached_property
@@ -130,9 +129,8 @@ class MeshObject:
         # whole coarse cells, as `sampled` asks for; rounding of the quotient must not add one
         cells = COARSE * np.ceil((size / step - 1e-9 + 2 * MARGIN_CELLS) / COARSE)
         if np.prod(cells + 1) > MOST_SAMPLES:
-            raise ValueError(
-                f"grid_step {step * 1e3:.3g} mm: {np.prod(cells + 1):.3g} samples, at most {MOST_SAMPLES}; raise it"
-            )
+            text = f"grid_step {step * 1e3:.3g} mm: {np.prod(cells + 1):.3g} samples, at most {MOST_SAMPLES}; raise it"
+            raise ValueError(text)
         sheet = facing_sheet(self._smooth, self._tree, self.closed, pose, box, step)
         axes = [0.5 * box[:, d].sum() + step * (np.arange(int(cells[d]) + 1) - 0.5 * cells[d]) for d in range(3)]
         grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)

@@ -100,9 +100,8 @@ def _check_size(extent: float, unit: str) -> None:
         return
     fits = [f'"{name}" ({extent * f * 1e3:.4g} mm)' for name, f in UNITS.items() if 0.02 <= extent * f <= 0.6]
     advice = f"the unit may be {' or '.join(fits)}" if fits else "scale the mesh to the object's true size"
-    raise MeshError(
-        f'an object of {size:.4g} m with unit = "{unit}"? Expected {SMALLEST:g} m to {LARGEST:g} m; {advice}'
-    )
+    text = f'an object of {size:.4g} m with unit = "{unit}"? Expected {SMALLEST:g} m to {LARGEST:g} m; {advice}'
+    raise MeshError(text)
 
 
 def _merged(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray, list[str]]:

@@ -188,9 +188,8 @@ class Grip(LoadPath[WallProblem]):
         start, (_, reached) = self._last, self.opening.last
         for ahead, speed in creep(self.problem, self.solver, start, force):
             if self.opening(self.problem.wall_state(ahead)) <= 0.0:
-                raise CheckError(
-                    f"the wall collapsed: its load path ends at {reached:.3g} N; its sides meet at {force:.4g} N"
-                )
+                text = f"the wall collapsed: its load path ends at {reached:.3g} N; its sides meet at {force:.4g} N"
+                raise CheckError(text)
             if speed > slow:
                 continue
             try:
@@ -282,9 +281,8 @@ class Grip(LoadPath[WallProblem]):
         load, q = problem.wall_load(state.x), problem.wall_state(state.x)
         worst = residual[: problem.model.size].max(initial=0.0)
         if not worst <= max(WALL_BALANCE, RESIDUAL) * force:
-            raise CheckError(
-                f"the state at {force:.4g} N converged but is wrong: a wall node is out of balance by {worst:.3g} N"
-            )
+            text = f"the state at {force:.4g} N converged but is wrong: a wall node is out of balance by {worst:.3g} N"
+            raise CheckError(text)
         # the supports balance both fingers: forces across a plane of symmetry cancel, the others add up
         mirrored = np.array([*problem.model.shell.mesh.symmetry, False])
         reaction = np.where(mirrored, 0.0, -load.sum(axis=0)) * 2.0 ** mirrored.sum()
