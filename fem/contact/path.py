@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
@@ -99,8 +99,7 @@ class OnPath(NamedTuple):
     snapped: bool = False
 
 
-@dataclass(frozen=True)
-class _PathState(Generic[ProblemT]):
+class _PathState(NamedTuple, Generic[ProblemT]):
     """State on the path of friction, the effort up to it, and what the next one depends on."""
 
     at: OnPath
