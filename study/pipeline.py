@@ -20,10 +20,10 @@ from softjaw.study.case.contact import of_fingers, on_faces
 from softjaw.study.case.effects import COUPLING, SCREENED, EffectChoice, settled
 from softjaw.study.case.errors import coarse_errors
 from softjaw.study.case.evaluate import evaluate
-from softjaw.study.case.pressing import state_flags
+from softjaw.study.case.pressing import OnWall, state_flags
 from softjaw.study.case.result import CaseFailure, CaseResult
 from softjaw.study.case.solver import CandidateSolver, Solution, Solved, join_notes
-from softjaw.study.case.wall import wall_flags
+from softjaw.study.case.wall import foot_note, wall_flags
 from softjaw.study.flags import Flag, flag_sentences
 from softjaw.study.quantities import misses
 from softjaw.study.scene import Scene
@@ -140,7 +140,8 @@ def _result(choice: EffectChoice, k: int, solved: Solved, unit: Any, begun: floa
     patches = [on_faces(c, pad_shape(scene.gripper)) for c in contacts]
     patch = {name: np.stack([faces[name] for faces in patches]) for name in patches[0]}
     notes = dict.fromkeys(note for c in contacts for note in c.state.notes)
-    message = join_notes(flag_sentences(values["maps/flags"]), *notes, solved.note, unit.candidate.note)
+    foot = foot_note(scene, contacts[0].state, fine.fingers.shell) if isinstance(fine.fingers, OnWall) else ""
+    message = join_notes(flag_sentences(values["maps/flags"]), *notes, foot, solved.note, unit.candidate.note)
     return CaseResult(values, patch, message, effects, tuple(contacts))
 
 

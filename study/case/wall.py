@@ -20,8 +20,10 @@ from softjaw.study.flags import Flag
 from softjaw.study.quantities import ALONG, AROUND
 from softjaw.study.scene import Scene
 from softjaw.study.scene.objects import Walled
+from softjaw.study.units import GRAVITY
 
 DENTED_SHARE = 0.2  # of the object's half width between the fingers, beyond which an indentation is flagged
+LIGHT = 0.05  # of the normal force: a pull at the foot that says nothing
 ESTIMATE = MeshSize(0.004, 0.006, 0.012)  # mesh of the estimate that the level is chosen by
 
 
@@ -100,6 +102,23 @@ def wall_flags(scene: Scene, state: Pressed, values: dict[str, Any]) -> Flag:
     flags |= Flag.SLIDES_OUT * (values["maps/support_force"] > friction + UNDECIDED * state.force)
     strength = thin_body(scene.object).material.yield_strength
     return flags | Flag.YIELDS * (strength is not None and not surely_below(values["maps/wall_stress"], strength))
+
+
+def foot_note(scene: Scene, state: Pressed, shell: Shell) -> str:
+    """What to know where a table would have to pull a standing foot down by more than the weight that is on it."""
+    if scene.object.support != "standing":
+        return ""
+    mesh, wall = shell.mesh, state.wall
+    held = shell.residual(wall.q).reshape(-1, 6)[mesh.foot, 2] - wall.load[mesh.foot, 2]
+    pulled = -float(np.minimum(held, 0.0).sum()) / mesh.share
+    weight = GRAVITY * (scene.object.mass or 0.0)
+    if pulled <= max(weight, LIGHT * state.force):
+        return ""
+    what = f"the {weight:.2g} N that it weighs" if weight else "nothing that is known"
+    return (
+        f"the table pulls the foot down with {pulled:.2g} N in all, against {what}: a foot that lifts, or an object"
+        ' that is held in the air, gives way more; see it with support = "free"'
+    )
 
 
 def _places(grasp: Grasp, shell: Shell, q: FloatArray) -> FloatArray:

@@ -74,6 +74,15 @@ def test_a_wall_that_is_taken_as_rigid_holds_what_the_rigid_object_does():
         assert ours == pytest.approx(theirs, rel=1e-3)
 
 
+def test_a_foot_that_a_table_would_have_to_pull_down_is_named():
+    pulled, heavy, free = (
+        solved(CUP, *changes, "effects.object='nonlinear_shell'")[-1].message
+        for changes in ((), ("object.mass_g=100000",), ("object.support='free'",))
+    )
+    assert "the table pulls the foot down with" in pulled
+    assert "foot" not in heavy + free
+
+
 @LONG
 def test_across_an_oval_there_is_no_symmetry_and_to_force_one_is_refused():
     where = "stations_mm = [40]\nangles_deg = [45]"
