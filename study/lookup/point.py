@@ -90,10 +90,11 @@ class GraspPoint(GraspNumbers):
         errors, values = (of(name, model, self.corners) for of in (self.map.errors, self.map.interpolated))
         # what meshes leave in a contact they leave in the quality of surfaces that are fitted to it, too
         q = BY_KEY.get(f"maps/{name.removesuffix('_fitted')}")
-        if q is not None and q.error and self.map.has(q.of_error.name):
-            cases = q.error_in_unit(self.map.interpolated(q.of_error.name, "ccm", self.corners), values)
+        stated = q.of_error.name if q is not None and q.error else f"{name}_error"
+        if self.map.has(stated):
+            cases = self.map.interpolated(stated, "ccm", self.corners)
             # one does not know of the other
-            errors = np.hypot(BESIDE_CASES * errors, cases)
+            errors = np.hypot(BESIDE_CASES * errors, q.error_in_unit(cases, values) if q is not None else cases)
         return self._shaped(np.where((self.states == INSIDE) & np.isfinite(values), errors, np.nan))
 
     def fingers(self, name: str, model: str = "ccm") -> FloatArray:

@@ -1,5 +1,7 @@
 """Lookup between candidates and forces: values, honest errors, symmetry, and points that have no value."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -309,8 +311,11 @@ def test_limit_surfaces_come_between_those_of_the_cases_around_and_bounds_of_the
         there.at(0.01, [0.1, 0.2], 6).limit_surface(1)
     layout = grid_axes()
     bound = np.broadcast_to(3 + 100 * STATIONS[:, None], (5, 9))
-    there = GraspMap(make(tmp_path / "a.hdf", axes=layout, derived=known.window(layout), derived__force_high=bound))
+    (high,) = known.window(layout)
+    derived = {"derived": (high, replace(high, name="force_high_error")), "derived__force_high_error": 0.25}
+    there = GraspMap(make(tmp_path / "a.hdf", axes=layout, derived__force_high=bound, **derived))
     assert there.at(0.015, 0.1, 2).value("force_high") == pytest.approx(4.5)
+    assert there.at(0.015, 0.1, 2).error("force_high") == pytest.approx(0.25)
     assert "force_high" in str(there.at(0.015, 0.1, 2))
     assert there.quantities["force_high"][0] == "N"
 
