@@ -23,7 +23,7 @@ from softjaw.study.scene.objects import Walled
 from softjaw.study.units import GRAVITY
 
 DENTED_SHARE = 0.2  # of the object's half width between the fingers, beyond which an indentation is flagged
-LIGHT = 0.05  # of the normal force: a pull at the foot that says nothing
+SLIGHT_PULL = 0.05  # of the normal force: a pull at the foot that says nothing
 ESTIMATE = MeshSize(0.004, 0.006, 0.012)  # mesh of the estimate that the level is chosen by
 
 
@@ -112,7 +112,7 @@ def foot_note(scene: Scene, state: Pressed, shell: Shell) -> str:
     held = shell.residual(wall.q).reshape(-1, 6)[mesh.foot, 2] - wall.load[mesh.foot, 2]
     pulled = -float(np.minimum(held, 0.0).sum()) / mesh.share
     weight = GRAVITY * (scene.object.mass or 0.0)
-    if pulled <= max(weight, LIGHT * state.force):
+    if pulled <= max(weight, SLIGHT_PULL * state.force):
         return ""
     what = f"the {weight:.2g} N that it weighs" if weight else "nothing that is known"
     return (

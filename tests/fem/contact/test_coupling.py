@@ -63,7 +63,8 @@ def test_coulombs_law_and_balance_hold(mu):
 
 def test_friction_goes_with_the_force_where_the_gradient_of_the_gap_is_no_unit_vector():
     """As at the ridges of a mesh, where the gap is interpolated."""
-    states = [next(iter(press(gap, 0.4).load_path([3.0]))) for gap in (OVAL, lambda x: tuple(1.2 * each for each in OVAL(x)))]
+    gaps = OVAL, lambda x: tuple(1.2 * each for each in OVAL(x))
+    states = [next(iter(press(gap, 0.4).load_path([3.0]))) for gap in gaps]
     for name in ("load", "friction", "normal"):
         one, other = (getattr(state.points, name) for state in states)
         assert np.abs(one - other).max() < 1e-6 * np.abs(one).max(), name
