@@ -66,9 +66,10 @@ class Opening:
         if opening > 0.0:
             self.last = opening, force
             return
-        before, at = self.last
-        meets = at + (force - at) * before / (before - opening)
-        raise CheckError(f"the wall collapsed: its opposite sides meet at {meets:.3g} N")
+        # no force in between: the opening falls ever faster, and other forces may have got further on other paths
+        at = self.last[1]
+        where = f"between {at:.3g} and {force:.3g} N" if 0.0 < at < force else f"at {force:.3g} N"
+        raise CheckError(f"the wall collapsed: its opposite sides meet {where}")
 
 
 def creep(
