@@ -198,7 +198,7 @@ def sweep_point(ds: xr.Dataset, index: Sequence[int] = ()) -> tuple[int, ...]:
     if "point" in ds.attrs:
         return tuple(ds.attrs["point"])
     names = {x.attrs.get("long_name"): str(name) for name, x in ds.coords.items()}
-    at, found = dict(zip(map(str, ds.status.dims), index, strict=False)), []
+    at, point = dict(zip(map(str, ds.status.dims), index, strict=False)), []
     for key, options in _parsed(ds.attrs["scene"]).sweep.items():
         if (name := names.get(key)) is None:
             raise ValueError(f"the dataset has lost {key}: take parts of it without drop=True")
@@ -206,8 +206,8 @@ def sweep_point(ds: xr.Dataset, index: Sequence[int] = ()) -> tuple[int, ...]:
             break
         value, texts = ds[name].values.ravel()[at.get(name, 0)], "options" in ds[name].attrs
         known = range(len(options)) if texts else [in_si(key, option) for option in options]
-        found.append(int(np.abs(np.asarray(known) - value).argmin()))
-    return tuple(found)
+        point.append(int(np.abs(np.asarray(known) - value).argmin()))
+    return tuple(point)
 
 
 @lru_cache(maxsize=64)

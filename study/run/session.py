@@ -253,8 +253,8 @@ class Session:
         solver = PathSolver(self._files, self._work.solve_unit, self._work.image, claims, self._state)
         limit = self._work.time_limit
         stopper = Stopper(solver.on_stop, limit, PATIENCE * limit if limit < math.inf else None)
-        told = install_listener("numba:compile", COMPILING) if self._comm.rank == 0 else contextlib.nullcontext()
-        with stopper, limited_memory(self._work.memory, claims.node.size), told:
+        listening = install_listener("numba:compile", COMPILING) if self._comm.rank == 0 else contextlib.nullcontext()
+        with stopper, limited_memory(self._work.memory, claims.node.size), listening:
             for position in claims:
                 solver.solve(self._todo[position], self._codes, stopper, self._look)
             request = self._comm.Ibarrier()  # a plain barrier would keep a core busy and rank 0 silent
