@@ -75,7 +75,7 @@ def best(
     others = [Column("others", programs=False, wrap=OTHERS_WIDTH)] * any(row["others"] for row in rows)
     columns = [column._replace(drop=0) if column.name == score else column for column in table.columns]
     columns = [*columns[:-1], *others, columns[-1]]
-    what = "places" if lines else "candidates"
+    what = ("place" if lines else "candidate") + "s" * (len(listed) != 1)
     title = f"best {len(listed)} {what} of {len(ranking)} solved candidates by {score} at {forces(ds)[k]:g} N"
     shown = np.full(ds.status.shape, MISSING)
     shown[tuple(np.array(listed).T)] = DONE
