@@ -132,7 +132,7 @@ def filled_in(
     """Put the keys of ``gripper.preset`` into a scene's tables, where it has none of its own; what is wrong with it.
 
     The largest opening is what the foam leaves of the stroke. An error is a key, what it has, and what was expected; a
-    gripper's own file is looked for from ``folder``, and has its whole path then. Keys other than ``kept`` are filled in
+    gripper's own file is looked for from ``folder``, and has its whole path then. Keys but ``kept`` are filled in
     anew; by default all that are there are the scene's own.
     """
     gripper = tables.get("gripper")
