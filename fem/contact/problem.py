@@ -314,9 +314,13 @@ class ContactProblem(ABC):
         assert c.traction is not None
         return Anchor(c.points, c.traction, bearing(self.point_pressure(f, c)) & (c.gap < FAR))
 
+    def steepness(self, c: Evaluated) -> FloatArray:
+        """Length of the gradient of the gap at the points ``(n,)`` [-]; the force of a contact goes with it."""
+        return np.ones(len(c.gap))
+
     def point_pressure(self, f: Finger, c: Evaluated) -> FloatArray:
         """Nominal pressures of the points ``(n,)`` [Pa], negative ones of quadratic faces cut off."""
-        return np.maximum(c.lam @ f.pad.face_N.T, 0.0).ravel()
+        return np.maximum(c.lam @ f.pad.face_N.T, 0.0).ravel() * self.steepness(c)
 
     def traction(
         self, k: int, x: FloatArray, c: Evaluated, derivatives: bool = False, before: FloatArray | None = None,
@@ -334,7 +338,7 @@ class ContactProblem(ABC):
         sticks = (anchor.closed & (c.gap < FAR))[:, None]
         d = np.where(sticks, anchor.traction - stick * self._moved(x, c, anchor), 0.0)
         pressure = self.point_pressure(f, c)
-        t, *changes = stick_or_slip(self._unit_normal(c), d, mu, pressure, derivatives, before, share)
+        t, *changes = stick_or_slip(self.unit_normal(c), d, mu, pressure, derivatives, before, share)
         if not derivatives:
             return (t,)
         by_d, by_normal, by_pressure = changes
@@ -344,8 +348,9 @@ class ContactProblem(ABC):
         """How far the points have moved along the object ``(n, 3)`` since the last accepted state [m]."""
         return c.points - anchor.at
 
-    def _unit_normal(self, c: Evaluated) -> FloatArray:
-        return c.normal
+    def unit_normal(self, c: Evaluated) -> FloatArray:
+        """Outward unit normals at the points ``(n, 3)``, in the frame of the object."""
+        return c.normal / self.steepness(c)[:, None]
 
     # -- states -------------------------------------------------------------------------------------------------------
 
@@ -354,17 +359,13 @@ class ContactProblem(ABC):
         f, c = self.fingers[k], self.evaluate(x)[k]
         place = f.points(x)
         # a point that faces no wall gets the approach, so that the patch has no face without a normal
-        normal = np.where(c.gap[:, None] < FAR, c.normal @ f.R, [0.0, 0.0, -1.0]).reshape(place.shape)
+        normal = np.where(c.gap[:, None] < FAR, self.unit_normal(c) @ f.R, [0.0, 0.0, -1.0]).reshape(place.shape)
         pressure = borne(f.pressure(x), c.active)
         # a node may carry load over the rim, but its points beyond it press on nothing
         load = f.pad.face_area * (pressure[f.nodes] @ f.pad.face_N.T)
-        load = np.where(c.gap.reshape(load.shape) < FAR, load, 0.0)
+        load = np.where(c.gap.reshape(load.shape) < FAR, load, 0.0) * self.steepness(c).reshape(load.shape)
         friction = None if c.traction is None else f.pad.face_area[..., None] * (c.traction @ f.R).reshape(place.shape)
-        # at the ridges of a mesh the gradient of the interpolated gap is no unit vector, and the force goes with it
-        length = np.linalg.norm(normal, axis=2)
-        points = ContactPoints(
-            place, normal / length[..., None], max(0.0, -self._lowest_gap(f, x, c)), load * length, friction
-        )
+        points = ContactPoints(place, normal, max(0.0, -self._lowest_gap(f, x, c)), load, friction)
         return pressure, c.weighted / f.area, points
 
     def _lowest_gap(self, f: Finger, x: FloatArray, c: Evaluated) -> float:

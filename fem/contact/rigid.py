@@ -82,13 +82,9 @@ class RigidProblem(ContactProblem):
         points = self.finger.points(x).reshape(-1, 3)
         return points, *self.finger.gap(points)
 
-    def _unit_normal(self, c: Evaluated) -> FloatArray:
-        # the gradient of a sampled distance is not quite a unit vector, and only one makes I - n n^T a projection
-        return c.normal / np.linalg.norm(c.normal, axis=-1)[..., None]
-
-    def point_pressure(self, f: Finger, c: Evaluated) -> FloatArray:
-        """See `ContactProblem`; the force of a gap goes with its gradient."""
-        return super().point_pressure(f, c) * np.linalg.norm(c.normal, axis=-1)
+    def steepness(self, c: Evaluated) -> FloatArray:
+        """See `ContactProblem`: the gradient of a sampled distance is not quite a unit vector, least so at ridges."""
+        return np.asarray(np.linalg.norm(c.normal, axis=-1))
 
     def _lowest_gap(self, f: Finger, x: FloatArray, c: Evaluated) -> float:
         # nodal gaps are closed at nodes, so it is between them that the contact face may be inside
@@ -156,8 +152,8 @@ class RigidProblem(ContactProblem):
             weight = self.pad.face_area
             off = weight[..., None] * (c.traction - t).reshape(*weight.shape, 3)
             self._slip_force = gather(self.finger.dofs, np.einsum("qa,fqi->fia", self.pad.face_N, off), self.size)
-        length = np.linalg.norm(c.normal, axis=-1)[..., None]
-        n = c.normal / length
+        length, n = self.steepness(c)[:, None], self.unit_normal(c)
+        # of the unit normal and of the pressure by the point's place
         turns = (np.eye(3) - n[..., :, None] * n[..., None, :]) @ c.surface / length[..., None]
         grows = (self.point_pressure(self.finger, c)[:, None] * n / length)[..., None, :] @ c.surface
         return by_motion + by_normal @ turns + by_pressure[..., None] * grows, by_pressure * length
