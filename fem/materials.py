@@ -165,11 +165,12 @@ def hyperfoam(F, B, J, par, P, A, work):
     if A.size == 0:
         return
     A[:] = 0.0
-    VT = np.ascontiguousarray(V.T)
+    VT, X, Y = np.ascontiguousarray(V.T), np.empty((3, 3)), np.empty((3, 3))
+    # written out: arrays that are broadcast, or assigned to slices, take seconds to compile
     for a in range(3):
         for i in range(3):
-            C[a, i] = s[a] * VT[a, i]
-    transposed_product(VT, C, S)
+            X[a, i] = s[a] * VT[a, i]
+    transposed_product(VT, X, S)
     shear = np.zeros((3, 3))
     for a in range(3):
         for b in range(3):
@@ -179,7 +180,6 @@ def hyperfoam(F, B, J, par, P, A, work):
                     shear[a, b] = (s[b] - s[a]) / (c[b] - c[a])
                 else:  # the limit of the quotient for equal stretches
                     shear[a, b] = 0.5 * (ds[b, b] - ds[a, b]) / stretch[b]
-    X, Y = np.empty((3, 3)), np.empty((3, 3))
     for a in range(3):
         for b in range(3):
             for k in range(3):

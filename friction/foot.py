@@ -103,7 +103,7 @@ class ContactFace(NamedTuple):
         share = patch.load[:, None] * patch.normal + UNLOADED * patch.load.mean() * plane_normal
         # corners no farther apart than this share of a usual face's size are one
         points, apart = q.reshape(-1, 3), 1e-6 * np.median(np.ptp(q, axis=1).max(axis=1))
-        along = points @ ASLANT
+        along = points @ ASLANT  # sorted here, as a sort takes seconds to compile
         corner = _numbered(points, along, np.argsort(along), apart)
         total = np.column_stack([np.bincount(corner, np.repeat(share, 4, axis=0)[:, k]) for k in range(3)])
         length = np.linalg.norm(total, axis=1, keepdims=True)

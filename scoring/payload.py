@@ -178,6 +178,7 @@ def _begin(grasp: _Grasp, rows: FloatArray) -> FloatArray:
 @njit(cache=True)
 def _planes(points, corners):
     """Outward unit normal and offset ``(m, 4)`` of facets with these corners ``(m, 3)``."""
+    # written out: products of arrays take seconds to compile
     planes = np.empty((len(corners), 4))
     for f in range(len(corners)):
         p, q, r = points[corners[f, 0]], points[corners[f, 1]], points[corners[f, 2]]
@@ -339,7 +340,6 @@ def _programme(C, A1, A2, kind, along, rows, basis):
         q[:] = -q
         q[:3] += along
         offset, value = y[: m - 1] @ right[: m - 1], cost @ x
-        reached = False
         for exact in (False, True):  # the points that are known, and where they have none, all
             bound = _farthest(C, A1, A2, kind, q, exact, point) + offset
             upper = min(upper, bound) if exact else upper

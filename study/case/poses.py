@@ -64,6 +64,7 @@ def in_file(point: FloatArray, approach: FloatArray, long_side: FloatArray, plac
 
 def pose_of(numbers: Sequence[float]) -> GraspPose:
     """The pose of a scene that nine numbers of `in_file` give."""
+    # slices of a sequence have no length that a type could tell; the model checks it
     return GraspPose(point_mm=numbers[:3], approach=numbers[3:6], long_side=numbers[6:])  # type: ignore[arg-type]
 
 

@@ -230,7 +230,9 @@ def record(layout: Layout, result: CaseResult) -> list[np.ndarray]:
     """
     given = _flattened(layout, result)
     row = blank(layout, result.message)
-    for i, column in ((i, c) for i, c in enumerate(layout.columns[:-1]) if c.key in given):
+    for i, column in enumerate(layout.columns[:-1]):
+        if column.key not in given:
+            continue
         value = np.asarray(given.pop(column.key), column.dtype)
         if value.shape != column.share:
             raise ValueError(f"'{column.key}' of a case has shape {value.shape}, its quantity says {column.share}")
