@@ -118,12 +118,13 @@ def _result(choice: EffectChoice, k: int, solved: Solved, unit: Any, begun: floa
     values, fits = evaluate(contacts, settings)
     values |= _state_values(fine) | of_fingers(contacts, shape.patch_faces)
     values["maps/flags"] |= state_flags(contacts) | choice.flags_at(k)
-    if contacts[0].state.wall is not None:
+    foot = ""
+    if isinstance(fine.fingers, OnWall):
         values["maps/flags"] |= wall_flags(scene, contacts[0].state, values)
+        foot = foot_note(scene, contacts[0].state, fine.fingers.shell)
     if coarse:
-        values |= solved.errors(values, _state_values(coarse), settings, choice.skipped_share(k))
-        for key, more in choice.stiff_wall_errors(float(values["maps/closing"])).items():
-            values[key] += more
+        left_out = choice.skipped_share(k), choice.closes_less()
+        values |= solved.errors(values, _state_values(coarse), settings, *left_out)
         # only where every case has a target: without one the sums at the end say how many cases miss the usual one
         if (target := scene.accuracy.target) is not None and not unit.finest:
             error = values[f"maps/{scene.accuracy.target_of}_error"]
@@ -140,7 +141,6 @@ def _result(choice: EffectChoice, k: int, solved: Solved, unit: Any, begun: floa
     patches = [on_faces(c, pad_shape(scene.gripper)) for c in contacts]
     patch = {name: np.stack([faces[name] for faces in patches]) for name in patches[0]}
     notes = dict.fromkeys(note for c in contacts for note in c.state.notes)
-    foot = foot_note(scene, contacts[0].state, fine.fingers.shell) if isinstance(fine.fingers, OnWall) else ""
     message = join_notes(flag_sentences(values["maps/flags"]), *notes, foot, solved.note, unit.candidate.note)
     return CaseResult(values, patch, message, effects, tuple(contacts))
 

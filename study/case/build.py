@@ -114,12 +114,10 @@ def with_mass(scene: Scene) -> Scene:
     return scene.model_copy(update={"object": scene.object.model_copy(update={"density": None, "mass_g": mass})})
 
 
-def centre_of_mass(scene: Scene, obj: Any) -> NDArray[np.float64]:
+def centre_of_mass(scene: Scene) -> NDArray[np.float64]:
     """Where the weight of a scene's object acts, in the object's frame ``(3,)`` [m]."""
-    given = scene.task.centre_of_mass
-    if given is not None:
-        return own_frame(scene.object).to_pad(np.array(given))
-    return centre_of_volume(build_object(full(scene.object)) if has_wall(scene.object) else obj)
+    shape, given = scene.object, scene.task.centre_of_mass
+    return centre_of_volume(build_object(full(shape))) if given is None else own_frame(shape).to_pad(np.array(given))
 
 
 @lru_cache(maxsize=8)

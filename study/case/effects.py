@@ -331,13 +331,11 @@ class EffectChoice:
         level = self.level(COUPLING, k)
         return E_N_TARGET / SMALL_TRACTION * level.indicator if level.reason == BELOW else 0.0
 
-    def stiff_wall_errors(self, closing: float) -> dict[str, float]:
-        """What a wall that is taken as rigid, because its indicator said so, adds to errors: it closes less [m]."""
+    def closes_less(self) -> float:
+        """By what share of it fingers close less on a wall that is taken as rigid, because its indicator said so."""
         level = self.level("object", self.count - 1)
-        if level.level != level_named("object", "rigid") or level.reason != BELOW:
-            return {}
-        less = RIGID_CLOSES * self.indentation[0]
-        return {"maps/closing_error": less, "maps/opening_loaded_error": 2.0 * less * closing}
+        stiff = level.level == level_named("object", "rigid") and level.reason == BELOW
+        return RIGID_CLOSES * self.indentation[0] if stiff else 0.0
 
     def flags_at(self, k: int) -> Flag:
         """Flag of a case that lacks an effect that moves its numbers by more than the target."""

@@ -92,13 +92,14 @@ def mesh_errors(
     fine: Sequence[Contact], coarse: Sequence[Contact], values: Mapping[str, Any], other: Mapping[str, Any],
     settings: EvaluationSettings, views: Sequence[Sequence[Contact]] = (),
     pairs: Sequence[tuple[Sequence[Any], Sequence[Any], float]] = (), unseen: Unseen = ALL_SEEN,
-    left_out: float = 0.0,
+    left_out: float = 0.0, closes_less: float = 0.0,
 ) -> dict[str, float]:  # fmt: skip
     """Errors of all quantities that have one, from the contacts on the mesh and on a coarser one.
 
     ``values`` are those of the fine mesh, ``other`` what the coarser one says beside its contacts; keyed alike.
     ``views`` are the coarse contacts with their pressures at Gauss points and at nodes, ``pairs`` are contacts on the
-    coarse mesh that differ too, and which share of that counts; ``left_out`` is a share of every value.
+    coarse mesh that differ too, and which share of that counts; ``left_out`` is a share of every value,
+    ``closes_less`` one of the closing alone.
     """
     fine_mesh, coarse_mesh = _on_mesh(values, fine), _on_mesh(other, coarse) | grasp_values(tuple(coarse), settings)
     viewed = [_sums(view) | grasp_values(tuple(view), settings) for view in views]
@@ -115,7 +116,8 @@ def mesh_errors(
         if q.error == "relative" and not np.all(coarse_mesh[q.key]):
             error = max(error, 1.0)  # a payload of which the coarse mesh has nothing
         apart = [s * distance(low[q.key], high[q.key], q.error, value) for low, high, s in compared if q.key in low]
-        errors[q.of_error.key] = error + OF_PAIRS.get(q.name, 1.0) * sum(apart) + left_out * size
+        more = left_out + closes_less * (q.name == "closing")
+        errors[q.of_error.key] = error + OF_PAIRS.get(q.name, 1.0) * sum(apart) + more * size
     if "maps/closing_error" in errors:  # the opening is less by what both pads close
         errors["maps/opening_loaded_error"] = 2.0 * errors["maps/closing_error"] * float(fine_mesh["maps/closing"][0])
     return errors

@@ -20,6 +20,7 @@ from softjaw.scoring.contact import SoftContact
 from softjaw.scoring.epsilon import epsilon
 from softjaw.scoring.pose import pose_volume
 from softjaw.scoring.quality import Score, grasp_score, score
+from softjaw.study.case.build import build_object, full
 from softjaw.study.case.contact import Contact, angle, angles, pose_flags
 from softjaw.study.case.limit_surface import SurfaceFit, fit_flag, fit_surface, surface_values
 from softjaw.study.case.task import Task, payload_values, task_of
@@ -71,10 +72,10 @@ def lengths(scene: Scene, obj: Any) -> tuple[FloatArray, float]:
     return arms, torques[torques_by] if isinstance(torques_by, str) else in_si("torques_mm", torques_by)
 
 
-def settings_of(scene: Scene, obj: Any) -> EvaluationSettings:
+def settings_of(scene: Scene) -> EvaluationSettings:
     """What a scene asks for."""
     return EvaluationSettings(
-        *lengths(scene, obj), task_of(scene, obj), scene.limit_surface,
+        *lengths(scene, build_object(full(scene.object))), task_of(scene), scene.limit_surface,
         epsilon_everywhere=scene.score.epsilon == "everywhere", six=scene.effects.wrench == "6-D",
     )  # fmt: skip
 

@@ -304,7 +304,7 @@ def with_sampled_grasps(scene: Scene) -> Scene:
     Raises `NoGraspError` where no grasp fits between the pads.
     """
     given, obj = scene.candidates, build_object(scene.object)
-    task, surface = task_of(scene, obj), surface_triangles(scene.object)
+    task, surface = task_of(scene), surface_triangles(scene.object)
     grasps = antipodal_grasps(
         surface, jaws_of(scene), task, given.sampled or 1, lids=lids_of(obj), reached=reached_by_hand(scene)
     )
@@ -339,7 +339,7 @@ def reached_by_hand(scene: Scene) -> Callable[[SampledGrasp], bool]:
 def check_sampler(scene: Scene) -> None:
     """Refuse a scene of which `with_sampled_grasps` would find no grasp; it ends with the first one."""
     obj, rejected = build_object(scene.object), list[SampledGrasp]()
-    surface, task = surface_triangles(scene.object), task_of(scene, obj)
+    surface, task = surface_triangles(scene.object), task_of(scene)
     for grasp, _ in offers(surface, jaws_of(scene), task, 0, SAMPLES, lids_of(obj)):
         if not grasp.state:
             return

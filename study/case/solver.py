@@ -19,7 +19,7 @@ from softjaw.fem.contact.path import Pressed
 from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.fem.objects.gap import Pose
 from softjaw.fem.petsc import Seconds
-from softjaw.study.case.build import build_object, forces_apart, full, has_wall, pad_elements
+from softjaw.study.case.build import build_object, forces_apart, has_wall, pad_elements
 from softjaw.study.case.contact import Contact
 from softjaw.study.case.errors import DOUBTED, Unseen, grasp_values, mesh_errors
 from softjaw.study.case.evaluate import EvaluationSettings, settings_of
@@ -89,8 +89,9 @@ class Solved(NamedTuple):
         return self.meshes[1] if len(self.meshes) > 1 else None
 
     def errors(
-        self, values: Mapping[str, Any], other: Mapping[str, Any], settings: EvaluationSettings, left_out: float = 0.0
-    ) -> dict[str, float]:
+        self, values: Mapping[str, Any], other: Mapping[str, Any], settings: EvaluationSettings, left_out: float = 0.0,
+        closes_less: float = 0.0,
+    ) -> dict[str, float]:  # fmt: skip
         """Errors of the values of a case that has a coarser mesh; see `mesh_errors`."""
         fine, coarse = self.fine.contacts, self.meshes[1]
         pairs = list(self.pairs)
@@ -99,7 +100,8 @@ class Solved(NamedTuple):
             sizes = [mesh.contacts[0].state.pad.shape.elements[0] for mesh in (self.meshes[-2], self.fine)]
             pairs.append((*self.edges, sizes[0] / sizes[1]))
         unseen = Unseen.of(fine, DOUBTED if any(contact.coarse for contact in fine) else 1.0)
-        return mesh_errors(fine, coarse.contacts, values, other, settings, coarse.views, pairs, unseen, left_out)
+        shares = left_out, closes_less
+        return mesh_errors(fine, coarse.contacts, values, other, settings, coarse.views, pairs, unseen, *shares)
 
 
 def followed(
@@ -149,7 +151,7 @@ class CandidateSolver:
     @cached_property
     def settings(self) -> EvaluationSettings:
         """What is computed from two contacts."""
-        return settings_of(self.scene, build_object(full(self.scene.object)))
+        return settings_of(self.scene)
 
     def at_levels(self, levels: Levels) -> Scene:
         """The scene with these levels of its effects."""

@@ -33,11 +33,11 @@ class Task(NamedTuple):
     mass: float | None = None
 
 
-def task_of(scene: Scene, obj: Any) -> Task:
+def task_of(scene: Scene) -> Task:
     """The task that a scene's sections ``[object]`` and ``[task]`` give."""
     keys, placed = scene.task, own_frame(scene.object)
     direction = None if keys.direction is None else np.array(keys.direction) @ placed.rotation
-    return Task(centre_of_mass(scene, obj), direction, keys.drive, scene.object.mass)
+    return Task(centre_of_mass(scene), direction, keys.drive, scene.object.mass)
 
 
 def payload_values(contacts: Sequence[Contact], task: Task) -> tuple[dict[str, Any], Flag]:

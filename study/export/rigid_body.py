@@ -63,7 +63,7 @@ def body_of(ds: xr.Dataset, case: dict[str, Any]) -> RigidBody:
     with fault_of(f"{ds.attrs['file']}: its object cannot be built", ValueError, OSError, code=OTHER_FILE):
         built, frame = build_object(shape), own_frame(shape)
         points, triangles = surface_triangles(shape)
-    centre = frame.to_object(centre_of_mass(scene, built)[None])[0]
+    centre = frame.to_object(centre_of_mass(scene)[None])[0]
     points = frame.to_object(np.asarray(points, float))
     surface = Trimesh(points, triangles, process=False)
     closed = getattr(built, "closed", True)

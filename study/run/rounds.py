@@ -83,7 +83,7 @@ def _neighbours(scene: Scene, rounds: Any, values: FloatArray, share: float) -> 
     """Neighbours of the best grasps that are not known yet, those first that a bed of springs finds the better."""
     shape, jaws = shapes_of(scene)[0], jaws_of(scene)
     placed, surface, obj = own_frame(shape), surface_triangles(shape), build_object(shape)
-    lids, task = lids_of(obj), task_of(scene, obj)
+    lids, task = lids_of(obj), task_of(scene)
 
     def promise(grip: JawsOnSurface) -> float:
         return grip.peak * spring_payload(grip.contacts, task)
