@@ -97,16 +97,10 @@ class EllipticCylinder(Analytic):
         normal, hessian = np.zeros((len(x), 3)), np.zeros((len(x), 3, 3))
         normal[:, :2], hessian[:, :2, :2] = n, H
         beyond = np.abs(x[:, 2]) - self._wall
-        wall = (beyond <= 0) & (g >= beyond - self.edge_radius)  # no farther than the cap, for points inside
-        if not wall.all():
-            self._add_ends(~wall, x, beyond, g, normal, hessian)
-        return g, normal, hessian
-
-    def _add_ends(
-        self, pick: FloatArray, x: FloatArray, beyond: FloatArray, g: FloatArray, normal: FloatArray,
-        hessian: FloatArray,
-    ) -> None:  # fmt: skip
-        """Put the distances to caps and edges in place of those to the wall, for the points ``pick``."""
+        # caps and edges take the place of the wall, but for points inside that are no farther from it than from the cap
+        pick = ~((beyond <= 0) & (g >= beyond - self.edge_radius))
+        if not pick.any():  # as mostly under a pad
+            return g, normal, hessian
         r, up = self.edge_radius, np.zeros((pick.sum(), 3))
         up[:, 2] = np.where(x[pick, 2] < 0, -1.0, 1.0)
         q = np.stack([g[pick] + r, beyond[pick]], axis=1)  # from the middle of the tube, outwards and up
@@ -118,6 +112,7 @@ class EllipticCylinder(Analytic):
         g[pick] = np.where(tube[:, 0, 0], distance, q[:, 1]) - r
         normal[pick] = np.where(tube[:, 0], np.einsum("ni,nia->na", e, directions), up)
         hessian[pick] = np.where(tube, bent, 0.0)
+        return g, normal, hessian
 
     @property
     def bounds(self) -> FloatArray:
