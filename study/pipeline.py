@@ -123,8 +123,7 @@ def _result(choice: EffectChoice, k: int, solved: Solved, unit: Any, begun: floa
         values["maps/flags"] |= wall_flags(scene, contacts[0].state, values)
         foot = foot_note(scene, contacts[0].state, fine.fingers.shell)
     if coarse:
-        left_out = choice.skipped_share(k), choice.closes_less()
-        values |= solved.errors(values, _state_values(coarse), settings, *left_out)
+        values |= solved.errors(values, _state_values(coarse), settings, choice.skipped_share(k), choice.closes_less())
         # only where every case has a target: without one the sums at the end say how many cases miss the usual one
         if (target := scene.accuracy.target) is not None and not unit.finest:
             error = values[f"maps/{scene.accuracy.target_of}_error"]
