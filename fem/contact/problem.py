@@ -157,6 +157,8 @@ class Evaluated:
         Their gaps [m]; `FAR` where a point faces nothing.
     lam : (facets, k) array
         Nodal pressures [Pa].
+    area : (facets, points) array
+        Of the points that face something [m^2].
     weighted, active : (nodes,) arrays
         Weighted gaps [m^3], active set.
     load : (n, 3) array
@@ -171,11 +173,17 @@ class Evaluated:
     gap: FloatArray
     normal: FloatArray
     lam: FloatArray
+    area: FloatArray
     weighted: FloatArray
     active: NDArray[np.bool_]
     load: FloatArray
     surface: Any
     traction: FloatArray | None = None
+
+    @property
+    def faces(self) -> NDArray[np.bool_]:
+        """Points ``(n,)`` that face something."""
+        return (self.gap < FAR) & (self.area.ravel() > 0.0)
 
 
 class ContactProblem(ABC):
@@ -211,19 +219,23 @@ class ContactProblem(ABC):
 
     def _face(self, k: int, f: Finger, x: FloatArray) -> Evaluated:
         points, gap, normal, surface = self._met(k, x)
-        N, face_area, lam = f.pad.face_N, f.pad.face_area, f.pressure(x)[f.nodes]
+        N, lam = f.pad.face_N, f.pressure(x)[f.nodes]
         # points that face nothing are left out, so that a pad over a rim is carried up to the rim
-        area = np.where(gap.reshape(face_area.shape) == FAR, 0.0, face_area)
+        area = self._faced(k)
         load = (area * (lam @ N.T)).reshape(-1, 1) * normal
-        weighted = f.nodal((area * gap.reshape(face_area.shape)) @ N)
+        weighted = f.nodal((area * gap.reshape(area.shape)) @ N)
         # a node that hangs over the rim with most of its area would put all of its pressure on the rest
         # part of a node's area that must face something for the node to carry load
         gaps = np.where(f.nodal(area @ N) > 0.3 * f.area, weighted, FAR * f.area)
-        c = Evaluated(points, gap, normal, lam, gaps, f.active(x, gaps), load, surface)
+        c = Evaluated(points, gap, normal, lam, area, gaps, f.active(x, gaps), load, surface)
         if self.friction is not None:
             c.traction = self.traction(k, x, c)[0]
-            c.load = load + face_area.reshape(-1, 1) * c.traction
+            c.load = load + area.reshape(-1, 1) * c.traction
         return c
+
+    def _faced(self, k: int) -> FloatArray:
+        """Area of the points that faces something ``(facets, points)`` [m^2]."""
+        return self.fingers[k].pad.face_area
 
     def residual(self, x: FloatArray) -> FloatArray:
         """Residual of all rows ``(size,)`` [N]; NaN where an element is inverted, so that the step is refused."""
@@ -312,7 +324,7 @@ class ContactProblem(ABC):
     def _anchor(self, f: Finger, x: FloatArray, c: Evaluated) -> Anchor:
         """What friction is measured from after the state ``x``."""
         assert c.traction is not None
-        return Anchor(c.points, c.traction, bearing(self.point_pressure(f, c)) & (c.gap < FAR))
+        return Anchor(c.points, c.traction, bearing(self.point_pressure(f, c)) & c.faces)
 
     def steepness(self, c: Evaluated) -> FloatArray:
         """Length of the gradient of the gap at the points ``(n,)`` [-]; the force of a contact goes with it."""
@@ -335,7 +347,7 @@ class ContactProblem(ABC):
         f, anchor, mu = self.fingers[k], self.friction.anchors[k], self.friction.mu
         stick = self.friction.stick * f.kappa
         # a point that was open has stuck nowhere that its motion could be measured from
-        sticks = (anchor.closed & (c.gap < FAR))[:, None]
+        sticks = (anchor.closed & c.faces)[:, None]
         d = np.where(sticks, anchor.traction - stick * self._moved(x, c, anchor), 0.0)
         pressure = self.point_pressure(f, c)
         t, *changes = stick_or_slip(self.unit_normal(c), d, mu, pressure, derivatives, before, share)
@@ -359,17 +371,16 @@ class ContactProblem(ABC):
         f, c = self.fingers[k], self.evaluate(x)[k]
         place = f.points(x)
         # a point that faces no wall gets the approach, so that the patch has no face without a normal
-        normal = np.where(c.gap[:, None] < FAR, self.unit_normal(c) @ f.R, [0.0, 0.0, -1.0]).reshape(place.shape)
+        normal = np.where(c.faces[:, None], self.unit_normal(c) @ f.R, [0.0, 0.0, -1.0]).reshape(place.shape)
         pressure = borne(f.pressure(x), c.active)
         # a node may carry load over the rim, but its points beyond it press on nothing
-        load = f.pad.face_area * (pressure[f.nodes] @ f.pad.face_N.T)
-        load = np.where(c.gap.reshape(load.shape) < FAR, load, 0.0) * self.steepness(c).reshape(load.shape)
-        friction = None if c.traction is None else f.pad.face_area[..., None] * (c.traction @ f.R).reshape(place.shape)
+        load = c.area * (pressure[f.nodes] @ f.pad.face_N.T) * self.steepness(c).reshape(c.area.shape)
+        friction = None if c.traction is None else c.area[..., None] * (c.traction @ f.R).reshape(place.shape)
         points = ContactPoints(place, normal, max(0.0, -self._lowest_gap(f, x, c)), load, friction)
         return pressure, c.weighted / f.area, points
 
     def _lowest_gap(self, f: Finger, x: FloatArray, c: Evaluated) -> float:
-        return float(c.gap.min())
+        return float(c.gap[c.faces].min(initial=FAR))
 
     def normal_force(self, x: FloatArray) -> float:
         """Normal force on a whole pad that the backing plates must exert at ``x`` [N], mean of the fingers."""

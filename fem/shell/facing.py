@@ -19,12 +19,13 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from softjaw.fem.assembly import IntArray
 from softjaw.fem.materials import inverted
 from softjaw.fem.objects.splines import SplineSurface, evaluate
-from softjaw.friction.patch import FloatArray
+from softjaw.friction.patch import NEGLIGIBLE, FloatArray
 
 FAR = 1.0  # gap of a point that faces no wall [m]
 LONGEST_TURN, LONGEST_SLIDE = 0.1, 0.004  # of one iteration [rad], [m]
@@ -48,6 +49,13 @@ class Wall:
         """Parameters ``(n, 2)`` of the undeformed wall's grid points that are closest to ``points (n, 3)``."""
         parameters, tree = self._grid
         return parameters[tree.query(points)[1]]
+
+    def beyond(self, points: FloatArray, places: FloatArray) -> NDArray[np.bool_]:
+        """Which ``points (n, 3)``, closest to ``places (n, 2)``, lie beyond an end of the undeformed wall."""
+        at, (low, high) = self.surface.at(*places.T), self.ends
+        along = ((points - at[:, 0]) * at[:, 2]).sum(axis=1)
+        # the outline is measured along s, so this is a length
+        return (places[:, 1] <= low) & (along < -NEGLIGIBLE) | (places[:, 1] >= high) & (along > NEGLIGIBLE)
 
     @cached_property
     def closed(self) -> bool:
@@ -86,14 +94,17 @@ class Facing(NamedTuple):
     S: FloatArray
 
 
-def face(wall: Wall, points: FloatArray, places: FloatArray, v: FloatArray, w: FloatArray) -> Facing:
+def face(
+    wall: Wall, points: FloatArray, places: FloatArray, v: FloatArray, w: FloatArray, beyond: float = 0.0
+) -> Facing:
     """What ``points (n, 3)`` face; ``places (n, 2)`` are where the search begins, and are set to what was found.
 
-    ``v, w (nodes, 3)``: displacement of the outer face and change of the director [m].
+    ``v, w (nodes, 3)``: displacement of the outer face and change of the director [m]; ``beyond``: length by which the
+    wall is continued at its ends [m].
 
     Raises `ArithmeticError`: if a point close to the wall finds no place.
     """
-    facing = _search(wall, points, places, v, w)
+    facing = _search(wall, points, places, v, w, beyond)
     # a second search for the few that failed is cheaper than a safe start for all of them
     again = np.flatnonzero(np.isnan(facing.gap) | (facing.gap == FAR))
     if len(again):
@@ -101,7 +112,7 @@ def face(wall: Wall, points: FloatArray, places: FloatArray, v: FloatArray, w: F
         fresh = wall.places(points[again])
         pick = (fresh[:, 1] > wall.ends[0]) & (fresh[:, 1] < wall.ends[1]) | np.isnan(facing.gap[again])
         again, fresh = again[pick], fresh[pick]
-        second = _search(wall, points[again], fresh, v, w)
+        second = _search(wall, points[again], fresh, v, w, beyond)
         # NaN compares as false: what is lost again keeps its first answer
         good = second.gap < FAR
         for values, better in zip(facing._asdict().values(), second._asdict().values(), strict=True):
@@ -113,7 +124,7 @@ def face(wall: Wall, points: FloatArray, places: FloatArray, v: FloatArray, w: F
     return facing
 
 
-def _search(wall: Wall, points: FloatArray, places: FloatArray, v: FloatArray, w: FloatArray) -> Facing:
+def _search(wall: Wall, points: FloatArray, places: FloatArray, v: FloatArray, w: FloatArray, beyond: float) -> Facing:
     """`face` from given places; the gap of a point that got lost is NaN."""
     n = len(points)
     facing = Facing(
@@ -123,14 +134,14 @@ def _search(wall: Wall, points: FloatArray, places: FloatArray, v: FloatArray, w
     surface = wall.surface
     _face(
         np.ascontiguousarray(points), places, surface.theta, surface.s, surface.coefficients,
-        wall.closed, *wall.ends, wall.theta, wall.s, wall.nodes, wall.half, v, w, facing.gap, facing.normal, facing.e,
-        facing.nodes, facing.N, facing.H, facing.G, facing.S,
+        wall.closed, *wall.ends, beyond, wall.theta, wall.s, wall.nodes, wall.half, v, w, facing.gap, facing.normal,
+        facing.e, facing.nodes, facing.N, facing.H, facing.G, facing.S,
     )  # fmt: skip
     return facing
 
 
 @njit(cache=True)
-def _face(points, places, lines_t, lines_s, coefficients, closed, low, high, theta, s, table, half, v, w, gap,
+def _face(points, places, lines_t, lines_s, coefficients, closed, low, high, beyond, theta, s, table, half, v, w, gap,
           normal, e, nodes, N, H, G, S):  # fmt: skip
     """Loop of `_search`."""
     X, J, inverse = np.empty((6, 3)), np.empty((3, 3)), np.empty((3, 3))
@@ -185,7 +196,7 @@ def _face(points, places, lines_t, lines_s, coefficients, closed, low, high, the
             # beyond an end of the wall there is nothing to face
             if s0 < low - 0.5 * (high - low) or s0 > high + 0.5 * (high - low):
                 break
-        inside = low - margin_s <= s0 <= high + margin_s
+        inside = low - beyond - margin_s <= s0 <= high + beyond + margin_s
         inside = inside and (closed or theta[0] - margin_t <= t0 <= theta[-1] + margin_t)
         # a point close to the wall that finds no place would be a hole in the contact; further off it is not
         if not inside or (not ok and size > 1e-9):

@@ -23,7 +23,7 @@ from softjaw.fem.contact.friction import Anchor
 from softjaw.fem.contact.problem import ContactProblem, Control, Evaluated, Finger, Gap
 from softjaw.fem.objects.gap import Pose
 from softjaw.fem.pad.mesh import Pad
-from softjaw.fem.shell.facing import FAR, Facing, Wall, face
+from softjaw.fem.shell.facing import Facing, Wall, face
 from softjaw.fem.shell.wall_kernel import add_blocks, changes, force_blocks
 from softjaw.fem.shell.wall_model import NonlinearWall
 from softjaw.friction.patch import FloatArray
@@ -31,6 +31,7 @@ from softjaw.friction.patch import FloatArray
 # Norm of the residual over modulus, thickness, extent and the root of the unknowns: its forces are differences of large
 # numbers.
 ROUNDING = 4e-16
+BEYOND = 2e-3  # by which the wall is continued for points that slide across a rim [m]
 
 
 class WallProblem(ContactProblem):
@@ -54,6 +55,7 @@ class WallProblem(ContactProblem):
         super().__init__(fingers, mu)
         self._damped_by: tuple[FloatArray, FloatArray] | None = None  # of the last tangent
         self._first_places = [f.wall.places(self._object_points(f, np.zeros(self.size))) for f in fingers]
+        self._areas = [self._area(f, places) for f, places in zip(fingers, self._first_places, strict=True)]
         self._bare = self._built()
         self._values = [np.zeros(len(f.foam.rows)) for f in fingers]
         self.forget()
@@ -112,8 +114,17 @@ class WallProblem(ContactProblem):
     def _met(self, k: int, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, Facing]:
         f = self.fingers[k]
         points = self._object_points(f, x)
-        facing = face(f.wall, points, self.places[k], *self.model.outer(x[: self.model.size]))
+        facing = face(f.wall, points, self.places[k], *self.model.outer(x[: self.model.size]), BEYOND)
         return points, facing.gap, facing.normal, facing
+
+    def _area(self, f: Finger, places: FloatArray) -> FloatArray:
+        # decided once: a point that left and faced the wall as it slides across a rim would do so for ever
+        beyond = f.wall.beyond(self._object_points(f, np.zeros(self.size)), places)
+        return np.where(beyond.reshape(f.pad.face_area.shape), 0.0, f.pad.face_area)
+
+    def _faced(self, k: int) -> FloatArray:
+        """See `ContactProblem`: what lies within the ends of the wall at first touch."""
+        return self._areas[k]
 
     def evaluate(self, x: FloatArray) -> list[Evaluated]:
         """See `ContactProblem`; the forces on the wall's nodes are noted [N]."""
@@ -192,7 +203,7 @@ class WallProblem(ContactProblem):
             return True
         facet, point = np.divmod(pick, f.pad.face_N.shape[0])
         facing = Facing(*(values[pick] for values in c.surface))
-        N, area = f.pad.face_N[point], f.pad.face_area[facet, point]
+        N, area = f.pad.face_N[point], c.area[facet, point]
         D, dn = changes(N, f.R, facing)
         pressure = (c.lam[facet] * N).sum(axis=1)
         force, by_lam = pressure[:, None] * facing.normal, facing.normal
@@ -221,7 +232,7 @@ class WallProblem(ContactProblem):
     def _engaged(self, f: Finger, c: Evaluated) -> IntArray:
         """Points that face the wall, of facets that already press or that the next iteration may close: few."""
         presses = (c.active[f.nodes] | (c.lam != 0.0)).any(axis=1)
-        return np.flatnonzero(np.repeat(presses, f.pad.face_N.shape[0]) & (c.gap < FAR))
+        return np.flatnonzero(np.repeat(presses, f.pad.face_N.shape[0]) & c.faces)
 
     def _grow(self, contacts: list[Evaluated]) -> None:
         """Couple the faces that press with the wall's nodes that they face."""
@@ -281,7 +292,7 @@ class WallProblem(ContactProblem):
     def _dragged(self, k: int, f: Finger, c: Evaluated) -> NDArray[np.bool_]:
         """Points whose traction changes with anything."""
         assert self.friction is not None
-        return self.friction.anchors[k].closed & (c.gap < FAR) & (self.point_pressure(f, c) > 0.0)
+        return self.friction.anchors[k].closed & c.faces & (self.point_pressure(f, c) > 0.0)
 
     # -- states -------------------------------------------------------------------------------------------------------
 

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from softjaw.fem.shell.wall_problem import WallProblem
 from softjaw.study import pipeline
 from softjaw.study.case import wall
 from softjaw.study.case.effects import ABOVE, BELOW, SMALL_INDENTATION
@@ -17,6 +18,12 @@ from tests.study.test_pipeline import differing
 CUP = """shape = "revolution"
 profile_mm = [[0, 24], [4, 28], [30, 30], [60, 32], [80, 34]]
 wall_mm = 0.6
+wall_material = "PP"
+"""
+OPEN = """shape = "revolution"
+open_ends = "top"
+profile_mm = [[0, 27], [3, 29.4], [8, 30.4], [30, 31.3], [60, 32.5], [110, 34.5]]
+wall_mm = 0.45
 wall_material = "PP"
 """
 OVAL = 'shape = "sections"\nwall_mm = 0.5\n' + "".join(
@@ -65,6 +72,16 @@ def test_what_a_wall_that_is_taken_as_rigid_closes_less_is_part_of_the_errors():
     assert shell.values["maps/closing"] / taken.values["maps/closing"] - 1.0 < closing - without < 0.05
     opening = [r.values["maps/opening_loaded_error"] for r in (taken, forced)]
     assert opening[0] / opening[1] == pytest.approx(closing / without)
+
+
+@pytest.mark.parametrize("station", [85.4, 85.7])
+def test_a_pad_that_stands_a_little_over_an_open_rim_is_solved_as_quickly_as_any(station, monkeypatch):
+    tangents, tangent = [], WallProblem.tangent
+    monkeypatch.setattr(WallProblem, "tangent", lambda self, x: tangents.append(1) or tangent(self, x))
+    pad = "gripper.pad_length_mm=50", "gripper.pad_width_mm=22", "gripper.pad_thickness_mm=15"
+    where = f"stations_mm = [{station}]\nangles_deg = [0]"
+    solved(OPEN, *pad, "gripper.shear_modulus_kpa=40", where=where, forces="[1]", elements="[10, 6, 3]")
+    assert len(tangents) < 20  # several hundred where points leave and face the wall for ever
 
 
 def test_a_wall_that_is_taken_as_rigid_holds_what_the_rigid_object_does():
