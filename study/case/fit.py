@@ -9,7 +9,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softjaw.fem.objects.gap import IntArray
 from softjaw.friction.patch import FloatArray
@@ -44,18 +43,6 @@ def extremes(points: FloatArray, triangles: IntArray, sides: tuple[float, float]
         np.ascontiguousarray(points), np.ascontiguousarray(triangles), 0.5 * sides[0], 0.5 * sides[1]
     )
     return float(low), float(high)
-
-
-def heights_over(corners: FloatArray, points: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """Heights of the planes of triangles ``(m, 3, 3)`` over ``points (n, 2)``, ``(n, m)``, and which lie over them."""
-    a, u, v = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    area = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
-    # seen from its edge a triangle has no height of its own: its neighbours have it
-    a, u, v, area = (part[area != 0.0] for part in (a, u, v, area))
-    x, y = points[:, :1] - a[:, 0], points[:, 1:] - a[:, 1]
-    s, t = (x * v[:, 1] - y * v[:, 0]) / area, (u[:, 0] * y - u[:, 1] * x) / area
-    over = (s >= -1e-12) & (t >= -1e-12) & (s + t <= 1.0 + 1e-12)
-    return a[:, 2] + s * u[:, 2] + t * v[:, 2], over
 
 
 def fit_of(points: FloatArray, triangles: IntArray, jaws: Jaws, doubt: float = 0.0) -> tuple[int, str]:

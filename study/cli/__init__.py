@@ -15,7 +15,7 @@ from softjaw.study.messages import BUG, CANNOT_WRITE, DONE, LACKING, STOPPED, US
 from softjaw.study.run.limits import is_out_of_memory, no_room, require_room
 
 UNWRITABLE = {errno.EPIPE, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}  # what standard output can answer
-SOLVING = ("run", "cost")
+SOLVING = ("run", "cost", "plan")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -192,7 +192,7 @@ COMMANDS = {  # by what they are for, in the order of use: name, what it does, a
          ("kind", "name", "mesh", "mesh unit", "axis", "gripper", "replace")),
         ("check", "find every error of a scene, or say what would be run", "check jobs/bottle-rigid.toml", "cli.quick",
          ("scene", "set", "objects")),
-        ("plan", "cases, units, disk, memory and time, before anything is spent", "plan jobs/bottle-rigid.toml -n 16",
+        ("plan", "cases, disk, memory and time, by a few grasps that are solved", "plan jobs/bottle-rigid.toml -n 16",
          "cli.quick", ("scene", "set", "objects", "ranks", "result")),
         ("cost", "what accuracy costs in time: errors and seconds on several meshes",
          "cost jobs/bottle-rigid.toml -o results/bottle-rigid-cost.hdf", "cli.running", ("scene", "set", "result")),

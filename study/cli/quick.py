@@ -1,4 +1,4 @@
-"""Commands that answer at once: what they import loads neither MPI nor PETSc nor xarray."""
+"""Commands that answer soon: what they import loads neither MPI nor PETSc nor xarray, but for grasps that are timed."""
 
 import json
 import time
@@ -13,7 +13,7 @@ import numpy as np
 from softjaw.study.case.build import build_object, check_object, geometry, mesh_notes, notices, with_mass
 from softjaw.study.case.candidates import check_candidates, with_sampled_grasps
 from softjaw.study.messages import USAGE, NoGraspError, StudyError, fault_of, with_ending
-from softjaw.study.run.estimate import START_S, estimated, slowness
+from softjaw.study.run.estimate import END_S, TIMED_S, timed
 from softjaw.study.run.object_folder import ObjectFolder, folder_of
 from softjaw.study.run.plan import free_bytes, gigabytes, make_plan, memory, plan_text
 from softjaw.study.run.progress import duration
@@ -92,7 +92,7 @@ def plan(options: Namespace) -> str:
     if options.folder:
         options.folder.check()
         return hanging(objects_text(options.folder, results_folder(options), options.ranks), terminal_width())
-    scene = with_sampled_grasps(scene_of(options))
+    scene = with_sampled_grasps(options.scene_read)
     path = target(options)
     made = make_plan(scene, options.scene, options.overrides)
     return hanging("\n".join([plan_text(made, scene, path, options.ranks), *notices(scene)]), terminal_width())
@@ -110,9 +110,10 @@ def objects_text(folder: ObjectFolder, out: Path, ranks: Sequence[int]) -> str:
     preparing = scale * (time.perf_counter() - begin)
     rows = {"objects": f"{len(objects)}, of which {len(some)} were looked at"}
     if planned:
-        paths = [seconds for made, _ in planned for seconds in estimated(made.tried)]
+        each, here = zip(*(timed(made.tried, TIMED_S / len(planned)) for made, _ in planned), strict=True)
+        paths = [seconds for some in each for seconds in some]
         many = paths * max(1, round(scale))
-        solving = slowness() * scale * len(paths) / len(many)
+        solving, start = scale * len(paths) / len(many), END_S + time.process_time() - preparing / scale - sum(here)
         on = {f"{n} rank{'s' * (n > 1)}": (preparing / n, solving * makespan(many, n)) for n in ranks}
         cases, space = (scale * sum(getattr(made.layout, name) for made, _ in planned) for name in ("rows", "nbytes"))
         need, free = max(needs for _, needs in planned), free_bytes(out / "index.hdf")
@@ -120,8 +121,8 @@ def objects_text(folder: ObjectFolder, out: Path, ranks: Sequence[int]) -> str:
             "cases": f"about {cases:.0f}",
             "disk": f"about {space / 1e6:.3g} MB in {out}, {free / 1e9:.1f} GB free",
             "memory": f"roughly {gigabytes(need, 1)} on each rank, {gigabytes(need * ranks[0], 2)} on {ranks[0]}",
-            "time": "; ".join(f"about {duration(START_S + sum(t))} on {name}" for name, t in on.items())
-            + f"; {duration(preparing)} for sampling grasps on one; estimated on a bed of springs",
+            "time": "; ".join(f"about {duration(start + sum(t))} on {name}" for name, t in on.items())
+            + f"; {duration(preparing)} for sampling grasps on one; judged by a few load paths that were solved for it",
         }
     if len(planned) < len(some):
         rows["no grasp"] = f"{len(some) - len(planned)} of {len(some)}: they are rows of the index, with the reason"

@@ -1,123 +1,102 @@
-"""Seconds of a study: of load paths on a bed of springs, before anything is solved; of those that are measured.
+"""Seconds of a study: of load paths that are solved to time them, or that an earlier run has solved.
 
-A force costs what its elements cost, whose number follows from symmetry, and symmetry from what the pads meet: heights
-of the object over a coarse grid on each pad, without compiled loops, because a plan answers at once.
+What a load path takes depends on symmetry, friction that acts back, meshes that the accuracy asks for and the machine:
+nothing foretells it as well as the paths themselves. The first one that is timed also loads what all solve with, so it
+counts only where there is no other.
 """
 
-import math
 import time
-import timeit
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from softjaw.friction.patch import FloatArray
-from softjaw.study.case.build import surface_triangles
-from softjaw.study.case.candidates import meshes_cost
-from softjaw.study.case.fit import bed_closing, doubt, heights_over, jaws_of
-from softjaw.study.case.poses import turn_of_pose
 from softjaw.study.quantities import FAILED, LISTED
 from softjaw.study.result.store import open_result
+from softjaw.study.scene.sections import FINEST
 
-FACE_GRID = (13, 7)  # points of a pad's face
-# Measured on cylinders, boxes, bottles and meshes of 64 to 2304 solved elements, CPU time of one core of 2026.
-CASE, ELEMENT = 0.06, 2.75e-4  # seconds of a force: friction, fits and score; contact, for each trilinear element
-SECTIONS_FACTOR = 1.7  # times as dear is a body of stacked sections, on whose surface places are searched
-QUADRATIC_FACTOR = 10.0  # times as dear is a triquadratic element
-START_S = 3.5  # seconds until a rank has loaded what it solves with, and at the end to pack and list
+TIMED_S = 10.0  # seconds of the processor after which no further load path is begun
+END_S = 2.0  # seconds to pack a file and list its grasps
 FIRST_FORCE_FACTOR = 2.0  # times as long the first force takes, which begins with a coarse step
-REGION_S = 0.3  # seconds until the distance to a mesh is known round both pads
-# times as dear with friction that acts back, everywhere or where it is found to matter
-COUPLED = {"none": 1.0, "auto": 2.2, "tangential": 2.2}
-SCREENED_COST = 0.1  # of a force on the coarse mesh alone, over that on the scene's
-ROUNDS = 2.3  # of the cases that a list shows, each once on the scene's mesh: with others, and with finer meshes
-DEEP, HARD = 0.4, 4.0  # closing over the pad's thickness from which forces are cut into steps, and how much that costs
-OPERATIONS_S = 3.6e-3  # seconds that `slowness` counts where cases take what is said above
+MOST_PROMISING = 3  # sampled grasps that are solved as well as listed ones
+ROUNDS = 1.6  # of the grasps that a list shows: with those that fall out of it
 
 
-def estimated(units: Sequence[Any]) -> list[float]:
-    """Expected time of each unit of work on objects without a wall [s]."""
-    # load paths that are looked at, evenly spread; the others take the time of the nearest one
-    step = -(-len(units) // 40) if units else 1
-    known = [_seconds(unit, *surface_triangles(unit.scene.object)) for unit in units[::step]]
-    # any of sampled grasps may be among those that rounds solve well
-    rounds = ROUNDS * min(LISTED, len(units)) / max(len(units), 1)
-    return [known[i // step][0] + rounds * known[i // step][1] for i in range(len(units))]
+def timed(units: Sequence[Any], budget: float = TIMED_S) -> tuple[list[float], float]:
+    """Expected time of each unit of work [s], by a few that are solved here, and what of the time here was theirs [s].
+
+    The results are thrown away. After ``budget`` [s] a path is left in the middle; what the first case takes, with all
+    that it loads and maybe compiles, is not counted.
+    """
+    if not units:
+        return [], 0.0
+    costs, seconds, spent = np.array([unit.cost for unit in units]), np.full(len(units), np.nan), 0.0
+    first = len(units) // 2
+    for i in dict.fromkeys([first, *_spread(len(units))]):
+        times: list[float] = []
+        for took in _times(units[i]):
+            times.append(took)
+            spent += took if np.isfinite(seconds[first]) or len(times) > 1 else 0.0
+            if spent > budget:
+                break
+        seconds[i] = _path(times, len(units[i].rows[0]), left=spent > budget, loads=i == first)
+        if spent > budget:
+            break
+    known = np.isfinite(seconds)
+    if known.sum() > 1:
+        known[first] = False
+    each = np.where(known, seconds, seconds[known].sum() / costs[known].sum() * costs)
+    here = float(each[np.isfinite(seconds)].sum())
+    if units[first].finest:
+        # sampled grasps come with the most promising first; any may be among those that rounds solve well
+        best = [_listed(unit) for unit in units[:MOST_PROMISING]]
+        each += ROUNDS * min(LISTED, len(units)) / len(units) * sum(best) / len(best)
+    return each.tolist(), here
 
 
-def slowness() -> float:
-    """How long small operations of numpy take here, over where the seconds of this module were measured."""
-    a = np.arange(300.0)
-
-    def operations() -> list[float]:
-        return [float((a * 2 + i).max()) for i in range(400)]
-
-    # the processor's time: others may share it now
-    return min(timeit.repeat(operations, timer=time.process_time, repeat=25, number=2)) / OPERATIONS_S
+def _path(times: Sequence[float], forces: int, *, left: bool, loads: bool) -> float:
+    """Time of a load path of which the first forces took ``times`` [s]; it ended by itself if it was not ``left``."""
+    further = sum(times[1:]) / (len(times) - 1) if len(times) > 1 else times[0] / FIRST_FORCE_FACTOR
+    first = FIRST_FORCE_FACTOR * further if loads else times[0]
+    return first + sum(times[1:]) + further * (forces - len(times)) * left
 
 
-def _seconds(unit: Any, points: FloatArray, triangles: NDArray[np.int64]) -> tuple[float, float]:
-    """Time before any round, and that of its cases which rounds may solve [s]."""
-    scene, gripper = unit.scene, unit.scene.gripper
-    pose, other = unit.candidate.poses
-    low, high = heights((points - pose.origin) @ pose.rotation, triangles, gripper.pad_size[:2])
-    fingers = 1 if turn_of_pose(pose, other, scene.object.axis_symmetry) is not None else 2
-    planes = _planes(scene, low, high, doubt(points))
-    kind = QUADRATIC_FACTOR if gripper.element == "hex27" else 1.0
-    kind *= SECTIONS_FACTOR if scene.object.shape == "sections" else 1.0
-    elements = kind * fingers * math.prod(gripper.elements) / 2**planes
-    each = CASE + ELEMENT * elements * meshes_cost(scene) * COUPLED[scene.effects.friction_pressure_coupling]
-    jaws, cell = jaws_of(scene), math.prod(gripper.pad_size[:2]) / math.prod(FACE_GRID)
-    forces = scene.load.normal_force
-    times = [FIRST_FORCE_FACTOR, *[1.0] * (len(forces) - 1)]
-    if np.isfinite(low).any():
-        bed = low - low.min()
-        shares = [bed_closing(bed, f / (jaws.stiffness * cell)) / gripper.pad_thickness for f in forces]
-        times = [t * (HARD if share > DEEP else 1.0) for t, share in zip(times, shares, strict=True)]
-    region = REGION_S if scene.object.shape == "mesh" else 0.0
-    if not unit.finest:
-        return region + each * sum(times), 0.0
+def _spread(n: int) -> Iterator[int]:
+    """Positions below ``n``, whose first few lie far apart: multiples of the golden section."""
+    for k in range(4 * n):
+        yield int((0.5 + 0.618034 * k) % 1.0 * n)
+
+
+def _times(unit: Any) -> Iterator[float]:
+    """Time of each case of a load path [s], up to one that fails."""
+    from softjaw.study.pipeline import solve_unit  # loads the solver, which a plan by an earlier run needs not
+
+    cases, before = solve_unit(unit), time.process_time()
+    for _ in unit.rows[0]:
+        failed = False
+        try:
+            next(cases)
+        except Exception:  # whatever a case dies of, the run says it
+            failed = True
+        now = time.process_time()
+        yield now - before
+        if failed:
+            return
+        before = now
+
+
+def _listed(unit: Any) -> float:
+    """Time of a listed grasp in rounds [s]: one force, on ever finer meshes until the accuracy is met."""
+    from softjaw.study.pipeline import solve_unit
+
+    before, last = time.process_time(), len(unit.finest) - 1
+    with suppress(Exception):
+        list(solve_unit(replace(unit, finest=(FINEST,) * (last + 1)), (last,)))
     # with a mass the least force that holds it lies between two
-    levels = 2 if scene.object.mass_g is not None and len(forces) > 1 else 1
-    return SCREENED_COST * each * sum(times), region + levels * FIRST_FORCE_FACTOR * each
-
-
-def _planes(scene: Any, low: FloatArray, high: FloatArray, off: float) -> int:
-    """Planes of symmetry that the pads' meshes will use; what a mesh from a file holds is never quite symmetric."""
-    wanted = scene.effects.model_size
-    if wanted == "full" or scene.object.shape == "mesh":
-        return 0
-    planes = 0
-    for axis in (0, 1):
-        even = scene.gripper.elements[axis] % 2 == 0
-        planes += even and all(_alike(field, np.flip(field, axis), off) for field in (low, high))
-    return min(planes, 1) if wanted == "half" else planes
-
-
-def _alike(values: FloatArray, other: FloatArray, off: float) -> bool:
-    both = np.isfinite(values) & np.isfinite(other)
-    same_rim = np.mean(np.isfinite(values) != np.isfinite(other)) < 0.1  # rounding decides what a line at the rim meets
-    return bool(same_rim and np.abs(values[both] - other[both]).max(initial=0.0) <= off)
-
-
-def heights(
-    points: FloatArray, triangles: NDArray[np.int64], sides: tuple[float, float]
-) -> tuple[FloatArray, FloatArray]:
-    """Lowest and highest z of triangles over a grid of points in a rectangle about the origin; else infinite."""
-    x, y = np.meshgrid(*(side * ((np.arange(n) + 0.5) / n - 0.5) for side, n in zip(sides, FACE_GRID, strict=True)),
-                       indexing="ij")  # fmt: skip
-    corners, half = points[triangles], 0.5 * np.array(sides)
-    near = (corners[..., :2].min(axis=1) <= half) & (corners[..., :2].max(axis=1) >= -half)
-    z, over = heights_over(corners[near.all(axis=1)], np.column_stack([x.ravel(), y.ravel()]))
-    low = np.where(over, z, np.inf).min(axis=1, initial=np.inf)
-    high = np.where(over, z, -np.inf).max(axis=1, initial=-np.inf)
-    return low.reshape(FACE_GRID), high.reshape(FACE_GRID)
-
-
-# --- from measured times ----------------------------------------------------------------------------------------------
+    return (2 if unit.scene.object.mass_g is not None and last else 1) * (time.process_time() - before)
 
 
 def unit_seconds(plan: Any, seconds: np.ndarray) -> list[float]:

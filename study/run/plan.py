@@ -1,7 +1,8 @@
-"""What a run will do, before anything is spent: layout, units of work, disk, memory and time."""
+"""What a run will do, before it is begun: layout, units of work, disk, memory and time."""
 
 import math
 import shutil
+import time
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
@@ -26,7 +27,7 @@ from softjaw.study.case.candidates import decided
 from softjaw.study.quantities import ALONG, AROUND, NO_GRASP, STATES
 from softjaw.study.result.derived import derived
 from softjaw.study.result.layout import Header, Layout, is_case
-from softjaw.study.run.estimate import SCREENED_COST, START_S, estimated, measured_seconds, slowness, unit_seconds
+from softjaw.study.run.estimate import END_S, measured_seconds, timed, unit_seconds
 from softjaw.study.run.progress import duration
 from softjaw.study.run.refine import Rounds, added_cases, refined
 from softjaw.study.run.shares import makespan
@@ -35,9 +36,8 @@ from softjaw.study.scene.sections import COARSE, FINEST
 # Measured on ten scenes at the end of a run: bytes of a rank with the libraries and compiled loops that it needs, and
 # numbers over dofs^(4/3), the growth of nested dissection in 3-D, of factors, matrices and the solutions that are kept.
 LIBRARY_BYTES, FILL_FACTOR = 4.5e8, 160.0
-# Of a wall, measured on a cup and a bottle: all that a force takes, with the coarse mesh; 16 kB are factors, the rest
-# solutions that are kept.
-SECONDS_PER_UNKNOWN, BYTES_PER_UNKNOWN = 9e-4, 9e4
+BYTES_PER_UNKNOWN = 9e4  # of a wall, measured on a cup and a bottle: 16 kB are factors, the rest kept solutions
+SCREENED_COST = 0.1  # of a force on the coarse mesh alone, over that on the scene's
 
 
 class Plan(NamedTuple):
@@ -181,34 +181,24 @@ def _rounds(plan: Plan, scene: Any) -> str:
         return ""
     each = added_cases(plan.units, plan.layout)
     what = "poses" if scene.candidates.poses else "stations"
-    return f"up to {asked // each} more {what}, {each} cases each; not in the numbers above and below"
+    return f"up to {asked // each} more {what}, {each} cases each; the time counts them, no other row does"
 
 
 def _time(plan: Plan, scene: Any, path: Path, ranks: Sequence[int]) -> str:
-    """Time on each of these numbers of ranks, by measured load paths where there are some."""
+    """Time on each of these numbers of ranks, by load paths of the file where there are some."""
     seconds = measured_seconds(plan, path)
     each, start = unit_seconds(plan, seconds) if seconds is not None else [], 0.0
-    source = f" for all cases, judged by those in {path}"
+    source = f"by those in {path}"
     if not each:
-        (each, by), start = _estimated(plan, scene), START_S
-        source = f", half to twice that, estimated {by}; more accurate once a few load paths are in {path}"
+        each, here = timed(plan.tried)
+        # what a run does before it solves, a plan did as well
+        start = END_S + time.process_time() - here
+        source = "by a few load paths that were solved for it"
+    added = 1.0 + (scene.candidates.refine or 0) / max(len(each) * plan.layout.shape[-1], 1)
     counts = [plan.layout.shape[-1] if unit.apart else 1 for unit in plan.tried]  # forces that ranks may divide
-    parts = [cost / n for cost, n in zip(each, counts, strict=True) for _ in range(n)]
+    parts = [added * cost / n for cost, n in zip(each, counts, strict=True) for _ in range(n)]
     times = (f"{duration(start + makespan(parts, n))} on {n} rank{'s' * (n > 1)}" for n in ranks)
-    return f"about {', '.join(times)}{source}"
-
-
-def _estimated(plan: Plan, scene: Any) -> tuple[list[float], str]:
-    """Time of each unit before anything is solved [s], and what it follows from."""
-    scale = slowness()
-    if not shells(scene):
-        # measured on 22 scenes: 0.5 to 2 times, by how far friction acts back and how thin and sharp an object is
-        return [scale * seconds for seconds in estimated(plan.tried)], "on a bed of springs"
-    pads, shell = wall_unknowns(scene)
-    # between rigid candidates and shells where the scene leaves that open
-    size = pads + shell if scene.effects.object.endswith("shell") else math.sqrt(pads * (pads + shell))
-    seconds = scale * SECONDS_PER_UNKNOWN * size * plan.layout.shape[-1]
-    return [seconds] * len(plan.tried), "from the size of pads and wall"
+    return f"about {', '.join(times)} for all cases, judged {source}"
 
 
 def free_bytes(path: Path) -> int:

@@ -28,7 +28,7 @@ from tests.study.view_files import make
 PARSERS = next(a for a in program()._actions if isinstance(a, argparse._SubParsersAction)).choices
 HEAVY = ("mpi4py", "petsc4py", "numba", "skfem", "pyvista", "matplotlib", "scipy")
 OUTLINE = "jobs/bottle-rigid.toml"  # a body of revolution: its outline is drawn to be judged
-QUICK = ("--help", "init --help", "check SCENE", f"check {OUTLINE}", f"plan {OUTLINE}", "status FILE", "show FILE",
+QUICK = ("--help", "init --help", "check SCENE", f"check {OUTLINE}", "status FILE", "show FILE",
          "patch jobs/cylinder-pressure.csv --surface full")  # fmt: skip
 EXAMPLES = [
     line.strip()

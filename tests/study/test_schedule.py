@@ -1,23 +1,24 @@
 """Who solves what: every unit once, the expensive ones first, nothing new after a stop; and the seconds of a plan."""
 
 import io
+import re
+import resource
 from itertools import chain
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from softjaw.fem.objects.shapes import Sphere
+from softjaw.study import pipeline
 from softjaw.study.quantities import DONE, MISSING, SLIPS, WIDE
 from softjaw.study.run import estimate
-from softjaw.study.run.estimate import FIRST_FORCE_FACTOR, estimated, heights, unit_seconds
+from softjaw.study.run.estimate import FIRST_FORCE_FACTOR, timed, unit_seconds
 from softjaw.study.run.load_path import settle
 from softjaw.study.run.plan import Plan, make_plan, plan_text
 from softjaw.study.run.progress import Progress
 from softjaw.study.run.shares import by_cost, makespan, shares
-from softjaw.study.scene import load_scene
 from tests.study.launching import ROOT, launch
-from tests.study.scenes import OVAL, QUICK, scene_of
+from tests.study.scenes import OVAL, scene_of
 
 CLAIMS = """
 from mpi4py import MPI
@@ -38,9 +39,6 @@ claims.free()
 if comm.rank == 0:
     print(everybody, stopped)
 """
-# CPU seconds of all load paths as they were measured on one core, compiled code there and loaded.
-MEASURED = {"smoke": 1.24, "box-poses": 3.4, "flask-mesh": 57.0, "bottle-rigid": 86.0}
-
 
 def claims(ranks, **values):
     """Positions of each rank, and whether each saw a stop."""
@@ -138,7 +136,7 @@ def test_a_plan_gives_the_time_on_every_number_of_ranks(tmp_path):
     scene = scene_of(OVAL)
     text = plan_text(make_plan(scene), scene, tmp_path / "a.hdf", (1, 4))
     assert " on 1 rank, " in text
-    assert " on 4 ranks, half to twice that" in text
+    assert " on 4 ranks for all cases" in text
 
 
 def test_a_case_that_an_earlier_run_left_out_is_missing_once_it_is_asked_for():
@@ -184,27 +182,62 @@ def test_a_rest_is_foretold_after_enough_cases(cases, enough):
     assert "left" in run.at(20.0, enough + 1)
 
 
-def seconds(station=0, angle=0, forces="[1]"):
-    scene = scene_of(OVAL, *QUICK, stations=f"[{station}]", angles=f"[{angle}]", forces=forces)
-    return estimated(make_plan(scene).units)[0]
+@pytest.fixture
+def paths(monkeypatch):
+    """Load paths that take as long as the test says, each from its first force, on a clock that only they move."""
+    clock, solved = [100.0], []
+
+    def solve_unit(unit, wanted=None):
+        solved.append(unit.index)
+        clock[0] += 50.0 if len(solved) == 1 else 0.0  # what the first one loads
+        for k, seconds in enumerate(unit.seconds):
+            if seconds is None:
+                raise ArithmeticError
+            clock[0] += seconds
+            yield k, None
+
+    monkeypatch.setattr(pipeline, "solve_unit", solve_unit)
+    monkeypatch.setattr(estimate.time, "process_time", lambda: clock[0])
+    return solved
 
 
-def test_heights_over_a_pad_are_those_of_a_ball_and_a_grasp_costs_what_its_elements_and_forces_cost():
-    radius, side = 0.03, 0.02
-    low, high = heights(*Sphere(radius).surface(), (side, side))
-    x, y = (side * ((np.arange(n) + 0.5) / n - 0.5) for n in estimate.FACE_GRID)
-    cap = np.sqrt(radius**2 - x[:, None] ** 2 - y**2)
-    np.testing.assert_allclose(high, cap, atol=2e-4)
-    np.testing.assert_allclose(low, -cap, atol=2e-4)
-    one = estimate.CASE + estimate.ELEMENT * 64  # of one finger, which stands for its image
-    assert seconds() == pytest.approx(FIRST_FORCE_FACTOR * (one - estimate.ELEMENT * 48), rel=1e-12)  # a quarter of it
-    assert seconds(angle=30) > seconds()  # no plane of symmetry across the long side
-    further = seconds() / FIRST_FORCE_FACTOR
-    assert seconds(forces="[1, 2]") - seconds() == pytest.approx(further, rel=1e-12)
-    assert seconds(forces="[1, 500]") - seconds() == pytest.approx(estimate.HARD * further, rel=1e-12)
+def units_that_take(*seconds):
+    return [
+        SimpleNamespace(index=i, rows=(range(len(s)),), cost=float(i + 1), seconds=s, finest=())
+        for i, s in enumerate(seconds)
+    ]
 
 
-@pytest.mark.parametrize("job", sorted(MEASURED))
-def test_the_scenes_that_come_along_are_within_a_factor_of_two(job):
-    found = sum(estimated(make_plan(load_scene(ROOT / "jobs" / f"{job}.toml")).units))
-    assert 0.5 < found / MEASURED[job] < 2.0
+def test_a_plan_times_paths_that_lie_far_apart_and_what_the_first_one_loads_is_none_of_theirs(paths):
+    units = units_that_take(*([2.0 * (i + 1), 1.0 * (i + 1)] for i in range(9)))
+    each, here = timed(units, budget=60.0)
+    assert each == pytest.approx([3.0 * (i + 1) for i in range(9)])  # by cost
+    assert paths[0] == 4
+    assert 1 < len(paths) < 9
+    assert max(paths[:3]) - min(paths[:3]) >= 4
+    assert here == pytest.approx(sum(each[i] for i in paths))
+
+
+def test_a_path_is_left_when_the_time_is_up_and_one_that_fails_counts_what_it_took(paths):
+    assert timed([], 10.0) == ([], 0.0)
+    [left], _ = timed(units_that_take([7.0, 4.0, 6.0, 4.0, 4.0]), budget=8.0)
+    assert left == pytest.approx((FIRST_FORCE_FACTOR + 4) * 5.0)
+    [_, failed], _ = timed(units_that_take([2.0, None, 5.0], [2.0, 1.0, 1.0])[::-1])
+    assert failed == pytest.approx(2.0)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("job", ["smoke", "box-poses", "flask-mesh", "sampled", "mug"])
+def test_a_plan_is_within_two_fifths_of_what_the_run_takes(job, tmp_path):
+    out, scene = ("-o", str(tmp_path / "a.hdf")), str(ROOT / "jobs" / f"{job}.toml")
+    code, text, errors = launch(1, "-m", "softjaw", "plan", scene, "-n", "1", *out)
+    assert code == 0, errors
+    minutes, seconds = re.search(r"about (?:(\d+) min )?([\d.]+) s on 1 rank", " ".join(text.split())).groups()
+    before = children_seconds()
+    assert launch(1, "-m", "softjaw", "run", scene, *out)[0] == 0
+    assert 0.6 < (60 * int(minutes or 0) + float(seconds)) / (children_seconds() - before) < 1.4
+
+
+def children_seconds():
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
