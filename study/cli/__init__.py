@@ -15,7 +15,7 @@ from softjaw.study.messages import BUG, CANNOT_WRITE, DONE, LACKING, STOPPED, US
 from softjaw.study.run.limits import is_out_of_memory, no_room, require_room
 
 UNWRITABLE = {errno.EPIPE, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}  # what standard output can answer
-SOLVING = ("run", "cost", "plan")
+SOLVING = ("run", "cost")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -74,7 +74,8 @@ def command(options: Namespace) -> int:
         begin_mpi()
     answer = getattr(_module(options.module), options.command)(options)
     if isinstance(answer, str):
-        print(printable(answer))
+        if answer:
+            print(printable(answer))
         return DONE
     return int(answer or DONE)
 

@@ -1,4 +1,4 @@
-"""Commands that answer soon: what they import loads neither MPI nor PETSc nor xarray, but for grasps that are timed."""
+"""Commands that answer at once and load neither MPI nor PETSc nor xarray; only what a plan times loads a solver."""
 
 import json
 import time
@@ -12,10 +12,10 @@ import numpy as np
 
 from softjaw.study.case.build import build_object, check_object, geometry, mesh_notes, notices, with_mass
 from softjaw.study.case.candidates import check_candidates, with_sampled_grasps
-from softjaw.study.messages import USAGE, NoGraspError, StudyError, fault_of, with_ending
+from softjaw.study.messages import USAGE, NoGraspError, StudyError, fault_of, printable, with_ending
 from softjaw.study.run.estimate import END_S, TIMED_S, timed
 from softjaw.study.run.object_folder import ObjectFolder, folder_of
-from softjaw.study.run.plan import free_bytes, gigabytes, make_plan, memory, plan_text
+from softjaw.study.run.plan import free_bytes, gigabytes, make_plan, memory, plan_rows
 from softjaw.study.run.progress import duration
 from softjaw.study.run.shares import makespan
 from softjaw.study.scene import Scene, SceneError, load_scene, start
@@ -92,10 +92,12 @@ def plan(options: Namespace) -> str:
     if options.folder:
         options.folder.check()
         return hanging(objects_text(options.folder, results_folder(options), options.ranks), terminal_width())
-    scene = with_sampled_grasps(options.scene_read)
+    scene = with_sampled_grasps(scene_of(options))
     path = target(options)
     made = make_plan(scene, options.scene, options.overrides)
-    return hanging("\n".join([plan_text(made, scene, path, options.ranks), *notices(scene)]), terminal_width())
+    for row in plan_rows(made, scene, path, options.ranks):
+        print(printable(hanging(row, terminal_width())), flush=True)
+    return hanging("\n".join(notices(scene)), terminal_width())
 
 
 def objects_text(folder: ObjectFolder, out: Path, ranks: Sequence[int]) -> str:

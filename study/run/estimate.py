@@ -16,6 +16,7 @@ import numpy as np
 
 from softjaw.study.quantities import FAILED, LISTED
 from softjaw.study.result.store import open_result
+from softjaw.study.run.limits import require_room
 from softjaw.study.scene.sections import FINEST
 
 TIMED_S = 10.0  # seconds of the processor after which no further load path is begun
@@ -33,6 +34,7 @@ def timed(units: Sequence[Any], budget: float = TIMED_S) -> tuple[list[float], f
     """
     if not units:
         return [], 0.0
+    require_room()
     costs, seconds, spent = np.array([unit.cost for unit in units]), np.full(len(units), np.nan), 0.0
     first = len(units) // 2
     for i in dict.fromkeys([first, *_spread(len(units))]):

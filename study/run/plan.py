@@ -4,7 +4,7 @@ import math
 import shutil
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -141,8 +141,8 @@ def gigabytes(size: float, digits: int) -> str:
     return f"{float(f'{size:.{digits}g}') / 1e9:g} GB"
 
 
-def plan_text(plan: Plan, scene: Any, path: Path, ranks: Sequence[int]) -> str:
-    """Cases, units and disk, memory on the first of these numbers of ranks, and time on each."""
+def plan_rows(plan: Plan, scene: Any, path: Path, ranks: Sequence[int]) -> Iterator[str]:
+    """Cases, units and disk, memory on the first of these numbers of ranks, and in the end time on each."""
     layout = plan.layout
     each = memory(scene)
     shared = plan.served - len(plan.units)
@@ -156,9 +156,11 @@ def plan_text(plan: Plan, scene: Any, path: Path, ranks: Sequence[int]) -> str:
         "rounds": _rounds(plan, scene),
         "disk": f"{space}, {free_bytes(path) / 1e9:.1f} GB free",
         "memory": f"roughly {gigabytes(each, 1)} on each rank, {gigabytes(each * ranks[0], 2)} on {ranks[0]}",
-        "time": _time(plan, scene, path, ranks),
     }
-    return "\n".join(f"  {name:<10}  {text}" for name, text in rows.items() if text)
+    for name, text in rows.items():
+        if text:
+            yield f"  {name:<10}  {text}"
+    yield f"  {'time':<10}  {_time(plan, scene, path, ranks)}"  # what is known at once need not wait for it
 
 
 def _no_grasps(plan: Plan) -> str:

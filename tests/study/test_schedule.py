@@ -14,7 +14,7 @@ from softjaw.study.quantities import DONE, MISSING, SLIPS, WIDE
 from softjaw.study.run import estimate
 from softjaw.study.run.estimate import FIRST_FORCE_FACTOR, timed, unit_seconds
 from softjaw.study.run.load_path import settle
-from softjaw.study.run.plan import Plan, make_plan, plan_text
+from softjaw.study.run.plan import Plan, make_plan, plan_rows
 from softjaw.study.run.progress import Progress
 from softjaw.study.run.shares import by_cost, makespan, shares
 from tests.study.launching import ROOT, launch
@@ -134,7 +134,7 @@ def test_times_follow_from_costs():
 
 def test_a_plan_gives_the_time_on_every_number_of_ranks(tmp_path):
     scene = scene_of(OVAL)
-    text = plan_text(make_plan(scene), scene, tmp_path / "a.hdf", (1, 4))
+    *_, text = plan_rows(make_plan(scene), scene, tmp_path / "a.hdf", (1, 4))
     assert " on 1 rank, " in text
     assert " on 4 ranks for all cases" in text
 
