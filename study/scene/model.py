@@ -412,6 +412,7 @@ def _scene(
 ) -> Scene:
     """The scene of tables that stand in a text, if any, of the file ``path``."""
     given: dict[KeyPath, Place] = {}
+    overrides = (overrides,) if isinstance(overrides, str) else overrides
     problems, lines = put_overrides(data, overrides, given), lines_of(text)
     for table, name in ((data, "sweep"), (data.get("uncertainty"), "spread")):
         if isinstance(table, dict) and isinstance(table.get(name), dict):

@@ -371,7 +371,8 @@ def test_a_scene_starts_no_heavy_machinery_is_that_of_tables_and_what_is_wrong_i
     file = tmp_path / "ball.toml"
     file.write_text(made.effective_toml())
     assert Scene.from_file(file) == made == load_scene(str(file))
-    assert Scene.from_file(file, ["object.radius_mm=20"]).object.radius == 0.02
+    for overrides in (["object.radius_mm=20"], "object.radius_mm=20"):
+        assert Scene.from_file(file, overrides).object.radius == 0.02
     assert made.with_values(**{"gripper.elements": np.array([8, 4, 2])}).gripper.elements == (8, 4, 2)
     with pytest.raises(SceneError) as refused:
         Scene.from_dict({"object": {"shape": "mesh", "mesh": "none.stl", "unit": "mm"}, "load": 5})
