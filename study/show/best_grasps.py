@@ -35,7 +35,6 @@ if TYPE_CHECKING:
     import xarray as xr  # slow to load, and a run needs it at its end only
 
 NOTES_WIDTH, OTHERS_WIDTH, LABEL_WIDTH = 13, 16, 20  # characters
-MU_ERROR = 0.1  # of mu, by which it is off where nothing is known of it
 PLANAR_E_N = f"e_n_{MODELS[1]}"  # column
 BRIEF = ("payload", "opening", "quality", "e_n")  # maps of a table in a terminal
 FINER = Flag.COARSE | Flag.NO_FIT | Flag.NO_CORNERS | Flag.NODAL | Flag.LEFT_OUT  # what a finer mesh or effect cures
@@ -253,15 +252,6 @@ def value_text(ds: xr.Dataset, name: str, index: Index, digits: int = 4, unit: b
     return f"{text} {shown_unit(si)}".rstrip() if unit else text
 
 
-def force_to_use(ds: xr.Dataset, index: Index) -> tuple[float, float]:
-    """Smallest force that holds the object at a candidate, and its error by mesh, curve and mu [N]; NaN: not known.
-
-    Friction bears in proportion to mu, so a share by which mu is off moves the force by that share.
-    """
-    low, error = (at(ds, name, index) for name in ("force_low", "force_low_error"))
-    return low, float(np.hypot(error, MU_ERROR * low))
-
-
 def _force(ds: xr.Dataset, index: Index) -> tuple[str, str]:
     """How hard to press: the least force that holds the mass, else what some forces hold and how to name a mass."""
     mass, safety = task_keys(ds, "object").get("mass_g"), task_keys(ds).get("safety", 1.0)
@@ -271,10 +261,11 @@ def _force(ds: xr.Dataset, index: Index) -> tuple[str, str]:
         known = [i for i in some if np.isfinite(at(ds, "payload", i)) and not int(ds["flags"].values[i]) & LOST]
         payloads = ", ".join(f"{value_text(ds, 'payload', i, 3, unit=True)} at {forces(ds)[i[-1]]:g} N" for i in known)
         return pressed, "; ".join(filter(None, (ds.attrs["why"], payloads, "object.mass_g gives the least")))
-    wanted, (low, error) = f"{safety:g} times its {shown_text(in_si('mass_g', mass), 'kg', 3)}", force_to_use(ds, index)
+    wanted = f"{safety:g} times its {shown_text(in_si('mass_g', mass), 'kg', 3)}"
+    low, error = (at(ds, name, index) for name in ("force_low", "force_low_error"))
     if np.isfinite(low):
         known = np.isfinite(error)
-        covers = f"±: mesh, interpolation, {100 * MU_ERROR:g} % of mu" if known else "error not known"
+        covers = "±: mesh, interpolation; 10 % less mu needs 10 % more" if known else "error not known"
         least = with_error(low, error) if known else number(low, 3)
         if at(ds, "force_high", index) < low:
             return "none is safe", f"{wanted} need {least} N per finger ({covers}), the wall bears {_borne(ds, index)}"
