@@ -70,8 +70,8 @@ class Walled(Shape):
     open_ends: Literal["top", "both", "none"] = Field(
         "top", description="top: open as a cup and a bottle without its cap are; both: a tube"
     )
-    support: Literal["standing", "clamped", "free"] = Field(
-        "standing", description="standing on its bottom, clamped there (a tube at both ends), or held by the fingers"
+    support: Literal["free", "standing", "clamped"] = Field(
+        "free", description="held by the fingers alone, on a foot glued to a table, or clamped (a tube at both ends)"
     )
 
     @property

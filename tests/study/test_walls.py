@@ -32,6 +32,7 @@ OVAL = 'shape = "sections"\nwall_mm = 0.5\n' + "".join(
 )
 COARSE = ("accuracy.wall_element_mm=4", *QUICK)
 WHERE = "stations_mm = [40]\nangles_deg = [0]"
+STANDING = "object.support='standing'"
 LONG = pytest.mark.long
 
 
@@ -64,7 +65,7 @@ def test_the_level_follows_the_indentation_and_compression_is_a_strain_too(monke
 
 
 def test_what_a_wall_that_is_taken_as_rigid_closes_less_is_part_of_the_errors():
-    stiff = "object.wall_mm=1.0", "object.young_modulus_gpa=60.0", "accuracy.meshes=2"
+    stiff = STANDING, "object.wall_mm=1.0", "object.young_modulus_gpa=60.0", "accuracy.meshes=2"
     taken, forced = (solved(CUP, *stiff, f"effects.object='{level}'", forces="[2]")[0] for level in ("auto", "rigid"))
     shell = solved(CUP, *stiff, "effects.object='nonlinear_shell'", forces="[2]")[0]
     assert (taken.effects["object"].level, taken.effects["object"].reason) == ("rigid", BELOW)
@@ -94,7 +95,7 @@ def test_a_wall_that_is_taken_as_rigid_holds_what_the_rigid_object_does():
 def test_a_foot_that_a_table_would_have_to_pull_down_is_named():
     pulled, heavy, free = (
         solved(CUP, *changes, "effects.object='nonlinear_shell'")[-1].message
-        for changes in ((), ("object.mass_g=100000",), ("object.support='free'",))
+        for changes in ((STANDING,), (STANDING, "object.mass_g=100000"), ())
     )
     assert "the table pulls the foot down with" in pulled
     assert "foot" not in heavy + free
@@ -163,7 +164,7 @@ def test_two_meshes_tell_the_error_a_tube_gives_way_more_than_a_cup_and_a_collap
     straight = CUP.replace("[0, 24], [4, 28]", "[0, 30]").replace("[60, 32], [80, 34]", "[60, 30], [80, 30]")
     found = [
         solved(straight, *own, forces="[1]")[0].values["maps/indentation"]
-        for own in (("object.support='clamped'", "object.open_ends='both'"), (), ("object.open_ends='both'",))
+        for own in (("object.support='clamped'", "object.open_ends='both'"), (STANDING,), ("object.open_ends='both'",))
     ]
     assert 1.3 * found[0] < found[1] < 0.8 * found[2]
     values = solved(straight, "object.open_ends='both'", "object.wall_mm=0.25", forces="[0.1, 1]")[1].values

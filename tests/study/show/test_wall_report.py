@@ -27,6 +27,7 @@ CAN = """shape = "revolution"
 profile_mm = [[0, 30], [40, 30], [70, 30], [100, 30]]
 wall_mm = 0.35
 wall_material = "PP"
+support = "standing"
 mass_g = 60
 allowed_dent_mm = 1.5"""
 SCENE = text_of(CAN, stations="[30, 50]", forces="[1, 3]", elements="[4, 4, 2]")
