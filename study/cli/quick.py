@@ -104,18 +104,18 @@ def objects_text(folder: ObjectFolder, out: Path, ranks: Sequence[int]) -> str:
     """Objects, cases, disk, memory and time on each of these numbers of ranks."""
     objects, planned = folder.objects, []
     some = objects[:: -(-len(objects) // PLANNED)]
-    scale, begin = len(objects) / len(some), time.perf_counter()
+    scale, begin = len(objects) / len(some), time.process_time()
     for obj in some:
         with suppress(StudyError):
             scene = with_sampled_grasps(folder.scene(obj))
             planned.append((make_plan(scene, folder.scene_file, folder.overrides_of(obj)), memory(scene)))
-    preparing = scale * (time.perf_counter() - begin)
+    preparing = scale * (time.process_time() - begin)
     rows = {"objects": f"{len(objects)}, of which {len(some)} were looked at"}
     if planned:
-        each, here = zip(*(timed(made.tried, TIMED_S / len(planned)) for made, _ in planned), strict=True)
+        each, loads = zip(*(timed(made.tried, TIMED_S / len(planned)) for made, _ in planned), strict=True)
         paths = [seconds for some in each for seconds in some]
         many = paths * max(1, round(scale))
-        solving, start = scale * len(paths) / len(many), END_S + time.process_time() - preparing / scale - sum(here)
+        solving, start = scale * len(paths) / len(many), begin + sum(loads) + END_S
         on = {f"{n} rank{'s' * (n > 1)}": (preparing / n, solving * makespan(many, n)) for n in ranks}
         cases, space = (scale * sum(getattr(made.layout, name) for made, _ in planned) for name in ("rows", "nbytes"))
         need, free = max(needs for _, needs in planned), free_bytes(out / "index.hdf")

@@ -1,8 +1,7 @@
 """Seconds of a study: of load paths that are solved to time them, or that an earlier run has solved.
 
 What a load path takes depends on symmetry, friction that acts back, meshes that the accuracy asks for and the machine:
-nothing foretells it as well as the paths themselves. The first one that is timed also loads what all solve with, so it
-counts only where there is no other.
+nothing foretells it as well as the paths themselves. The first one that is timed also loads what all solve with.
 """
 
 import time
@@ -19,7 +18,7 @@ from softjaw.study.result.store import open_result
 from softjaw.study.run.limits import require_room
 from softjaw.study.scene.sections import FINEST
 
-TIMED_S = 10.0  # seconds of the processor after which no further load path is begun
+TIMED_S = 15.0  # seconds of the processor after which no further load path is begun
 END_S = 2.0  # seconds to pack a file and list its grasps
 FIRST_FORCE_FACTOR = 2.0  # times as long the first force takes, which begins with a coarse step
 MOST_PROMISING = 3  # sampled grasps that are solved as well as listed ones
@@ -27,43 +26,47 @@ ROUNDS = 1.6  # of the grasps that a list shows: with those that fall out of it
 
 
 def timed(units: Sequence[Any], budget: float = TIMED_S) -> tuple[list[float], float]:
-    """Expected time of each unit of work [s], by a few that are solved here, and what of the time here was theirs [s].
+    """Expected time of each unit of work [s], by a few that are solved here, and what the first one has loaded [s].
 
-    The results are thrown away. After ``budget`` [s] a path is left in the middle; what the first case takes, with all
-    that it loads and maybe compiles, is not counted.
+    The results are thrown away. After ``budget`` [s] a path is left in the middle; what the first case loads, and maybe
+    compiles, is not counted.
     """
     if not units:
         return [], 0.0
     require_room()
-    costs, seconds, spent = np.array([unit.cost for unit in units]), np.full(len(units), np.nan), 0.0
-    first = len(units) // 2
+    costs, seconds = np.array([unit.cost for unit in units]), np.full(len(units), np.nan)
+    first, loads, spent = len(units) // 2, np.nan, 0.0  # the latter two: the first case of all, that of the others
     for i in dict.fromkeys([first, *_spread(len(units))]):
         times: list[float] = []
         for took in _times(units[i]):
             times.append(took)
-            spent += took if np.isfinite(seconds[first]) or len(times) > 1 else 0.0
+            if np.isnan(loads):
+                loads = took
+                continue
+            # how much of the first case was no loading tells the second one
+            spent += took if spent else took + min(loads, FIRST_FORCE_FACTOR * took)
             if spent > budget:
                 break
         seconds[i] = _path(times, len(units[i].rows[0]), left=spent > budget, loads=i == first)
         if spent > budget:
             break
-    known = np.isfinite(seconds)
-    if known.sum() > 1:
+    known, forces = np.isfinite(seconds), len(units[first].rows[0])
+    if known.sum() > 1 and forces == 1:
         known[first] = False
     each = np.where(known, seconds, seconds[known].sum() / costs[known].sum() * costs)
-    here = float(each[np.isfinite(seconds)].sum())
+    loads = max(loads - FIRST_FORCE_FACTOR * each[first] / (forces - 1 + FIRST_FORCE_FACTOR), 0.0)
     if units[first].finest:
-        # sampled grasps come with the most promising first; any may be among those that rounds solve well
-        best = [_listed(unit) for unit in units[:MOST_PROMISING]]
-        each += ROUNDS * min(LISTED, len(units)) / len(units) * sum(best) / len(best)
-    return each.tolist(), here
+        each += ROUNDS * _listed(units[:MOST_PROMISING], budget) * min(LISTED, len(units)) / len(units)
+    return each.tolist(), float(loads)
 
 
 def _path(times: Sequence[float], forces: int, *, left: bool, loads: bool) -> float:
     """Time of a load path of which the first forces took ``times`` [s]; it ended by itself if it was not ``left``."""
+    if len(times) < forces and not left:
+        return sum(times)  # it failed
     further = sum(times[1:]) / (len(times) - 1) if len(times) > 1 else times[0] / FIRST_FORCE_FACTOR
     first = FIRST_FORCE_FACTOR * further if loads else times[0]
-    return first + sum(times[1:]) + further * (forces - len(times)) * left
+    return first + sum(times[1:]) + further * (forces - len(times))
 
 
 def _spread(n: int) -> Iterator[int]:
@@ -90,15 +93,22 @@ def _times(unit: Any) -> Iterator[float]:
         before = now
 
 
-def _listed(unit: Any) -> float:
-    """Time of a listed grasp in rounds [s]: one force, on ever finer meshes until the accuracy is met."""
+def _listed(units: Sequence[Any], budget: float) -> float:
+    """Mean time of a listed grasp in rounds [s]: one force, on ever finer meshes until the accuracy is met.
+
+    Sampled grasps come with the most promising first.
+    """
     from softjaw.study.pipeline import solve_unit
 
-    before, last = time.process_time(), len(unit.finest) - 1
-    with suppress(Exception):
-        list(solve_unit(replace(unit, finest=(FINEST,) * (last + 1)), (last,)))
+    times, begin, last = list[float](), time.process_time(), len(units[0].finest) - 1
+    for unit in units:
+        with suppress(Exception):
+            list(solve_unit(replace(unit, finest=(FINEST,) * (last + 1)), (last,)))
+        times.append(time.process_time() - begin - sum(times))
+        if sum(times) > budget:
+            break
     # with a mass the least force that holds it lies between two
-    return (2 if unit.scene.object.mass_g is not None and last else 1) * (time.process_time() - before)
+    return (2 if units[0].scene.object.mass_g is not None and last else 1) * sum(times) / len(times)
 
 
 def unit_seconds(plan: Any, seconds: np.ndarray) -> list[float]:

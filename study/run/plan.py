@@ -191,11 +191,12 @@ def _time(plan: Plan, scene: Any, path: Path, ranks: Sequence[int]) -> str:
     seconds = measured_seconds(plan, path)
     each, start = unit_seconds(plan, seconds) if seconds is not None else [], 0.0
     source = f"by those in {path}"
+    if not plan.tried:
+        return "no grasp is solved"
     if not each:
-        each, here = timed(plan.tried)
-        # what a run does before it solves, a plan did as well
-        start = END_S + time.process_time() - here
-        source = "by a few load paths that were solved for it"
+        before = time.process_time()  # what a run does before it solves, a plan did as well
+        each, loads = timed(plan.tried)
+        start, source = before + loads + END_S, "by a few load paths that were solved for it"
     added = 1.0 + (scene.candidates.refine or 0) / max(len(each) * plan.layout.shape[-1], 1)
     counts = [plan.layout.shape[-1] if unit.apart else 1 for unit in plan.tried]  # forces that ranks may divide
     parts = [added * cost / n for cost, n in zip(each, counts, strict=True) for _ in range(n)]
