@@ -124,12 +124,8 @@ def has(scene: Any) -> tuple[str, ...]:
 def memory(scene: Any) -> float:
     """Rough memory of one rank [bytes]: the libraries, what whole pads take on their finest mesh, and a wall."""
     pad = 8.0 * FILL_FACTOR * (3.0 * _pad_nodes(scene, scene.accuracy.most_meshes - 1)) ** (4.0 / 3.0)
-    return LIBRARY_BYTES + pad + (BYTES_PER_UNKNOWN * wall_unknowns(scene)[1] if shells(scene) else 0.0)
-
-
-def shells(scene: Any) -> bool:
-    """Whether the object's wall may be simulated as a shell."""
-    return has_wall(scene.object) and scene.effects.object != "rigid"
+    shell = has_wall(scene.object) and scene.effects.object != "rigid"
+    return LIBRARY_BYTES + pad + (BYTES_PER_UNKNOWN * wall_unknowns(scene)[1] if shell else 0.0)
 
 
 def gigabytes(size: float, digits: int) -> str:
