@@ -35,16 +35,16 @@ def timed(units: Sequence[Any], budget: float = TIMED_S) -> tuple[list[float], f
         return [], 0.0
     require_room()
     costs, seconds = np.array([unit.cost for unit in units]), np.full(len(units), np.nan)
-    first, loads, spent = len(units) // 2, np.nan, 0.0  # the latter two: the first case of all, that of the others
+    first, first_case, spent = len(units) // 2, np.nan, 0.0
     for i in dict.fromkeys([first, *_spread(len(units))]):
         times: list[float] = []
         for took in _times(units[i]):
             times.append(took)
-            if np.isnan(loads):
-                loads = took
+            if np.isnan(first_case):
+                first_case = took
                 continue
-            # how much of the first case was no loading tells the second one
-            spent += took if spent else took + min(loads, FIRST_FORCE_FACTOR * took)
+            # the second case tells how much of the first one was no loading
+            spent += took if spent else took + min(first_case, FIRST_FORCE_FACTOR * took)
             if spent > budget:
                 break
         seconds[i] = _path(times, len(units[i].rows[0]), left=spent > budget, loads=i == first)
@@ -54,7 +54,7 @@ def timed(units: Sequence[Any], budget: float = TIMED_S) -> tuple[list[float], f
     if known.sum() > 1 and forces == 1:
         known[first] = False
     each = np.where(known, seconds, seconds[known].sum() / costs[known].sum() * costs)
-    loads = max(loads - FIRST_FORCE_FACTOR * each[first] / (forces - 1 + FIRST_FORCE_FACTOR), 0.0)
+    loads = max(first_case - FIRST_FORCE_FACTOR * each[first] / (forces - 1 + FIRST_FORCE_FACTOR), 0.0)
     if units[first].finest:
         each += ROUNDS * _listed(units[:MOST_PROMISING], budget) * min(LISTED, len(units)) / len(units)
     return each.tolist(), float(loads)

@@ -17,6 +17,7 @@ from tests.fem.grips import check_tangent, e_n, gap_at, grip, pose, stirred, thi
 
 FORCES, MU = (0.5, 2.0), 0.4
 FORCE = Control(force=2.0)
+WALL, RIM = {"z": 0.075}, {"z": 0.198, "radius": 0.013}  # pads in the middle, and over the rim of the neck
 FINE = MeshSize(0.00085, 0.0025, 0.005)
 # An independent prototype with another element library: force [N] and e_n [mm] by thickness and closing [mm].
 PROTOTYPE = {
@@ -33,13 +34,16 @@ def states(allowed=(True, True), level="nonlinear", thickness=4e-4, z=0.075, sup
     return tuple(grip(body, z, allowed=allowed, level=level, theta=theta, mu=mu).load_path(FORCES))
 
 
-@pytest.mark.parametrize(("allowed", "level", "control"), [
-    ((True, True), "nonlinear", FORCE), ((True, True), "linear", FORCE), ((False, False), "nonlinear", FORCE),
-    ((True, True), "nonlinear", Control(closing=1e-3)),
+@pytest.mark.parametrize(("allowed", "level", "control", "place"), [
+    ((True, True), "nonlinear", FORCE, WALL), ((True, True), "linear", FORCE, WALL),
+    ((False, False), "nonlinear", FORCE, WALL), ((True, True), "nonlinear", Control(closing=1e-3), WALL),
+    ((True, True), "nonlinear", FORCE, RIM),
 ])  # fmt: skip
-def test_the_tangent_is_the_derivative_of_the_residual(allowed, level, control):
-    problem = grip(thin(), elements=(4, 2, 2), allowed=allowed, level=level).problem
+def test_the_tangent_is_the_derivative_of_the_residual(allowed, level, control, place):
+    problem = grip(thin(), elements=(4, 2, 2), allowed=allowed, level=level, **place).problem
     problem.control = control
+    faced = problem.evaluate(np.zeros(problem.size))[0].area / problem.fingers[0].pad.face_area
+    assert ((faced > 0.0) & (faced < 1.0)).any() == (place == RIM)
     check_tangent(problem, stirred(problem, np.random.default_rng(1)), 1e-9, 1e-8)
 
 
