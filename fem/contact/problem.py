@@ -370,8 +370,8 @@ class ContactProblem(ABC):
         """Of one finger, in its pad's frame: nodal pressures ``(n,)`` [Pa], mean gaps ``(n,)`` [m], quadrature."""
         f, c = self.fingers[k], self.evaluate(x)[k]
         place = f.points(x)
-        # a point that faces no wall gets the approach, so that the patch has no face without a normal
-        normal = np.where(c.faces[:, None], self.unit_normal(c) @ f.R, [0.0, 0.0, -1.0]).reshape(place.shape)
+        # a point that faces no wall gets a normal across the approach, so that the rim counts as an edge of the object
+        normal = np.where(c.faces[:, None], self.unit_normal(c) @ f.R, [1.0, 0.0, 0.0]).reshape(place.shape)
         pressure = borne(f.pressure(x), c.active)
         # a node may carry load over the rim, but its points beyond it press on nothing
         load = c.area * (pressure[f.nodes] @ f.pad.face_N.T) * self.steepness(c).reshape(c.area.shape)
