@@ -5,7 +5,7 @@ nothing foretells it as well as the paths themselves. The first one that is time
 """
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -34,11 +34,13 @@ def timed(units: Sequence[Any], budget: float = TIMED_S) -> tuple[list[float], f
     if not units:
         return [], 0.0
     require_room()
+    from softjaw.study.pipeline import solve_unit  # loads the solver, which a plan by an earlier run needs not
+
     costs, seconds = np.array([unit.cost for unit in units]), np.full(len(units), np.nan)
     first, first_case, spent = len(units) // 2, np.nan, 0.0
     for i in dict.fromkeys([first, *_spread(len(units))]):
         times: list[float] = []
-        for took in _times(units[i]):
+        for took in _times(solve_unit(units[i]), len(units[i].rows[0])):
             times.append(took)
             if np.isnan(first_case):
                 first_case = took
@@ -56,7 +58,7 @@ def timed(units: Sequence[Any], budget: float = TIMED_S) -> tuple[list[float], f
     each = np.where(known, seconds, seconds[known].sum() / costs[known].sum() * costs)
     loads = max(first_case - FIRST_FORCE_FACTOR * each[first] / (forces - 1 + FIRST_FORCE_FACTOR), 0.0)
     if units[first].finest:
-        each += ROUNDS * _listed(units[:MOST_PROMISING], budget) * min(LISTED, len(units)) / len(units)
+        each += ROUNDS * _listed(units[:MOST_PROMISING], budget, solve_unit) * min(LISTED, len(units)) / len(units)
     return each.tolist(), float(loads)
 
 
@@ -75,12 +77,10 @@ def _spread(n: int) -> Iterator[int]:
         yield int((0.5 + 0.618034 * k) % 1.0 * n)
 
 
-def _times(unit: Any) -> Iterator[float]:
+def _times(cases: Iterator[Any], count: int) -> Iterator[float]:
     """Time of each case of a load path [s], up to one that fails."""
-    from softjaw.study.pipeline import solve_unit  # loads the solver, which a plan by an earlier run needs not
-
-    cases, before = solve_unit(unit), time.process_time()
-    for _ in unit.rows[0]:
+    before = time.process_time()
+    for _ in range(count):
         try:
             next(cases)
         except Exception:  # whatever a case dies of, the run says it
@@ -91,13 +91,11 @@ def _times(unit: Any) -> Iterator[float]:
         before = now
 
 
-def _listed(units: Sequence[Any], budget: float) -> float:
+def _listed(units: Sequence[Any], budget: float, solve_unit: Callable) -> float:
     """Mean time of a listed grasp in rounds [s]: one force, on ever finer meshes until the accuracy is met.
 
     Sampled grasps come with the most promising first.
     """
-    from softjaw.study.pipeline import solve_unit
-
     times, begin, last = list[float](), time.process_time(), len(units[0].finest) - 1
     for unit in units:
         with suppress(Exception):
