@@ -31,6 +31,8 @@ from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.shell.facing import FAR
 from softjaw.friction.patch import NEGLIGIBLE, FloatArray
 
+PARTS = 4  # of the piece that a point stands for, along a side, of which some may lie beyond a rim
+
 Gap = Callable[[FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
 
 
@@ -109,6 +111,8 @@ class Finger:
         Number, among the nodes of the contact face, of the nodes of every facet.
     local_dofs, dofs : (facets, 3, k) arrays
         Displacements of these nodes, numbered by the pad and in the whole problem; -1 is fixed.
+    faced : (facets, points) array
+        Area of the points that faces something: of a wall what lies within its ends at first touch [m^2].
     """
 
     def __init__(self, pad: Pad, gap: Gap, offset: int = 0, pose: Pose = IN_PLACE, wall: Any = None) -> None:
@@ -123,6 +127,16 @@ class Finger:
         self.dofs = shifted(self.local_dofs, offset)
         self.pressure_dofs = shifted(pad.closing_dof + 1 + self.nodes, offset)
         self.foam_entries = shifted(self.foam.rows, offset), shifted(self.foam.columns, offset)
+        # decided once: a point that left and faced a wall as it slides across a rim would do so for ever
+        self.faced = pad.face_area if wall is None else pad.face_area * self._within()
+        # part of a node's area that must face something: with less of it, that would bear all of the node's pressure
+        self.carries = self.nodal(self.faced @ pad.face_N) > 0.3 * self.area
+
+    def _within(self) -> FloatArray:
+        """Share of the pieces of the points that lies within the ends of the wall ``(facets, points)``."""
+        points = self.points(np.zeros(self.unknowns.stop), self.pad.pieces_N(PARTS)).reshape(-1, 3)
+        past = self.wall.past_ends(self.pose.to_object(points)).reshape(-1, *[len(self.pad.side_weights), PARTS] * 2)
+        return np.asarray(1.0 - past.mean(axis=(2, 4)).reshape(self.pad.face_area.shape))
 
     def pressure(self, x: FloatArray) -> FloatArray:
         """Nominal pressures of the contact face's nodes at the state ``x`` of the whole problem [Pa]."""
@@ -157,8 +171,8 @@ class Evaluated:
         Their gaps [m]; `FAR` where a point faces nothing.
     lam : (facets, k) array
         Nodal pressures [Pa].
-    area : (facets, points) array
-        Of the points that face something [m^2].
+    faces : (n,) array
+        Whether a point faces something.
     weighted, active : (nodes,) arrays
         Weighted gaps [m^3], active set.
     load : (n, 3) array
@@ -173,17 +187,12 @@ class Evaluated:
     gap: FloatArray
     normal: FloatArray
     lam: FloatArray
-    area: FloatArray
+    faces: NDArray[np.bool_]
     weighted: FloatArray
     active: NDArray[np.bool_]
     load: FloatArray
     surface: Any
     traction: FloatArray | None = None
-
-    @property
-    def faces(self) -> NDArray[np.bool_]:
-        """Points ``(n,)`` that face something."""
-        return (self.gap < FAR) & (self.area.ravel() > 0.0)
 
 
 class ContactProblem(ABC):
@@ -221,21 +230,15 @@ class ContactProblem(ABC):
         points, gap, normal, surface = self._met(k, x)
         N, lam = f.pad.face_N, f.pressure(x)[f.nodes]
         # points that face nothing are left out, so that a pad over a rim is carried up to the rim
-        area = self._faced(k)
+        area, faces = f.faced, (gap < FAR) & (f.faced.ravel() > 0.0)
         load = (area * (lam @ N.T)).reshape(-1, 1) * normal
         weighted = f.nodal((area * gap.reshape(area.shape)) @ N)
-        # a node that hangs over the rim with most of its area would put all of its pressure on the rest
-        # part of a node's area that must face something for the node to carry load
-        gaps = np.where(f.nodal(area @ N) > 0.3 * f.area, weighted, FAR * f.area)
-        c = Evaluated(points, gap, normal, lam, area, gaps, f.active(x, gaps), load, surface)
+        gaps = np.where(f.carries, weighted, FAR * f.area)
+        c = Evaluated(points, gap, normal, lam, faces, gaps, f.active(x, gaps), load, surface)
         if self.friction is not None:
             c.traction = self.traction(k, x, c)[0]
             c.load = load + area.reshape(-1, 1) * c.traction
         return c
-
-    def _faced(self, k: int) -> FloatArray:
-        """Area of the points that faces something ``(facets, points)`` [m^2]."""
-        return self.fingers[k].pad.face_area
 
     def residual(self, x: FloatArray) -> FloatArray:
         """Residual of all rows ``(size,)`` [N]; NaN where an element is inverted, so that the step is refused."""
@@ -374,8 +377,8 @@ class ContactProblem(ABC):
         normal = np.where(c.faces[:, None], self.unit_normal(c) @ f.R, [1.0, 0.0, 0.0]).reshape(place.shape)
         pressure = borne(f.pressure(x), c.active)
         # a node may carry load over the rim, but its points beyond it press on nothing
-        load = c.area * (pressure[f.nodes] @ f.pad.face_N.T) * self.steepness(c).reshape(c.area.shape)
-        friction = None if c.traction is None else c.area[..., None] * (c.traction @ f.R).reshape(place.shape)
+        load = f.faced * (pressure[f.nodes] @ f.pad.face_N.T) * self.steepness(c).reshape(f.faced.shape)
+        friction = None if c.traction is None else f.faced[..., None] * (c.traction @ f.R).reshape(place.shape)
         points = ContactPoints(place, normal, max(0.0, -self._lowest_gap(f, x, c)), load, friction)
         return pressure, c.weighted / f.area, points
 

@@ -148,6 +148,12 @@ class Pad:
             len(self.contact_nodes),
         )
 
+    def pieces_N(self, parts: int) -> FloatArray:
+        """Shape functions ``(places, face nodes)`` over grids of ``parts`` places a side in the pieces of points."""
+        weights, inside = self.side_weights, (np.arange(parts) + 0.5) / parts
+        places = (np.cumsum(weights) - weights)[:, None] + weights[:, None] * inside
+        return _over_face(along_side(len(weights), places.ravel()))
+
     @property
     def share(self) -> float:
         """Part of the whole pad that is meshed: 1, 1/2 or 1/4."""
@@ -196,8 +202,12 @@ def face_rule(per_side: int, contact: str) -> tuple[FloatArray, FloatArray]:
     points = np.linspace(0.5 - 0.5 * a, 0.5 + 0.5 * a, per_side)
     outer = 0.5 if per_side == 2 else 1.0 / (6.0 * a * a)
     weights = np.array([outer, outer]) if per_side == 2 else np.array([outer, 1.0 - 2.0 * outer, outer])
-    side = along_side(per_side, points)
-    return np.einsum("pi,qj->pqij", side, side).reshape(per_side**2, per_side**2), weights
+    return _over_face(along_side(per_side, points)), weights
+
+
+def _over_face(side: FloatArray) -> FloatArray:
+    """Shape functions ``(points, face nodes)`` over a grid of places from those along a side ``(places, nodes)``."""
+    return np.einsum("pi,qj->pqij", side, side).reshape(len(side) ** 2, -1)
 
 
 def along_side(per_side: int, s: FloatArray) -> FloatArray:

@@ -50,9 +50,10 @@ class Wall:
         parameters, tree = self._grid
         return parameters[tree.query(points)[1]]
 
-    def beyond(self, points: FloatArray, places: FloatArray) -> NDArray[np.bool_]:
-        """Which ``points (n, 3)``, closest to ``places (n, 2)``, lie beyond an end of the undeformed wall."""
-        at, (low, high) = self.surface.at(*places.T), self.ends
+    def past_ends(self, points: FloatArray) -> NDArray[np.bool_]:
+        """Which ``points (n, 3)`` lie beyond an end of the undeformed wall."""
+        places, (low, high) = self.places(points), self.ends
+        at = self.surface.at(*places.T)
         along = ((points - at[:, 0]) * at[:, 2]).sum(axis=1)
         # the outline is measured along s, so this is a length
         return (places[:, 1] <= low) & (along < -NEGLIGIBLE) | (places[:, 1] >= high) & (along > NEGLIGIBLE)

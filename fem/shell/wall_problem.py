@@ -22,7 +22,7 @@ from softjaw.fem.assembly import IntArray, Pattern, gather, pairs
 from softjaw.fem.contact.friction import Anchor
 from softjaw.fem.contact.problem import ContactProblem, Control, Evaluated, Finger, Gap
 from softjaw.fem.objects.gap import Pose
-from softjaw.fem.pad.mesh import Pad, along_side
+from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.shell.facing import Facing, Wall, face
 from softjaw.fem.shell.wall_kernel import add_blocks, changes, force_blocks
 from softjaw.fem.shell.wall_model import NonlinearWall
@@ -31,7 +31,6 @@ from softjaw.friction.patch import FloatArray
 # Norm of the residual over modulus, thickness, extent and the root of the unknowns: its forces are differences of large
 # numbers.
 ROUNDING = 4e-16
-PARTS = 4  # of the piece that a point stands for, along a side, of which some may lie beyond a rim
 BEYOND = 2e-3  # by which the wall is continued for points that slide across a rim [m]
 
 
@@ -56,7 +55,6 @@ class WallProblem(ContactProblem):
         super().__init__(fingers, mu)
         self._damped_by: tuple[FloatArray, FloatArray] | None = None  # of the last tangent
         self._first_places = [f.wall.places(self._object_points(f, np.zeros(self.size))) for f in fingers]
-        self._areas = [self._area(f) for f in fingers]
         self._bare = self._built()
         self._values = [np.zeros(len(f.foam.rows)) for f in fingers]
         self.forget()
@@ -117,20 +115,6 @@ class WallProblem(ContactProblem):
         points = self._object_points(f, x)
         facing = face(f.wall, points, self.places[k], *self.model.outer(x[: self.model.size]), BEYOND)
         return points, facing.gap, facing.normal, facing
-
-    def _area(self, f: Finger) -> FloatArray:
-        # decided once: a point that left and faced the wall as it slides across a rim would do so for ever
-        weights = f.pad.side_weights
-        places = ((np.cumsum(weights) - weights)[:, None] + weights[:, None] * (np.arange(PARTS) + 0.5) / PARTS).ravel()
-        side = along_side(len(weights), places)
-        N = np.einsum("pi,qj->pqij", side, side).reshape(len(places) ** 2, -1)
-        points = f.pose.to_object(f.points(np.zeros(self.size), N).reshape(-1, 3))
-        beyond = f.wall.beyond(points, f.wall.places(points)).reshape(-1, *[len(weights), PARTS] * 2)
-        return f.pad.face_area * (1.0 - beyond.mean(axis=(2, 4)).reshape(f.pad.face_area.shape))
-
-    def _faced(self, k: int) -> FloatArray:
-        """See `ContactProblem`: what lies within the ends of the wall at first touch."""
-        return self._areas[k]
 
     def evaluate(self, x: FloatArray) -> list[Evaluated]:
         """See `ContactProblem`; the forces on the wall's nodes are noted [N]."""
@@ -209,7 +193,7 @@ class WallProblem(ContactProblem):
             return True
         facet, point = np.divmod(pick, f.pad.face_N.shape[0])
         facing = Facing(*(values[pick] for values in c.surface))
-        N, area = f.pad.face_N[point], c.area[facet, point]
+        N, area = f.pad.face_N[point], f.faced[facet, point]
         D, dn = changes(N, f.R, facing)
         pressure = (c.lam[facet] * N).sum(axis=1)
         force, by_lam = pressure[:, None] * facing.normal, facing.normal

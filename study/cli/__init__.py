@@ -74,8 +74,7 @@ def command(options: Namespace) -> int:
         begin_mpi()
     answer = getattr(_module(options.module), options.command)(options)
     if isinstance(answer, str):
-        if answer:
-            print(printable(answer))
+        print(printable(answer))
         return DONE
     return int(answer or DONE)
 

@@ -5,6 +5,7 @@ import time
 from argparse import Namespace
 from collections.abc import Sequence
 from contextlib import suppress
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +13,8 @@ import numpy as np
 
 from softjaw.study.case.build import build_object, check_object, geometry, mesh_notes, notices, with_mass
 from softjaw.study.case.candidates import check_candidates, with_sampled_grasps
-from softjaw.study.messages import USAGE, NoGraspError, StudyError, fault_of, printable, with_ending
-from softjaw.study.run.estimate import END_S, TIMED_S, timed
+from softjaw.study.messages import DONE, USAGE, NoGraspError, StudyError, fault_of, printable, with_ending
+from softjaw.study.run.estimate import END_S, TIMED, TIMED_S, timed
 from softjaw.study.run.object_folder import ObjectFolder, folder_of
 from softjaw.study.run.plan import free_bytes, gigabytes, make_plan, memory, plan_rows
 from softjaw.study.run.progress import duration
@@ -87,7 +88,7 @@ def _checked(scene: Scene) -> Scene:
     return scene
 
 
-def plan(options: Namespace) -> str:
+def plan(options: Namespace) -> str | int:
     """Say what a run will take."""
     if options.folder:
         options.folder.check()
@@ -95,9 +96,9 @@ def plan(options: Namespace) -> str:
     scene = with_sampled_grasps(scene_of(options))
     path = target(options)
     made = make_plan(scene, options.scene, options.overrides)
-    for row in plan_rows(made, scene, path, options.ranks):
+    for row in chain(plan_rows(made, scene, path, options.ranks), notices(scene)):
         print(printable(hanging(row, terminal_width())), flush=True)
-    return hanging("\n".join(notices(scene)), terminal_width())
+    return DONE
 
 
 def objects_text(folder: ObjectFolder, out: Path, ranks: Sequence[int]) -> str:
@@ -114,8 +115,8 @@ def objects_text(folder: ObjectFolder, out: Path, ranks: Sequence[int]) -> str:
     if planned:
         each, loads = zip(*(timed(made.tried, TIMED_S / len(planned)) for made, _ in planned), strict=True)
         paths = [seconds for some in each for seconds in some]
-        many = paths * max(1, round(scale))
-        solving, start = scale * len(paths) / len(many), begin + sum(loads) + END_S
+        times = max(1, round(scale))
+        many, solving, start = paths * times, scale / times, begin + sum(loads) + END_S
         on = {f"{n} rank{'s' * (n > 1)}": (preparing / n, solving * makespan(many, n)) for n in ranks}
         cases, space = (scale * sum(getattr(made.layout, name) for made, _ in planned) for name in ("rows", "nbytes"))
         need, free = max(needs for _, needs in planned), free_bytes(out / "index.hdf")
@@ -124,7 +125,7 @@ def objects_text(folder: ObjectFolder, out: Path, ranks: Sequence[int]) -> str:
             "disk": f"about {space / 1e6:.3g} MB in {out}, {free / 1e9:.1f} GB free",
             "memory": f"roughly {gigabytes(need, 1)} on each rank, {gigabytes(need * ranks[0], 2)} on {ranks[0]}",
             "time": "; ".join(f"about {duration(start + sum(t))} on {name}" for name, t in on.items())
-            + f"; {duration(preparing)} for sampling grasps on one; judged by a few load paths that were solved for it",
+            + f"; {duration(preparing)} for sampling grasps on one; {TIMED}",
         }
     if len(planned) < len(some):
         rows["no grasp"] = f"{len(some) - len(planned)} of {len(some)}: they are rows of the index, with the reason"

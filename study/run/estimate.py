@@ -13,11 +13,13 @@ from typing import Any
 
 import numpy as np
 
+from softjaw.friction.patch import FloatArray
 from softjaw.study.quantities import FAILED, LISTED
 from softjaw.study.result.store import open_result
 from softjaw.study.run.limits import require_room
 from softjaw.study.scene.sections import FINEST
 
+TIMED = "judged by a few load paths that were solved for it"  # what a time follows from
 TIMED_S = 15.0  # seconds of the processor after which no further load path is begun
 END_S = 2.0  # seconds to pack a file and list its grasps
 FIRST_FORCE_FACTOR = 2.0  # times as long the first force takes, which begins with a coarse step
@@ -36,9 +38,10 @@ def timed(units: Sequence[Any], budget: float = TIMED_S) -> tuple[list[float], f
     require_room()
     from softjaw.study.pipeline import solve_unit  # loads the solver, which a plan by an earlier run needs not
 
-    costs, seconds = np.array([unit.cost for unit in units]), np.full(len(units), np.nan)
-    first, first_case, spent = len(units) // 2, np.nan, 0.0
-    for i in dict.fromkeys([first, *_spread(len(units))]):
+    seconds, first_case, spent = np.full(len(units), np.nan), np.nan, 0.0
+    order = list(dict.fromkeys(_spread(len(units))))
+    first = order[0]
+    for i in order:
         times: list[float] = []
         for took in _times(solve_unit(units[i]), len(units[i].rows[0])):
             times.append(took)
@@ -52,10 +55,10 @@ def timed(units: Sequence[Any], budget: float = TIMED_S) -> tuple[list[float], f
         seconds[i] = _path(times, len(units[i].rows[0]), left=spent > budget, loads=i == first)
         if spent > budget:
             break
-    known, forces = np.isfinite(seconds), len(units[first].rows[0])
-    if known.sum() > 1 and forces == 1:
-        known[first] = False
-    each = np.where(known, seconds, seconds[known].sum() / costs[known].sum() * costs)
+    forces = len(units[first].rows[0])
+    if np.isfinite(seconds).sum() > 1 and forces == 1:
+        seconds[first] = np.nan
+    each = _by_cost(units, seconds)
     loads = max(first_case - FIRST_FORCE_FACTOR * each[first] / (forces - 1 + FIRST_FORCE_FACTOR), 0.0)
     if units[first].finest:
         each += ROUNDS * _listed(units[:MOST_PROMISING], budget, solve_unit) * min(LISTED, len(units)) / len(units)
@@ -72,7 +75,7 @@ def _path(times: Sequence[float], forces: int, *, left: bool, loads: bool) -> fl
 
 
 def _spread(n: int) -> Iterator[int]:
-    """Positions below ``n``, whose first few lie far apart: multiples of the golden section."""
+    """Positions below ``n``, the middle first, whose first few lie far apart: multiples of the golden section."""
     for k in range(4 * n):
         yield int((0.5 + 0.618034 * k) % 1.0 * n)
 
@@ -110,17 +113,18 @@ def _listed(units: Sequence[Any], budget: float, solve_unit: Callable) -> float:
 def unit_seconds(plan: Any, seconds: np.ndarray) -> list[float]:
     """Expected time of every unit that is tried [s]; empty where nothing was measured.
 
-    ``seconds (rows,)`` are the measured times of some cases, NaN for the others. Measured units keep their
-    time, the others are judged by their cost.
+    ``seconds (rows,)``: measured times of some cases, else NaN. Measured units keep theirs, others follow from costs.
     """
     # Candidates served by symmetry have no times, so the solved one speaks for the unit. A load path that is measured
     # in part has none either: it would be taken for a cheap one.
     times = np.array([seconds[list(unit.rows[0])].sum() for unit in plan.tried])
-    costs = np.array([unit.cost for unit in plan.tried])
-    known = np.isfinite(times)
-    if not costs[known].sum():
-        return []
-    return np.where(known, times, times[known].sum() / costs[known].sum() * costs).tolist()
+    return _by_cost(plan.tried, times).tolist() if np.isfinite(times).any() else []
+
+
+def _by_cost(units: Sequence[Any], seconds: FloatArray) -> FloatArray:
+    """Times ``(units,)`` [s] of which some are known; the others follow from those by their cost."""
+    costs, known = np.array([unit.cost for unit in units]), np.isfinite(seconds)
+    return np.where(known, seconds, seconds[known].sum() / costs[known].sum() * costs)
 
 
 def measured_seconds(plan: Any, path: Path) -> Any:
