@@ -191,3 +191,10 @@ def test_a_mesh_of_very_many_triangles_is_decimated():
     assert len(mesh.triangles) <= 210_000
     assert np.abs(np.linalg.norm(mesh.points, axis=1) - 0.03).max() < 2e-5
     assert mesh.closed
+    flat = trimesh.creation.cylinder(0.03, 0.1, sections=300)  # wide flat faces, whose edges cost nothing
+    while len(flat.faces) < 600_000:
+        flat = flat.subdivide()
+    mesh = cleaned(np.array(flat.vertices), np.array(flat.faces))
+    assert len(mesh.triangles) <= 210_000
+    assert mesh.closed
+    assert solid(mesh.points, mesh.triangles, True)[0] == pytest.approx(flat.volume, rel=1e-5)
