@@ -177,7 +177,7 @@ def grasp_arrays(ds: xr.Dataset, gripper: GripperFrame) -> Arrays:
     listed = list(cases(ds, "ccm", [*solved, *refused]))
     for case, at in zip(listed[len(solved) :], refused, strict=True):
         _placed(case, poses[at[-3]])
-    listed += [_offered(listed[0], row) for row in ds.attrs["rejected"] if listed]
+    listed += [_offered(listed[0], row) for row in ds.attrs["rejected"].reshape(-1, 10) if listed]
     transforms, success = np.tile(np.eye(4), (len(listed), 1, 1)), np.zeros(len(listed), bool)
     for i, case in enumerate(listed):
         approach = (gripper.approach or gripper.hand.approaches)[0]

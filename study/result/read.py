@@ -6,7 +6,8 @@ PETSc, and works on a file that a run is still writing.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import json
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
@@ -158,7 +159,7 @@ def dataset(result: Result) -> xr.Dataset:
     # Flags are stored as floats, which can be NaN; masks need integers.
     flags = np.nan_to_num(variables["flags"].values).astype(np.int64)
     known = [flag for flag in Flag if flag & OF_FILE]
-    marks = {"flag_masks": tuple(map(int, known)), "flag_meanings": tuple(flag.word for flag in known)}
+    marks = {"flag_masks": tuple(map(int, known)), "flag_meanings": _joined(flag.word for flag in known)}
     variables["flags"] = xr.Variable(layout.names, flags, variables["flags"].attrs | marks)
     variables["status"] = xr.Variable(layout.names, status.astype(np.int8), _about(BY_KEY["status/code"]))
     if set(FORCE_RANGE) & variables.keys() and (status == MISSING).any():  # what is solved has its range at once
@@ -257,7 +258,7 @@ def maps_in(ds: xr.Dataset) -> dict[str, str]:
     """Name and unit of every map, and of what is derived for every case, or for all forces of a candidate together."""
     names = [q.name for q in TABLE if q.group == "maps" and q.name in ds]
     over = ds.status.dims
-    names += [name for name in ds.attrs["derived"] if name in ds and ds[name].dims in (over, over[:-1])]
+    names += [name for name in ds.attrs["derived"].split() if name in ds and ds[name].dims in (over, over[:-1])]
     return {name: ds[name].attrs["units"] for name in names}
 
 
@@ -276,8 +277,12 @@ def _variable(result: Result, q: Quantity) -> xr.Variable:
 
 def _about(q: Quantity) -> dict[str, Any]:
     """Attributes of a variable; codes list what they mean, as in the CF conventions."""
-    codes = {"flag_values": tuple(range(len(q.meanings))), "flag_meanings": q.meanings} if q.meanings else {}
+    codes = {"flag_values": tuple(range(len(q.meanings))), "flag_meanings": _joined(q.meanings)} if q.meanings else {}
     return {"units": q.unit, "long_name": q.label, "definition": q.definition, **codes}
+
+
+def _joined(words: Iterable[str]) -> str:
+    return " ".join(word.replace(" ", "_") for word in words)
 
 
 def _coordinates(result: Result, variables: dict[str, Any]) -> dict[str, Any]:
@@ -296,16 +301,17 @@ def _coordinates(result: Result, variables: dict[str, Any]) -> dict[str, Any]:
 
 
 def _attributes(result: Result) -> dict[str, Any]:
+    """Attributes of the dataset: numbers, texts and flat arrays, which NetCDF can store too."""
     layout, header = result.layout, result.header
     return {
         "title": result.title, "file": str(result.path), "layout_version": VERSION, "digest": result.digest,
-        "scene": result.scene, "scene_file": header.scene_file, "overrides": header.overrides,
+        "scene": result.scene, "scene_file": header.scene_file, "overrides": "\n".join(header.overrides),
         "petsc_options": header.petsc_options, "definitions": result.definitions, "report": result.report,
-        "provenance": result.sessions, "has": layout.has,
-        "patches": "patch/pressure" in {c.key for c in layout.columns}, "poses": not result.axes[-3].units,
-        "derived": tuple(q.name for q in layout.derived),
-        "object_rotation": np.eye(3), "object_origin": np.zeros(3), "rejected": np.zeros((0, 10)),
-        **{name: np.asarray(values) for name, values in header.about.items()},
+        "provenance": json.dumps(result.sessions), "has": ", ".join(layout.has),
+        "patches": int("patch/pressure" in {c.key for c in layout.columns}), "poses": int(not result.axes[-3].units),
+        "derived": " ".join(q.name for q in layout.derived),
+        "object_rotation": np.eye(3).ravel(), "object_origin": np.zeros(3), "rejected": np.zeros(0),
+        **{name: np.ravel(values) for name, values in header.about.items()},
     }  # fmt: skip
 
 
@@ -339,5 +345,5 @@ def with_intervals(ds: xr.Dataset) -> xr.Dataset:
         text = f"Half of the range in which {name} (CCM) of 95 % of the samples of the uncertain inputs lies."
         given[f"{name}_interval"] = (given.status.dims, half_width(values.values), about | {"definition": text})
         given[f"{name}_samples"] = values
-    given.attrs["derived"] = (*ds.attrs["derived"], *(f"{name}_interval" for name in names))
+    given.attrs["derived"] = " ".join([*ds.attrs["derived"].split(), *(f"{name}_interval" for name in names)])
     return given

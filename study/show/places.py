@@ -58,12 +58,13 @@ def spot(ds: xr.Dataset, index: Index) -> tuple[str, str]:
     middle, closing = origin[index].mean(axis=0), turn[index][0, :, 2]
     given = scene.task.centre_of_mass
     offset = middle - (body["object_centroid"] if given is None else np.array(given))
+    bounds = np.reshape(body["object_bounds"], (2, 3))
     if ds.attrs["poses"]:
-        part = _sides(body["object_bounds"], middle, closing)
+        part = _sides(bounds, middle, closing)
     else:
-        along = int(np.abs(ds.attrs["object_rotation"][:, 2]).argmax())
+        along = int(np.abs(ds.attrs["object_rotation"][2::3]).argmax())
         alike = ", any angle alike" * (scene.axis_symmetry == 0)
-        part = f"{_third(body['object_bounds'], middle, [along])} of the object{alike}"
+        part = f"{_third(bounds, middle, [along])} of the object{alike}"
     return part, _beside(offset)
 
 

@@ -1,5 +1,6 @@
 """A folder of objects: which there are, one run over all of them, and what the index says."""
 
+import json
 import re
 import shutil
 from pathlib import Path
@@ -124,7 +125,7 @@ def test_every_object_is_a_row_of_the_index_and_its_page_and_none_stops_the_othe
         held = np.nan_to_num(ds.payload.sel(model="ccm").values[..., -1])
         assert float(found[name].payload) == held.max()
         assert int(found[name].cases) == ds.status.size
-        assert ds.attrs["provenance"][-1]["reason"] == "complete"
+        assert json.loads(ds.attrs["provenance"])[-1]["reason"] == "complete"
     assert command(0, "status", solved)[0] == DONE
     code, text, _ = command(0, "show", solved, "--csv")
     assert (code, len(text.splitlines())) == (DONE, len(NAMES) + 2)

@@ -1,5 +1,6 @@
 """Tables of a report: best grasps, cases and their reasons, checks, effects, cost, definitions, provenance."""
 
+import json
 from dataclasses import replace
 from typing import Any
 
@@ -136,15 +137,15 @@ def definitions(ds: xr.Dataset) -> list[Block]:
 def scene(ds: xr.Dataset) -> list[Block]:
     """The effective scene and where it came from."""
     about = ds.attrs
-    named = {"file": about["scene_file"], "overrides": ", ".join(about["overrides"]), "digest": about["digest"],
-             "petsc options": about["petsc_options"]}  # fmt: skip
+    named = {"file": about["scene_file"], "overrides": about["overrides"].replace("\n", ", "),
+             "digest": about["digest"], "petsc options": about["petsc_options"]}  # fmt: skip
     listed = bullets(f"{name}: {given}" for name, given in named.items() if given)
     return [listed, {"kind": "pre", "text": about["scene"]}]
 
 
 def provenance(ds: xr.Dataset) -> list[Block]:
     """Sessions, programs and machines."""
-    sessions = ds.attrs["provenance"]
+    sessions = json.loads(ds.attrs["provenance"])
     rows = [[spoken(name), *(str(s[name]) for s in sessions)] for name in (sessions[0] if sessions else ())]
     head = ["session", *map(str, range(1, len(sessions) + 1))]
     return [table("Sessions", head, rows, wide=range(len(head)))] if rows else []

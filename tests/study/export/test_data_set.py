@@ -66,7 +66,7 @@ def test_arrays_are_those_of_the_file_and_what_the_sampler_rejected_is_unsuccess
         assert matrix[:3, 0] == pytest.approx(R[0][:, 2])  # and closes along x, from finger 1
         assert matrix[:3, 3] == pytest.approx(o.mean(axis=0))
     assert arrays["semi_axes"].shape == (COUNT, 2, 3)
-    ds.attrs["rejected"] = np.array([[10, 20, 30, 1, 0, 0, 0, 0, 1, SLIPPING], [0, 0, 5, 0, 1, 0, 0, 0, 1, WIDE]], "f4")
+    ds.attrs["rejected"] = np.array([10, 20, 30, 1, 0, 0, 0, 0, 1, SLIPPING, 0, 0, 5, 0, 1, 0, 0, 0, 1, WIDE], "f4")
     for gripper in (GripperFrame(Hand(closing="x"), ("y",)), GripperFrame(Hand(closing="x", approaches=["y"]), ())):
         assert grasp_arrays(ds, gripper)["transforms"][COUNT, :3, 2] == pytest.approx([0, -1, 0])
     arrays = grasp_arrays(ds, GripperFrame(Hand(closing="x")))

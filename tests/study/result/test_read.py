@@ -1,5 +1,7 @@
 """A result file as a dataset: dimensions, coordinates and attributes; no value where a case has none."""
 
+import json
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -84,7 +86,7 @@ def test_every_dataset_has_its_numbers_and_cases_without_a_result_a_state_and_a_
                                   equal_nan=True), path  # fmt: skip
     status = ds.status.values.ravel()
     assert status.tolist() == [DONE] * 10 + [FAILED] + [MISSING] * (status.size - 11)
-    assert ds.status.attrs["flag_meanings"] == STATES
+    assert ds.status.attrs["flag_meanings"].split() == [state.replace(" ", "_") for state in STATES]
     for name, variable in ds.data_vars.items():
         if variable.dtype.kind == "f" and variable.dims[:3] == ds.status.dims:
             assert np.isnan(variable.values.reshape(status.size, -1)[10:]).all(), name
@@ -95,7 +97,11 @@ def test_every_dataset_has_its_numbers_and_cases_without_a_result_a_state_and_a_
 
 def test_flags_are_bits_that_attributes_name_patches_are_read_on_demand_and_status_needs_no_xarray(tmp_path, half):
     ds = softjaw.open(make(tmp_path / "a.hdf", flags__flags=float(Flag.SLIPS | Flag.COARSE)))
-    words = dict(zip(ds.flags.attrs["flag_masks"], ds.flags.attrs["flag_meanings"], strict=True))
+    ds.to_netcdf(tmp_path / "a.nc")
+    with xr.open_dataset(tmp_path / "a.nc") as stored:
+        assert np.array_equal(stored.e_n, ds.e_n, equal_nan=True)
+        assert json.loads(stored.attrs["provenance"]) == json.loads(ds.attrs["provenance"])
+    words = dict(zip(ds.flags.attrs["flag_masks"], ds.flags.attrs["flag_meanings"].split(), strict=True))
     assert {words[m] for m in words if int(ds.flags[0, 0, 0]) & m} == {"slips", "coarse"}
     one = softjaw.read_patch(half, station=1, angle=0, normal_force=1)
     with open_result(half) as result:
