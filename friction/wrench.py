@@ -191,7 +191,7 @@ def model_faces(patch: ContactPatch, model: str) -> tuple[FloatArray, FloatArray
 def checked_mu(mu: float) -> float:
     """Friction coefficient, refused if it is no number, negative or not finite."""
     if np.ndim(mu) or np.asarray(mu).dtype.kind not in "fiu" or not 0 <= mu < math.inf:
-        raise ValueError(f"mu is {mu}: the friction coefficient must be one finite number and not negative")
+        raise ValueError(f"mu is {mu!r}: the friction coefficient must be one finite number and not negative")
     return float(mu)
 
 

@@ -26,6 +26,7 @@ SMALLEST, LARGEST = 1e-3, 2.0  # plausible largest extent of an object that a gr
 HUGE_COORDINATE = 1e12  # of a coordinate, in any unit
 ROUNDED = 5e-7  # of the largest coordinate: corners this close are one; files hold numbers of single precision (6e-8)
 MOST_TRIANGLES, DECIMATED_TO = 500_000, 200_000
+COMES_THROUGH = 1e-3  # of a piece's extent: how far another may come through it and still count as inside
 UNITS = {name: times / over for name, (times, over) in LENGTHS.items()}
 
 
@@ -298,11 +299,17 @@ def _without_shells(points: FloatArray, triangles: IntArray) -> tuple[FloatArray
     inner = np.array([any(_inside(points, part, other) for other in parts if other is not part) for part in parts])
     if not inner.any() or inner.all():
         return points, triangles, []
-    return *_used(points, triangles[~inner[piece]]), [f"dropped {inner.sum()} shells inside the object"]
+    return *_used(points, triangles[~inner[piece]]), [f"dropped {inner.sum()} shell{'s'[: inner.sum() - 1]} inside"]
 
 
 def _inside(points: FloatArray, piece: IntArray, other: IntArray) -> bool:
-    """Whether a piece lies inside another, but for a few places where it may come through."""
-    corners = np.unique(piece)
-    asked = points[corners[:: 1 + len(corners) // 100]]  # corners of a piece are tested, about 100
-    return float(np.mean(TriangleTree(points, other).signed(asked)[0] < -ROUNDED * np.abs(points).max())) > 0.9
+    """Whether a piece lies inside another, but for a few places where it touches that from within."""
+    corners = points[piece]
+    within = np.ptp(points[other], axis=(0, 1)) * COMES_THROUGH
+    low, high = points[other].min(axis=(0, 1)) - within, points[other].max(axis=(0, 1)) + within
+    if (corners < low).any() or (corners > high).any():
+        return False
+    # middles too: between corners that lie inside, a side may run outside
+    middles = (corners + corners[:, [1, 2, 0]]).reshape(-1, 3) / 2
+    signed = TriangleTree(points, other).signed(np.concatenate([points[np.unique(piece)], middles]))[0]
+    return bool(signed.max() < within.max() and np.mean(signed < -ROUNDED * np.abs(points).max()) > 0.9)

@@ -154,6 +154,8 @@ def chosen(
     """
     with fault_of("--force", ValueError):
         at, k, _ = at_level(ds, window(ds) if force is None else force)
+    with fault_of(ds.attrs["file"], ValueError):
+        by = score_of(at, by)
     units = {name: unit for name, unit in maps_in(at).items() if name != "flags"}  # which have no least
     if unknown := [name for name in least if name not in units]:
         raise StudyError(USAGE, f"--min: found '{unknown[0]}', expected one of {', '.join(units)}")
@@ -166,7 +168,7 @@ def chosen(
         for index, case in zip(which, cases(at, model, which), strict=True)
         if all(case["maps"][name] >= value for name, value in bounds.items())
     ][: top or None]
-    return [case for case, _ in listed], [place for _, place in listed], score_of(at, by)
+    return [case for case, _ in listed], [place for _, place in listed], by
 
 
 def grasps(ds: xr.Dataset, gripper: GripperFrame, **choice: Any) -> list[RankedGrasp]:

@@ -119,6 +119,7 @@ def corners(axes: Sequence[Nodes], points: FloatArray) -> Corners:
     for a, nodes in enumerate(axes):
         x, slack, v = nodes.x, nodes.slack, points[:, a]
         if nodes.period:
+            v = np.where(np.isfinite(v), v, np.nan)
             turns = np.floor((v - x[0] + slack) / nodes.period)
             v = v - turns * nodes.period
             swap |= nodes.half_turn & (turns % 2 == 1)

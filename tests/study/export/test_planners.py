@@ -197,6 +197,7 @@ def test_grasps_are_chosen_by_rank_force_and_least_values_and_simulators_get_a_f
     found = json.loads(said("--json", "--force", 2, "--top", 1))["cases"]
     assert [case["normal_force"] for case in found] == [2.0]
     assert found[0]["maps"]["payload"] == pytest.approx(0.2 * (1 + STATIONS[4]))
+    assert main(["export", str(path), "--csv", "--by", "epsilon"]) == USAGE  # no grasp has one
     assert stations("--force", 4, "--by", "payload") == pytest.approx([*held, STATIONS[LOST]])
     each = json.loads(said("--format", "graspgen", "--top", 2, "--approach", "x", "--approach", "minus-y"))
     assert each["grasps"]["names"] == ["grasp_0_x", "grasp_0_minus_y", "grasp_1_x", "grasp_1_minus_y"]
