@@ -49,6 +49,12 @@ def cases(
         }  # fmt: skip
 
 
+def _spoken_place(ds: xr.Dataset, case: dict[str, Any]) -> dict[str, Any]:
+    """Where a case is along the axes, with the texts and lists of a sweep as they are."""
+    axes, place = axes_of(ds), case["place"]
+    return {a.name: a.options[int(place[a.name])] if a.options else place[a.name] for a in axes}
+
+
 def _fingers(ds: xr.Dataset, model: str) -> dict[str, tuple[np.ndarray, str | tuple[str, ...], tuple[str, ...]]]:
     """By name of what a finger has: values over axes and finger, unit of every component, names of the components.
 
@@ -82,7 +88,7 @@ def as_json(ds: xr.Dataset, model: str = "ccm", listed: Iterable[dict[str, Any]]
     units |= {name: unit for name, (_, unit, _) in _fingers(ds, model).items()}
     rows = []
     for case in cases(ds, model) if listed is None else listed:
-        place, words = case["place"], [flag.word for flag in flags_in(case["flags"])]
+        place, words = _spoken_place(ds, case), [flag.word for flag in flags_in(case["flags"])]
         case = {**case, "flags": case["flags"] & OF_FILE}
         del case["place"]
         rows.append(place | plain(case) | {"flag_words": words})
@@ -103,7 +109,7 @@ def as_csv(ds: xr.Dataset, model: str = "ccm", listed: Iterable[dict[str, Any]] 
     columns += [c._replace(name=f"finger{f}.{c.name}") for f in (1, 2) for c in of_finger]
     rows = []
     for case in cases(ds, model) if listed is None else listed:
-        row = {**case["place"], **case["maps"], **case, "flags": case["flags"] & OF_FILE}
+        row = {**_spoken_place(ds, case), **case["maps"], **case, "flags": case["flags"] & OF_FILE}
         for f, finger in enumerate(case["fingers"], start=1):
             flat = (float(v) for part in finger.values() for v in np.ravel(part))
             row |= {f"finger{f}.{c.name}": v for c, v in zip(of_finger, flat, strict=True)}

@@ -54,9 +54,11 @@ WAYS = {  # of giving candidates, with what an override of each replaces
     "poses": ("stations", "stations_mm", "angles_deg", "sampled"),
     "sampled": ("stations", "stations_mm", "angles_deg", "poses"),
 }  # fmt: skip
-NOT_SWEPT = (  # they change which datasets a file has and how large they are, or no number of a case
+NOT_SWEPT = (  # they change which cases or datasets a file has, or no number of a case
     "object.shape", "object.mesh", "object.name", "object.mass_g", "object.density", "gripper.preset",
-    "candidates.stations", "accuracy.meshes", "accuracy.target", "effects.wrench", "limit_surface.samples",
+    "candidates.stations", "candidates.stations_mm", "candidates.angles_deg", "candidates.poses", "candidates.sampled",
+    "candidates.refine", "load.normal_force_n", "accuracy.meshes", "accuracy.target", "accuracy.target_of",
+    "effects.wrench", "limit_surface.samples",
 )  # fmt: skip
 OF_FACES = ("gripper.element", "gripper.elements")  # keys that the number of stored faces depends on
 OF_PRESET = {"gripper.preset", "gripper.pad_thickness_mm", "load.normal_force_n"}  # keys that a preset has a say in
@@ -511,7 +513,8 @@ def axis_rules(sweep: Mapping[str, Sequence[Any]], sections: Mapping[str, Any]) 
             near = closest(key, [f"{s}.{k}" for s, m in models.items() for k in m.model_fields])
             yield wrong(key, f"a key with a single value, as `{near or 'gripper.pad_width_mm'}`", key)
         elif key in NOT_SWEPT or section in NO_RESULT:
-            yield wrong(values, "a key that changes the numbers of cases alone; write a scene for each value", key)
+            more = "places and forces are lists of their own, other keys want a scene for each value"
+            yield wrong(values, f"a key that changes the numbers of cases alone; {more}", key)
         elif key in OF_FACES and "run" in sections and sections["run"].patches == "all":
             yield wrong(values, 'run.patches = "none" beside it, for faces that differ from case to case', key)
         elif len(set(values)) < len(values) or len(kinds) > 1:

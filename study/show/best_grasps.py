@@ -147,10 +147,10 @@ def _map_columns(ds: xr.Dataset, maps: Collection[str]) -> list[Column]:
     columns: list[Column] = []
     for name in (name for name in maps if name in ds):
         q, least = map_row(name), list(maps).index(name)
-        error = next((e for e in (f"{name}_interval", q.of_error.name) if e in ds), "")
-        relative = error == q.of_error.name and q.error == "relative"
-        columns.append(Column(name, q.unit, q.symbol, error, relative, drop=least * (least > 1)))
+        error, interval = q.of_error.name if q.of_error.name in ds else "", f"{name}_interval"
+        columns.append(Column(name, q.unit, q.symbol, error, q.error == "relative", drop=least * (least > 1)))
         columns += [Column(error, ds[error].units, display=False)] if error else []
+        columns += [Column(interval, q.unit, "± inputs", digits=2, drop=50 * least)] * (interval in ds)
         if name == "e_n" and maps is not BRIEF:
             columns.append(Column(PLANAR_E_N, q.unit, drop=len(maps)))
     extra = [name for name in ("misalignment", "pad_elements") if name in ds and maps is MAIN]
@@ -245,9 +245,7 @@ def answer(ds: xr.Dataset, index: Index) -> dict[str, tuple[str, str]]:
 def value_text(ds: xr.Dataset, name: str, index: Index, digits: int = 4, unit: bool = False) -> str:
     """A map's value in the unit in which it is shown, with its error where that is known."""
     q, value, si = BY_KEY.get(f"maps/{name}"), at(ds, name, index), ds[name].units if name in ds else ""
-    error = at(ds, f"{name}_interval", index)
-    if not np.isfinite(error) and q and q.error:
-        error = q.error_in_unit(at(ds, q.of_error.name, index), value)
+    error = q.error_in_unit(at(ds, q.of_error.name, index), value) if q and q.error else np.nan
     text = with_error(*shown(np.array([value, error]), si)) if np.isfinite(error) else number(shown(value, si), digits)
     return f"{text} {shown_unit(si)}".rstrip() if unit else text
 
@@ -290,9 +288,8 @@ def _held(ds: xr.Dataset, index: Index) -> tuple[str, str]:
     every += f" at {forces(ds)[index[-1]]:g} N" * ("force_low" in ds)
     share = at(ds, "payload_error", index)
     covers = "±: mesh and method" if np.isfinite(share) else "error not known"
-    if "payload_interval" in ds:
-        mesh = f"; mesh and method: {100 * share:.2g} %" * bool(np.isfinite(share))
-        covers = f"±: uncertain inputs, 95 %{mesh}"
+    if np.isfinite(interval := at(ds, "payload_interval", index)):
+        covers += f"; inputs: ± {shown_text(interval, 'kg', 2)} in 95 %"
     return value_text(ds, "payload", index, 3, unit=True), f"{every} ({covers})"
 
 

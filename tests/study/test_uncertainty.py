@@ -7,11 +7,12 @@ from scipy.stats import norm
 import softjaw
 from softjaw.study.case.candidates import axes, candidates
 from softjaw.study.case.poses import axis_poses, moved
-from softjaw.study.ranking import Sure
+from softjaw.study.ranking import Sure, judge
 from softjaw.study.result.read import half_width
 from softjaw.study.run.plan import make_plan
 from softjaw.study.scene import SceneError, parse_scene
 from softjaw.study.scene.sections import Uncertainty
+from softjaw.study.show.best_grasps import best
 from tests.study.scenes import BALL, QUICK, pose_of, scene_of
 
 RIGID = "effects.sheet='rigid'"
@@ -106,6 +107,9 @@ def test_maps_have_what_the_samples_say_and_grasps_that_inputs_move_alike_are_to
     assert third.value("quality") == pytest.approx(values[0, 0, 0, 2], rel=1e-12)
     low, high = np.quantile(values, [0.025, 0.975], axis=-1, method="hazen")
     assert ds.quality_interval.values == pytest.approx((high - low) / 2, rel=1e-12)
+    table = best(judge(ds))
+    errors = {column.name: column.error for column in table.columns}
+    assert (errors["quality"], errors["quality_interval"]) == ("", "")  # which never stands for the mesh's error
     # at the middle of a ball pads face each other: e_n does not depend on mu, and quality goes with its fifth power
     moduli = np.array([p["gripper.shear_modulus_kpa"] for p in scene().points[1:]])
     mu = np.array([p["friction.mu"] for p in scene().points[1:]])
