@@ -123,7 +123,14 @@ class Scene(SceneSection):
         return hash((self.object, self.gripper, self.candidates, self.load))
 
     def rules(self) -> Errors:
-        """Not more cases than a file can hold."""
+        """Samples of uncertain inputs that are scenes, and not more cases than a file can hold."""
+        for key, spread in self.uncertainty.spread.items():
+            given, values = self.effective(), sorted(sample[key] for sample in self.realisations[1:])
+            for value in (values[0], values[-1]):
+                if trouble := _trouble({name: given[name] for name in given if name not in NO_RESULT}, {key: value}):
+                    text = f"a spread whose samples are valid, unlike {value:.3g} ({trouble})"
+                    yield wrong(spread, text, "uncertainty", "spread", key)
+                    break
         if self.cases > MOST_CASES:
             yield wrong(self.cases, f"at most {MOST_CASES:,} cases; split the study into several scenes", "candidates")
 
