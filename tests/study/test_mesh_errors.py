@@ -100,6 +100,14 @@ def test_errors_hold_where_a_contact_is_narrower_than_an_element(radius, modulus
         assert abs(at_best / found[f"maps/{name}"] - 1) < found[f"maps/{name}_error"], name
 
 
+def test_the_largest_pressure_is_no_less_than_that_in_the_mean():
+    """The pad overhangs the end of a cylinder across its axis, and one line of nodes bears."""
+    oval = parse_scene(OVAL.format(25, 20, 80) + PAD.format(50, 22, 15), overrides=[
+        "candidates.stations_mm=[15]", "load.normal_force_n=[3]", "gripper.elements=[10, 6, 4]"])  # fmt: skip
+    [found] = [result.values for result in results_of(oval)]
+    assert found["maps/p_max"] * found["maps/contact_area"] >= min(found["fingers/S"]) * (1 - 1e-9)
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("station", [40, 148.5])
 def test_errors_of_both_kinds_of_gaps_cancel(station):
