@@ -183,7 +183,7 @@ def ranked(ds: xr.Dataset, k: int, by: str | None = None) -> IntArray:
     """The candidates solved at a force level, flat, the best first; see `score_of` and `ranking`.
 
     Of grasps that their errors cannot tell from the best of them the simpler ones come first, antipodal and without a
-    flag, and then those that surely reach more.
+    flag, and then those that surely reach more. Of the `LOST` ones those come first that are safe at another force.
     """
     done = np.flatnonzero(ds["status"].values[..., k].ravel() == DONE)
     name = score_of(ds, by)
@@ -198,7 +198,11 @@ def ranked(ds: xr.Dataset, k: int, by: str | None = None) -> IntArray:
         head = head if alike and lost[0] == lost[1] else n
         group[n] = head
     marks, surely = flags[order], _places(score if errors is None else score - errors.half_width)[order]
-    return order[np.lexsort((surely, marks != 0, marks & Flag.NOT_ANTIPODAL, group))]
+    order = order[np.lexsort((surely, marks != 0, marks & Flag.NOT_ANTIPODAL, group))]
+    safe = np.zeros(len(flags), bool)
+    if {"force_low", "force_high"} <= set(ds):
+        safe = (ds["force_low"] <= ds["force_high"]).values.ravel() & (flags & LOST == Flag.TOO_WEAK)
+    return order[np.argsort((flags & LOST > 0)[order] * (2 - safe[order]), kind="stable")]
 
 
 # --- distinct places, and the force that is shown ---------------------------------------------------------------------

@@ -267,7 +267,8 @@ def _force(ds: xr.Dataset, index: Index) -> tuple[str, str]:
         least = with_error(low, error) if known else number(low, 3)
         if at(ds, "force_high", index) < low:
             return "none is safe", f"{wanted} need {least} N per finger ({covers}), the wall bears {_borne(ds, index)}"
-        alone = "; no solved force does without harm: solve one" * bool(int(ds["flags"].values[index]) & Flag.TOO_WEAK)
+        usable = (ds.status.values[index[:-1]] == DONE) & (ds["flags"].values[index[:-1]] & LOST == 0)
+        alone = "; no solved force does without harm: solve one" * (not usable.any() and "between" not in ds.attrs)
         return f"{least} N per finger", f"the least that holds {wanted} ({covers}){alone}"
     weak = not at(ds, "safety_factor", index) >= safety * (1 - TIE)
     return pressed, f"no solved force holds {wanted}" if weak else f"the smallest solved force that holds {wanted}"

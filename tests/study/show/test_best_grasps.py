@@ -134,6 +134,7 @@ def test_a_window_between_two_solved_forces_is_shown_where_it_lies():
     ds["finger_pieces"] = ds["finger_holes"] = ds.finger_rims.copy(data=np.add(ds.finger_rims.values, [[1], [2]]))
     table = best(ds)  # contacts change on the way: the nearest that is solved, and what to do
     assert table.facts["force"] == 1.0
+    assert stations(best(ds, by="quality")) == [1.0, 0.0]  # both are too weak at 1 N, and the other one is safe nowhere
     assert not best(ds, force=2.0).rows
     assert "none" not in best(ds, force=2.0).title
 
