@@ -148,7 +148,7 @@ def _map_columns(ds: xr.Dataset, maps: Collection[str]) -> list[Column]:
     for name in (name for name in maps if name in ds):
         q, least = map_row(name), list(maps).index(name)
         error, interval = q.of_error.name if q.of_error.name in ds else "", f"{name}_interval"
-        columns.append(Column(name, q.unit, q.symbol, error, q.error == "relative", drop=least * (least > 1)))
+        columns.append(Column(name, q.unit, q.symbol, error, q.error == "relative", drop=least))
         columns += [Column(error, ds[error].units, display=False)] if error else []
         columns += [Column(interval, q.unit, "± inputs", digits=2, drop=50 * least)] * (interval in ds)
         if name == "e_n" and maps is not BRIEF:
