@@ -318,7 +318,7 @@ def grasp_quality(
     lengths = {"distance": distance, "object_length": object_length, "contact_length": contact_length}
     for name, length in lengths.items():
         if length is not None and (isinstance(length, str) or np.ndim(length) or not 0 < length < np.inf):
-            raise ValueError(f"{name} is {length}: expected a positive length [m]")
+            raise ValueError(f"{name} is {length!r}: expected a positive length [m]")
     first = contact_of(one, mu)
     contacts = first, opposite(first, float(distance or 0.0)) if two is None else contact_of(two, mu)
     check_facing(contacts, ("one", "two"))
