@@ -124,13 +124,11 @@ class Scene(SceneSection):
 
     def rules(self) -> Errors:
         """Samples of uncertain inputs that are scenes, and not more cases than a file can hold."""
-        for key, spread in self.uncertainty.spread.items():
-            given, values = self.effective(), sorted(sample[key] for sample in self.realisations[1:])
-            for value in (values[0], values[-1]):
-                if trouble := _trouble({name: given[name] for name in given if name not in NO_RESULT}, {key: value}):
-                    text = f"a spread whose samples are valid, unlike {value:.3g} ({trouble})"
-                    yield wrong(spread, text, "uncertainty", "spread", key)
-                    break
+        given = {name: table for name, table in self.effective().items() if name not in NO_RESULT}
+        for key, (low, high) in self.uncertainty.ends(self._means).items():
+            if found := [(v, trouble) for v in (low, high) if (trouble := _trouble(given, {key: v}))]:
+                text = f"a spread whose samples are valid, unlike {found[0][0]:.3g} ({found[0][1]})"
+                yield wrong(self.uncertainty.spread[key], text, "uncertainty", "spread", key)
         if self.cases > MOST_CASES:
             yield wrong(self.cases, f"at most {MOST_CASES:,} cases; split the study into several scenes", "candidates")
 
@@ -214,9 +212,13 @@ class Scene(SceneSection):
         """Values of the uncertain inputs by dotted key: the scene's own, which are none, then those of the samples."""
         if not self.uncertainty.spread:
             return [{}]
+        return [{}, *self.uncertainty.inputs(self._means)]
+
+    @property
+    def _means(self) -> dict[str, float]:
+        """The scene's own values of the uncertain inputs."""
         keys = {key: key.partition(".") for key in self.uncertainty.spread}
-        means = {key: getattr(getattr(self, section), name) for key, (section, _, name) in keys.items()}
-        return [{}, *self.uncertainty.inputs(means)]
+        return {key: getattr(getattr(self, section), name) for key, (section, _, name) in keys.items()}
 
     def effective(self) -> dict[str, Any]:
         """Every value in effect, defaults filled in, as the tables of a scene file."""

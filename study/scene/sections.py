@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Mapping
 from contextlib import suppress
+from statistics import NormalDist
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
@@ -325,6 +326,11 @@ class Uncertainty(SceneSection):
         values = np.array([means[key] for key in self.spread]) + normal * np.array([*self.spread.values()])
         # digits of a sample, so that no rounding error of a machine makes another one
         return [dict(zip(self.spread, (float(f"{v:.9g}") for v in row), strict=True)) for row in values]
+
+    def ends(self, means: Mapping[str, float]) -> dict[str, tuple[float, float]]:
+        """The smallest and the largest sample of each input; see `inputs`."""
+        widest = NormalDist().inv_cdf(1.0 - 0.5 / self.samples) / NormalDist().inv_cdf(UPPER)
+        return {key: (means[key] - widest * width, means[key] + widest * width) for key, width in self.spread.items()}
 
     def spread_rules(self, *sections: SceneSection) -> Errors:
         """Only single numbers of the sections in `UNCERTAIN` can be uncertain."""

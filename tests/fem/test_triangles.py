@@ -81,7 +81,6 @@ def test_a_body_that_comes_out_of_another_is_kept_however_many_of_its_corners_li
         assert extent is None or np.allclose(np.ptp(mesh.points, axis=0), extent)
 
 
-
 def test_solids_that_touch_along_one_edge_are_closed_and_keep_their_insides():
     """Faces of both lie in one plane, one on either side of the edge."""
     first, second = trimesh.creation.box([0.02, 0.02, 0.06]), trimesh.creation.box([0.02, 0.02, 0.06])

@@ -34,6 +34,7 @@ def test_inputs_take_the_middles_of_equal_intervals_once_and_a_scene_is_solved_a
     expected = norm.ppf((np.arange(16) + 0.5) / 16) / norm.ppf(0.975)
     for key, mean, width in (("a", 1.0, 0.2), ("b", -5.0, 3.0)):
         assert np.sort([sample[key] for sample in samples]) == pytest.approx(mean + width * expected, rel=1e-8)
+        assert uncertain.ends(means)[key] == pytest.approx(mean + width * expected[[0, -1]], rel=1e-8)
     # the inputs are independent
     assert abs(np.corrcoef([[s["a"], s["b"]] for s in samples], rowvar=False)[0, 1]) < 0.3
     assert uncertain.inputs(means) == samples
