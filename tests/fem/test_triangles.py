@@ -70,6 +70,7 @@ def test_triangles_are_turned_outwards_specks_dropped_separate_parts_kept_and_on
     assert joint.at_edge[edge] == 4
     assert not joint.paired[np.arange(len(joint.edges)) != edge].any()
 
+
 @pytest.mark.parametrize("sections", [8, 32])
 def test_a_body_that_comes_out_of_another_is_kept_however_many_of_its_corners_lie_inside(sections):
     block = trimesh.creation.box((0.06, 0.06, 0.06))
