@@ -144,7 +144,7 @@ def shapes_of(scene: Scene) -> list[Any]:
     """The object at every point that is solved, each once."""
     points = [{key: v for key, v in point.items() if key.startswith("object.")} for point in scene.points]
     each = [point for i, point in enumerate(points) if point not in points[:i]]
-    return [scene.with_values(point).object if point else scene.object for point in each]
+    return [scene.at(point).object if point else scene.object for point in each]
 
 
 def check_object(scene: Scene) -> None:
@@ -156,7 +156,7 @@ def check_object(scene: Scene) -> None:
     Raises `StudyError` with the key and what is wrong with it.
     """
     for inputs in scene.realisations[1:]:
-        scene.with_values(inputs)  # a sample that cannot be, such as a friction coefficient below 0
+        scene.at(inputs)  # samples that are no scene together
     for shape in shapes_of(scene):
         key = {"revolution": "object.profile_mm", "sections": "object.sections", "mesh": "object.mesh"}.get(shape.shape)
         if key is None:

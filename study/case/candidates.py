@@ -234,7 +234,7 @@ def units(scene: Scene) -> list[Unit]:
     made: list[Unit] = []
     forces, count = len(scene.load.normal_force_n), scene.candidates.total
     for point, values in enumerate(scene.points):
-        at_point = scene.with_values(values | {"uncertainty.spread": {}})
+        at_point = scene.at(values)
         places, cost = candidates(at_point), path_cost(at_point)
         for group in groups(places, at_point.axis_symmetry):
             rows = tuple(tuple(range(r, r + forces)) for r in ((point * count + n) * forces for n, _ in group))

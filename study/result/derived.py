@@ -59,7 +59,7 @@ def derived(scene: Scene) -> list[Quantity]:
 def finalise(writer: Any, scene: Scene) -> None:
     """Fill it, by one rank, after all cases."""
     if any(q.name == "b_over_a" for q in derived(scene)):
-        points = [scene.with_values(values).object for values in scene.points]
+        points = [scene.at(values).object for values in scene.points]
         shape = writer.layout.shape[:-3]
         a, b = (np.reshape([getattr(p, name) for p in points], shape) for name in ("semi_axis_a", "semi_axis_b"))
         writer.write_derived("b_over_a", b / a)

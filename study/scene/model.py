@@ -124,11 +124,14 @@ class Scene(SceneSection):
 
     def rules(self) -> Errors:
         """Samples of uncertain inputs that are scenes, and not more cases than a file can hold."""
-        given = {name: table for name, table in self.effective().items() if name not in NO_RESULT}
-        for key, (low, high) in self.uncertainty.ends(self._means).items():
-            if found := [(v, trouble) for v in (low, high) if (trouble := _trouble(given, {key: v}))]:
-                text = f"a spread whose samples are valid, unlike {found[0][0]:.3g} ({found[0][1]})"
-                yield wrong(self.uncertainty.spread[key], text, "uncertainty", "spread", key)
+        if self.uncertainty.spread:
+            certain = self.at({}).effective()
+            for key, ends in self.uncertainty.ends(self._means).items():
+                for value in ends:
+                    if trouble := _trouble(certain, {key: value}):
+                        text = f"a spread whose samples are valid, unlike {value:.3g} ({trouble})"
+                        yield wrong(self.uncertainty.spread[key], text, "uncertainty", "spread", key)
+                        break
         if self.cases > MOST_CASES:
             yield wrong(self.cases, f"at most {MOST_CASES:,} cases; split the study into several scenes", "candidates")
 
@@ -304,6 +307,10 @@ class Scene(SceneSection):
         if "candidates.stations_mm" in given:  # which are not the first and the last of the scene's own number
             given.setdefault("candidates.stations", None)
         return Scene.of_tables(put(self.effective(), plain_tables(given)))
+
+    def at(self, point: Mapping[str, Any]) -> Scene:
+        """The scene at one of its `points`: without its sweep, and nothing is uncertain."""
+        return self.with_values({**point, "uncertainty.spread": {}})
 
     def reread(self) -> Scene:
         """The scene with its object's file as it is now."""

@@ -70,6 +70,9 @@ def test_a_sample_out_of_range_is_refused_and_moved_pads_face_each_other(tmp_pat
     with pytest.raises(SceneError) as error:
         softjaw.run(scene("friction.mu=0.05"), tmp_path / "never.hdf")
     assert error.value.problems[0].key == 'uncertainty.spread."friction.mu"'
+    wide = make_plan(scene('uncertainty.spread={"friction.mu" = 0.9}'))  # a sample of 0.1 has no such spread of its own
+    least = 0.8 - 0.9 * norm.ppf(15 / 16) / norm.ppf(0.975)
+    assert min(unit.scene.friction.mu for unit in wide.units) == pytest.approx(least)
     assert not list(tmp_path.iterdir())
     before = axis_poses(0.03, 0.4, 0.2)
     one, two = moved(before, 0.002, 0.1)
