@@ -18,7 +18,7 @@ from softjaw.study.case.result import TIE
 from softjaw.study.flags import HARM, LOST, Flag, flags_in
 from softjaw.study.grippers import Hand, gripper_file
 from softjaw.study.messages import StudyError
-from softjaw.study.quantities import DONE, LEAST_FORCE, LISTED
+from softjaw.study.quantities import DONE, FORCE_RANGE, LEAST_FORCE, LISTED
 from softjaw.study.result.interpolation import at_force
 from softjaw.study.result.read import half_width, scene_of, stated_error, values_of
 from softjaw.study.scene.text import scene_table
@@ -198,11 +198,11 @@ def ranked(ds: xr.Dataset, k: int, by: str | None = None) -> IntArray:
         head = head if alike and lost[0] == lost[1] else n
         group[n] = head
     marks, surely = flags[order], _places(score if errors is None else score - errors.half_width)[order]
-    order = order[np.lexsort((surely, marks != 0, marks & Flag.NOT_ANTIPODAL, group))]
-    safe = np.zeros(len(flags), bool)
-    if {"force_low", "force_high"} <= set(ds):
-        safe = (ds["force_low"] <= ds["force_high"]).values.ravel() & (flags & LOST == Flag.TOO_WEAK)
-    return order[np.argsort((flags & LOST > 0)[order] * (2 - safe[order]), kind="stable")]
+    hopeless = marks & LOST > 0
+    if all(name in ds for name in FORCE_RANGE):
+        safe = (ds["force_low"] <= ds["force_high"]).values.ravel()[order]
+        hopeless &= ~(safe & (marks & LOST == Flag.TOO_WEAK))
+    return order[np.lexsort((surely, marks != 0, marks & Flag.NOT_ANTIPODAL, group, hopeless))]
 
 
 # --- distinct places, and the force that is shown ---------------------------------------------------------------------

@@ -304,12 +304,12 @@ def _without_shells(points: FloatArray, triangles: IntArray) -> tuple[FloatArray
 
 def _inside(points: FloatArray, piece: IntArray, other: IntArray) -> bool:
     """Whether a piece lies inside another, but for a few places where it touches that from within."""
-    corners = points[piece]
+    corners, sides = points[np.unique(piece)], edges_of(piece)
     within = np.ptp(points[other], axis=(0, 1)) * COMES_THROUGH
     low, high = points[other].min(axis=(0, 1)) - within, points[other].max(axis=(0, 1)) + within
     if (corners < low).any() or (corners > high).any():
         return False
-    # middles too: between corners that lie inside, a side may run outside
-    middles = (corners + corners[:, [1, 2, 0]]).reshape(-1, 3) / 2
-    signed = TriangleTree(points, other).signed(np.concatenate([points[np.unique(piece)], middles]))[0]
+    # middles of sides too, each once: between corners that lie inside a side may run outside
+    middles = points[sides[sides[:, 0] < sides[:, 1]]].mean(axis=1)
+    signed = TriangleTree(points, other).signed(np.concatenate([corners, middles]))[0]
     return bool(signed.max() < within.max() and np.mean(signed < -ROUNDED * np.abs(points).max()) > 0.9)

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from softjaw.study.flags import OF_FILE, flags_in
-from softjaw.study.quantities import FINGERS, MONOMIALS, STATES
+from softjaw.study.quantities import FINGERS, MONOMIALS, STATES, Axis
 from softjaw.study.result.layout import DONE
 from softjaw.study.result.read import axes_of, maps_in, values_of
 from softjaw.study.table import Column, Table, plain
@@ -49,10 +49,10 @@ def cases(
         }  # fmt: skip
 
 
-def _spoken_place(ds: xr.Dataset, case: dict[str, Any]) -> dict[str, Any]:
+def _spoken_place(axes: Iterable[Axis], case: dict[str, Any]) -> dict[str, Any]:
     """Where a case is along the axes, with the texts and lists of a sweep as they are."""
-    axes, place = axes_of(ds), case["place"]
-    return {a.name: a.options[int(place[a.name])] if a.options else place[a.name] for a in axes}
+    place = case["place"]
+    return place | {axis.name: axis.options[int(place[axis.name])] for axis in axes if axis.options}
 
 
 def _fingers(ds: xr.Dataset, model: str) -> dict[str, tuple[np.ndarray, str | tuple[str, ...], tuple[str, ...]]]:
@@ -84,11 +84,12 @@ def as_json(ds: xr.Dataset, model: str = "ccm", listed: Iterable[dict[str, Any]]
 
     ``flags`` are those of the file, ``flag_words`` also those that the safe force range adds to listed cases.
     """
-    units: dict[str, Any] = {axis.name: axis.units for axis in axes_of(ds)} | maps_in(ds)
+    axes = axes_of(ds)
+    units: dict[str, Any] = {axis.name: axis.units for axis in axes} | maps_in(ds)
     units |= {name: unit for name, (_, unit, _) in _fingers(ds, model).items()}
     rows = []
     for case in cases(ds, model) if listed is None else listed:
-        place, words = _spoken_place(ds, case), [flag.word for flag in flags_in(case["flags"])]
+        place, words = _spoken_place(axes, case), [flag.word for flag in flags_in(case["flags"])]
         case = {**case, "flags": case["flags"] & OF_FILE}
         del case["place"]
         rows.append(place | plain(case) | {"flag_words": words})
@@ -98,7 +99,8 @@ def as_json(ds: xr.Dataset, model: str = "ccm", listed: Iterable[dict[str, Any]]
 
 def as_csv(ds: xr.Dataset, model: str = "ccm", listed: Iterable[dict[str, Any]] | None = None) -> str:
     """One line for each case (`listed`, or all), each component of the fingers' arrays in a column of its own."""
-    columns = [Column(axis.name, axis.units) for axis in axes_of(ds)]
+    axes = axes_of(ds)
+    columns = [Column(axis.name, axis.units) for axis in axes]
     columns += [Column(name) for name in ("label", "state", "message", "flags")]
     columns += [Column(name, unit) for name, unit in maps_in(ds).items() if name != "flags"]
     of_finger = []
@@ -109,7 +111,7 @@ def as_csv(ds: xr.Dataset, model: str = "ccm", listed: Iterable[dict[str, Any]] 
     columns += [c._replace(name=f"finger{f}.{c.name}") for f in (1, 2) for c in of_finger]
     rows = []
     for case in cases(ds, model) if listed is None else listed:
-        row = {**_spoken_place(ds, case), **case["maps"], **case, "flags": case["flags"] & OF_FILE}
+        row = {**_spoken_place(axes, case), **case["maps"], **case, "flags": case["flags"] & OF_FILE}
         for f, finger in enumerate(case["fingers"], start=1):
             flat = (float(v) for part in finger.values() for v in np.ravel(part))
             row |= {f"finger{f}.{c.name}": v for c, v in zip(of_finger, flat, strict=True)}

@@ -345,5 +345,5 @@ def with_intervals(ds: xr.Dataset) -> xr.Dataset:
         text = f"Half of the range in which {name} (CCM) of 95 % of the samples of the uncertain inputs lies."
         given[f"{name}_interval"] = (given.status.dims, half_width(values.values), about | {"definition": text})
         given[f"{name}_samples"] = values
-    given.attrs["derived"] = " ".join([*ds.attrs["derived"].split(), *(f"{name}_interval" for name in names)])
+    given.attrs["derived"] += "".join(f" {name}_interval" for name in names)
     return given
