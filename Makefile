@@ -88,7 +88,7 @@ bench: setup
 
 lint: setup
 	$(BIN)/ruff check .
-	$(BIN)/python -m mypy -p softjaw
+	$(BIN)/python -m mypy -p softjaw -p jobs
 
 doctor: setup
 	@$(BIN)/softjaw doctor

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import argparse
 import csv
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from functools import partial
 from itertools import chain, cycle
@@ -105,9 +105,9 @@ def choices(scene: Scene) -> Iterator[EffectChoice]:
         solver.put_away()
 
 
-def contacts_at(scene: Scene, **levels: str) -> dict[tuple[int, float], list[Contact]]:
+def contacts_at(scene: Scene, **levels: str) -> dict[tuple[int, float], Sequence[Contact]]:
     """Contacts by candidate and force where there is a solution; effects that are not named are left out."""
-    contacts = {}
+    contacts: dict[tuple[int, float], Sequence[Contact]] = {}
     for n, choice in enumerate(choices(at_levels(scene, **(PLAIN | levels)))):
         for k, force in enumerate(choice.solver.forces):
             with suppress(ConvergenceError, CheckError):
@@ -115,7 +115,7 @@ def contacts_at(scene: Scene, **levels: str) -> dict[tuple[int, float], list[Con
     return contacts
 
 
-def e_n(contacts: list[Contact], friction: str = "ccm") -> float:
+def e_n(contacts: Sequence[Contact], friction: str = "ccm") -> float:
     """e_n of the weaker finger [m]."""
     return min(c.limits[friction].e_n for c in contacts)
 
@@ -132,13 +132,13 @@ def volume(contact: Contact, found: SurfaceFit) -> float:
     return found.surface.volume * found.surface.shadow_area / (exact.volume * exact.shadow_area)
 
 
-def of_patch(name: str, contacts: list[Contact]) -> Iterator[Row]:
+def of_patch(name: str, contacts: Sequence[Contact]) -> Iterator[Row]:
     """Effects that are chosen when the contact is solved."""
     S, F_N = (sum(getattr(c.limits["ccm"], value) for c in contacts) for value in ("S", "F_N"))
     yield "friction", name, 1.0 - F_N / S, np.nan, 1, off(e_n(contacts, "pcm"), e_n(contacts))
     c = contacts[0]
     for level in SURFACES:
-        found = fit_surface(c, "ccm", LimitSurfaceKeys(model=level))
+        found = fit_surface(c, "ccm", LimitSurfaceKeys.model_validate({"model": level}))
         yield "limit surface", f"{name}, {level}", found.fit_error_own.Erad, np.nan, 1, off(volume(c, found), 1.0)
 
 
@@ -220,8 +220,8 @@ def summary(rows: list[Row]) -> Iterator[str]:
     _, _, error = of_effect(rows, EXACT)
     yield f"{EXACT}: {len(error)} cases, largest difference from the whole {error.max(initial=0.0):.1e}"
     for level in SURFACES:
-        error = [row[5] for row in rows if row[0] == "limit surface" and row[1].endswith(level)] or [np.nan]
-        yield f"quality with {level}: off by {min(error):.2%} to {max(error):.1%}, on average {np.mean(error):.2%}"
+        off_by = [row[5] for row in rows if row[0] == "limit surface" and row[1].endswith(level)] or [np.nan]
+        yield f"quality with {level}: off by {min(off_by):.2%} to {max(off_by):.1%}, on average {np.mean(off_by):.2%}"
 
 
 def draw(rows: list[Row]) -> bytes:
@@ -275,7 +275,7 @@ def table(file: Path, parts: list[str]) -> None:
             stream.flush()
 
 
-PARTS = {  # with the effects that each has rows of
+PARTS: dict[str, tuple[Callable[[], Iterator[Row]], tuple[str, ...]]] = {  # with the effects that each has rows of
     "friction": (partial(chosen_rows, COUPLED, COUPLING, "none", "tangential", {"sheet": "rigid"}), (COUPLING,)),
     "plates": (partial(chosen_rows, "sheet", "sheet", "rigid", "elastic", {COUPLED: "none"}), ("sheet",)),
     "patches": (patch_rows, ("friction", "limit surface", EXACT)),

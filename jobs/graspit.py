@@ -48,5 +48,5 @@ if __name__ == "__main__":
     data = sj.open(sys.argv[1])
     semi_axes = data.limit_surface_semi_axes.sel(model="ccm").transpose(..., "finger", "component").values
     pairs = semi_axes.reshape(-1, *semi_axes.shape[-2:])
-    shares = [volume_share(*pair, 0.05) for pair in pairs if (pair > 0).all()]
+    shares = [volume_share(one, other, 0.05) for one, other in pairs if min(one.min(), other.min()) > 0]
     print(f"GraspIt!'s volume over the exact one: {min(shares):.3f} to {max(shares):.3f} in {len(shares)} cases")

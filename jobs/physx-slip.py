@@ -66,7 +66,7 @@ def ratios(contact: PointContact) -> dict[str, tuple[float, float]]:
             speeds.append((body.linear_velocity[0], body.angular_velocity[2]))
         growth = np.diff(speeds, axis=0)[-PULLED // 2 :].mean(axis=0) / STEP
         carried = np.array([f, tau]) - growth * [MASS, INERTIA]
-        found[name] = tuple(float(v) for v in carried / largest)
+        found[name] = (float(carried[0] / largest[0]), float(carried[1] / largest[1]))
     return found
 
 

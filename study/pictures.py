@@ -12,6 +12,7 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.ticker import LogLocator, NullFormatter
 
 INK, SOFT = "#1d2429", "#6b747b"
 ALIKE = 0.02  # relative, below which colours would draw differences that are errors
@@ -61,3 +62,11 @@ def span(values: Any) -> tuple[float, float]:
         return low, high
     room = 0.05 * abs(high) or 0.5
     return low - room, high + room
+
+
+def logarithmic(plot: Any) -> None:
+    """Give a plot a logarithmic x axis with plain numbers at 1, 2 and 5 of each decade."""
+    plot.set_xscale("log")
+    plot.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    plot.xaxis.set_major_formatter("{x:g}")
+    plot.xaxis.set_minor_formatter(NullFormatter())

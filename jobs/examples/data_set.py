@@ -5,7 +5,10 @@ The data set is what ``softjaw export results/objects --format graspgen -o DATA_
 
 import json
 import sys
+from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -27,14 +30,15 @@ class Grasps:
 
 
 if __name__ == "__main__":
-    data = Grasps(sys.argv[1])
-    try:
+    data = Grasps(sys.argv[1]) if len(sys.argv) == 2 else sys.exit(__doc__)
+    batches: Iterable[Any] = [data[n] for n in range(len(data))]  # an object's grasps at a time
+    with suppress(ImportError):
         from torch.utils.data import ConcatDataset, DataLoader
 
-        each = ConcatDataset([[{k: v[i] for k, v in item.items()} for i in range(len(item["force"]))] for item in data])
+        each = ConcatDataset(
+            [[{k: v[i] for k, v in item.items()} for i in range(len(item["force"]))] for item in batches]
+        )
         batches = DataLoader(each, batch_size=64, shuffle=True)
-    except ImportError:
-        batches = data
     good = whole = 0
     for batch in batches:
         good, whole = good + int(batch["object_in_gripper"].sum()), whole + len(batch["force"])

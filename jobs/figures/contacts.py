@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -69,7 +68,7 @@ def _fewer(pad: Pad) -> Pad:
     counts = (min(n, len(k)) for k, n in zip((rows, columns), ARROWS, strict=True))
     i, j = (k[((np.arange(n) + 0.5) / n * len(k)).astype(int)] for k, n in zip((rows, columns), counts, strict=True))
     of = np.ix_(i, j)
-    return replace(pad, centroid=pad.centroid[of], normal=pad.normal[of], pressure=pad.pressure[of], area=pad.area[of])
+    return pad._replace(centroid=pad.centroid[of], normal=pad.normal[of], pressure=pad.pressure[of], area=pad.area[of])
 
 
 def candidates(ds: xr.Dataset) -> tuple[Any, str]:

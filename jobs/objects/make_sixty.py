@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import csv
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +21,7 @@ BOTTLE = [(0, 0), (26, 0), (30, 4), (30, 90), (14, 115), (14, 130), (0, 130)]  #
 SPINDLE = [(0, 0), (12, 0), (22, 25), (10, 50), (22, 75), (12, 100), (0, 100)]
 
 
-def turned(outline: list[tuple[float, float]]) -> trimesh.Trimesh:
+def turned(outline: Sequence[tuple[float, float]]) -> trimesh.Trimesh:
     """A body of revolution [m]."""
     return revolve(1e-3 * np.array(outline), sections=40)
 

@@ -149,10 +149,11 @@ def cost_text(ds: xr.Dataset) -> str:
 def cost_picture(ds: xr.Dataset) -> bytes:
     """Largest errors over the time of a case, a line for each value of the last axis; the scene's own is ringed.
 
-    Thin dashes are the largest errors that the results state themselves.
+    Dashes and hollow marks are the largest errors that the results state themselves.
     """
     settings = [s for s in settings_in(ds) if not s.reference]
     names, last = list(settings[0].worst), list(settings[0].values)[-1]
+    seconds = [s.seconds for s in settings]
     with pictures.style():
         drawn, axes = pictures.figure(3.4 * len(names), 3.2, 1, len(names))
         for plot, name in zip(axes[0], names, strict=True):
@@ -161,11 +162,13 @@ def cost_picture(ds: xr.Dataset) -> bytes:
                 line = [(s.seconds, s.worst[name]) for s in along if s.worst[name] > 0]
                 plot.plot(*np.transpose(line or [(np.nan, np.nan)]), color=colour, marker=marker, label=value)
                 claimed = [(s.seconds, s.stated[name]) for s in along]
-                plot.plot(*np.transpose(claimed), "--", lw=1, marker=marker, ms=3, color=colour)
+                plot.plot(*np.transpose(claimed), "--", lw=1, marker=marker, mfc="none", color=colour)
             given = [(s.seconds, s.worst[name]) for s in settings if s.given and s.worst[name] > 0]
             if given:
                 plot.plot(*np.transpose(given), "o", ms=11, mfc="none", color="black", label="as in the scene")
-            title = f"largest error of {name} (dashed: stated)"
-            plot.set(xscale="log", yscale="log", xlabel="time per case [s]", title=title)
-        axes[0][-1].legend(title=last)
+            plot.set(yscale="log", xlabel="time per case [s]", title=f"largest error of {name} (hollow: stated)")
+            if max(seconds) > 5 * min(seconds):  # over less, a logarithmic axis has no room for its labels
+                pictures.logarithmic(plot)
+        named = axes[0][-1].get_legend_handles_labels()
+        drawn.legend(*named, loc="outside lower center", ncols=4, title=last, frameon=False)
         return pictures.as_png(drawn)

@@ -173,6 +173,9 @@ class _ObjectsRun:
             return [settle(w, part.plan.units, part.torn, self._retry) for w, part in zip(writers, parts, strict=True)]
 
         codes = np.concatenate(on_rank0(self._comm, states))
+        if self._comm.rank == 0:  # in each round of further grasps and finer meshes counts begin anew
+            missing, s = np.count_nonzero(codes == quantities.MISSING), "s" * (len(parts) > 1)
+            print(f"{len(parts)} object{s}: {missing} of {codes.size} cases to solve", flush=True)
         units = [files.counted(i, part.plan.units) for i, part in enumerate(parts)]
         session = Session(units, self._work, files, self._comm, codes)
         code = session.solve()

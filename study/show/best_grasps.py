@@ -253,7 +253,7 @@ def value_text(ds: xr.Dataset, name: str, index: Index, digits: int = 4, unit: b
 def _force(ds: xr.Dataset, index: Index) -> tuple[str, str]:
     """How hard to press: the least force that holds the mass, else what some forces hold and how to name a mass."""
     mass, safety = task_keys(ds, "object").get("mass_g"), task_keys(ds).get("safety", 1.0)
-    pressed = f"{forces(ds)[index[-1]]:.3g} N per finger"
+    pressed = f"{number(forces(ds)[index[-1]], 3)} N per finger"
     if mass is None:
         some = [(*index[:-1], k) for k in other_levels(len(forces(ds)), index[-1])]
         known = [i for i in some if np.isfinite(at(ds, "payload", i)) and not int(ds["flags"].values[i]) & LOST]

@@ -33,7 +33,7 @@ def scene_text(scene: Any, file: str) -> str:
         "friction": f"mu = {scene.friction.mu:g}; CCM, PCM and PCM scaled by F_N",
         "sweep": "; ".join(f"{key}: {listed(values)}" for key, values in scene.sweep.items()),
         "cases": f"{most}{scene.cases}",
-        "refinement": f"at most {c.refine} more cases" if c.refine else "",
+        "refinement": f"at most {c.refine} more cases, beside their images by symmetry" if c.refine else "",
         "pad": f"{size} mm, {g.material}, {g.shear_modulus_kpa:g} kPa, {mesh} elements ({g.element})",
         "accuracy": _meshes(listed_accuracy(scene), "those that may be the best" if c.sampled else "every case"),
         "intervals": f"from {inputs}; every case is solved {scene.uncertainty.samples} more times" if inputs else "",

@@ -25,7 +25,7 @@ from softjaw.study.show.grasps import (
     spoken,
 )
 from softjaw.study.show.object_surface import undeformed
-from softjaw.study.show.report.maps import ticks
+from softjaw.study.show.report.maps import elsewhere, ticks
 from softjaw.study.show.view.model import View
 
 PANELS = ("e_n", "quality", "tau_z_max", "f_x_max", "f_y_max", "closing")
@@ -97,7 +97,7 @@ def differences(ds: xr.Dataset, index: Index) -> list[Block]:
     position = -max(swept, default=(0, 0))[1]  # the longest axis that sweeps a number of the object
     if not swept or not (lines := overestimates(ds, position, index)):
         return []
-    return [_differences(ds, name, x, lines, index) for name, x in abscissas(ds, position, index).items()]
+    return [_differences(ds, name, x, lines, position, index) for name, x in abscissas(ds, position, index).items()]
 
 
 def overestimates(ds: xr.Dataset, position: int, index: Index) -> dict[tuple[str, str], Any]:
@@ -122,7 +122,9 @@ def abscissas(ds: xr.Dataset, position: int, index: Index) -> dict[str, np.ndarr
     }
 
 
-def _differences(ds: xr.Dataset, name: str, x: np.ndarray, lines: dict[Any, Any], index: Index) -> Block:
+def _differences(
+    ds: xr.Dataset, name: str, x: np.ndarray, lines: dict[Any, Any], position: int, index: Index
+) -> Block:
     shown_models = [m for m in AGAINST if any(model == m for model, _ in lines)]
     made = plots.figure(1, len(shown_models), [AGAINST[m] for m in shown_models])
     order = np.argsort(x)
@@ -133,7 +135,8 @@ def _differences(ds: xr.Dataset, name: str, x: np.ndarray, lines: dict[Any, Any]
     made.update_layout(legend={"y": -0.25})
     fine = HALF_AS_FINE if any(e is not None for _, e in lines.values()) else ""
     share = "the share of the planar model's claim that the curved contact cannot carry."
-    caption = f"At {number(forces(ds)[index[-1]])} N: {share}{fine}"
+    at = elsewhere(ds, index, position) or f"{number(forces(ds)[index[-1]])} N"
+    caption = f"At {at}: {share}{fine}"
     return plot(made, caption, f"Differences of PCM and CCM over {name}.", 400)
 
 

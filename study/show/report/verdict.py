@@ -38,13 +38,15 @@ ASCII = str.maketrans({"\N{MULTIPLICATION SIGN}": "x", "±": "+-"})
 def subtitle(ds: xr.Dataset) -> str:
     """File and axes in one line."""
     parts, poses = [], ds.attrs["poses"]
-    for axis in axes_of(ds):
+    for k, axis in enumerate(axes_of(ds), start=-ds.status.ndim):
         n, ends = len(axis.values), (int(f(axis.values)) for f in (np.argmin, np.argmax))
         if axis.name == "station" and poses:
             parts.append(f"{n} candidate{'s' * (n > 1)}")
         elif axis.name != "angle" or not poses:
             reach = " to ".join(dict.fromkeys(value_text(axis, i) for i in ends))
-            parts.append(f"{n} {spoken(axis.name)}{'s' * (n > 1)} ({reach})")
+            name = spoken(axis.name)
+            known = f"{name}s" if k >= -3 else f"values of {name}"  # a swept key may have any name
+            parts.append(f"{n} {known if n > 1 else name} ({reach})")
     return f"{Path(ds.attrs['file']).name}: {' × '.join(parts)}"
 
 
