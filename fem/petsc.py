@@ -460,6 +460,11 @@ class Factors:
             thing.destroy()
 
 
+def options_elsewhere() -> list[str]:
+    """Names of a solve's options that the environment variable PETSC_OPTIONS has set."""
+    return [name for name in PETSc.Options().getAll() if name.startswith(PREFIX)]
+
+
 def unknown_options(options: dict[str, Any]) -> list[str]:
     """Names among ``options`` that no solver asks PETSc for, misspelt ones for example; printing ones are not judged.
 

@@ -10,7 +10,7 @@ from softjaw.fem.materials import Material, material
 from softjaw.fem.pad.backing_plate import relative_compliance
 from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.pad.shape import BackingPlate, TiltingMount
-from softjaw.fem.petsc import PETSc, unknown_options
+from softjaw.fem.petsc import PETSc, options_elsewhere, unknown_options
 from softjaw.friction.patch import FloatArray
 from softjaw.study.case.build import pad_shape
 from softjaw.study.case.geometry import KNOWN_DEPTH, Finger
@@ -133,7 +133,10 @@ def press_of(scene: Scene, finger: Finger, coarser: bool, stride: int = 1) -> Pr
 
 
 def check_petsc(wanted: dict[str, Any]) -> None:
-    """Refuse PETSc options that no solver asks for, or that PETSc itself refuses."""
+    """Refuse PETSc options that no solver asks for, that PETSc itself refuses, or that the scene does not know of."""
+    if hidden := [f"-{name}" for name in options_elsewhere()]:
+        text = f"petsc: found {', '.join(hidden)} in PETSC_OPTIONS, which no result tells"
+        raise StudyError(USAGE, f"{text}; give them after '--', or as keys of [petsc]")
     try:
         strange = unknown_options(wanted)
     except PETSc.Error as error:

@@ -1,6 +1,7 @@
 """The command line: the module that a command needs is imported when it runs, and every error becomes an exit code."""
 
 import errno
+import io
 import os
 import sys
 import traceback
@@ -12,7 +13,7 @@ from typing import Any
 from softjaw.study.cli.options import program
 from softjaw.study.doctor import begin_mpi, keep_compiled_loops, pin_threads
 from softjaw.study.messages import BUG, CANNOT_WRITE, DONE, LACKING, STOPPED, USAGE, StudyError, complain, printable
-from softjaw.study.run.limits import is_out_of_memory, no_room, require_room
+from softjaw.study.run.limits import is_out_of_memory, listen, no_room, require_room
 
 UNWRITABLE = {errno.EPIPE, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}  # what standard output can answer
 SOLVING = ("run", "cost")
@@ -24,6 +25,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     pin_threads()
     keep_compiled_loops()
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # the search for some is a tenth of a start
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # a coding that lacks a letter ends no command
+            stream.reconfigure(errors="backslashreplace")
     words = list(sys.argv[1:] if arguments is None else arguments)
     # What follows "--" belongs to PETSc, whose options argparse would take for its own.
     cut = words.index("--") if "--" in words else len(words)
@@ -63,6 +67,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def command(options: Namespace) -> int:
     """Import the module of a command and run it; a text that it returns is printed."""
     if options.command in SOLVING:
+        listen()
         # Before the solvers load, which may hang instead of failing where memory is short.
         require_room()
     if options.command == "run":

@@ -29,6 +29,7 @@ from softjaw.study.quantities import BY_KEY, DONE, NO_GRASP, STATES
 from softjaw.study.ranking import judged, task_keys
 from softjaw.study.result.index import arrays_file, read_index
 from softjaw.study.result.read import maps_in, open, scene_of
+from softjaw.study.result.store import open_result
 from softjaw.study.table import Row, plain
 from softjaw.study.units import UNITS
 
@@ -146,11 +147,12 @@ FORMS = {"graspgen": _graspgen, "acronym": _acronym, "webdataset": _webdataset}
 
 
 def solved_files(index: Path) -> Iterator[tuple[Row, xr.Dataset]]:
-    """Rows of a folder's objects that have solved cases, each with its result file."""
-    for row in read_index(index)[0]:
-        path = index.parent / row["file"]
-        if row["done"] > 0 and path.exists():
-            yield row, open(path)
+    """Rows of a folder's objects that have solved cases, each with its result file; none before all of them open."""
+    rows = [(row, index.parent / row["file"]) for row in read_index(index)[0] if row["done"] > 0]
+    for _, path in rows:
+        with open_result(path):
+            pass
+    yield from ((row, open(path)) for row, path in rows)
 
 
 def _objects(index: Path, gripper: GripperFrame) -> Iterator[ObjectGrasps]:

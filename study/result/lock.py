@@ -42,16 +42,22 @@ class Lock:
             if attempt == 5:
                 raise self._in_use(holder or "name unknown")
             time.sleep(0.1)
-        # A shorter name must not keep the end of a longer one that a killed run left.
-        os.ftruncate(self._fd, 0)
-        os.pwrite(self._fd, self.owner.encode(), 0)
+        with self._writing():
+            # A shorter name must not keep the end of a longer one that a killed run left.
+            os.ftruncate(self._fd, 0)
+            os.pwrite(self._fd, self.owner.encode(), 0)
         self._flock(fcntl.LOCK_SH)
 
     def _opened(self) -> int:
-        try:
+        with self._writing():
             return os.open(self.path, os.O_RDWR | os.O_CREAT, 0o666)
+
+    @contextlib.contextmanager
+    def _writing(self) -> Iterator[None]:
+        try:
+            yield
         except OSError as error:
-            remedy = "choose another place with -o"
+            remedy = "choose another place with -o, or make room"
             text = f"{self.result}: cannot be written: {error.strerror} for {self.path.name} beside it; {remedy}"
             raise StudyError(CANNOT_WRITE, text) from error
 

@@ -60,7 +60,8 @@ class Result:
         self._unchecked = unchecked
         # With a wrong header, the sums of the rows would be looked for in the wrong places.
         if not unchecked and str(checksums.of_header(file, self.layout)) != file.attributes(ROOT).get("checksum"):
-            raise self._damaged("axes, layout, scene or definitions do not match their checksum")
+            what = "axes, layout, scene or definitions do not match their checksum"
+            raise file.damaged(what, "restore it from a copy, or move it away and run the scene again")
 
     def refuse_other(self, header: Header) -> None:
         """Raise `StudyError` unless the file was made from the scene of a header."""

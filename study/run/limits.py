@@ -37,6 +37,19 @@ class AbandonedError(BaseException):
     """The case in flight is given up; not an ``Exception``, so that no solver takes it for a failed step."""
 
 
+early: set[int] = set()  # signals that came when no `Stopper` listened
+
+
+def remember(number: int, _frame: Any) -> None:
+    """Keep a signal for the next `Stopper`."""
+    early.add(number)
+
+
+def listen() -> None:
+    """From now on a batch system's signal ends no process: the next `Stopper` acts on it."""
+    signal.signal(signal.SIGUSR1, remember)
+
+
 class Stopper:
     """Listens to signals between ``with stopper:``; ``name`` is the signal that came, or empty; ``limit`` as below.
 
@@ -52,9 +65,11 @@ class Stopper:
         self._leave = self._case_ends = math.inf
 
     def __enter__(self) -> Stopper:
-        """Take the handlers over."""
+        """Take the handlers over, and act on what came before."""
         self._before = {number: signal.signal(number, self._stop) for number in GRACE}
         self._before[signal.SIGALRM] = signal.signal(signal.SIGALRM, self._alarm)
+        while early:
+            self._stop(early.pop(), None)
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -64,7 +79,7 @@ class Stopper:
             # A batch system may send it when all is solved, and by default it would make the finished run a failed one.
             late = number == signal.SIGUSR1 and handler == signal.SIG_DFL
             # not SIG_IGN, which programs started from here would inherit
-            signal.signal(number, (lambda number, frame: None) if late else handler)
+            signal.signal(number, remember if late else handler)
 
     @contextmanager
     def case(self) -> Iterator[None]:

@@ -261,10 +261,18 @@ def _rows_of(folder: ObjectFolder, out: Path, retry_failed: bool) -> list[Row]:
             change = _change(out / row["file"], scene)
             text = f"{path}: object '{listed.name}' was solved from another scene or mesh ({change})"
             raise StudyError(messages.OTHER_FILE, f"{text}; choose another folder with -o, or move this one away")
-        if before["key"] == key:
+        if before["key"] == key and (before["done"] < 1 or _whole(out / row["file"])):
             row = before | ({"state": index.MISSING} if before["state"] in again else {})
         rows.append(row | {"key": key} | ({} if mass is None else {"mass": in_si("mass_g", mass)}))
     return rows
+
+
+def _whole(path: Path) -> bool:
+    """Whether a result file is there; raises `StudyError` where it is and cannot be read."""
+    if path.exists():
+        with open_result(path):
+            return True
+    return False
 
 
 def _change(path: Path, scene: Scene) -> str:

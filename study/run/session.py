@@ -305,7 +305,7 @@ class Compiling(Listener):
     def on_start(self, event: Event) -> None:
         """Say it."""
         if not self._said:
-            print("compiling for this machine, once: a minute or two", flush=True)
+            print("compiling for this machine: a minute or two", flush=True)
         self._said = True
 
     def on_end(self, event: Event) -> None:

@@ -55,8 +55,9 @@ def status_text(path: Path, width: int) -> str:
     runner = holder(path)
     ended = [row for row in rows if row["state"] != index.STOPPED]
     # The index does not know how far an object was when a run was killed; its file does.
-    cases = sum(max(row["done"], 0) for row in ended) + sum(done for done, _ in _under_way(path, rows))
-    seconds = duration(sum(np.nan_to_num(row["seconds"]) for row in ended))
+    now = _under_way(path, rows)
+    cases = sum(max(row["done"], 0) for row in ended) + sum(done for done, *_ in now)
+    seconds = duration(sum(np.nan_to_num(row["seconds"]) for row in ended) + sum(seconds for *_, seconds in now))
     lines = [f"{path}: {counts_text(rows)}", f"  {cases} cases solved; what is done took {seconds} on all ranks"]
     resume = "run the same command again to resume" * (index.code_of(rows) == STOPPED)
     lines += filter(None, [f"running now: {runner}" if runner else resume])
@@ -74,15 +75,16 @@ def look(path: Path) -> tuple[list[str], int | None]:
     runner = holder(path)  # asked first: what a run writes before it ends is then read below
     rows, _ = index.read_index(path)
     under_way = _under_way(path, rows)
-    done, cases = (sum(part) for part in zip(*under_way, strict=True)) if under_way else (0, 0)
+    done, cases, _ = (sum(part) for part in zip(*under_way, strict=True)) if under_way else (0, 0, 0)
     now = f"; {done}/{cases} cases of {len(under_way)} objects that are solved now" if cases else ""
     return [f"{counts_text(rows)}{now}"], None if runner else index.code_of(rows)
 
 
-def _under_way(path: Path, rows: list[Row]) -> list[tuple[int, int]]:
-    """Cases that have an end, and all, of the file of each object that is under way."""
+def _under_way(path: Path, rows: list[Row]) -> list[tuple[int, int, float]]:
+    """Cases that have an end, all, and seconds they took, of the file of each object that is under way."""
     counts = []
     for file in (path.parent / row["file"] for row in rows if row["state"] == index.STOPPED):
         with suppress(StudyError), open_result(file, unchecked=True) as result:
-            counts.append((int(np.sum(result.codes != MISSING)), result.codes.size))
+            seconds = np.nansum(result.read("work/seconds_total"))
+            counts.append((int(np.sum(result.codes != MISSING)), result.codes.size, float(seconds)))
     return counts

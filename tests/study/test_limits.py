@@ -20,7 +20,7 @@ from softjaw.study.case.result import TimeLimitError
 from softjaw.study.messages import CANNOT_WRITE, USAGE, StudyError
 from softjaw.study.result.lock import OpenedFile
 from softjaw.study.run import limits
-from softjaw.study.run.limits import GRACE, AbandonedError, Stopper, available, limited_memory
+from softjaw.study.run.limits import GRACE, AbandonedError, Stopper, available, limited_memory, listen
 from tests.study.launching import launch
 
 
@@ -30,16 +30,7 @@ def wait():
         time.sleep(0.01)
 
 
-def test_a_signal_after_the_end_fails_no_run_and_what_takes_too_long_is_interrupted_but_not_the_next():
-    before = signal.getsignal(signal.SIGUSR1)
-    signal.signal(signal.SIGUSR1, signal.SIG_DFL)
-    try:
-        with Stopper(lambda: None):
-            pass
-        os.kill(os.getpid(), signal.SIGUSR1)
-        assert signal.getsignal(signal.SIGUSR1) != signal.SIG_IGN  # which children would inherit
-    finally:
-        signal.signal(signal.SIGUSR1, before)
+def test_what_takes_too_long_is_interrupted_but_not_the_next():
     with Stopper(lambda: None, 0.1) as stopper:
         with pytest.raises(TimeLimitError), stopper.case():
             wait()
@@ -49,6 +40,24 @@ def test_a_signal_after_the_end_fails_no_run_and_what_takes_too_long_is_interrup
         with pytest.raises(TimeLimitError), stopper.case():
             wait()
     assert signal.getsignal(signal.SIGALRM) == signal.SIG_DFL
+
+
+@pytest.mark.parametrize("begin", [listen, lambda: Stopper(lambda: None).__enter__().__exit__()])
+def test_a_signal_before_or_between_sessions_ends_no_process_and_stops_the_next_session(begin):
+    before = signal.getsignal(signal.SIGUSR1)
+    signal.signal(signal.SIGUSR1, signal.SIG_DFL)
+    told = []
+    try:
+        begin()
+        os.kill(os.getpid(), signal.SIGUSR1)
+        assert signal.getsignal(signal.SIGUSR1) != signal.SIG_IGN  # which children would inherit
+        with Stopper(lambda: told.append("stop")) as stopper:
+            pass
+        with Stopper(lambda: told.append("again")) as next_one:
+            pass
+    finally:
+        signal.signal(signal.SIGUSR1, before)
+    assert (stopper.name, next_one.name, told) == ("SIGUSR1", "", ["stop"])
 
 
 def test_an_interruption_that_was_swallowed_comes_again_and_a_signal_stops_before_the_time_limit(monkeypatch):

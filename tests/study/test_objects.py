@@ -159,6 +159,15 @@ def test_again_nothing_is_solved_another_mesh_is_refused_and_a_signal_stops_in_o
     before = {path: path.stat().st_mtime_ns for path in solved.glob("*.hdf") if path.stem != "index"}
     assert here(fake_objects.main, scene, solved)[0] == SOME_FAILED
     assert {path: path.stat().st_mtime_ns for path in before} == before
+    stored = solved / "a.hdf"
+    whole = stored.read_bytes()
+    stored.write_bytes(whole[:5000])
+    assert here(fake_objects.main, scene, solved)[0] == OTHER_FILE
+    stored.unlink()
+    assert command(0, "export", solved, "--format", "graspgen", "-o", scene.parent / "set")[0] == OTHER_FILE
+    assert not (scene.parent / "set").exists()
+    assert here(fake_objects.main, scene, solved)[0] == SOME_FAILED
+    assert stored.exists()
     mesh = scene.parent / "meshes/a.stl"
     content = mesh.read_bytes()
     mesh.unlink()

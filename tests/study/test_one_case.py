@@ -10,8 +10,10 @@ from mpi4py import MPI
 from threadpoolctl import threadpool_limits
 
 import softjaw as sj
+from softjaw.fem.petsc import PETSc
 from softjaw.study import pipeline
 from softjaw.study.case.candidates import candidates
+from softjaw.study.case.model import check_petsc
 from softjaw.study.one_case import CaseError, _asked
 from softjaw.study.quantities import BY_KEY, MODELS
 from softjaw.study.result.store import open_result
@@ -172,3 +174,14 @@ def test_poses_are_turned_and_shifted_as_the_scene_says_but_not_where_a_pad_stan
 def test_what_names_no_case_is_refused(scene, asked, error, words):
     with pytest.raises(error, match=words):
         sj.press(scene, **{"force": 1.0, **asked})
+
+
+def test_options_of_the_solver_that_no_result_would_tell_of_are_refused():
+    database = PETSc.Options()
+    database.setValue("contact_snes_max_it", 1)
+    try:
+        with pytest.raises(sj.StudyError, match="contact_snes_max_it"):
+            check_petsc({})
+    finally:
+        database.delValue("contact_snes_max_it")
+    check_petsc({})

@@ -53,15 +53,17 @@ def calls(folder):
 
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: path.stem)
 def test_a_signal_stops_the_run_and_puts_the_job_back_into_the_queue(script, tmp_path, slurm):
-    words = ["a.toml", "b.toml"] if script.stem == "array" else ["b.toml"]
-    process = started(script, tmp_path, slurm, *words)
+    words, more = ["b.toml", "--set", "friction.mu=0.5"], {}
+    if script.stem == "array":
+        words, more = ["a.toml", "b.toml"], {"OPTIONS": "--set friction.mu=0.5"}
+    process = started(script, tmp_path, slurm, *words, **more)
     wait_for((tmp_path / "working").exists)
     process.send_signal(signal.SIGUSR1)
     output, _ = process.communicate(timeout=30)
     assert process.returncode == 75, output
-    run = "-n 3 .venv/bin/softjaw run b.toml"
+    run = "-n 3 .venv/bin/softjaw run b.toml --set friction.mu=0.5"
     assert calls(tmp_path) == [run, "scontrol requeue 4711"]
-    assert finished(script, tmp_path, slurm, *words, SLURM_RESTART_COUNT="1")[0] == 0
+    assert finished(script, tmp_path, slurm, *words, SLURM_RESTART_COUNT="1", **more)[0] == 0
     assert calls(tmp_path) == [run, "scontrol requeue 4711", run]
 
 
@@ -70,6 +72,11 @@ def test_a_job_that_never_ends_is_not_put_back_for_ever(tmp_path, slurm):
     code, _ = finished(*words, SLURM_RESTART_COUNT="5", MOST_RESTARTS="5", FAKE_CODE="75")
     assert code == 75
     assert not any("scontrol" in line for line in calls(tmp_path))
+
+
+def test_a_signal_that_comes_before_the_run_has_begun_puts_the_job_back_too(tmp_path, slurm):
+    assert finished(SCRIPTS[-1], tmp_path, slurm, "a.toml", FAKE_CODE="138")[0] == 75
+    assert calls(tmp_path)[1:] == ["scontrol requeue 4711"]
 
 
 @pytest.mark.parametrize("code", [0, 2, 6, 70, 137])
