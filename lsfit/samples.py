@@ -66,8 +66,9 @@ def sample_rank(W: ArrayLike) -> int:
 
 def pressed(W: ArrayLike) -> NDArray[np.bool_]:
     """Which wrenches ``(m, d)`` are not zero, or the rounding of that (`ZERO_SHARE`): the others fit no surface."""
-    size = np.linalg.norm(np.asarray(W, float), axis=1)
-    return size > ZERO_SHARE * size.max()
+    W = np.asarray(W, float)
+    squares = np.einsum("md,md->m", W, W)
+    return np.asarray(squares > ZERO_SHARE**2 * squares.max())
 
 
 def principal_frame(W: FloatArray) -> tuple[FloatArray, FloatArray, FitFlag]:
