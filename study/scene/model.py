@@ -288,8 +288,8 @@ class Scene(SceneSection):
         Parameters
         ----------
         values, **more
-            Values by dotted key, in the key's own unit: ``scene.with_values(**{"gripper.shear_modulus_kpa": 60})``.
-            None takes a key out, which then has its default.
+            Values by dotted key or by section, in the key's own unit: ``{"gripper.shear_modulus_kpa": 60}``, or
+            ``gripper={"shear_modulus_kpa": 60}``. None takes a key out, which then has its default.
 
         Raises
         ------
@@ -303,7 +303,9 @@ class Scene(SceneSection):
         >>> Scene.from_dict(tables).with_values(**{"object.radius_mm": 20}).object.radius
         0.02
         """
-        given = {**(values or {}), **more}
+        parts = {**(values or {}), **more}
+        given = {key: value for key, value in parts.items() if not isinstance(value, Mapping) or "." in key}
+        given |= {f"{part}.{key}": v for part in parts.keys() - given.keys() for key, v in parts[part].items()}
         if "candidates.stations_mm" in given:  # which are not the first and the last of the scene's own number
             given.setdefault("candidates.stations", None)
         return Scene.of_tables(put(self.effective(), plain_tables(given)))
@@ -350,6 +352,9 @@ def put(data: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
     tables = {name: dict(table) for name, table in data.items() if isinstance(table, Mapping) and name != "sweep"}
     for key, value in _matching_foam(tables.get("gripper", {}), values).items():
         section, _, name = key.partition(".")
+        if not name:
+            tables[section] = value  # no table, which is refused as in a file
+            continue
         tables.setdefault(section, {})[name] = value
         if value is None:
             del tables[section][name]

@@ -219,7 +219,10 @@ def test_overrides_replace_values_which_are_in_si_units_and_hyperfoam_fills_in_i
     assert one.gripper.hyperfoam_terms == ((-2,), (30e3,))
     two = parse_scene(BALL, overrides=["gripper.material=hyperfoam", "gripper.terms_kpa=[[8, 10], [-2, 20]]"])
     assert two.gripper.shear_modulus_kpa == 30
-    softer = two.with_values(**{"gripper.shear_modulus_kpa": 15})
+    softer = two.with_values(gripper={"shear_modulus_kpa": 15})
+    assert softer.digest == two.with_values(**{"gripper.shear_modulus_kpa": 15}).digest
+    with pytest.raises(SceneError, match="gripper: found 15"):
+        two.with_values(gripper=15)
     assert softer.gripper.hyperfoam_terms == ((8, -2), (5e3, 10e3))
     other = softer.with_values(**{"gripper.terms_kpa": [[4, 20]]})
     assert (other.gripper.hyperfoam_terms, other.gripper.shear_modulus_kpa) == (((4,), (20e3,)), 20)
