@@ -189,7 +189,7 @@ def _state_values(solution: Solution) -> dict[str, Any]:
     opening = float((second.origin - first.origin) @ first.rotation[:, 2])
     values |= {"maps/opening": opening, "maps/opening_loaded": opening - sum(closing)}
     values |= {f"checks/{name}": [check[name] for check in checks] for name in checks[0]}
-    return values | solution.fingers.wall_values(solution.states)
+    return values | solution.fingers.wall_values(contacts)
 
 
 def _work(solver: CandidateSolver, solved: Solved, friction: float, begun: float, before: Seconds) -> dict[str, Any]:

@@ -268,8 +268,8 @@ MAP_ROWS = (  # of every case, with what is said beside them
              "Largest principal strain, by size, on its two faces, as the stress.", needs=("wall",),
              error="relative"),
     Quantity("support_force", (), "N", "force of the support",
-             "What the support bears in this frictionless contact: the pads push sloping walls along their axis. Where"
-             " friction, mu F_N of both fingers, cannot take it, the flag is 'slides out'.", needs=("wall",)),
+             "What support or friction has to bear: pads push sloping walls along their axis. Of pressures alone."
+             " Where friction, mu F_N of both fingers, cannot take it, the flag is 'slides out'.", needs=("wall",)),
 )  # fmt: skip
 OF_FINGERS = ("f_x_max", "f_y_max", "tau_z_max", "tau_pure", "e_n_ratio", "S", "F_N", "force_excess", "closing")
 ROWS = (

@@ -47,15 +47,14 @@ def jumps(low: tuple[float, float], high: tuple[float, float]) -> bool:
 class WallState(NamedTuple):
     """The wall at one force: its mesh, state ``q (6 k,)`` [m] and contact forces ``load (k, 3)`` on its nodes [N].
 
-    ``reaction (3,)``: force of supports and springs on the whole object [N]; ``snapped``: whether the wall has snapped
-    in before, so that the force fell while the fingers closed, more force would open them, the force hardly grew, or
-    the wall closed far more than in proportion; ``opening``: see ``fem.shell.opening``.
+    ``snapped``: whether the wall has snapped in before, so that the force fell while the fingers closed, more force
+    would open them, the force hardly grew, or the wall closed far more than in proportion; ``opening``: see
+    ``fem.shell.opening``.
     """
 
     mesh: BodyMesh
     q: FloatArray
     load: FloatArray
-    reaction: FloatArray
     snapped: bool
     opening: float
 
@@ -283,9 +282,6 @@ class Grip(LoadPath[WallProblem]):
         if not worst <= max(WALL_BALANCE, RESIDUAL) * force:
             text = f"the state at {force:.4g} N converged but is wrong: a wall node is out of balance by {worst:.3g} N"
             raise CheckError(text)
-        # the supports balance both fingers: forces across a plane of symmetry cancel, the others add up
-        mirrored = np.array([*problem.model.shell.mesh.symmetry, False])
-        reaction = np.where(mirrored, 0.0, -load.sum(axis=0)) * 2.0 ** mirrored.sum()
-        wall = WallState(problem.model.shell.mesh, q, load, reaction, state.snapped, self.opening(q))
+        wall = WallState(problem.model.shell.mesh, q, load, state.snapped, self.opening(q))
         first, *others = (pad._replace(wall=wall) for pad in pads)
         return first._replace(other=others[0]) if others else first

@@ -25,16 +25,17 @@ from softjaw.fem.shell.wall_model import LinearShell, LinearWall, NonlinearWall
 from softjaw.friction.patch import NEGLIGIBLE, FloatArray
 
 HALF_TURN = np.diag([-1.0, -1.0, 1.0])
+HELD = 100.0  # stiffness of all springs, per direction, over that of a square of the wall that is drawn
 
 
 def supported(
-    mesh: BodyMesh, material: WallMaterial, support: str = "free", stiffness: float = 1.0
+    mesh: BodyMesh, material: WallMaterial, support: str = "free"
 ) -> tuple[Shell[BodyMesh], FloatArray]:
     """Shell of a body with springs, and which of its numbers ``(6 k,)`` its support fixes.
 
     "clamped": the flat bottom does not move, or both rims of a tube; "standing": the rim of the bottom keeps its
-    height; "free". The springs hold the rigid motions that are left, and resist no others: ``stiffness`` is that of all
-    together, per direction [N/m].
+    height; "free". The springs hold the rigid motions that are left, and resist no others: they are so stiff that the
+    wall as a whole stays where it is, as a rigid object does.
     """
     constrained = np.zeros((len(mesh.X), 6), dtype=bool)
     if support == "clamped":
@@ -46,6 +47,7 @@ def supported(
     elif support == "standing":
         constrained[mesh.foot, 2] = True
     fixed = constrained.ravel() | mesh.symmetric
+    stiffness = HELD * material.young_modulus * float(mesh.thickness.mean())
     springs = _springs(mesh, fixed.reshape(-1, 6), stiffness)
     return Shell(mesh, material.young_modulus, material.poisson_ratio, springs), fixed
 
@@ -73,8 +75,8 @@ def _springs(mesh: BodyMesh, fixed: NDArray[np.bool_], stiffness: float) -> tupl
 class ThinWalled(NamedTuple):
     """Object that gives way.
 
-    ``thickness`` of the wall [m], or pairs (z, thickness); ``support`` as in `supported`; ``springs``: in place of what
-    friction holds, all together and per direction [N/m]; ``open_top, open_bottom``: whether it has no lid, and no base.
+    ``thickness`` of the wall [m], or pairs (z, thickness); ``support`` as in `supported`; ``open_top, open_bottom``:
+    whether it has no lid, and no base.
     """
 
     surface: OuterSurface
@@ -83,7 +85,6 @@ class ThinWalled(NamedTuple):
     support: str = "free"
     open_top: bool = True
     base_thickness: float | None = None
-    springs: float = 1e3
     open_bottom: bool = False
 
 
@@ -159,7 +160,7 @@ def _supported(body: ThinWalled, frame: Grasp, size: MeshSize) -> tuple[Shell[Bo
         body.surface.turned(frame.angle), body.thickness, size, frame.mirrors,
         open_top=body.open_top, open_bottom=body.open_bottom, base_thickness=body.base_thickness,
     )  # fmt: skip
-    return supported(mesh, body.material, body.support, body.springs)
+    return supported(mesh, body.material, body.support)
 
 
 def _surface(mesh: BodyMesh):

@@ -233,7 +233,7 @@ class OnRigid:
             contacts.append(PressedContact(self.scene, self.fingers[1], states[0], (float(i), float(j), 1.0)))
         return contacts
 
-    def wall_values(self, states: Sequence[Any]) -> dict[str, Any]:
+    def wall_values(self, contacts: Sequence[PressedContact]) -> dict[str, Any]:
         """What the wall bears, keyed as in ``study.quantities``; a rigid object has none."""
         return {}
 
@@ -261,9 +261,9 @@ class OnWall:
             contacts.append(PressedContact(self.scene, self.fingers[1], state.fingers[0], signs))
         return contacts
 
-    def wall_values(self, states: Sequence[Any]) -> dict[str, Any]:
+    def wall_values(self, contacts: Sequence[PressedContact]) -> dict[str, Any]:
         """See `OnRigid`."""
-        return wall_values(self.grasp, states[0], self.shell)
+        return wall_values(self.grasp, contacts, contacts[0].state, self.shell)
 
 
 def pressing(

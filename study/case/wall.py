@@ -1,5 +1,6 @@
 """Thin-walled objects in a study: their wall, the level that a candidate calls for, and what the wall bears."""
 
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -14,6 +15,7 @@ from softjaw.fem.shell.wall_mesh import MeshSize
 from softjaw.fem.shell.wall_model import faces
 from softjaw.friction.patch import FloatArray
 from softjaw.study.case.build import outer_surface
+from softjaw.study.case.contact import Contact
 from softjaw.study.case.geometry import material_of
 from softjaw.study.case.result import UNDECIDED, surely_below
 from softjaw.study.flags import Flag
@@ -81,15 +83,16 @@ def _indentations(shell: Shell, q: FloatArray) -> FloatArray:
     return -np.einsum("ki,ki->k", v - drift, normal)
 
 
-def wall_values(grasp: Grasp, state: Pressed, shell: Shell) -> dict[str, Any]:
+def wall_values(grasp: Grasp, contacts: Sequence[Contact], state: Pressed, shell: Shell) -> dict[str, Any]:
     """What the wall bears in one case, keyed as in ``study.quantities``."""
     q = state.wall.q.reshape(-1, 6)
     both = faces(shell, state.wall.q)
+    force, approach = np.sum([c.pressure_wrench[:3] for c in contacts], axis=0), contacts[0].pose.rotation[:, 2]
     return {
         "maps/indentation": float(_indentations(shell, q).max(initial=0.0)),
         "maps/wall_stress": max(float(f.von_mises.max()) for f in both),
         "maps/wall_strain": max(float(np.abs(f.principal_strain).max()) for f in both),
-        "maps/support_force": float(np.linalg.norm(state.wall.reaction)),
+        "maps/support_force": float(np.linalg.norm(force - (force @ approach) * approach)),
         "wall/place": _places(grasp, shell, q),
     }
 

@@ -26,6 +26,12 @@ profile_mm = [[0, 27], [3, 29.4], [8, 30.4], [30, 31.3], [60, 32.5], [110, 34.5]
 wall_mm = 0.45
 wall_material = "PP"
 """
+SLOPE = """shape = "revolution"
+profile_mm = [[0, 26], [20, 30], [50, 26], [80, 30], [110, 26]]
+wall_material = "custom"
+wall_poisson_ratio = 0.4
+young_modulus_gpa = 1
+"""
 OVAL = 'shape = "sections"\nwall_mm = 0.5\n' + "".join(
     f"[[object.sections]]\nz_mm = {z}\na_mm = {a}\nb_mm = {b}\n"
     for z, a, b in ((0, 22, 18), (20, 24, 20), (40, 24, 20), (70, 24, 20))
@@ -60,8 +66,29 @@ def test_the_level_follows_the_indentation_and_compression_is_a_strain_too(monke
     face = SimpleNamespace(von_mises=np.ones(1), principal_strain=np.array([[-3e-3, 1e-3]]))
     for name, value in (("faces", [face, face]), ("_indentations", np.zeros(1)), ("_places", None)):
         monkeypatch.setattr(wall, name, lambda *_, value=value: value)
-    state = SimpleNamespace(wall=SimpleNamespace(q=np.zeros(6), reaction=np.zeros(3)))
-    assert wall.wall_values(None, state, None)["maps/wall_strain"] == pytest.approx(3e-3)
+    state = SimpleNamespace(wall=SimpleNamespace(q=np.zeros(6)))
+    pushes = ([5.0, 0, 1, 0, 0, 0], [-5.0, 0, 2, 0, 0, 0])
+    pose = SimpleNamespace(rotation=np.eye(3)[[1, 2, 0]].T)  # pressed along x
+    contacts = [SimpleNamespace(pressure_wrench=np.array(wrench), pose=pose) for wrench in pushes]
+    values = wall.wall_values(None, contacts, state, None)
+    assert values["maps/wall_strain"] == pytest.approx(3e-3)
+    assert values["maps/support_force"] == pytest.approx(3.0)
+
+
+@pytest.mark.parametrize("support", ["standing", "free"])
+def test_on_a_slope_a_stiff_wall_is_a_rigid_object_and_stiffness_and_force_scale_together(support):
+    made = SLOPE, f"object.support='{support}'", "object.wall_mm=2.5", "effects.friction_pressure_coupling='none'"
+
+    def values(modulus, shear, force, level="linear_shell"):
+        changes = f"object.young_modulus_gpa={modulus}", f"gripper.shear_modulus_kpa={shear}"
+        return solved(*made, *changes, f"effects.object='{level}'", forces=f"[{force}]")[0].values
+
+    names = [f"maps/{name}" for name in ("closing", "e_n", "payload", "misalignment")]
+    soft, scaled, stiff, rigid = values(0.5, 40, 2), values(2, 160, 8), values(1e3, 40, 2), values(1, 40, 2, "rigid")
+    for one, other, powers, rel in ((soft, scaled, (1, 1, 4, 1), 1e-3), (rigid, stiff, (1, 1, 1, 1), 2e-3)):
+        for name, power in zip(names, powers, strict=True):
+            assert other[name] == pytest.approx(power * np.asarray(one[name]), rel=rel), name
+    assert stiff["maps/support_force"] > 0.1
 
 
 def test_what_a_wall_that_is_taken_as_rigid_closes_less_is_part_of_the_errors():

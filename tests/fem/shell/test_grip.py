@@ -57,7 +57,6 @@ def test_quarter_half_and_full_give_the_same(mu):
                 assert finger.closing == pytest.approx(a.fingers[0].closing, rel=1e-7)
                 # whether a point at the edge of the contact held on before is decided by rounding, on either mesh
                 assert e_n(finger) == pytest.approx(e_n(a.fingers[0]), rel=1e-4 if mu else 1e-6)
-            np.testing.assert_allclose(b.wall.reaction, a.wall.reaction, atol=1e-7)
 
 
 @pytest.mark.parametrize("support", ["standing", pytest.param("free", marks=pytest.mark.long)])
@@ -67,10 +66,8 @@ def test_fingers_object_and_support_are_in_balance(support):
         forces = np.array([f.points.force for f in state.fingers])
         assert forces[:, 2] == pytest.approx(state.force, rel=1e-8)
         along_axis = forces[:, 0].sum()  # the pads' long side points up
-        assert state.wall.reaction[2] == pytest.approx(-along_axis, rel=1e-9)
-        assert abs(state.wall.reaction[2]) > 1e-3 * state.force
-        np.testing.assert_allclose(state.wall.reaction[:2], 0.0, atol=1e-7)
-        np.testing.assert_allclose(state.wall.load.sum(axis=0), -state.wall.reaction, atol=1e-12)
+        assert abs(along_axis) > 1e-3 * state.force
+        np.testing.assert_allclose(state.wall.load.sum(axis=0), [0.0, 0.0, along_axis], atol=1e-7)
 
 
 def test_a_very_stiff_wall_is_a_rigid_object():

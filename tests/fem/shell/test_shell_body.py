@@ -122,7 +122,7 @@ def flask(symmetry, support="standing"):
 
 
 def reaction(body, q, load):
-    """Force of the whole body's support and weak springs on it in the equilibrium under ``load``."""
+    """Force of the whole body's support and springs on it in the equilibrium under ``load``."""
     mesh = body[0].mesh
     held = body[1] & ~mesh.symmetric
     force = np.where(held, body[0].residual(q) - load, 0.0).reshape(-1, 6)
@@ -153,8 +153,7 @@ def test_the_support_carries_what_is_left_over(support):
     load[:, 2] = 1e-3 * body[0].node_area / body[0].node_area.sum()
     q = LinearShell(*body).solve(load.ravel())
     assert reaction(body, q, load.ravel()) == pytest.approx([0, 0, -2e-3], rel=1e-5, abs=1e-9)
-    rise = q.reshape(-1, 2, 3)[:, :, 2].sum(axis=1).mean()
-    assert rise == pytest.approx(2e-3, rel=0.05) if support == "free" else rise < 1e-5
+    assert 0 < q.reshape(-1, 2, 3)[:, :, 2].sum(axis=1).mean() < 1e-7  # as a whole it stays where it is
 
 
 @pytest.mark.parametrize("symmetry", [(False, False), HALF_Y, QUARTER])
@@ -163,7 +162,7 @@ def test_springs_hold_a_pinched_ring_and_do_not_stiffen_it(symmetry):
     ring = of_revolution(Revolution(np.array([[0.0, 0.03], [0.001, 0.03], [0.002, 0.03]])))
     size = MeshSize(heights=(0.0, 0.002), half_width=0.01, around=1e-3, along=5e-4, coarse=2e-3)
     mesh = body_mesh(ring, 3e-4, size, symmetry, open_bottom=True)
-    body, load = supported(mesh, PET, stiffness=1e3), np.zeros((len(mesh.X), 6))
+    body, load = supported(mesh, PET), np.zeros((len(mesh.X), 6))
     pinched = mesh.number[np.abs(np.mod(mesh.theta + 0.1, np.pi) - 0.1) < 1e-9]
     load[pinched, 0] = -np.sign(mesh.X[pinched, 0]) / mesh.number.shape[1] * (0.5 if symmetry[1] else 1.0)
     q, R = LinearShell(*body).solve(load.ravel()).reshape(-1, 6), 0.03 - 1.5e-4
@@ -223,7 +222,7 @@ def tube(thickness, length, nu, around, along, planes, support="free"):
     surface = of_revolution(Revolution(np.array([[z, outer] for z in np.linspace(0.0, length, 4)])))
     size = MeshSize(heights=(0.0, length), half_width=1.0, around=around, along=along, coarse=1.0)
     mesh = body_mesh(surface, thickness, size, planes, open_bottom=True)
-    return supported(mesh, WallMaterial(E, nu), support, 1e-4)
+    return supported(mesh, WallMaterial(E, nu), support)
 
 
 def squeezed(body, weight):
