@@ -1,10 +1,11 @@
 """Facets made smooth: curved point-normal triangles (Vlachos, 2001) below a crease angle, cut into small flat ones.
 
 Every corner of a triangle has the mean normal of the faces that reach it across smooth edges, those that turn by less
-than the crease angle. A face counts by its angle times its squared area, so that a large flat face stays flat beside
-the narrow facets of its rounding. An edge becomes a cubic that leaves its ends at right angles to their normals; where
-the edge is a crease, along the line in which the two tangent planes meet. A cubic belongs to the edge, not to a
-triangle, so neighbours stay joined without gaps. The mesh's own points stay where they are.
+than the crease angle and do not end long facets. A face counts by its angle times its squared area, so that a large
+flat face stays flat beside the narrow facets of its rounding. An edge becomes a cubic that leaves its ends at right
+angles to their normals; where the edge is a crease, along the line in which the two tangent planes meet. A cubic
+belongs to the edge, not to a triangle, so neighbours stay joined without gaps. The mesh's own points stay where they
+are.
 
 For facets of length h on a surface of radius R the error falls from h^2 / (8 R) to about 0.02 h^4 / R^3.
 """
@@ -23,14 +24,18 @@ from softjaw.friction.patch import FloatArray
 CREASE_ANGLE = 30.0  # [deg]: edges that turn by less are taken for facets of a smooth surface
 STEEPEST_EDGE = 0.7  # an edge that leaves its tangent plane by more (sine) is kept straight: its normal is no use
 SHARP = 60.0  # [deg]: edges that turn by less may still be facets of something round
+FLAT = np.radians(0.5)  # turn below which two triangles are one facet
+# An edge across which both facets are so many times as wide as it is long, and would bulge so many times as much as at
+# their other edges, is a real one where that is more than so much [m]; see `_at_ends`.
+SLENDER, OUTSTANDING, BULGE = 4.0, 8.0, 3e-4
 
 
 class SmoothTriangles(NamedTuple):
     """Bezier points of every edge ``(e,)`` of a mesh.
 
     ``edges (e, 2)``: points of each, the smaller number first; ``edge_of (m, 3)``: edge from corner 0, 1, 2 of each
-    triangle to the next one; ``inner (e, 2, 3)``: inner Bezier points [m]; ``crease (e,)``: edges that turn by more
-    than the crease angle; ``turn (e,)``: angle between their two triangles [rad].
+    triangle to the next one; ``inner (e, 2, 3)``: inner Bezier points [m]; ``crease (e,)``: edges that stay sharp;
+    ``turn (e,)``: angle between their two triangles [rad].
     """
 
     points: FloatArray
@@ -47,10 +52,7 @@ class SmoothTriangles(NamedTuple):
         The second array ``(k,)`` is how far that surface would lie from the facets [m]. ``width`` is what both
         triangles measure at least across their edge [m].
         """
-        area = 0.5 * np.linalg.norm(area_vectors(self.points, self.triangles), axis=1)
-        length = np.linalg.norm(np.diff(self.points[self.edges], axis=1)[:, 0], axis=1)
-        narrower = np.full(len(self.edges), np.inf)
-        np.minimum.at(narrower, self.edge_of, 2.0 * area[:, None] / np.maximum(length[self.edge_of], 1e-300))
+        _, narrower = _measures(self.points, self.triangles, self.edges, self.edge_of)
         creases = np.flatnonzero(self.crease & (self.turn < np.radians(SHARP)) & (narrower >= width))
         # an arc over chords of this length that turn by this angle
         return creases, narrower[creases] * self.turn[creases] / 8.0
@@ -136,6 +138,9 @@ def smooth_triangles(points: FloatArray, triangles: IntArray, crease_angle: floa
     # margin of the cosine: files of single precision turn edges of one angle, as of 12 facets, by less
     crease = ~paired | ~alike | (cosine < np.cos(np.radians(crease_angle)) + 1e-5)
     turn = np.where(paired, np.arccos(np.clip(np.where(alike, cosine, -cosine), -1.0, 1.0)), np.pi)
+    length, narrower = _measures(points, triangles, ends, joined.edge_of)
+    while (real := _at_ends(length, narrower, turn, halves // 3, ~crease)).any():
+        crease |= real  # of a cone between two straight walls the next end shows
     corner_normals = _corner_normals(points, triangles, area, normal, halves[~crease])
     inner = np.empty((len(ends), 2, 3))
     for end in (0, 1):
@@ -147,6 +152,44 @@ def smooth_triangles(points: FloatArray, triangles: IntArray, crease_angle: floa
         # where several surfaces end nobody knows how the edge continues
         inner[:, end] = p + np.where((paired | (joined.at_edge == 1))[:, None], tangent, q - p) / 3
     return SmoothTriangles(points, triangles, ends, joined.edge_of, inner, crease, turn)
+
+
+def _measures(
+    points: FloatArray, triangles: IntArray, edges: IntArray, edge_of: IntArray
+) -> tuple[FloatArray, FloatArray]:
+    """Lengths of edges, and what the narrower triangle at each measures across it, ``(e,)`` each [m]."""
+    area = np.linalg.norm(area_vectors(points, triangles), axis=1)
+    length = np.linalg.norm(np.diff(points[edges], axis=1)[:, 0], axis=1)
+    narrower = np.full(len(edges), np.inf)
+    np.minimum.at(narrower, edge_of, area[:, None] / np.maximum(length[edge_of], 1e-300))
+    return length, narrower
+
+
+def _at_ends(
+    length: FloatArray, narrower: FloatArray, turn: FloatArray, sides: IntArray, smooth: np.ndarray
+) -> np.ndarray:
+    """Which of the ``smooth (e,)`` edges are real ones at the ends of long facets, as of a straight shank and a cone.
+
+    Whoever cuts a round surface into facets makes them as fine as it bends: one that were round there would bulge far
+    more than at its other edges. ``sides (e, 2)``: both triangles of an edge.
+    """
+    count, flat = int(sides.max()) + 1, smooth & (turn < FLAT)
+    links = coo_array((np.ones(flat.sum()), tuple(sides[flat].T)), shape=(count, count))
+    facet = connected_components(links, directed=False)[1]
+    edges = np.flatnonzero(smooth & ~flat)
+    bulge, (one, two) = narrower[edges] * turn[edges] / 8.0, facet[sides[edges]].T
+    here, there, each = np.concatenate([one, two]), np.concatenate([two, one]), np.tile(bulge, 2)
+    # of every facet the largest bulge, at which neighbour that is, and the largest at all others
+    most, rest, neighbour = np.zeros(count), np.zeros(count), np.full(count, -1)
+    np.maximum.at(most, here, each)
+    order = np.argsort(each, kind="stable")
+    neighbour[here[order]] = there[order]
+    others = there != neighbour[here]
+    np.maximum.at(rest, here[others], each[others])
+    elsewhere = np.where(others, most[here], rest[here]).reshape(2, -1).min(axis=0)
+    real = np.zeros(len(smooth), dtype=bool)
+    real[edges] = (bulge > np.maximum(OUTSTANDING * elsewhere, BULGE)) & (narrower[edges] > SLENDER * length[edges])
+    return real
 
 
 def _following(halves: IntArray) -> IntArray:

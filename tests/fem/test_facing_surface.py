@@ -85,6 +85,20 @@ def test_edges_above_the_crease_angle_stay_and_neighbours_stay_joined():
     assert smooth_triangles(*octagon).bulge(np.arange(len(octagon[1]))).max() < 1e-15
 
 
+def test_a_straight_wall_between_cones_stays_straight_and_a_round_one_of_many_facets_stays_round():
+    """Long facets of a shank between flares of 22 degrees; a waist of facets of 4 degrees."""
+    cones = [(0.03, 0.0), (0.03, 0.015), (0.018, 0.045), (0.018, 0.135), (0.03, 0.165), (0.03, 0.18)]
+    z = np.linspace(0.0, 0.12, 25)
+    waist = np.column_stack([0.03 - 0.012 * np.sin(np.pi * z / 0.12), z])
+    for profile, sharp, most in ((cones, 4 * 64, 5e-5), (waist, 0, np.inf)):
+        body = trimesh.creation.revolve(np.vstack([[0.0, profile[0][1]], profile, [0.0, profile[-1][1]]]), sections=64)
+        smooth = smooth_triangles(body.vertices, body.faces)
+        turn = np.degrees(smooth.turn)
+        assert (smooth.crease & (turn < 30)).sum() == sharp
+        assert smooth.bulge(np.arange(len(body.faces))).max() < most
+        assert bool(MeshObject(body.vertices, body.faces).sharp_facets(5e-3)) == (sharp > 0)
+
+
 @pytest.mark.parametrize("axis", [0, 1])
 def test_the_mirror_image_of_a_mesh_has_the_mirror_image_of_its_gap(axis):
     """A lopsided body, in the pad's frame, mirrored across a plane of the pad."""
