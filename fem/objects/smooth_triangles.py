@@ -26,8 +26,9 @@ STEEPEST_EDGE = 0.7  # an edge that leaves its tangent plane by more (sine) is k
 SHARP = 60.0  # [deg]: edges that turn by less may still be facets of something round
 FLAT = np.radians(0.5)  # turn below which two triangles are one facet
 # An edge across which both facets are so many times as wide as it is long, and would bulge so many times as much as at
-# their other edges, is a real one where that is more than so much [m]; see `_at_ends`.
-SLENDER, OUTSTANDING, BULGE = 4.0, 8.0, 3e-4
+# their other edges, is a real one where that is more than so much [m]; see `_at_ends`. No round numbers, at which
+# rounding would tell edges of one kind apart.
+SLENDER, OUTSTANDING, BULGE = 3.9, 7.9, 2.9e-4
 
 
 class SmoothTriangles(NamedTuple):
@@ -177,16 +178,16 @@ def _at_ends(
     links = coo_array((np.ones(flat.sum()), tuple(sides[flat].T)), shape=(count, count))
     facet = connected_components(links, directed=False)[1]
     edges = np.flatnonzero(smooth & ~flat)
-    bulge, (one, two) = narrower[edges] * turn[edges] / 8.0, facet[sides[edges]].T
-    here, there, each = np.concatenate([one, two]), np.concatenate([two, one]), np.tile(bulge, 2)
+    bulge, (first, second) = narrower[edges] * turn[edges] / 8.0, facet[sides[edges]].T
+    facets, across, each = np.concatenate([first, second]), np.concatenate([second, first]), np.tile(bulge, 2)
     # of every facet the largest bulge, at which neighbour that is, and the largest at all others
     most, rest, neighbour = np.zeros(count), np.zeros(count), np.full(count, -1)
-    np.maximum.at(most, here, each)
+    np.maximum.at(most, facets, each)
     order = np.argsort(each, kind="stable")
-    neighbour[here[order]] = there[order]
-    others = there != neighbour[here]
-    np.maximum.at(rest, here[others], each[others])
-    elsewhere = np.where(others, most[here], rest[here]).reshape(2, -1).min(axis=0)
+    neighbour[facets[order]] = across[order]
+    others = across != neighbour[facets]
+    np.maximum.at(rest, facets[others], each[others])
+    elsewhere = np.where(others, most[facets], rest[facets]).reshape(2, -1).min(axis=0)
     real = np.zeros(len(smooth), dtype=bool)
     real[edges] = (bulge > np.maximum(OUTSTANDING * elsewhere, BULGE)) & (narrower[edges] > SLENDER * length[edges])
     return real
