@@ -174,8 +174,7 @@ def solved_case(
         check_candidates(scene)
     except StudyError as error:  # here a station off a mesh is an argument
         raise ValueError(str(error)) from error
-    if scene.petsc:
-        check_petsc(dict(scene.petsc))
+    check_petsc(dict(scene.petsc))
     row = number * len(scene.load.normal_force_n) + k
     unit, c = next((u, c) for u in units(scene) for c, rows in enumerate(u.rows) if row in rows)
     place, what = unit.served[c], f"{unit.served[c].label}, {scene.load.normal_force_n[k]:g} N"

@@ -169,11 +169,11 @@ class MeshObject:
         if len(edges) < 4:  # a round surface has more edges of one kind than a scan has by chance
             return ""
         turn = np.degrees(smooth.turn[edges])
-        by_angle = bool(turn.max() > self.crease_angle)  # the others are at the ends of long facets
-        higher = f"raise object.crease_angle_deg above {np.ceil(turn.max()):.0f}, or " * by_angle
+        least = max(np.ceil(turn.max()), CREASE_ANGLE)  # with which edges at the ends of long facets are round, too
         return (
             f"{len(edges)} edges of wide facets, {turn.min():.3g} to {turn.max():.3g} degrees, stay sharp; if round,"
-            f" the surface lies up to {1e3 * off.max():.2g} mm outside: {higher}export a finer mesh"
+            f" the surface lies up to {1e3 * off.max():.2g} mm outside: raise object.crease_angle_deg above"
+            f" {least:.0f}, or export a finer mesh"
         )
 
     @cached_property

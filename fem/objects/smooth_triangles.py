@@ -140,7 +140,8 @@ def smooth_triangles(points: FloatArray, triangles: IntArray, crease_angle: floa
     crease = ~paired | ~alike | (cosine < np.cos(np.radians(crease_angle)) + 1e-5)
     turn = np.where(paired, np.arccos(np.clip(np.where(alike, cosine, -cosine), -1.0, 1.0)), np.pi)
     length, narrower = _measures(points, triangles, ends, joined.edge_of)
-    while (real := _at_ends(length, narrower, turn, halves // 3, ~crease)).any():
+    # whoever raises the angle wants such edges round
+    while crease_angle <= CREASE_ANGLE and (real := _at_ends(length, narrower, turn, halves // 3, ~crease)).any():
         crease |= real  # of a cone between two straight walls the next end shows
     corner_normals = _corner_normals(points, triangles, area, normal, halves[~crease])
     inner = np.empty((len(ends), 2, 3))

@@ -137,6 +137,8 @@ def check_petsc(wanted: dict[str, Any]) -> None:
     if hidden := [f"-{name}" for name in options_elsewhere()]:
         text = f"petsc: found {', '.join(hidden)} in PETSC_OPTIONS, which no result tells"
         raise StudyError(USAGE, f"{text}; give them after '--', or as keys of [petsc]")
+    if not wanted:
+        return
     try:
         strange = unknown_options(wanted)
     except PETSc.Error as error:

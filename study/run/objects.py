@@ -29,7 +29,7 @@ from softjaw.study.result.read import dataset, values_of
 from softjaw.study.result.skeleton import rewrite
 from softjaw.study.result.store import open_result
 from softjaw.study.result.write import Files, ResultWriter
-from softjaw.study.run.limits import AbandonedError, Stopper, limited_memory
+from softjaw.study.run.limits import AbandonedError, Stopper, early, limited_memory
 from softjaw.study.run.load_path import sentence, settle
 from softjaw.study.run.object_folder import ObjectFolder, key_of
 from softjaw.study.run.plan import Plan
@@ -76,6 +76,7 @@ def run_objects(
         while todo := run.todo()[:batch]:
             if not run.solve(todo):
                 break
+        early.clear()  # a signal that found nothing left to stop
         return index.code_of(run.rows)
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import math
 import os
+import signal
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -26,7 +27,7 @@ from softjaw.study.result.lock import Lock, OpenedFile
 from softjaw.study.result.skeleton import create, rewrite
 from softjaw.study.result.store import Result, open_result, torn_rows
 from softjaw.study.result.write import MESH, Files, ResultWriter, codes_on, verify
-from softjaw.study.run.limits import PATIENCE, Stopper, limited_memory
+from softjaw.study.run.limits import PATIENCE, Stopper, early, limited_memory
 from softjaw.study.run.load_path import PathSolver, rows_again, settle
 from softjaw.study.run.plan import Plan
 from softjaw.study.run.progress import Progress, code_of
@@ -100,6 +101,7 @@ def run_study(plan: Plan, work: Work, path: Path, comm: Any, *, retry_failed: bo
         if comm.rank == 0 and work.summary is not None:
             with open_result(path) as result:
                 print(work.summary(result), flush=True)
+    early.clear()  # a signal that found nothing left to stop
     return code
 
 
@@ -243,6 +245,8 @@ class Session:
         self.signal = name = max(self._comm.allgather(name))
         claims.free()
         code = code_of(self._files.codes())
+        if name and code != STOPPED:  # the last case was in time: what comes next stops
+            early.add(signal.Signals[name])
         self._files.close()
         if self._progress:
             self._progress.clear()

@@ -304,8 +304,9 @@ class Scene(SceneSection):
         0.02
         """
         parts = {**(values or {}), **more}
-        given = {key: value for key, value in parts.items() if not isinstance(value, Mapping) or "." in key}
-        given |= {f"{part}.{key}": v for part in parts.keys() - given.keys() for key, v in parts[part].items()}
+        sections = {key: v for key, v in parts.items() if isinstance(v, Mapping) and key in Scene.model_fields}
+        given = {key: value for key, value in parts.items() if key not in sections}
+        given |= {f"{section}.{key}": v for section, table in sections.items() for key, v in table.items()}
         if "candidates.stations_mm" in given:  # which are not the first and the last of the scene's own number
             given.setdefault("candidates.stations", None)
         return Scene.of_tables(put(self.effective(), plain_tables(given)))

@@ -255,7 +255,8 @@ class Mesh(Walled):
         "auto", description="step of the grid on which the distance to the mesh is sampled"
     )
     crease_angle_deg: Annotated[float, Field(ge=0, le=180)] = Field(
-        30.0, description="edges that turn by less are facets of a smooth surface, others stay edges; 0: all stay"
+        30.0, description="edges that turn by less are facets of a smooth surface, others stay edges; 0: all stay."
+        " Up to 30 those at the ends of long facets stay, too"
     )
 
     # time and size of the file: what is kept of a mesh is not taken for another one in its place

@@ -97,6 +97,7 @@ def test_a_straight_wall_between_cones_stays_straight_and_a_round_one_of_many_fa
         assert (smooth.crease & (turn < 30)).sum() == sharp
         assert smooth.bulge(np.arange(len(body.faces))).max() < most
         assert bool(MeshObject(body.vertices, body.faces).sharp_facets(5e-3)) == (sharp > 0)
+        assert not (smooth_triangles(body.vertices, body.faces, 31.0).crease & (turn < 30)).any()  # who wants it round
 
 
 @pytest.mark.parametrize("axis", [0, 1])

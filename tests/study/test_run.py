@@ -1,5 +1,6 @@
 """Runs of a fake study under mpirun: the same bits on any number of ranks, and no kill, full disk or bug loses work."""
 
+import os
 import shutil
 import signal
 import time
@@ -8,9 +9,11 @@ import h5py
 import numpy as np
 import pytest
 
+from softjaw.study import messages
 from softjaw.study.quantities import DONE, FAILED, MISSING, WIDE
 from softjaw.study.result.store import open_result, torn_rows
-from tests.study.launching import contents, differing, done, ended, softjaw, start, states, study, wait_for
+from tests.study import fake_run
+from tests.study.launching import contents, differing, done, ended, here, softjaw, start, states, study, wait_for
 
 pytestmark = pytest.mark.ranks
 
@@ -179,3 +182,25 @@ def test_a_bug_outside_a_case_ends_all_ranks_what_is_done_stays_and_a_finished_f
         assert [s["reason"] for s in result.sessions] == ["complete"]
         assert [s["ranks"] for s in result.sessions] == [1]
         assert "numpy" in result.sessions[0]["versions"]
+
+
+def test_a_signal_in_the_last_case_of_a_round_stops_before_the_next(tmp_path, monkeypatch):
+    solved, path, last = [], fake_run.fake_path, 27  # cases of the first round
+
+    def signalled(options):
+        inner = path(options)
+
+        def solve_unit(unit, wanted):
+            for case in inner(unit, wanted):
+                solved.append(case)
+                if len(solved) == last:
+                    os.kill(os.getpid(), signal.SIGUSR1)
+                yield case
+
+        return solve_unit
+
+    monkeypatch.setattr(fake_run, "fake_path", signalled)
+    assert here(fake_run.main, tmp_path / "a.hdf", "--grow")[0] == messages.STOPPED
+    assert len(solved) == last
+    assert here(fake_run.main, tmp_path / "a.hdf", "--grow")[0] == messages.DONE
+    assert len(solved) > last
