@@ -53,7 +53,8 @@ class SmoothTriangles(NamedTuple):
         The second array ``(k,)`` is how far that surface would lie from the facets [m]. ``width`` is what both
         triangles measure at least across their edge [m].
         """
-        _, narrower = _measures(self.points, self.triangles, self.edges, self.edge_of)
+        area = area_vectors(self.points, self.triangles)
+        _, narrower = _measures(self.points, area, self.edges, self.edge_of)
         creases = np.flatnonzero(self.crease & (self.turn < np.radians(SHARP)) & (narrower >= width))
         # an arc over chords of this length that turn by this angle
         return creases, narrower[creases] * self.turn[creases] / 8.0
@@ -139,7 +140,7 @@ def smooth_triangles(points: FloatArray, triangles: IntArray, crease_angle: floa
     # margin of the cosine: files of single precision turn edges of one angle, as of 12 facets, by less
     crease = ~paired | ~alike | (cosine < np.cos(np.radians(crease_angle)) + 1e-5)
     turn = np.where(paired, np.arccos(np.clip(np.where(alike, cosine, -cosine), -1.0, 1.0)), np.pi)
-    length, narrower = _measures(points, triangles, ends, joined.edge_of)
+    length, narrower = _measures(points, area, ends, joined.edge_of)
     # whoever raises the angle wants such edges round
     while crease_angle <= CREASE_ANGLE and (real := _at_ends(length, narrower, turn, halves // 3, ~crease)).any():
         crease |= real  # of a cone between two straight walls the next end shows
@@ -157,13 +158,16 @@ def smooth_triangles(points: FloatArray, triangles: IntArray, crease_angle: floa
 
 
 def _measures(
-    points: FloatArray, triangles: IntArray, edges: IntArray, edge_of: IntArray
+    points: FloatArray, area: FloatArray, edges: IntArray, edge_of: IntArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Lengths of edges, and what the narrower triangle at each measures across it, ``(e,)`` each [m]."""
-    area = np.linalg.norm(area_vectors(points, triangles), axis=1)
+    """Lengths of edges, and what the narrower triangle at each measures across it, ``(e,)`` each [m].
+
+    ``area (m, 3)``: `area_vectors` of the triangles [m^2].
+    """
+    twice = np.linalg.norm(area, axis=1)
     length = np.linalg.norm(np.diff(points[edges], axis=1)[:, 0], axis=1)
     narrower = np.full(len(edges), np.inf)
-    np.minimum.at(narrower, edge_of, area[:, None] / np.maximum(length[edge_of], 1e-300))
+    np.minimum.at(narrower, edge_of, twice[:, None] / np.maximum(length[edge_of], 1e-300))
     return length, narrower
 
 

@@ -28,9 +28,7 @@ HALF_TURN = np.diag([-1.0, -1.0, 1.0])
 HELD = 100.0  # stiffness of all springs, per direction, over that of a square of the wall that is drawn
 
 
-def supported(
-    mesh: BodyMesh, material: WallMaterial, support: str = "free"
-) -> tuple[Shell[BodyMesh], FloatArray]:
+def supported(mesh: BodyMesh, material: WallMaterial, support: str = "free") -> tuple[Shell[BodyMesh], FloatArray]:
     """Shell of a body with springs, and which of its numbers ``(6 k,)`` its support fixes.
 
     "clamped": the flat bottom does not move, or both rims of a tube; "standing": the rim of the bottom keeps its

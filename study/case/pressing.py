@@ -263,7 +263,7 @@ class OnWall:
 
     def wall_values(self, contacts: Sequence[PressedContact]) -> dict[str, Any]:
         """See `OnRigid`."""
-        return wall_values(self.grasp, contacts, contacts[0].state, self.shell)
+        return wall_values(self.grasp, contacts, self.shell)
 
 
 def pressing(

@@ -15,7 +15,6 @@ from softjaw.fem.shell.wall_mesh import MeshSize
 from softjaw.fem.shell.wall_model import faces
 from softjaw.friction.patch import FloatArray
 from softjaw.study.case.build import outer_surface
-from softjaw.study.case.contact import Contact
 from softjaw.study.case.geometry import material_of
 from softjaw.study.case.result import UNDECIDED, surely_below
 from softjaw.study.flags import Flag
@@ -83,10 +82,10 @@ def _indentations(shell: Shell, q: FloatArray) -> FloatArray:
     return -np.einsum("ki,ki->k", v - drift, normal)
 
 
-def wall_values(grasp: Grasp, contacts: Sequence[Contact], state: Pressed, shell: Shell) -> dict[str, Any]:
-    """What the wall bears in one case, keyed as in ``study.quantities``."""
-    q = state.wall.q.reshape(-1, 6)
-    both = faces(shell, state.wall.q)
+def wall_values(grasp: Grasp, contacts: Sequence[Any], shell: Shell) -> dict[str, Any]:
+    """What the wall bears in one case, from its pressed contacts; keyed as in ``study.quantities``."""
+    wall = contacts[0].state.wall
+    q, both = wall.q.reshape(-1, 6), faces(shell, wall.q)
     force, approach = np.sum([c.pressure_wrench[:3] for c in contacts], axis=0), contacts[0].pose.rotation[:, 2]
     return {
         "maps/indentation": float(_indentations(shell, q).max(initial=0.0)),

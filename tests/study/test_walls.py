@@ -69,8 +69,8 @@ def test_the_level_follows_the_indentation_and_compression_is_a_strain_too(monke
     state = SimpleNamespace(wall=SimpleNamespace(q=np.zeros(6)))
     pushes = ([5.0, 0, 1, 0, 0, 0], [-5.0, 0, 2, 0, 0, 0])
     pose = SimpleNamespace(rotation=np.eye(3)[[1, 2, 0]].T)  # pressed along x
-    contacts = [SimpleNamespace(pressure_wrench=np.array(wrench), pose=pose) for wrench in pushes]
-    values = wall.wall_values(None, contacts, state, None)
+    contacts = [SimpleNamespace(pressure_wrench=np.array(wrench), pose=pose, state=state) for wrench in pushes]
+    values = wall.wall_values(None, contacts, None)
     assert values["maps/wall_strain"] == pytest.approx(3e-3)
     assert values["maps/support_force"] == pytest.approx(3.0)
 
