@@ -29,6 +29,7 @@ FLAT = np.radians(0.5)  # turn below which two triangles are one facet
 # their other edges, is a real one where that is more than so much [m]; see `_at_ends`. No round numbers, at which
 # rounding would tell edges of one kind apart.
 SLENDER, OUTSTANDING, BULGE = 3.9, 7.9, 2.9e-4
+ALIKE = 2.9  # three edges in a row that bend the same way, and by no more than so many times one another, are round
 
 
 class SmoothTriangles(NamedTuple):
@@ -141,9 +142,10 @@ def smooth_triangles(points: FloatArray, triangles: IntArray, crease_angle: floa
     crease = ~paired | ~alike | (cosine < np.cos(np.radians(crease_angle)) + 1e-5)
     turn = np.where(paired, np.arccos(np.clip(np.where(alike, cosine, -cosine), -1.0, 1.0)), np.pi)
     length, narrower = _measures(points, area, ends, joined.edge_of)
-    # whoever raises the angle wants such edges round
-    while crease_angle <= CREASE_ANGLE and (real := _at_ends(length, narrower, turn, halves // 3, ~crease)).any():
-        crease |= real  # of a cone between two straight walls the next end shows
+    if crease_angle <= CREASE_ANGLE:  # whoever raises the angle wants such edges round
+        opposite = triangles.ravel()[_following(_following(halves[:, 1]))]
+        inwards = np.einsum("ed,ed->e", normal[halves[:, 0] // 3], points[opposite] - points[ends[:, 0]]) < 0
+        crease |= _at_ends(length, narrower, np.where(inwards, turn, -turn), halves // 3, ~crease)
     corner_normals = _corner_normals(points, triangles, area, normal, halves[~crease])
     inner = np.empty((len(ends), 2, 3))
     for end in (0, 1):
@@ -172,30 +174,53 @@ def _measures(
 
 
 def _at_ends(
-    length: FloatArray, narrower: FloatArray, turn: FloatArray, sides: IntArray, smooth: np.ndarray
+    length: FloatArray, narrower: FloatArray, bend: FloatArray, sides: IntArray, smooth: np.ndarray
 ) -> np.ndarray:
     """Which of the ``smooth (e,)`` edges are real ones at the ends of long facets, as of a straight shank and a cone.
 
     Whoever cuts a round surface into facets makes them as fine as it bends: one that were round there would bulge far
-    more than at its other edges. ``sides (e, 2)``: both triangles of an edge.
+    more than at its other edges. ``bend (e,)``: turn of an edge, negative where it is hollow [rad]; ``sides (e, 2)``:
+    both triangles of an edge.
     """
-    count, flat = int(sides.max()) + 1, smooth & (turn < FLAT)
+    count, flat = int(sides.max()) + 1, smooth & (np.abs(bend) < FLAT)
     links = coo_array((np.ones(flat.sum()), tuple(sides[flat].T)), shape=(count, count))
     facet = connected_components(links, directed=False)[1]
     edges = np.flatnonzero(smooth & ~flat)
-    bulge, (first, second) = narrower[edges] * turn[edges] / 8.0, facet[sides[edges]].T
-    facets, across, each = np.concatenate([first, second]), np.concatenate([second, first]), np.tile(bulge, 2)
-    # of every facet the largest bulge, at which neighbour that is, and the largest at all others
-    most, rest, neighbour = np.zeros(count), np.zeros(count), np.full(count, -1)
-    np.maximum.at(most, facets, each)
-    order = np.argsort(each, kind="stable")
-    neighbour[facets[order]] = across[order]
-    others = across != neighbour[facets]
-    np.maximum.at(rest, facets[others], each[others])
-    elsewhere = np.where(others, most[facets], rest[facets]).reshape(2, -1).min(axis=0)
+    # where two facets meet, whatever number of edges that has
+    facets, joint = np.unique(np.sort(facet[sides[edges]], axis=1), axis=0, return_inverse=True)
+    joint, each = joint.ravel(), narrower[edges] * np.abs(bend[edges]) / 8.0
+    bulge, bends = np.zeros(len(facets)), np.zeros(len(facets))
+    np.maximum.at(bulge, joint, each)
+    bends[joint] = bend[edges]
+    round_ = _in_a_row(_next_joints(facets, bulge), bends)
     real = np.zeros(len(smooth), dtype=bool)
-    real[edges] = (bulge > np.maximum(OUTSTANDING * elsewhere, BULGE)) & (narrower[edges] > SLENDER * length[edges])
-    return real
+    while True:  # of a cone between two straight walls the next end shows
+        elsewhere = np.append(bulge, 0.0)[_next_joints(facets, bulge)].min(axis=1)
+        ends = (each > np.maximum(OUTSTANDING * elsewhere, BULGE)[joint]) & (narrower[edges] > SLENDER * length[edges])
+        ends &= ~round_[joint] & ~real[edges]
+        if not ends.any():
+            return real
+        real[edges[ends]] = True
+        bulge[joint[ends]] = 0.0
+
+
+def _next_joints(facets: IntArray, bulge: FloatArray) -> IntArray:
+    """Of both ``facets (k, 2)`` of every joint the other joint that bulges most, ``(k, 2)``; -1 where there is none."""
+    flat, number = facets.ravel(), np.repeat(np.arange(len(facets)), 2)
+    order = np.lexsort([-bulge[number], flat])
+    starts = np.searchsorted(flat[order], flat)
+    first, second = (np.append(order, order[-1:])[np.minimum(starts + k, len(order))] for k in (0, 1))
+    other = np.where(number[first] == number, second, first)
+    return np.where((flat[other] == flat) & (number[other] != number), number[other], -1).reshape(-1, 2)
+
+
+def _in_a_row(following: IntArray, bends: FloatArray) -> np.ndarray:
+    """Which joints are among three in a row that bend alike; ``following``: `_next_joints`."""
+    known = np.append(bends, 0.0)
+    ratio = known[following] / bends[:, None]
+    alike = (ratio > 1 / ALIKE) & (ratio < ALIKE)
+    beyond = np.where(following >= 0, alike.sum(axis=1)[following], 0)
+    return alike.all(axis=1) | (alike & (beyond > 1)).any(axis=1)
 
 
 def _following(halves: IntArray) -> IntArray:

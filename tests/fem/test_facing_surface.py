@@ -86,12 +86,14 @@ def test_edges_above_the_crease_angle_stay_and_neighbours_stay_joined():
 
 
 def test_a_straight_wall_between_cones_stays_straight_and_a_round_one_of_many_facets_stays_round():
-    """Long facets of a shank between flares of 22 degrees; a waist of facets of 4 degrees."""
-    cones = [(0.03, 0.0), (0.03, 0.015), (0.018, 0.045), (0.018, 0.135), (0.03, 0.165), (0.03, 0.18)]
+    """Long facets of a shank between flares of 22 degrees; a waist of facets of 4 degrees; coarse bands of a ball."""
+    cones = [(0, 0), (0.03, 0), (0.03, 0.015), (0.018, 0.045), (0.018, 0.135), (0.03, 0.165), (0.03, 0.18), (0, 0.18)]
     z = np.linspace(0.0, 0.12, 25)
-    waist = np.column_stack([0.03 - 0.012 * np.sin(np.pi * z / 0.12), z])
-    for profile, sharp, most in ((cones, 4 * 64, 5e-5), (waist, 0, np.inf)):
-        body = trimesh.creation.revolve(np.vstack([[0.0, profile[0][1]], profile, [0.0, profile[-1][1]]]), sections=64)
+    waist = np.vstack([[0, 0], np.column_stack([0.03 - 0.012 * np.sin(np.pi * z / 0.12), z]), [0, 0.12]])
+    angle = np.linspace(0.0, np.pi, 13)
+    bands = np.column_stack([0.06 * np.sin(angle).round(12), -0.06 * np.cos(angle)])
+    for profile, sharp, most in ((cones, 4 * 64, 5e-5), (waist, 0, np.inf), (bands, 0, np.inf)):
+        body = trimesh.creation.revolve(np.asarray(profile, float), sections=64)
         smooth = smooth_triangles(body.vertices, body.faces)
         turn = np.degrees(smooth.turn)
         assert (smooth.crease & (turn < 30)).sum() == sharp
