@@ -27,7 +27,7 @@ from softjaw.study.ranking import judge, largest, task_keys
 from softjaw.study.result import index
 from softjaw.study.result.read import dataset, values_of
 from softjaw.study.result.skeleton import rewrite
-from softjaw.study.result.store import open_result
+from softjaw.study.result.store import open_result, torn_rows
 from softjaw.study.result.write import Files, ResultWriter
 from softjaw.study.run.limits import AbandonedError, Stopper, early, limited_memory
 from softjaw.study.run.load_path import sentence, settle
@@ -269,11 +269,11 @@ def _rows_of(folder: ObjectFolder, out: Path, retry_failed: bool) -> list[Row]:
 
 
 def _whole(path: Path) -> bool:
-    """Whether a result file is there; raises `StudyError` where it is and cannot be read."""
-    if path.exists():
-        with open_result(path):
-            return True
-    return False
+    """Whether a result file is there without torn rows; raises `StudyError` where it is and cannot be read."""
+    if not path.exists():
+        return False
+    with open_result(path) as result:
+        return not torn_rows(path, result.layout)
 
 
 def _change(path: Path, scene: Scene) -> str:

@@ -5,6 +5,7 @@ import re
 import shutil
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 import trimesh
@@ -161,6 +162,11 @@ def test_again_nothing_is_solved_another_mesh_is_refused_and_a_signal_stops_in_o
     assert {path: path.stat().st_mtime_ns for path in before} == before
     stored = solved / "a.hdf"
     whole = stored.read_bytes()
+    numbers = contents(stored)
+    with h5py.File(stored, "r+") as file:
+        file["study/payload/ccm"][...] += 1.0
+    assert here(fake_objects.main, scene, solved)[0] == SOME_FAILED
+    assert differing(stored, numbers) == []
     stored.write_bytes(whole[:5000])
     assert here(fake_objects.main, scene, solved)[0] == OTHER_FILE
     stored.unlink()
