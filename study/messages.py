@@ -3,7 +3,6 @@
 Files that a user asked for are whole under their name or not there.
 """
 
-import datetime
 import difflib
 import json
 import os
@@ -79,14 +78,10 @@ def shortened(text: str, width: int = 80) -> str:
 
 def shown(value: Any, width: int = 60) -> str:
     """A value as TOML would write it, shortened to ``width`` characters."""
-    if isinstance(value, datetime.date | datetime.time):
-        text = str(value)
-    elif isinstance(value, Mapping):
-        text = "a table" if value else "an empty table"
-    else:
-        text = json.dumps(value, ensure_ascii=False, default=str)
-        text = text if isinstance(value, str) else text.replace("Infinity", "inf").replace("NaN", "nan")
-    return shortened(text, width)
+    if isinstance(value, Mapping):
+        return "a table" if value else "an empty table"
+    text = json.dumps(value, ensure_ascii=False, default=str)
+    return shortened(text if isinstance(value, str) else text.replace("Infinity", "inf").replace("NaN", "nan"), width)
 
 
 def first_of(texts: Sequence[str], most: int, what: str, place: str = "") -> list[str]:

@@ -118,18 +118,18 @@ def passed_over(score: np.ndarray, flags: np.ndarray) -> tuple[list[int], str]:
 class Sure(NamedTuple):
     """Values of some grasps and how far off they may be.
 
-    ``value, error`` (n,) arrays: ``error`` is the stated one; NaN where it is not known. ``samples`` (n, m) array:
-    values with samples of the uncertain inputs, the same for all grasps; a zero where no input is uncertain.
+    ``value, error`` (n,) arrays: ``error`` is the stated one; NaN where it is not known. ``changes`` (n, m) array:
+    what samples of the uncertain inputs, the same for all grasps, change; a zero where no input is uncertain.
     """
 
     value: FloatArray
     error: FloatArray
-    samples: FloatArray
+    changes: FloatArray
 
     @property
     def half_width(self) -> FloatArray:
         """All of it together, ``(n,)``."""
-        return np.hypot(self.error, half_width(self.samples))
+        return np.hypot(self.error, half_width(self.changes))
 
     def apart(self, i: int, j: int) -> bool | None:
         """Whether grasp ``i`` is better than ``j`` beyond the errors of their difference; None where not known.
@@ -137,7 +137,7 @@ class Sure(NamedTuple):
         Inputs move all grasps at once, so it is the difference that has an interval. A difference within `TIE` of the
         values is none, also where nothing is said to be in error.
         """
-        error = np.hypot(np.hypot(self.error[i], self.error[j]), half_width(self.samples[i] - self.samples[j]))
+        error = np.hypot(np.hypot(self.error[i], self.error[j]), half_width(self.changes[i] - self.changes[j]))
         least = TIE * max(abs(self.value[i]), abs(self.value[j]))
         return None if np.isnan(error) else bool(self.value[i] - self.value[j] > error + least)
 
@@ -149,8 +149,9 @@ def sure(ds: xr.Dataset, name: str, k: int) -> Sure | None:
         return None
     values = values_of(ds, name)[..., k].ravel()
     of_mesh = np.zeros(values.shape) if error is None else error[..., k].ravel()
-    inputs = np.zeros((len(values), 1)) if samples is None else samples.values[..., k, :].reshape(len(values), -1)
-    return Sure(values, of_mesh, inputs)
+    if samples is None:
+        return Sure(values, of_mesh, np.zeros((len(values), 1)))
+    return Sure(values, of_mesh, samples.values[..., k, :].reshape(len(values), -1) - values[:, None])
 
 
 def score_of(ds: xr.Dataset, by: str | None = None) -> str:

@@ -29,7 +29,6 @@ FLAT = np.radians(0.5)  # turn below which two triangles are one facet
 # their other edges, is a real one where that is more than so much [m]; see `_at_ends`. No round numbers, at which
 # rounding would tell edges of one kind apart.
 SLENDER, OUTSTANDING, BULGE = 3.9, 7.9, 2.9e-4
-ALIKE = 2.9  # three edges in a row that bend the same way, and by no more than so many times one another, are round
 
 
 class SmoothTriangles(NamedTuple):
@@ -215,10 +214,12 @@ def _next_joints(facets: IntArray, bulge: FloatArray) -> IntArray:
 
 
 def _in_a_row(following: IntArray, bends: FloatArray) -> np.ndarray:
-    """Which joints are among three in a row that bend alike; ``following``: `_next_joints`."""
-    known = np.append(bends, 0.0)
-    ratio = known[following] / bends[:, None]
-    alike = (ratio > 1 / ALIKE) & (ratio < ALIKE)
+    """Which joints are among three in a row that bend the same way, by less than 3 times one another: a round surface.
+
+    ``following``: `_next_joints`.
+    """
+    ratio = np.append(bends, 0.0)[following] / bends[:, None]
+    alike = (ratio > 0.34) & (ratio < 1 / 0.34)
     beyond = np.where(following >= 0, alike.sum(axis=1)[following], 0)
     return alike.all(axis=1) | (alike & (beyond > 1)).any(axis=1)
 

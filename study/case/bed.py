@@ -56,22 +56,6 @@ def height_fields(points, triangles, x, y):
     return low, high
 
 
-@njit(cache=True)
-def slopes_of(h, dx, dy):
-    """Slopes ``(m, n, 2)`` of heights ``(m, n)`` that are ``dx`` and ``dy`` apart."""
-    (m, n), slope = h.shape, np.empty((*h.shape, 2))
-    for i in range(m):
-        for j in range(n):
-            a, b, c, d = max(i - 1, 0), min(i + 1, m - 1), max(j - 1, 0), min(j + 1, n - 1)
-            slope[i, j, 0] = (h[b, j] - h[a, j]) / ((b - a) * dx)
-            slope[i, j, 1] = (h[i, d] - h[i, c]) / ((d - c) * dy)
-            # a cell whose neighbour misses the object, or lies far behind it, is at a silhouette: its slope says
-            # nothing; one that is steeper than this is the object's flank
-            if np.abs(slope[i, j]).max() > 3.0:
-                slope[i, j] = 0.0
-    return slope
-
-
 class Side:
     """What one pad meets: closing at which each cell of its face touches ``height (m, n)`` [m], normals, pressures."""
 
@@ -81,7 +65,10 @@ class Side:
         self.height, self.cell = np.ascontiguousarray(height - self.touch), steps[0] * steps[1]
         depth = bed_closing(self.height, jaws.force / (jaws.stiffness * self.cell))
         self.pressure = jaws.stiffness * np.maximum(depth - self.height, 0.0)
-        self.slope = slopes_of(np.where(np.isfinite(self.height), self.height, jaws.pad[2]), *steps)
+        slope = np.stack(np.gradient(np.where(np.isfinite(self.height), self.height, jaws.pad[2]), *steps), axis=-1)
+        # a cell whose neighbour misses the object, or lies far behind it, is at a silhouette: its slope says nothing;
+        # one that is steeper than this is the object's flank
+        self.slope = np.where((np.abs(slope) > 3.0).any(axis=-1, keepdims=True), 0.0, slope)
 
     @cached_property
     def centre(self) -> FloatArray:

@@ -51,17 +51,12 @@ SMALL_TRACTION = E_N_TARGET / 0.5
 # too, which a rigid wall has not and e_n does not tell; and a linear wall takes as long as a nonlinear one.
 STIFF_WALL, SMALL_INDENTATION = 0.02, 0.05
 RIGID_CLOSES = 1.35  # times that indentation a rigid wall closed less at most, in 14 cases
-SURFACES = {
-    "three_motions": "ellipsoid from three motions", "axis_aligned": "fitted ellipsoid", "full": "fitted ellipsoid",
-    "quartic": "convex quartic",
-}  # fmt: skip
 # Part of the largest change on the coarse mesh that is doubted: the fine one shifts where a change passes through zero.
 DOUBT = 0.3
 # What may be raised where a contact is smaller than a coarse element: that says nothing, and harms no case.
 TOO_SMALL = (ArithmeticError, ConvergenceError, CheckError, NoContactError)
 CHANGE_OF = {"e_n": "change", "payload": "payload_change", "quality": "quality_change"}  # fields of a `Level`
 LEFT_OUT = "friction that acts back on the pressure was not solved ({reason})"
-MODEL_SIZES = ("full", "half", "quarter")  # by the number of planes of symmetry
 
 
 class Level(NamedTuple):
@@ -140,15 +135,16 @@ def settled(scene: Scene, solution: Solution, fits: Sequence[Mapping[str, Surfac
     wrench, surface = scene.effects.wrench, scene.limit_surface.model
     dropped = max(dropped_share(fit.wrench, fit.rho) for fit in curved)
     error = float(np.max([fit.fit_error.Erad for fit in curved]))
+    kind = EFFECTS["limit_surface"][2 if surface == "quartic" else surface != "three_motions"]
     reason = SYMMETRY if scene.effects.model_size == "auto" else FORCED
     return {
-        "model_size": Level(MODEL_SIZES[solution.fingers.planes], reason=reason),
+        "model_size": Level(EFFECTS["model_size"][-1 - solution.fingers.planes], reason=reason),
         # one where a plane of symmetry lies between two that press on one wall
         "fingers": Level("one", reason=SYMMETRY) if solution.fingers.fingers_solved == 1 else Level("two"),
         "friction": Level("ccm", 1.0 - F_N / S, CHEAP),
         "wrench": Level("3-D", dropped, APART) if wrench == "auto" else Level(wrench, dropped, FORCED),
         # an ellipsoid, whose quality is 5 to 10 % off, only where the scene asks for it
-        "limit_surface": Level(SURFACES[surface], error, CHEAP if surface == "quartic" else FORCED),
+        "limit_surface": Level(kind, error, CHEAP if surface == "quartic" else FORCED),
     }
 
 

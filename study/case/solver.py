@@ -15,7 +15,6 @@ from functools import cached_property
 from itertools import islice, repeat
 from typing import Any, NamedTuple, TypeVar
 
-from softjaw.fem.contact.path import Pressed
 from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.fem.objects.gap import Pose
 from softjaw.fem.petsc import Seconds
@@ -53,11 +52,10 @@ class Levels(NamedTuple):
 class Solution:
     """Both fingers in equilibrium at one force on one mesh.
 
-    ``fingers``: what was pressed. ``states``: of its parts. ``contacts``: of both fingers.
+    ``fingers``: what was pressed. ``contacts``: of both fingers.
     """
 
     fingers: OnRigid | OnWall
-    states: Sequence[Pressed]
     contacts: Sequence[PressedContact]
 
     @cached_property
@@ -183,7 +181,7 @@ class CandidateSolver:
             for state in states:
                 if isinstance(state, Failure):
                     raise state
-            self._solutions[k, mesh, levels] = Solution(fingers, states, fingers.contacts(states))
+            self._solutions[k, mesh, levels] = Solution(fingers, fingers.contacts(states))
         return self._solutions[k, mesh, levels]
 
     def case(self, k: int, levels: Levels, left_out: float = 0.0) -> Solved:

@@ -12,10 +12,6 @@ from typing import Any
 
 import numpy as np
 
-SAMPLING = (
-    "The same numbers in every run: sampled motions are Fibonacci points, generators of random ones have fixed seeds."
-)
-
 
 def timestamp() -> str:
     """Local time with its offset from UTC."""

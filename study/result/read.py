@@ -320,21 +320,21 @@ def other_levels(count: int, k: int) -> list[int]:
     return sorted({0, (count - 1) // 2, count - 1} - {k})
 
 
-def half_width(samples: np.ndarray) -> np.ndarray:
-    """Half of the range of 95 % of some samples along the last axis; NaN where one of them has no value.
+def half_width(changes: np.ndarray) -> np.ndarray:
+    """Within which 95 % of the changes by samples lie along the last axis, to one side or both; NaN where one is NaN.
 
-    >>> float(half_width(np.arange(40.0)))
-    19.0
+    >>> float(half_width(np.arange(-39.0, 41.0, 2.0)))
+    38.0
     """
     # hazen: of n samples that take the middles of n intervals of equal probability, as the scene's do
-    low, high = np.quantile(samples, (1 - UPPER, UPPER), axis=-1, method="hazen")
-    return np.asarray(high - low) / 2
+    return np.asarray(np.quantile(np.abs(changes), 2 * UPPER - 1, axis=-1, method="hazen"))
 
 
 def with_intervals(ds: xr.Dataset) -> xr.Dataset:
     """The cases with the scene's own inputs; samples of the uncertain ones become an interval of each main map.
 
-    ``NAME_interval`` is its half-width (CCM), ``NAME_samples`` has the values, whose last dimension is `REALISATION`.
+    ``NAME_interval`` is its half-width (CCM) about the value, ``NAME_samples`` has the values, whose last dimension is
+    `REALISATION`.
     """
     given, samples = ds.isel({REALISATION: 0}, drop=True), ds.isel({REALISATION: slice(1, None)})
     names = [name for name in UNCERTAIN_MAPS if name in ds]
@@ -342,8 +342,9 @@ def with_intervals(ds: xr.Dataset) -> xr.Dataset:
         values = samples[name].sel(model=MODELS[0], drop=True) if "model" in samples[name].dims else samples[name]
         values = values.transpose(*given.status.dims, REALISATION)
         about = {"units": ds[name].attrs["units"], "long_name": f"half-width of the 95 % interval of {name}"}
-        text = f"Half of the range in which {name} (CCM) of 95 % of the samples of the uncertain inputs lies."
-        given[f"{name}_interval"] = (given.status.dims, half_width(values.values), about | {"definition": text})
+        text = f"By how much {name} (CCM) of 95 % of the samples of uncertain inputs differs from its value."
+        changes = values.values - values_of(given, name)[..., None]
+        given[f"{name}_interval"] = (given.status.dims, half_width(changes), about | {"definition": text})
         given[f"{name}_samples"] = values
     given.attrs["derived"] += "".join(f" {name}_interval" for name in names)
     return given

@@ -32,7 +32,6 @@ from softjaw.study.result.layout import (
     Header,
     Layout,
 )
-from softjaw.study.result.provenance import SAMPLING
 from softjaw.study.result.store import open_result
 from softjaw.study.table import with_unit
 from softjaw.study.units import shown_text
@@ -162,7 +161,6 @@ def _write_texts(study: h5py.Group, layout: Layout, header: Header, packed: bool
     study.create_dataset("report", data=report_bytes(UNFINISHED))
     for name, label in TEXTS.items():
         study[name].attrs["long_name"] = label
-    study["provenance"].attrs["sampling"] = SAMPLING
     how = {"compression": DEFLATE_LEVEL} if packed else {}
     sessions = study["provenance"].create_dataset("sessions", data=np.zeros(MOST_SESSIONS, SESSION), **how)
     sessions.attrs["long_name"] = "one row for each time the study was started: program, machine, start, end"

@@ -48,7 +48,8 @@ def timed(units: Sequence[Any], budget: float = TIMED_S) -> tuple[list[float], f
 def _timed(units: Sequence[Any], budget: float, solve_unit: Callable) -> tuple[list[float], float]:
     """See `timed`; what the first case loads counts for no unit."""
     seconds, first_case, spent = np.full(len(units), np.nan), np.nan, 0.0
-    order = list(dict.fromkeys(_spread(len(units))))
+    n = len(units)  # the middle first; the first few lie far apart: multiples of the golden section
+    order = list(dict.fromkeys(int((0.5 + 0.618034 * k) % 1.0 * n) for k in range(4 * n)))
     first = order[0]
     for i in order:
         times: list[float] = []
@@ -81,12 +82,6 @@ def _path(times: Sequence[float], forces: int, *, left: bool, loads: bool) -> fl
     further = sum(times[1:]) / (len(times) - 1) if len(times) > 1 else times[0] / FIRST_FORCE_FACTOR
     first = FIRST_FORCE_FACTOR * further if loads else times[0]
     return first + sum(times[1:]) + further * (forces - len(times))
-
-
-def _spread(n: int) -> Iterator[int]:
-    """Positions below ``n``, the middle first, whose first few lie far apart: multiples of the golden section."""
-    for k in range(4 * n):
-        yield int((0.5 + 0.618034 * k) % 1.0 * n)
 
 
 def _times(cases: Iterator[Any], count: int) -> Iterator[float]:

@@ -63,6 +63,7 @@ class Stopper:
         self._on_stop, self._last_resort = on_stop, last_resort
         self._before: dict[signal.Signals, Any] = {}
         self._leave = self._case_ends = math.inf
+        self._raised: type[BaseException] | None = None
 
     def __enter__(self) -> Stopper:
         """Take the handlers over, and act on what came before."""
@@ -88,9 +89,13 @@ class Stopper:
         self._set_alarm()
         if self._last_resort is not None:  # in a thread that needs nothing of Python, which may never be back
             faulthandler.dump_traceback_later(self._last_resort, exit=True, file=sys.__stderr__ or sys.stderr)
-        self._solving = True
+        self._solving, self._raised = True, None
         try:
             yield
+        except Exception as error:
+            if self._raised is not None:  # compiled loops wrap what a signal raises in them
+                raise self._raised from error
+            raise
         finally:
             # First of all: an alarm that comes from here on belongs to no case.
             self._solving, self._case_ends = False, math.inf
@@ -123,6 +128,7 @@ class Stopper:
     def _raise(self, error: type[BaseException]) -> None:
         # Outside of a solve, as amid a write, an exception would leave half a row.
         if self._solving:
+            self._raised = error
             raise error
 
 

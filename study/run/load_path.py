@@ -103,7 +103,7 @@ class PathSolver:
                 # What was given up for a signal stays not computed, so that resume solves it.
                 break
             except (Exception, TimeLimitError) as error:  # whatever a case dies of is its result
-                _close(cases)
+                cases.close()
                 self._fail(unit, pending, sentence(error, stopper.limit), time.perf_counter() - clock)
                 cases, clock = self._solve_unit(unit, tuple(pending)), time.perf_counter()
                 continue
@@ -113,7 +113,7 @@ class PathSolver:
             look()
         # An orderly end, so what was begun has killed nobody.
         self._uncount()
-        _close(cases)
+        cases.close()
 
     def _store(self, unit: Any, served: list[tuple[int, int]], result: Any, seconds: float) -> None:
         rows = {row for _, row in served}
@@ -191,10 +191,3 @@ def sentence(error: BaseException, limit: float) -> str:
         frame = traceback.extract_tb(error.__traceback__)[-1]
         text += f" ({Path(frame.filename).name}:{frame.lineno})"
     return text
-
-
-def _close(cases: Any) -> None:
-    try:
-        cases.close()
-    except Exception as error:  # the rows are stored; what the solver says while it is being closed changes nothing
-        print(f"warning: closing a solver: {error}", flush=True)

@@ -123,9 +123,9 @@ def has(scene: Any) -> tuple[str, ...]:
 
 def memory(scene: Any) -> float:
     """Rough memory of one rank [bytes]: the libraries, what whole pads take on their finest mesh, and a wall."""
-    pad = 8.0 * FILL_FACTOR * (3.0 * _pad_nodes(scene, scene.accuracy.most_meshes - 1)) ** (4.0 / 3.0)
+    pad = 8.0 * FILL_FACTOR * (3.0 * _pad_nodes(scene)) ** (4.0 / 3.0)
     shell = has_wall(scene.object) and scene.effects.object != "rigid"
-    return LIBRARY_BYTES + pad + (BYTES_PER_UNKNOWN * wall_unknowns(scene)[1] if shell else 0.0)
+    return LIBRARY_BYTES + pad + (BYTES_PER_UNKNOWN * wall_unknowns(scene) if shell else 0.0)
 
 
 def gigabytes(size: float, digits: int) -> str:
@@ -206,15 +206,13 @@ def free_bytes(path: Path) -> int:
     return shutil.disk_usage(next(folder for folder in path.absolute().parents if folder.is_dir())).free
 
 
-def wall_unknowns(scene: Any) -> tuple[int, int]:
-    """Unknowns of the pads that are solved and of the shell, of a candidate in the middle of the scene's stations."""
+def wall_unknowns(scene: Any) -> int:
+    """Unknowns of the shell, of a candidate in the middle of the scene's stations."""
     where, surface = scene.candidates, outer_surface(scene.object)
     turned = surface.turned(0.0 if where.poses else where.angles[0])
     mirrors = _mirrors(scene, turned.symmetric)
     theta, s = geometry().wall_lines(scene, turned, *_covered(scene, surface), mirrors)
-    # of the pads from the nodes of a whole one, of which a plane of symmetry leaves one finger, or half of both
-    pads = round(3 * _pad_nodes(scene) * (1 if mirrors[0] else 2) * (0.5 if mirrors[1] else 1.0))
-    return pads, 6 * len(theta) * len(s)
+    return 6 * len(theta) * len(s)
 
 
 def _mirrors(scene: Any, symmetric: tuple[bool, bool]) -> tuple[bool, bool]:
@@ -237,6 +235,7 @@ def _covered(scene: Any, surface: Any) -> tuple[tuple[float, float], float]:
     return (float(low), float(high)), breadth
 
 
-def _pad_nodes(scene: Any, mesh: int = 1) -> int:
-    """Nodes of one whole pad, on the scene's mesh or a finer one."""
-    return math.prod(n * (2 if scene.gripper.element == "hex27" else 1) + 1 for n in pad_elements(scene, mesh))
+def _pad_nodes(scene: Any) -> int:
+    """Nodes of one whole pad, on its finest mesh."""
+    each, sides = 2 if scene.gripper.element == "hex27" else 1, pad_elements(scene, scene.accuracy.most_meshes - 1)
+    return math.prod(n * each + 1 for n in sides)

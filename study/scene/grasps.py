@@ -9,7 +9,6 @@ from pydantic import BeforeValidator, Field, PrivateAttr
 from softjaw.study.scene.objects import Plate, Shape, Span, SphereShape
 from softjaw.study.scene.section import RISING, Direction, Errors, SceneSection, Text, Vector, wrong
 from softjaw.study.scene.sections import Gripper
-from softjaw.study.units import converted
 
 Angle = Annotated[float, Field(ge=-360, le=360)]
 POSE = [{"point_mm": [0, 0, 20], "approach": [1, 0, 0], "long_side": [0, 0, 1]}]
@@ -132,14 +131,6 @@ class Candidates(SceneSection):
         if span is None or not places:
             return
         (low, high), half = span, self.half_extent_mm(gripper)
-        first, last = (converted(place, "m", "mm") for place in (places[0], places[-1]))
-        spread = places[-1] - places[0]
-        # stations within this share of the object are all but one; in metres they would spread over it
-        if len(places) > 1 and spread < 0.01 * (high - low) and low <= first <= last <= high:
-            yield (
-                f"candidates.stations_mm: {spread:.3g} mm between first and last station of an object of"
-                f" {high - low:g} mm; metres? Then write {first:g} to {last:g}"
-            )
         slack = 1e-6 * (high - low)
         over = [s for s in places if s - half < low - slack or s + half > high + slack]
         if over and not isinstance(shape, Plate | SphereShape):

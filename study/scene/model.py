@@ -125,12 +125,15 @@ class Scene(SceneSection):
     def rules(self) -> Errors:
         """Samples of uncertain inputs that are scenes, and not more cases than a file can hold."""
         if self.uncertainty.spread:
-            certain = self.at({}).effective()
-            for key, ends in self.uncertainty.ends(self._means).items():
-                for value in ends:
+            certain, samples = self.at({}).effective(), self.realisations[1:]
+            for key, width in self.uncertainty.spread.items():
+                values = [sample[key] for sample in samples]
+                place = "uncertainty", "spread", key
+                if key in self.sweep:
+                    yield wrong(width, "a key that is not swept, too", *place)
+                for value in {min(values), max(values)}:
                     if trouble := _trouble(certain, {key: value}):
-                        text = f"a spread whose samples are valid, unlike {value:.3g} ({trouble})"
-                        yield wrong(self.uncertainty.spread[key], text, "uncertainty", "spread", key)
+                        yield wrong(width, f"a spread whose samples are valid, unlike {value:.3g} ({trouble})", *place)
                         break
         if self.cases > MOST_CASES:
             yield wrong(self.cases, f"at most {MOST_CASES:,} cases; split the study into several scenes", "candidates")
@@ -173,6 +176,9 @@ class Scene(SceneSection):
             yield f"load.normal_force_n = {load}: {strain:.2g} times the shear modulus may not converge"
         if g.shear_modulus_kpa > 1e4:
             yield f"gripper.shear_modulus_kpa = {g.shear_modulus_kpa:g} is more than rubber has; foam: 8 to 80 kPa"
+        where = self.candidates
+        if where.refine and not where.sampled and where.refine < (each := self.cases // max(where.total, 1)):
+            yield f"candidates.refine = {where.refine} adds no grasp: one takes up to {each} cases"
         usual = Gripper()
         own_plate = (g.sheet_thickness_mm, g.sheet_modulus_gpa) != (usual.sheet_thickness_mm, usual.sheet_modulus_gpa)
         if g.tilt_stiffness_nm_per_rad is not None and own_plate:

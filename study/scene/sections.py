@@ -6,7 +6,6 @@ import math
 import re
 from collections.abc import Mapping
 from contextlib import suppress
-from statistics import NormalDist
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
@@ -327,20 +326,15 @@ class Uncertainty(SceneSection):
         # digits of a sample, so that no rounding error of a machine makes another one
         return [dict(zip(self.spread, (float(f"{v:.9g}") for v in row), strict=True)) for row in values]
 
-    def ends(self, means: Mapping[str, float]) -> dict[str, tuple[float, float]]:
-        """The smallest and the largest sample of each input; see `inputs`."""
-        widest = NormalDist().inv_cdf(1.0 - 0.5 / self.samples) / NormalDist().inv_cdf(UPPER)
-        return {key: (means[key] - widest * width, means[key] + widest * width) for key, width in self.spread.items()}
-
     def spread_rules(self, *sections: SceneSection) -> Errors:
         """Only single numbers of the sections in `UNCERTAIN` can be uncertain."""
         by_name = dict(zip(UNCERTAIN, sections, strict=True))
         for key in self.spread:
             section, _, name = key.partition(".")
             known = section in by_name and name in type(by_name[section]).model_fields
-            if type(value := getattr(by_name[section], name) if known else None) not in (int, float):
+            if not known or type(getattr(by_name[section], name)) not in (int, float):
                 expected = f"a key that has a single number, of {', '.join(UNCERTAIN)}"
-                yield wrong(value, expected, "spread", key)
+                yield wrong(self.spread[key], expected, "spread", key)
 
 
 class Run(SceneSection):

@@ -142,9 +142,5 @@ def value_text(value: Any) -> str:
 
 
 def scene_table(text: str, section: str) -> dict[str, Any]:
-    """A section of a stored scene; empty where there is none, or where somebody wrote another text into the file."""
-    try:
-        table = parse_toml(text, "scene").get(section, {})
-    except SceneError:
-        return {}
-    return table if isinstance(table, dict) else {}
+    """A section of a stored scene; empty where there is none."""
+    return dict(parse_toml(text, "scene").get(section, {}))

@@ -263,7 +263,7 @@ def _force(ds: xr.Dataset, index: Index) -> tuple[str, str]:
     low, error = (at(ds, name, index) for name in ("force_low", "force_low_error"))
     if np.isfinite(low):
         known = np.isfinite(error)
-        covers = "±: mesh, interpolation; 10 % less mu needs 10 % more" if known else "error not known"
+        covers = "±: mesh, interpolation, not mu" if known else "error not known"
         least = with_error(low, error) if known else number(low, 3)
         if at(ds, "force_high", index) < low:
             return "none is safe", f"{wanted} need {least} N per finger ({covers}), the wall bears {_borne(ds, index)}"

@@ -314,6 +314,6 @@ def test_a_solver_that_was_put_away_goes_on_with_the_next_force_of_its_path():
     kept, new = (CandidateSolver(unit.scene, unit.candidate.poses) for _ in range(2))
     kept.solve(0, COARSE, PLAIN)
     kept.put_away()
-    later, alone = (solver.solve(1, COARSE, PLAIN).states[0] for solver in (kept, new))
+    later, alone = (solver.solve(1, COARSE, PLAIN).contacts[0].state for solver in (kept, new))
     assert later.force == 3.0
     np.testing.assert_array_equal(later.points.load, alone.points.load)

@@ -30,6 +30,14 @@ def wait():
         time.sleep(0.01)
 
 
+def wrapped():
+    """What compiled loops make of an interruption."""
+    try:
+        wait()
+    except BaseException as error:
+        raise SystemError("a result with an exception set") from error
+
+
 def test_what_takes_too_long_is_interrupted_but_not_the_next():
     with Stopper(lambda: None, 0.1) as stopper:
         with pytest.raises(TimeLimitError), stopper.case():
@@ -39,6 +47,10 @@ def test_what_takes_too_long_is_interrupted_but_not_the_next():
             pass
         with pytest.raises(TimeLimitError), stopper.case():
             wait()
+        with pytest.raises(TimeLimitError), stopper.case():
+            wrapped()
+        with pytest.raises(SystemError), stopper.case():
+            raise SystemError
     assert signal.getsignal(signal.SIGALRM) == signal.SIG_DFL
 
 
