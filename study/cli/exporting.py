@@ -11,7 +11,7 @@ from softjaw.study.export.cases import as_csv, as_json
 from softjaw.study.export.data_set import FORMS, solved_files, write_data_set
 from softjaw.study.export.planners import CLOSING, as_graspgen, as_yaml
 from softjaw.study.export.rigid_body import body_of
-from softjaw.study.export.selection import GripperFrame, chosen, grasps, usable
+from softjaw.study.export.selection import GripperFrame, chosen, first, grasps, usable
 from softjaw.study.export.simulators import as_mjcf, as_sdf, as_stl, as_usd
 from softjaw.study.grippers import Hand, gripper_file
 from softjaw.study.messages import USAGE, StudyError, write_file
@@ -42,8 +42,12 @@ def export(options: Namespace) -> str:
         raise StudyError(USAGE, f"-o: found '{options.output}', expected another file than the results")
     if index:
         refuse_unused(options, "force", "by", "model", "most", "min", "frame")
-        preset = next((task_keys(ds, "gripper").get("preset") for _, ds in solved_files(index)), None)
-        return write_data_set(index, Path(options.output), options.form, gripper_of(options, preset))
+        listed, presets = solved_files(index)
+        if len(presets) > 1 and not options.gripper:
+            found = ", ".join(sorted(preset or "no preset" for preset in presets))
+            raise StudyError(USAGE, f"{index}: found objects of several grippers ({found}): name one with --gripper")
+        gripper = gripper_of(options, next(iter(presets), None))
+        return write_data_set(index, listed, Path(options.output), options.form, gripper)
     if options.form in DATA_SETS:
         raise StudyError(USAGE, f"--format {options.form}: found '{options.file}', expected a folder of objects")
     refuse_unused(options, *UNUSED.get(options.form, ()), form=options.form)
@@ -54,17 +58,18 @@ def export(options: Namespace) -> str:
         return f"written: {write_vtk(ds, Path(options.output), options.force)}"
     few = options.top if options.top is not None else 1 if options.form in SIMULATORS else 0
     choice = {name: getattr(options, name) for name in ("model", "force", "by")}
-    choice |= {"top": few, "least": dict(options.least)}
+    choice |= {"least": dict(options.least)}
     if options.form in TABLES:
         asked = options.force or options.by or options.least or options.top is not None
-        return _written(options, [TABLES[options.form](ds, options.model, chosen(ds, **choice)[0] if asked else None)])
+        cases = chosen(ds, top=few, **choice)[0] if asked else None
+        return _written(options, [TABLES[options.form](ds, options.model, cases)])
     gripper = gripper_of(options, task_keys(ds, "gripper").get("preset"))
     ranked = grasps(ds, gripper, **choice)
     if options.form != "graspgen":  # which has a field for those that do not hold
         ranked, note = usable(ranked)
         if note:
             print(f"note: {note}", file=sys.stderr)
-    if not ranked:
+    if not (ranked := first(ranked, few)):
         raise StudyError(USAGE, f"{options.file}: no grasp is left to write; 'softjaw show' lists all")
     if options.form in PLANNERS:
         folder = (str(Path(options.output or ".").parent),) if options.form == "graspgen" else ()

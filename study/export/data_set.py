@@ -11,7 +11,7 @@ import hashlib
 import io
 import json
 import tarfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -29,7 +29,8 @@ from softjaw.study.quantities import BY_KEY, DONE, NO_GRASP, STATES
 from softjaw.study.ranking import judged, task_keys
 from softjaw.study.result.index import arrays_file, read_index
 from softjaw.study.result.read import maps_in, open, scene_of
-from softjaw.study.result.store import open_result
+from softjaw.study.result.store import open_result, torn_rows
+from softjaw.study.scene.text import scene_table
 from softjaw.study.table import Row, plain
 from softjaw.study.units import UNITS
 
@@ -59,14 +60,28 @@ class ObjectGrasps(NamedTuple):
     @property
     def file(self) -> str:
         """Name of the mesh in the data set."""
-        return self.name + self.mesh.suffix.lower()
+        return self.name + self.kind
+
+    @property
+    def kind(self) -> str:
+        """Ending of the mesh in the data set: glTF, whose parts may lie in files beside it, becomes one file."""
+        return self.mesh.suffix.lower().replace(".gltf", ".glb")
+
+    @property
+    def content(self) -> bytes:
+        """The mesh in the data set."""
+        if self.kind == self.mesh.suffix.lower():
+            return self.mesh.read_bytes()
+        import trimesh  # slow to load
+
+        return bytes(trimesh.load(self.mesh).export(file_type="glb"))
 
 
 Files = dict[str, bytes]  # of one object, by name
 
 
-def write_data_set(index: Path, out: Path, form: str, gripper: GripperFrame) -> str:
-    """Write a folder's grasps as a data set into ``out``; a line that says what was written.
+def write_data_set(index: Path, rows: Sequence[Row], out: Path, form: str, gripper: GripperFrame) -> str:
+    """Write the grasps of a folder's objects ``rows`` as a data set into ``out``; a line that says what was written.
 
     Raises `StudyError`: a file cannot be read or written, or no object has a grasp.
     """
@@ -76,12 +91,15 @@ def write_data_set(index: Path, out: Path, form: str, gripper: GripperFrame) -> 
     listed: dict[str, list[str]] = {split: [] for split in SPLITS}
     good = total = 0
     with ExitStack() as stack:
+        opened = {split: stack.enter_context(ExitStack()) for split in SPLITS}
         shards: dict[str, tarfile.TarFile] = {}
-        for grasps in _objects(index, gripper):
+        for grasps in _objects(index, rows, gripper):
             number, position = divmod(len(listed[grasps.split]), SHARD)
             if form == "webdataset" and not position:
-                made = stack.enter_context(beside(out / f"{grasps.split}-{number:06d}.tar", folders=True))
-                shards[grasps.split] = stack.enter_context(tarfile.open(made, "w"))
+                shard = opened[grasps.split]
+                shard.close()  # the one before
+                made = shard.enter_context(beside(out / f"{grasps.split}-{number:06d}.tar", folders=True))
+                shards[grasps.split] = shard.enter_context(tarfile.open(made, "w"))
             _add(FORMS[form](grasps), out, shards.get(grasps.split))
             listed[grasps.split].append(grasps.file)
             good += int(grasps.arrays["object_in_gripper"].sum())
@@ -96,9 +114,11 @@ def write_data_set(index: Path, out: Path, form: str, gripper: GripperFrame) -> 
              "object_in_gripper": "holds (a known mass with task.safety), does no harm, and this gripper can take it"}
     write_file(out / "data-set.json", json.dumps(about, indent=1))
     counts = " and ".join(f"{len(files)} for {split}" for split, files in listed.items())
+    others = len(read_index(index)[0]) - len(rows)
+    without = f"; {others} objects without a solved grasp are left out" * bool(others)
     stale = sum(path.stat().st_mtime_ns == stamp for path, stamp in before.items())
-    others = f"\nnote: {stale} files in {out} are from before and of other objects or formats" * bool(stale)
-    return f"written: {out}: {counts}; {good} of {total} grasps are successful{others}"
+    older = f"\nnote: {stale} files in {out} are from before and of other objects or formats" * bool(stale)
+    return f"written: {out}: {counts}; {good} of {total} grasps are successful{without}{older}"
 
 
 def _add(files: Files, out: Path, shard: tarfile.TarFile | None) -> None:
@@ -124,7 +144,7 @@ def _as_json(grasps: ObjectGrasps) -> bytes:
 
 def _graspgen(grasps: ObjectGrasps) -> Files:
     """``objects/NAME.stl``, and ``grasps/NAME.json`` for each."""
-    return {f"objects/{grasps.file}": grasps.mesh.read_bytes(), f"grasps/{grasps.name}.json": _as_json(grasps)}
+    return {f"objects/{grasps.file}": grasps.content, f"grasps/{grasps.name}.json": _as_json(grasps)}
 
 
 def _acronym(grasps: ObjectGrasps) -> Files:
@@ -134,32 +154,39 @@ def _acronym(grasps: ObjectGrasps) -> Files:
             "grasps/transforms": arrays.pop("transforms"),
             "grasps/qualities/flex/object_in_gripper": arrays.pop("object_in_gripper").astype(np.int64)}
     made |= {f"grasps/qualities/softjaw/{name}": values for name, values in arrays.items()}
-    return {mesh: grasps.mesh.read_bytes(), f"grasps/{grasps.name}_{grasps.scale!r}.h5": arrays_file(made)}
+    return {mesh: grasps.content, f"grasps/{grasps.name}_{grasps.scale!r}.h5": arrays_file(made)}
 
 
 def _webdataset(grasps: ObjectGrasps) -> Files:
     """``train-000000.tar``, ...: for each object ``NAME.json``, as GraspGen keeps it, and ``NAME.mesh.stl``."""
     key = grasps.name.replace("%", "%25").replace(".", "%2e")  # what follows the first dot is the kind of a file
-    return {f"{key}.json": _as_json(grasps), f"{key}.mesh{grasps.mesh.suffix.lower()}": grasps.mesh.read_bytes()}
+    return {f"{key}.json": _as_json(grasps), f"{key}.mesh{grasps.kind}": grasps.content}
 
 
 FORMS = {"graspgen": _graspgen, "acronym": _acronym, "webdataset": _webdataset}
 
 
-def solved_files(index: Path) -> Iterator[tuple[Row, xr.Dataset]]:
-    """Rows of a folder's objects that have solved cases, each with its result file; none before all of them open."""
-    rows = [(row, index.parent / row["file"]) for row in read_index(index)[0] if row["done"] > 0]
-    for _, path in rows:
-        with open_result(path):
-            pass
-    yield from ((row, open(path)) for row, path in rows)
+def solved_files(index: Path) -> tuple[list[Row], set[str | None]]:
+    """Rows of a folder's objects that have solved cases, and the grippers that their scenes name.
 
-
-def _objects(index: Path, gripper: GripperFrame) -> Iterator[ObjectGrasps]:
-    for row, ds in solved_files(index):
-        scale = UNITS[task_keys(ds, "object").get("unit", "m")].size
-        if not (mesh := index.parent / row["mesh"]).is_file():
+    Raises `StudyError`: a result file is missing or damaged, or a mesh is missing.
+    """
+    rows, presets = [row for row in read_index(index)[0] if row["done"] > 0], set()
+    for row in rows:
+        path, mesh = index.parent / row["file"], index.parent / row["mesh"]
+        with open_result(path) as result:
+            presets.add(scene_table(result.scene, "gripper").get("preset"))
+            if torn_rows(path, result.layout):
+                raise StudyError(OTHER_FILE, f"{path}: damaged, numbers do not match their checksums; run it again")
+        if not mesh.is_file():
             raise StudyError(OTHER_FILE, f"{mesh}: no such file; put the mesh of '{row['object']}' back")
+    return rows, presets
+
+
+def _objects(index: Path, rows: Sequence[Row], gripper: GripperFrame) -> Iterator[ObjectGrasps]:
+    for row in rows:
+        ds, mesh = open(index.parent / row["file"]), index.parent / row["mesh"]
+        scale = UNITS[task_keys(ds, "object").get("unit", "m")].size
         each = [grasp_arrays(ds, gripper._replace(approach=(way,))) for way in gripper.approach]
         each = each or [grasp_arrays(ds, gripper)]
         arrays = {name: np.concatenate([part[name] for part in each]) for name in each[0]}

@@ -13,7 +13,7 @@ against one of them (`study.case.reach` finds the clearest).
 import textwrap
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -202,6 +202,16 @@ def holds(ds: xr.Dataset, case: dict[str, Any], gripper: GripperFrame) -> dict[s
         approach, room = clearest(scene, hand, pad, _middle(case), wide, depth)
     beyond += ["the hand meets the object from every side"] * (room < FREE and not beyond)
     return {approach: Hold(*joints, tuple(beyond))}
+
+
+def first(grasps: Sequence[RankedGrasp], top: int = 0) -> list[RankedGrasp]:
+    """Those of the first ``top`` cases (0: all); ``merit`` is relative to the best of them, and falls."""
+    few = list(dict.fromkeys(grasp.place for grasp in grasps))[: top or None]
+    kept, merit, best = list[RankedGrasp](), 1.0, max((grasp.merit for grasp in grasps[:1]), default=0.0)
+    for grasp in (grasp for grasp in grasps if grasp.place in few):
+        merit = min(merit, grasp.merit / best) if best > 0 else 0.0
+        kept.append(replace(grasp, merit=merit))
+    return kept
 
 
 def usable(grasps: Sequence[RankedGrasp]) -> tuple[list[RankedGrasp], str]:

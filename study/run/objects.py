@@ -22,7 +22,7 @@ from softjaw.study import messages, quantities
 from softjaw.study.case.build import listed_accuracy, with_mass
 from softjaw.study.case.result import TimeLimitError
 from softjaw.study.flags import LOST, Flag, flag_words
-from softjaw.study.messages import NoGraspError, StudyError, complain, shortened
+from softjaw.study.messages import NoGraspError, StudyError, complain, first_of, shortened
 from softjaw.study.ranking import judge, largest, task_keys
 from softjaw.study.result import index
 from softjaw.study.result.read import dataset, values_of
@@ -41,6 +41,7 @@ from softjaw.study.table import Row
 from softjaw.study.units import in_si
 
 BATCH_PER_RANK, MOST_OPEN_FILES = 4, 128  # objects of a batch: for each rank, and at most
+MOST_NAMED = 20  # damaged files
 REASON_LETTERS = 400
 FATAL = (messages.CANNOT_WRITE, messages.IN_USE)  # codes of errors that the objects after it would meet, too
 T = TypeVar("T")
@@ -248,7 +249,7 @@ def _rows_of(folder: ObjectFolder, out: Path, retry_failed: bool) -> list[Row]:
     again = {index.FAILED, index.REFUSED, index.NO_GRASP, index.SOME_FAILED} if retry_failed else set()
     if gone := known.keys() - {listed.name for listed in folder.objects}:
         print(f"note: {len(gone)} of {len(known)} objects in {path} are not in this run; their files stay", flush=True)
-    rows = []
+    rows, damaged = list[Row](), list[StudyError]()
     for listed in folder.objects:
         row = index.blank_row(listed.name, file=f"{listed.name}.hdf", mesh=os.path.relpath(listed.mesh, out))
         before = known.get(listed.name, row)
@@ -262,9 +263,15 @@ def _rows_of(folder: ObjectFolder, out: Path, retry_failed: bool) -> list[Row]:
             change = _change(out / row["file"], scene)
             text = f"{path}: object '{listed.name}' was solved from another scene or mesh ({change})"
             raise StudyError(messages.OTHER_FILE, f"{text}; choose another folder with -o, or move this one away")
-        if before["key"] == key and (before["done"] < 1 or _whole(out / row["file"])):
-            row = before | ({"state": index.MISSING} if before["state"] in again else {})
+        try:
+            if before["key"] == key and (before["done"] < 1 or _whole(out / row["file"])):
+                row = before | ({"state": index.MISSING} if before["state"] in again else {})
+        except StudyError as error:
+            damaged.append(error)
         rows.append(row | {"key": key} | ({} if mass is None else {"mass": in_si("mass_g", mass)}))
+    if damaged:
+        texts = first_of([error.message for error in damaged], MOST_NAMED, " files like this")
+        raise StudyError(damaged[0].code, "\n".join(texts))
     return rows
 
 

@@ -55,7 +55,7 @@ WAYS = {  # of giving candidates, with what an override of each replaces
     "sampled": ("stations", "stations_mm", "angles_deg", "poses"),
 }  # fmt: skip
 NOT_SWEPT = (  # they change which cases or datasets a file has, or no number of a case
-    "object.shape", "object.mesh", "object.name", "object.mass_g", "object.density", "gripper.preset",
+    "object.shape", "object.mesh", "object.unit", "object.name", "object.mass_g", "object.density", "gripper.preset",
     "candidates.stations", "candidates.stations_mm", "candidates.angles_deg", "candidates.poses", "candidates.sampled",
     "candidates.refine", "load.normal_force_n", "accuracy.meshes", "accuracy.target", "accuracy.target_of",
     "effects.wrench", "limit_surface.samples",

@@ -1,19 +1,24 @@
 """A folder's grasps as a data set: the fields of each format, labels, poses, splits, and the loader of the examples."""
 
+import io
 import json
 import runpy
+import shutil
 import tarfile
+from itertools import cycle
 
 import h5py
 import numpy as np
 import pytest
+import trimesh
 
 from softjaw.study.cli import main
 from softjaw.study.export import data_set
-from softjaw.study.export.data_set import FORMS, grasp_arrays, write_data_set
+from softjaw.study.export.data_set import FORMS, grasp_arrays, solved_files, write_data_set
 from softjaw.study.export.selection import GripperFrame
 from softjaw.study.flags import Flag
 from softjaw.study.grippers import Hand, gripper_file
+from softjaw.study.messages import OTHER_FILE, USAGE
 from softjaw.study.quantities import DONE, WIDE
 from softjaw.study.quantities import SLIPS as SLIPPING
 from softjaw.study.result.index import blank_row, write_index
@@ -120,18 +125,16 @@ def test_graspgen_has_its_fields_and_splits_acronym_its_datasets_and_shards_both
     assert sorted(set(keys)) == ["bowl", "cup", "mug%2eold", "vase"]
     assert all(first == other for first, other in zip(keys[::2], keys[1::2], strict=True))
     assert found["cup.mesh.stl"] == b"cup"
-    assert "note" not in write_data_set(folder / "index.hdf", out, "graspgen", GRIPPER)
+    rows, _ = solved_files(folder / "index.hdf")
+    assert "note" not in write_data_set(folder / "index.hdf", rows, out, "graspgen", GRIPPER)
     (out / "objects/plate.stl").touch()
-    assert "note: 1 " in write_data_set(folder / "index.hdf", out, "graspgen", GRIPPER)
+    assert "note: 1 " in write_data_set(folder / "index.hdf", rows, out, "graspgen", GRIPPER)
     assert len(json.loads(found["cup.json"])["grasps"]["force"]) == COUNT
 
 
 def test_the_gripper_of_the_scene_comes_to_a_folder_too_from_every_side_asked_for(folder, tmp_path, monkeypatch):
-    def with_preset(path):
-        ds = opened(path)
-        return ds.assign_attrs(scene=f'{ds.scene}\n[gripper]\npreset = "franka_hand"')
-
-    monkeypatch.setattr(data_set, "open", with_preset)
+    presets = cycle([{"preset": "franka_hand"}])
+    monkeypatch.setattr(data_set, "scene_table", lambda *_: next(presets))
     ways = ["--approach", "x", "--approach", "minus-y"]
     assert main(["export", str(folder), "--format", "acronym", "-o", str(tmp_path), *ways]) == 0
     frame = gripper_file("franka_hand")[1].frame
@@ -140,6 +143,31 @@ def test_the_gripper_of_the_scene_comes_to_a_folder_too_from_every_side_asked_fo
         ahead = file["grasps/transforms"][:, :3, 2]
     R = np.repeat([geometry(i)[0][0] for i in range(len(STATIONS))], len(FORCES), axis=0)
     assert ahead == pytest.approx(np.concatenate([R[..., 0], -R[..., 1]]))
+    presets = cycle([{"preset": "franka_hand"}, {}])  # whose depths and strokes differ
+    assert main(["export", str(folder), "--format", "acronym", "-o", str(tmp_path / "mixed"), *ways]) == USAGE
+    assert main(["export", str(folder), "--format", "acronym", "-o", str(tmp_path), "--gripper", "wsg50", *ways]) == 0
+
+
+def test_damage_ends_it_before_anything_is_written_shards_are_whole_one_by_one_and_gltf_is_one_file(
+    folder, tmp_path, monkeypatch
+):
+    copy, out = tmp_path / "copy", tmp_path / "out"
+    shutil.copytree(folder, copy)
+    trimesh.creation.box((1.0, 2.0, 3.0)).export(copy / "cup.gltf")
+    rows, _ = solved_files(copy / "index.hdf")
+    rows = [row | {"mesh": row["mesh"].replace("cup.stl", "cup.gltf")} for row in rows]
+    whole, form = list[int](), FORMS["webdataset"]
+    monkeypatch.setattr(data_set, "SHARD", 1)
+    monkeypatch.setitem(FORMS, "webdataset", lambda g: [whole.append(len([*out.glob("train-??????.tar")])), form(g)][1])
+    write_data_set(copy / "index.hdf", rows, out, "webdataset", GRIPPER)
+    assert whole == [0, 1, 2, 3]
+    with tarfile.open(out / "train-000001.tar") as shard:
+        mesh = trimesh.load(io.BytesIO(shard.extractfile("cup.mesh.glb").read()), "glb")
+    assert mesh.extents == pytest.approx([1.0, 2.0, 3.0])
+    with h5py.File(copy / "vase.hdf", "r+") as file:
+        file["study/payload/ccm"][...] += 1.0
+    assert main(["export", str(copy), "--format", "graspgen", "-o", str(tmp_path / "never")]) == OTHER_FILE
+    assert not (tmp_path / "never").exists()
 
 
 def test_the_example_loads_every_object_and_a_single_file_is_no_data_set(sets, capsys, monkeypatch, folder, tmp_path):

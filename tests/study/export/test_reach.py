@@ -10,7 +10,7 @@ from softjaw.study.case.poses import axis_poses
 from softjaw.study.case.reach import WAY, boxes, clearance, surface_points
 from softjaw.study.cli.exporting import gripper_of
 from softjaw.study.export.rigid_body import scene_of
-from softjaw.study.export.selection import GripperFrame, grasps, usable
+from softjaw.study.export.selection import GripperFrame, first, grasps, usable
 from softjaw.study.flags import Flag
 from softjaw.study.grippers import Hand, gripper_file
 from tests.study.export.grasp_results import RADIUS, STATIONS, opened, write
@@ -62,6 +62,15 @@ def test_what_the_gripper_cannot_take_is_left_out_with_the_reason(path, hand, wh
     assert not kept
     assert why in said
     assert said.startswith("5 of 5 ")
+
+
+def test_the_first_of_those_that_fit_are_written_and_none_is_better_than_the_first(path):
+    grasps = [replace(g, merit=merit) for g, merit in zip(taken(path, Hand()), (0.4, 0.5, 0.3, 0.2, 0.1), strict=True)]
+    few = first(grasps, 3)
+    assert [grasp.name for grasp in few] == [grasp.name for grasp in grasps[:3]]
+    assert [grasp.merit for grasp in few] == pytest.approx([1.0, 1.0, 0.75])
+    assert len(first(grasps)) == 5
+    assert first([], 2) == []
 
 
 def test_another_force_is_advised_only_where_one_that_was_solved_holds_the_object(path):
