@@ -36,8 +36,8 @@ OF_EDGES = dict.fromkeys((q.name for q in TABLE), 0.12) | {
     "p_max": 3.0,
 }  # fmt: skip
 # Of the square of the overlap where one line of nodes bears, which tells little of the contact's width.
-ONE_LINE = 2.0  # elements across a contact that one line of nodes makes
-OF_OVERLAP = {"closing": 2.0, "contact_area": 2.6, "p_max": 70.0}
+ONE_LINE, MOST_OVERLAP = 2.0, 0.45  # elements across a contact that one line of nodes makes; overlap that counts
+OF_OVERLAP = {"closing": 2.0, "contact_area": 2.6, "p_max": 70.0, "payload": 0.4, "safety_factor": 0.4}
 EDGES_ROUNDED = 1.6  # times the error of a payload on the coarse mesh alone, where the object's edges are rounded
 OF_PAIRS = {"p_max": 3.0}  # of what pairs differ by: peaks that an effect makes at an edge grow as elements shrink
 ALIGNED, LEANING = 0.2, np.radians(15.0)  # times the floor of a payload where contacts face each other; added per angle
@@ -46,6 +46,7 @@ ALIGNED, LEANING = 0.2, np.radians(15.0)  # times the floor of a payload where c
 ACTING, OF_LOSS = 2.0, 0.5
 # Of that share times that of the load on edges, where the contact lies round a corner: forces and what they make.
 OF_CORNERS = {"f_x_max": 1.5, "f_y_max": 1.5, "tau_z_max": 1.0, "quality": 6.0, "payload": 2.0, "safety_factor": 2.0}
+REMAINDER = 2.5  # times the error itself, by which that of a payload grows
 PAYLOADS = ("payload", "safety_factor")  # what arms and couples leave of the friction: little of it moves all of them
 
 
@@ -65,7 +66,7 @@ class Unseen(NamedTuple):
         """On these contacts; floors, at which meshes agree by luck, are ``doubt`` times what the elements tell."""
         floor = doubt * FLOOR / min(c.elements for c in contacts) ** POWER
         of_width = doubt * FLOOR / min(c.across for c in contacts) ** POWER
-        overlap = max(c.overlap * (c.across <= ONE_LINE) for c in contacts)
+        overlap = max(min(c.overlap, MOST_OVERLAP) * (c.lines <= ONE_LINE) for c in contacts)
         return cls(floor, of_width, max(c.on_edges for c in contacts), overlap)
 
     def share(self, q: Quantity, contacts: Sequence[Any], acts: bool = False) -> float:
@@ -113,6 +114,8 @@ def mesh_errors(
         share = 1.0 if "wall" in q.needs else OF_FARTHEST
         error = estimate(value, coarse_mesh[q.key], view_values, q.error, q.name in PAYLOADS, share)
         error += unseen.share(q, fine, acts or left_out > 0.0) * size
+        if q.name in PAYLOADS:  # the larger, the more in doubt
+            error *= 1.0 + min(REMAINDER * error, 1.0)
         if q.error == "relative" and not np.all(coarse_mesh[q.key]):
             error = max(error, 1.0)  # a payload of which the coarse mesh has nothing
         apart = [s * distance(low[q.key], high[q.key], q.error, value) for low, high, s in compared if q.key in low]

@@ -141,6 +141,12 @@ class PressedContact(Contact):
         return max(np.count_nonzero(loaded) / (2.0 * longest), 1.0)
 
     @property
+    def lines(self) -> float:
+        """Elements across the contact, at its narrowest, that share the load; some bear little."""
+        load = self.patch.load.reshape(self.state.pad.shape.patch_faces)
+        return min(float(sums.sum() ** 2 / (sums**2).sum()) for sums in (load.sum(axis=0), load.sum(axis=1))) / 2.0
+
+    @property
     def on_edges(self) -> float:
         """Share of the load on elements in or beside which the object has an edge; round ones count in part."""
         shape = self.state.pad.shape
