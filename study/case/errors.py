@@ -46,7 +46,6 @@ ALIGNED, LEANING = 0.2, np.radians(15.0)  # times the floor of a payload where c
 ACTING, OF_LOSS = 2.0, 0.5
 # Of that share times that of the load on edges, where the contact lies round a corner: forces and what they make.
 OF_CORNERS = {"f_x_max": 1.5, "f_y_max": 1.5, "tau_z_max": 1.0, "quality": 6.0, "payload": 2.0, "safety_factor": 2.0}
-REMAINDER = 2.5  # times the error itself, by which that of a payload grows
 PAYLOADS = ("payload", "safety_factor")  # what arms and couples leave of the friction: little of it moves all of them
 
 
@@ -115,7 +114,7 @@ def mesh_errors(
         error = estimate(value, coarse_mesh[q.key], view_values, q.error, q.name in PAYLOADS, share)
         error += unseen.share(q, fine, acts or left_out > 0.0) * size
         if q.name in PAYLOADS:  # the larger, the more in doubt
-            error *= 1.0 + min(REMAINDER * error, 1.0)
+            error *= 1.0 + min(2.5 * error, 1.0)
         if q.error == "relative" and not np.all(coarse_mesh[q.key]):
             error = max(error, 1.0)  # a payload of which the coarse mesh has nothing
         apart = [s * distance(low[q.key], high[q.key], q.error, value) for low, high, s in compared if q.key in low]

@@ -41,7 +41,6 @@ from softjaw.study.table import Row
 from softjaw.study.units import in_si
 
 BATCH_PER_RANK, MOST_OPEN_FILES = 4, 128  # objects of a batch: for each rank, and at most
-MOST_NAMED = 20  # damaged files
 REASON_LETTERS = 400
 FATAL = (messages.CANNOT_WRITE, messages.IN_USE)  # codes of errors that the objects after it would meet, too
 T = TypeVar("T")
@@ -270,8 +269,7 @@ def _rows_of(folder: ObjectFolder, out: Path, retry_failed: bool) -> list[Row]:
             damaged.append(error)
         rows.append(row | {"key": key} | ({} if mass is None else {"mass": in_si("mass_g", mass)}))
     if damaged:
-        texts = first_of([error.message for error in damaged], MOST_NAMED, " files like this")
-        raise StudyError(damaged[0].code, "\n".join(texts))
+        raise StudyError(damaged[0].code, "\n".join(first_of([error.message for error in damaged], 20, " such files")))
     return rows
 
 
