@@ -29,7 +29,7 @@ from softjaw.lsfit.form import exponents, monomial_gradients, monomials
 from softjaw.lsfit.lowest import lies_above, smallest_value
 from softjaw.lsfit.quartic import Quartic
 from softjaw.lsfit.quartic_fit import convex_quartic
-from softjaw.lsfit.samples import FLAT_RATIO, THIN_RATIO, FitErrors, fit_error, radii
+from softjaw.lsfit.samples import FLAT_RATIO, FitErrors, fit_error, principal_frame, radii
 from softjaw.lsfit.sos import conic_solution, gram_map, quadratic_map, side, upper_triangle
 from softjaw.lsfit.surface import FitError, FitFlag, FloatArray, LimitSurface
 
@@ -77,19 +77,13 @@ def span_samples(W: ArrayLike, T: ArrayLike) -> SpanSamples:
 def _map(W: FloatArray, largest: FloatArray) -> tuple[FloatArray, FitFlag]:
     """Columns ``B (d, r)`` of the coordinates, and whether the samples are flat or thin."""
     used = np.flatnonzero(largest > FLAT_RATIO * largest.max())
-    scale = largest[used]
+    scale = largest[used, None]
     # Rank is a property of the samples, not of the unit of a torque: judge it with all components of one size.
-    _, values, V = np.linalg.svd(W[:, used] / scale, full_matrices=False)
-    r = int((values > FLAT_RATIO * values[0]).sum())
-    flag = FitFlag.RANK_DEFICIENT if r < W.shape[1] else FitFlag.CLEAN
-    flag |= FitFlag.THIN if values[r - 1] < THIN_RATIO * values[0] else FitFlag.CLEAN
-    B = np.zeros((W.shape[1], r))
+    frame, Y, flag = principal_frame(W[:, used] / scale.T)
+    B = np.zeros((W.shape[1], frame.shape[1]))
     # a diagonal map keeps the surface a quartic of the components, which files and look-ups can hold
-    if r == len(used):
-        B[used] = np.diag(scale)
-        return B, flag
-    B[used] = scale[:, None] * V[:r].T
-    return B * np.abs(W[:, used] / scale @ V[:r].T).max(axis=0), flag
+    B[used] = scale * (np.eye(len(used)) if len(used) == len(frame.T) else frame * np.abs(Y).max(axis=0))
+    return B, flag | FitFlag.RANK_DEFICIENT * (B.shape[0] > B.shape[1])
 
 
 def span_ellipsoid(W: ArrayLike, T: ArrayLike) -> tuple[LimitSurface, FitErrors]:

@@ -151,14 +151,18 @@ def _worst(grasp: _Grasp, gap: float) -> Payload:
     extent = np.linalg.svd(points[:8] - points[:8].mean(axis=0), compute_uv=False)
     lower = 0.0
     if extent[-1] > ROUNDING_FORCE and upper > ROUNDING_FORCE:
-        before, n, convex = 0, 8, False
-        while not convex and n > before:  # rounding may break the hull of a thin set: it is made anew from its points
-            hull = ConvexHull(points[:n])
-            corners = hull.simplices.astype(np.int64)  # in no order round their facets
-            inward = np.einsum("fi,fi->f", _planes(points, corners)[:, :3], hull.equations[:, :3]) < 0
-            corners[inward] = corners[inward, ::-1]
-            before = n
-            lower, upper, u, n, convex = _refined(*search, n, corners, hull.equations, upper, u, gap)
+        hull, before = ConvexHull(points[:8], incremental=True), np.zeros(4)
+        for n in range(8, MOST_POINTS):
+            nearest = hull.equations[:, 3].argmax()
+            plane = hull.equations[nearest].copy()
+            lower = -plane[3]
+            # a point that the hull has already ends the search: along its nearest facet both bounds are the same
+            if (plane == before).all() or upper < ROUNDING_FORCE or lower >= upper * (1.0 - gap):
+                break
+            # a programme that did not fill its rows says nothing of the support
+            before, basis = plane, bases[hull.simplices[nearest, 0]]
+            upper, u = _looked(*search, plane[None, :3], basis, n, np.inf, upper, u)
+            hull.add_points(points[n : n + 1])
     force = min(lower, upper) if lower > ROUNDING_FORCE else 0.0
     return Payload(force, max(upper, 0.0), -u, upper >= -ROUNDING_FORCE)
 
@@ -173,43 +177,6 @@ def _begin(grasp: _Grasp, rows: FloatArray) -> FloatArray:
     basis[-1, :6], basis[-1, 6:] = point, (1.0, 0.0)
     basis[:-1, 6] = np.where(TORQUE_OFFSET * np.sqrt(np.arange(2.0, m + 1)) < rows @ point, -1.0, 1.0)
     return basis
-
-
-@njit(cache=True)
-def _planes(points, corners):
-    """Outward unit normal and offset ``(m, 4)`` of facets with these corners ``(m, 3)``."""
-    # written out: products of arrays take seconds to compile
-    planes = np.empty((len(corners), 4))
-    for f in range(len(corners)):
-        p, q, r = points[corners[f, 0]], points[corners[f, 1]], points[corners[f, 2]]
-        a0, a1, a2, b0, b1, b2 = q[0] - p[0], q[1] - p[1], q[2] - p[2], r[0] - p[0], r[1] - p[1], r[2] - p[2]
-        x, y, z = a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0
-        size = np.sqrt(x * x + y * y + z * z)
-        x, y, z = x / size, y / size, z / size
-        planes[f, 0], planes[f, 1], planes[f, 2], planes[f, 3] = x, y, z, -(x * p[0] + y * p[1] + z * p[2])
-    return planes
-
-
-@njit(cache=True)
-def _joined(points, n, corners, planes):
-    """Facets of a hull, their ``corners (m, 3)`` and ``planes (m, 4)``, with the ``n``-th of the points joined to it.
-
-    The facets that see the point give way to those between it and their rim. Where it is beyond a facet by rounding
-    alone that one stays: a facet so thin would have no normal.
-    """
-    keep, rim, x = np.ones(len(corners), np.bool_), np.zeros((n, n), np.bool_), points[n]
-    for f in range(len(corners)):
-        if planes[f, 0] * x[0] + planes[f, 1] * x[1] + planes[f, 2] * x[2] + planes[f, 3] > ROUNDING_FORCE:
-            keep[f] = False
-            for k in range(3):
-                rim[corners[f, k], corners[f, (k + 1) % 3]] = True
-    new, count = np.full((3 * len(corners), 3), n), 0
-    for i in range(n):
-        for j in range(n):
-            if rim[i, j] and not rim[j, i]:
-                new[count, 0], new[count, 1], count = i, j, count + 1
-    new = new[:count]
-    return np.concatenate((corners[keep], new)), np.concatenate((planes[keep], _planes(points, new)))
 
 
 @njit(cache=True)
@@ -229,31 +196,6 @@ def _looked(C, A1, A2, kind, rows, points, bases, directions, basis, n, empty, u
         if upper < -ROUNDING_FORCE:
             break
     return upper, u
-
-
-@njit(cache=True)
-def _refined(C, A1, A2, kind, rows, points, bases, n, corners, planes, upper, u, gap):
-    """Distance of the hull's nearest facet, after a look along all that are nearer than the least support, and that.
-
-    ``n`` points are known; ``corners, planes`` are the facets of their hull. How many are known then, and whether it is
-    a hull still, come last.
-    """
-    before = np.zeros(4)
-    while True:
-        nearest = planes[:, 3].argmax()
-        plane = planes[nearest]
-        # a point that the hull has already ends the search: along its nearest facet both bounds are the same
-        known = (plane == before).all() or n == len(points)
-        used = np.zeros(n, np.bool_)
-        used[corners.ravel()] = True
-        convex = len(planes) == 2 * used.sum() - 4  # Euler's formula, of triangles
-        if known or not convex or upper < ROUNDING_FORCE or -plane[3] >= upper * (1.0 - gap):
-            return -plane[3], upper, u, n, convex
-        # a programme that did not fill its rows says nothing of the support
-        before, basis, along = plane, bases[corners[nearest, 0]], plane[:3].copy().reshape(1, 3)
-        upper, u = _looked(C, A1, A2, kind, rows, points, bases, along, basis, n, np.inf, upper, u)
-        corners, planes = _joined(points, n, corners, planes)
-        n += 1
 
 
 @njit(cache=True)

@@ -36,12 +36,6 @@ class CentreLine:
     def _curve(self) -> CubicSpline:
         return CubicSpline(self.z, self.middle)
 
-    @property
-    def straight(self) -> bool:
-        """Whether it is the axis z itself, but for the noise of a scan."""
-        # share of the line's height: one that stays so near to the axis z is the axis, but for noise of a scan
-        return bool(np.abs(self.middle).max() <= 3e-3 * (self.z[-1] - self.z[0]))
-
     def remark(self, z: float, half: float) -> str:
         """What is doubtful where a pad reaches ``half`` [m] to both sides of a height, if anything."""
         if not self.z[0] <= z <= self.z[-1]:
@@ -55,7 +49,7 @@ class CentreLine:
     def radius(self, low: float, high: float) -> float:
         """Smallest radius [m] in which the line bends between two heights."""
         z = self.z[(self.z >= low) & (self.z <= high)]
-        if self.straight or not len(z):
+        if not len(z):
             return np.inf
         velocity, acceleration = (np.column_stack([self._curve(z, k), np.full(len(z), 2.0 - k)]) for k in (1, 2))
         curvature = np.linalg.norm(np.cross(velocity, acceleration), axis=1) / np.linalg.norm(velocity, axis=1) ** 3
@@ -63,16 +57,12 @@ class CentreLine:
 
     def straightened(self, x: FloatArray, sense: float = 1.0) -> FloatArray:
         """Points ``(..., 3)`` shifted across z so that the line becomes the axis; ``sense`` -1 shifts them back."""
-        if self.straight:
-            return x
         moved = x.copy()
         moved[..., :2] -= sense * self._curve(np.clip(x[..., 2], self.z[0], self.z[-1]))
         return moved
 
     def at(self, z: float) -> tuple[FloatArray, FloatArray]:
         """Place ``(3,)`` [m] and unit tangent ``(3,)`` at a height; beyond the ends the line continues straight."""
-        if self.straight:
-            return np.array([0.0, 0.0, z]), np.array([0.0, 0.0, 1.0])
         inside = float(np.clip(z, self.z[0], self.z[-1]))
         slope = self._curve(inside, 1)
         tangent = np.array([*slope, 1.0])
@@ -100,4 +90,6 @@ def centre_line(points: FloatArray, triangles: IntArray, wavelength: float) -> C
         )
     smooth = smooth_spline(z[known], middle[known], wavelength, (z[known][0], z[known][-1]))
     inside = (z >= z[known][0]) & (z <= z[known][-1])
-    return CentreLine(z[inside], smooth(z[inside]), loops[inside])
+    z, middle = z[inside], smooth(z[inside])
+    # share of the line's height: one that stays so near to the axis z is the axis, but for noise of a scan
+    return CentreLine(z, middle * (np.abs(middle).max() > 3e-3 * (z[-1] - z[0])), loops[inside])

@@ -1,8 +1,7 @@
 """Holes of a triangle mesh, the triangles that close them, and the volume that a mesh encloses in spite of them.
 
-A hole is a loop of edges that border on one triangle only. A small one is filled by the triangulation of its loop that
-has the least area (Barequet and Sharir, 1995); no point moves and none is added. A large one stays open; a lid, a fan
-about its middle, tells where it is.
+A hole is a loop of edges that border on one triangle only. A small one is filled by a fan about its middle; no point
+moves. A large one stays open; a lid, such a fan, tells where it is.
 
 The divergence theorem gives what closed surfaces enclose, and counts twice where parts cross. Along a line each
 crossing adds to the winding number or takes from it, so lines along the three axes tell how much that is: exact in
@@ -20,34 +19,30 @@ SMALL_HOLE = 0.02  # of the object's diagonal: smaller holes are filled, others 
 FEW_SIDES, LARGEST_GAP = 4, 0.1  # a triangle or two that are missing are filled up to this share of the diagonal
 
 
-def with_holes_filled(points: FloatArray, triangles: IntArray) -> tuple[IntArray, list[str]]:
-    """Mesh with its small holes filled, and a note of them; the larger ones stay open.
+def with_holes_filled(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray, list[str]]:
+    """Mesh with its small holes filled, each by a fan, and a note of them; the larger ones stay open.
 
     Triangles that hardly hang together have no holes to speak of, and stay as they are.
     """
-    loops, size = _holes(triangles), float(np.linalg.norm(np.ptp(points, axis=0)))
-    if not loops:
-        return triangles, []
-    edges = set(map(tuple, np.sort(edges_of(triangles), axis=1).tolist()))
+    size = float(np.linalg.norm(np.ptp(points, axis=0)))
     present = set(map(tuple, np.sort(triangles, axis=1).tolist()))
-    parts, places = [triangles], []
-    for loop in loops:
-        x = points[loop]
-        across = float(np.linalg.norm(np.ptp(x, axis=0)))
-        # a triangle or two that are missing can be meant in one way only, so these may be larger
-        small = across <= (SMALL_HOLE if len(loop) > FEW_SIDES else LARGEST_GAP) * size
-        new = filling(points, loop, edges) if small else None
+    middles, parts, places = [points], [triangles], []
+    for loop in _holes(triangles):
+        x, few, apex = points[loop], len(loop) <= FEW_SIDES, len(points) + len(middles) - 1
+        across, middle = float(np.linalg.norm(np.ptp(x, axis=0))), x.mean(axis=0)
+        # a triangle or two that are missing can be meant in one way only: no point is added, and they may be larger
+        fan = np.insert(np.stack([loop, np.roll(loop, -1)], axis=1), 2, loop[0] if few else apex, axis=1)
+        new = fan[1:-1] if few else fan
         # the border of a triangle that stands alone is no hole
-        if new is None or any(tuple(sorted(t)) in present for t in new.tolist()):
+        alone = any(tuple(sorted(t)) in present for t in new.tolist())
+        if alone or across > (LARGEST_GAP if few else SMALL_HOLE) * size:
             continue
-        middle = ", ".join(f"{v:.4g}" for v in x.mean(axis=0))
-        places.append(f"{across * 1e3:.3g} mm near ({middle}) m of the file's frame")
-        # the filling of the next hole must not use an edge of this one a third time
-        edges.update(map(tuple, np.sort(edges_of(new), axis=1).tolist()))
+        places.append(f"{across * 1e3:.3g} mm near ({', '.join(f'{v:.4g}' for v in middle)}) m of the file's frame")
         parts.append(new)
+        middles += [middle[None]] * (not few)
     more = "; ..." if len(places) > 3 else ""
     notes = [f"small holes filled: {len(places)} ({'; '.join(places[:3])}{more})"] if places else []
-    return np.concatenate(parts), notes
+    return np.concatenate(middles), np.concatenate(parts), notes
 
 
 def _holes(triangles: IntArray) -> list[list[int]]:
@@ -92,36 +87,6 @@ def _closed_part(path: list[int]) -> list[list[int]]:
     loop = path[start:-1]
     del path[start + 1 :]
     return [loop] if len(loop) > 2 else []
-
-
-def filling(points: FloatArray, loop: list[int], edges: set[tuple[int, int]]) -> IntArray | None:
-    """Triangles ``(n - 2, 3)`` of least area that close a loop of n points, or None where there are none.
-
-    ``edges`` (smaller number first) are those that already have two triangles or would get a third.
-    """
-    n, x = len(loop), points[loop]
-    if n > 60:  # sides of a loop that is filled without a new point: the effort grows with the cube
-        return None
-    best, cut = np.zeros((n, n)), np.zeros((n, n), np.int64)
-    for length in range(2, n):
-        for i in range(n - length):
-            j = i + length
-            k = np.arange(i + 1, j)
-            area = 0.5 * np.linalg.norm(np.cross(x[k] - x[i], x[j] - x[i]), axis=1)
-            cost = best[i, k] + best[k, j] + area
-            chord = (min(loop[i], loop[j]), max(loop[i], loop[j]))
-            best[i, j] = np.inf if length < n - 1 and chord in edges else cost.min()
-            cut[i, j] = k[cost.argmin()]
-    if not np.isfinite(best[0, n - 1]):
-        return None
-    triangles, spans = [], [(0, n - 1)]
-    while spans:
-        i, j = spans.pop()
-        if j > i + 1:
-            corner = int(cut[i, j])
-            triangles.append((loop[i], loop[corner], loop[j]))
-            spans += [(i, corner), (corner, j)]
-    return np.array(triangles)
 
 
 def lid_corners(points: FloatArray, loops: list[list[int]]) -> FloatArray:

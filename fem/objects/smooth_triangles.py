@@ -13,13 +13,11 @@ For facets of length h on a surface of radius R the error falls from h^2 / (8 R)
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from softjaw.fem.objects.gap import IntArray, edges_of
 from softjaw.fem.objects.triangle_tree import area_vectors
 from softjaw.fem.objects.triangles import neighbours
-from softjaw.friction.patch import FloatArray
+from softjaw.friction.patch import FloatArray, components
 
 CREASE_ANGLE = 30.0  # [deg]: edges that turn by less are taken for facets of a smooth surface
 STEEPEST_EDGE = 0.7  # an edge that leaves its tangent plane by more (sine) is kept straight: its normal is no use
@@ -182,8 +180,7 @@ def _at_ends(
     both triangles of an edge.
     """
     count, flat = int(sides.max()) + 1, smooth & (np.abs(bend) < FLAT)
-    links = coo_array((np.ones(flat.sum()), tuple(sides[flat].T)), shape=(count, count))
-    facet = connected_components(links, directed=False)[1]
+    facet = components(sides[flat], count)
     edges = np.flatnonzero(smooth & ~flat)
     # where two facets meet, whatever number of edges that has
     facets, joint = np.unique(np.sort(facet[sides[edges]], axis=1), axis=0, return_inverse=True)
@@ -234,9 +231,8 @@ def _corner_normals(
 ) -> FloatArray:
     """Unit normal ``(3 m, 3)`` at each triangle's corners: the mean over the faces joined across smooth edges."""
     before, after = smooth.T
-    links = np.concatenate([before, _following(before)]), np.concatenate([_following(after), after])
-    m = triangles.size
-    group = connected_components(coo_array((np.ones(len(links[0])), links), shape=(m, m)), directed=False)[1]
+    links = np.concatenate([np.stack([before, _following(after)], 1), np.stack([_following(before), after], 1)])
+    group = components(links, triangles.size)
     corners = points[triangles]
     along = np.roll(corners, -1, axis=1) - corners
     along /= np.maximum(np.linalg.norm(along, axis=2), 1e-300)[:, :, None]

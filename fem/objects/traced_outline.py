@@ -11,8 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
-from scipy.sparse import coo_array, csc_array, diags_array
-from scipy.sparse.csgraph import connected_components
+from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import splu
 
 from softjaw.fem.errors import MeshError
@@ -20,7 +19,7 @@ from softjaw.fem.objects.gap import IntArray
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.fem.objects.profile import Curve
 from softjaw.fem.objects.revolution import Revolution
-from softjaw.friction.patch import FloatArray
+from softjaw.friction.patch import FloatArray, components
 
 LEVELS = 400  # heights of the first look at a mesh
 FEW = 64  # rays per height of that look
@@ -80,10 +79,8 @@ def _loops(segments: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Areas ``(l,)``, positive round material, and centroids ``(l, 2)`` of the loops of segments ``(m, 2, 2)``."""
     # segments of neighbouring triangles share their end points to the last bit, so loops are found without a tolerance
     ends, number = np.unique(segments.reshape(-1, 2), axis=0, return_inverse=True)
-    first, last = number.reshape(-1, 2).T
-    joined = coo_array((np.ones(len(first)), (first, last)), shape=(len(ends), len(ends)))
-    loops, of_end = connected_components(joined, directed=False)
-    loop = of_end[first]
+    of_end = components(number.reshape(-1, 2), len(ends))
+    loops, loop = of_end.max(initial=-1) + 1, of_end[number.reshape(-1, 2)[:, 0]]
     p, q = segments[:, 0], segments[:, 1]
     base = np.stack([np.bincount(of_end, ends[:, i], loops) / np.bincount(of_end, minlength=loops) for i in (0, 1)], 1)
     p, q = p - base[loop], q - base[loop]  # about its own middle: far from the axis areas would cancel

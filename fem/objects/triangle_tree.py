@@ -11,8 +11,9 @@ from functools import cached_property
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
-from softjaw.fem.objects.gap import IntArray
+from softjaw.fem.objects.gap import IntArray, edges_of
 from softjaw.friction.patch import NEGLIGIBLE, FloatArray
 
 LEAF = 4  # triangles in the smallest boxes
@@ -224,41 +225,6 @@ def _along(x, d, least, skipped, nodes):
     return distance, hit
 
 
-@njit(cache=True)
-def _pseudo_normals(which, feature, corners, triangles, normals, start, members):
-    """Outward vectors ``(n, 3)`` of features of triangles, see `_on_triangle`, and which lie on a border ``(n,)``."""
-    vectors, border = np.zeros((len(which), 3)), np.zeros(len(which), np.bool_)
-    for i in range(len(which)):
-        t, f = which[i], feature[i]
-        if f == 0:
-            vectors[i] = normals[t]
-            continue
-        point = triangles[t, (f - 1) % 3]
-        for m in members[start[point] : start[point + 1]]:
-            k = 0 if triangles[m, 0] == point else 1 if triangles[m, 1] == point else 2
-            weight = 1.0
-            if f > 3:
-                uu = vv = uv = 0.0
-                for d in range(3):
-                    u = corners[m, (k + 1) % 3, d] - corners[m, k, d]
-                    v = corners[m, (k + 2) % 3, d] - corners[m, k, d]
-                    uu, vv, uv = uu + u * u, vv + v * v, uv + u * v
-                # rounding can push the cosine beyond 1
-                weight = np.arccos(min(max(uv / max(np.sqrt(uu * vv), 1e-300), -1.0), 1.0))
-            elif triangles[t, f % 3] not in triangles[m]:
-                continue
-            vectors[i] += weight * normals[m]
-        # the feature ends on a border where one of its edges belongs to a single triangle
-        for m in members[start[point] : start[point + 1]]:
-            for end in triangles[m]:
-                if end != point and (f > 3 or end == triangles[t, f % 3]):
-                    times = 0
-                    for other in members[start[point] : start[point + 1]]:
-                        times += end in triangles[other]
-                    border[i] |= times == 1
-    return vectors, border
-
-
 def area_vectors(points: FloatArray, triangles: IntArray) -> FloatArray:
     """Normals ``(m, 3)`` of triangles, as long as twice their areas [m^2]."""
     a, b, c = points[triangles].transpose(1, 0, 2)
@@ -289,11 +255,20 @@ class TriangleTree:
         return np.ascontiguousarray(area / np.where(size > 0, size, 1.0)[:, None])
 
     @cached_property
-    def _round_points(self) -> tuple[np.ndarray, np.ndarray]:
-        """Triangles round each point: where they start ``(k + 1,)`` in a list ``(3 m,)``, and the list."""
-        corners = self.triangles.ravel()
-        order = np.argsort(corners, kind="stable")
-        return np.searchsorted(corners[order], np.arange(len(self.points) + 1)), order // 3
+    def _pseudo_normals(self) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
+        """Sums of normals round each edge ``(m, 3, 3)`` and, by their angles, point ``(k, 3)``; borders ``(m, 6)``."""
+        sides, count = edges_of(self.triangles), len(self.points)
+        _, edge, times = np.unique(np.sort(sides, axis=1) @ [count, 1], return_inverse=True, return_counts=True)
+        alone = times[edge.ravel()] == 1
+        along = np.diff(self.points[sides], axis=1).reshape(-1, 3, 3)
+        along /= np.maximum(np.linalg.norm(along, axis=2), 1e-300)[:, :, None]
+        angle = np.arccos(np.clip(-np.einsum("mkd,mkd->mk", along, np.roll(along, 1, axis=1)), -1.0, 1.0)).ravel()
+        each, rim = np.repeat(self.face_normals, 3, axis=0), np.zeros(count, dtype=bool)
+        rim[sides[alone]] = True
+        of_edges = np.stack([np.bincount(edge.ravel(), each[:, d]) for d in range(3)], axis=1)[edge.ravel()]
+        of_points = np.stack([np.bincount(self.triangles.ravel(), angle * each[:, d], count) for d in range(3)], axis=1)
+        border = np.hstack([alone.reshape(-1, 3), rim[self.triangles]])
+        return of_edges.reshape(-1, 3, 3), np.asarray(of_points, float), border
 
     def along(self, x: FloatArray, direction: FloatArray) -> FloatArray:
         """Distances ``(n,)`` [m] from points ``(n, 3)`` to the first triangle in a direction; infinite without one."""
@@ -312,8 +287,11 @@ class TriangleTree:
         """Signed distance ``(n,)`` [m], its unit gradient ``(n, 3)``, and whether the border is closest ``(n,)``."""
         x = np.ascontiguousarray(x, dtype=float)
         away, triangle, feature = closest(x, *self.nodes)
-        about = self.nodes[0], np.ascontiguousarray(self.triangles), self.face_normals, *self._round_points
-        vector, border = _pseudo_normals(triangle, feature, *about)
+        of_edges, of_points, at_border = self._pseudo_normals
+        vector, on_edge, on_point = self.face_normals[triangle], (feature > 0) & (feature < 4), feature > 3
+        vector[on_edge] = of_edges[triangle[on_edge], feature[on_edge] - 1]
+        vector[on_point] = of_points[self.triangles[triangle[on_point], feature[on_point] - 4]]
+        border = (feature > 0) & at_border[triangle, feature - 1]
         length = np.linalg.norm(away, axis=1)
         sign = np.where(np.einsum("nd,nd->n", away, vector) < 0, -1.0, 1.0)
         # on the surface itself the direction to the foot is rounding

@@ -11,8 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from softjaw.fem.errors import MeshError
@@ -20,7 +18,7 @@ from softjaw.fem.objects.gap import IntArray, cone_volumes, edges_of
 from softjaw.fem.objects.mesh_file import LENGTHS
 from softjaw.fem.objects.mesh_holes import border_loops, lid_corners, with_holes_filled
 from softjaw.fem.objects.triangle_tree import TriangleTree, area_vectors
-from softjaw.friction.patch import FloatArray
+from softjaw.friction.patch import FloatArray, components
 
 SMALLEST, LARGEST = 1e-3, 2.0  # plausible largest extent of an object that a gripper holds [m]
 HUGE_COORDINATE = 1e12  # of a coordinate, in any unit
@@ -74,7 +72,7 @@ def cleaned(points: FloatArray, triangles: IntArray, unit: str = "m") -> Triangl
     _check_size(float(np.ptp(points, axis=0).max()), unit)
     points, triangles, thinned = _with_fewer(points * UNITS[unit], triangles)
     points, triangles, specks = _without_specks(points, triangles)
-    triangles, filled = with_holes_filled(points, triangles)
+    points, triangles, filled = with_holes_filled(points, triangles)
     triangles, closed, turned = turned_alike(points, triangles)
     shells: list[str] = []
     if closed:
@@ -111,11 +109,8 @@ def _merged(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArr
     points, inverse = np.unique(points[triangles.ravel()], axis=0, return_inverse=True)
     triangles = inverse.reshape(-1, 3).astype(np.int64)
     close = cKDTree(points).query_pairs(ROUNDED * np.abs(points).max(), output_type="ndarray")
-    notes = []
-    if len(close):
-        links = coo_array((np.ones(len(close)), close.T), shape=(len(points), len(points)))
-        group = connected_components(links, directed=False)[1]
-        points, triangles = _used(points, np.unique(group, return_index=True)[1][group][triangles])
+    group, notes = components(close, len(points)), []
+    points, triangles = _used(points, np.unique(group, return_index=True)[1][group][triangles])
     a, b, c = triangles.T
     proper = (a != b) & (b != c) & (c != a)
     if not proper.any():
@@ -162,8 +157,7 @@ def _with_fewer(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, In
 def pieces_of(points: FloatArray, triangles: IntArray) -> IntArray:
     """Number ``(m,)`` of the connected piece of each triangle, from 0 on."""
     edges = triangles[:, [0, 1, 1, 2]].reshape(-1, 2)
-    links = coo_array((np.ones(len(edges)), edges.T), shape=(len(points), len(points)))
-    return np.unique(connected_components(links, directed=False)[1][triangles[:, 0]], return_inverse=True)[1].ravel()
+    return np.unique(components(edges, len(points))[triangles[:, 0]], return_inverse=True)[1].ravel()
 
 
 @njit(cache=True)
@@ -268,8 +262,7 @@ def turned_alike(points: FloatArray, triangles: IntArray) -> tuple[IntArray, boo
     i, j = i // 3, j // 3
     # every triangle counts twice, as given and turned; an edge links the copies that agree
     mirrored = np.where(clash, n, 0)
-    ends = np.r_[i, i + n], np.r_[j + mirrored, j + n - mirrored]
-    _, label = connected_components(coo_array((np.ones(2 * len(i)), ends), shape=(2 * n, 2 * n)), directed=False)
+    label = components(np.stack([np.r_[i, i + n], np.r_[j + mirrored, j + n - mirrored]], axis=1), 2 * n)
     # both copies in one part: a surface of one side, which stays as it is given
     one_sided = label[:n] == label[n:]
     flip = (label[:n] > label[n:]) & ~one_sided

@@ -145,17 +145,6 @@ class BodyMesh(ShellMesh):
         """Nodes by which a body touches a table: the rim of its flat bottom."""
         return np.unique(self.number[:, np.abs(self.s - self.surface.flat[0]).argmin()])
 
-    def locate(self, t: FloatArray, p: FloatArray) -> tuple[IntArray, FloatArray]:
-        """Nodes and bilinear shape functions ``(n, 4)`` at angles and places; outside the mesh those of the nearest."""
-        if self.closed:
-            t = self.theta[0] + np.mod(t - self.theta[0], 2 * np.pi)
-        i = np.clip(np.searchsorted(self.theta, t, side="right") - 1, 0, len(self.theta) - 2)
-        j = np.clip(np.searchsorted(self.s, p, side="right") - 1, 0, len(self.s) - 2)
-        u = (t - self.theta[i]) / (self.theta[i + 1] - self.theta[i])
-        v = (p - self.s[j]) / (self.s[j + 1] - self.s[j])
-        N = np.stack([(1 - u) * (1 - v), u * (1 - v), u * v, (1 - u) * v], axis=1)
-        return self.number[np.stack([i, i + 1, i + 1, i], 1), np.stack([j, j, j + 1, j + 1], 1)], N
-
 
 def body_mesh(
     surface: OuterSurface,
@@ -270,7 +259,7 @@ def interpolated(coarse: BodyMesh, q: FloatArray, fine: BodyMesh) -> FloatArray:
 
     Either may be the half or quarter that symmetry leaves.
     """
-    lines, values = _all_round(coarse, q.reshape(-1, 6)[coarse.number])
+    lines, values = all_round(coarse, q.reshape(-1, 6)[coarse.number])
     # splines, for a kink between two nodes would be a bend that the thin wall resists with all its stiffness
     around = CubicSpline(lines, values, bc_type="periodic")(fine.theta)
     state = np.empty((len(fine.X), 6))
@@ -282,7 +271,7 @@ def interpolated(coarse: BodyMesh, q: FloatArray, fine: BodyMesh) -> FloatArray:
     return state.ravel()
 
 
-def _all_round(mesh: BodyMesh, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+def all_round(mesh: BodyMesh, values: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Grid lines once round the body and the values ``(lines, n, 6)`` on them, images where it is not meshed."""
     lines = mesh.theta
     for plane in (0, 1):

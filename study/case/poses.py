@@ -28,7 +28,7 @@ def axis_poses(station: float, angle: float, roll: float, middle: CentreLine | N
     approach = -np.array([math.cos(angle), math.sin(angle), 0.0])
     # The rotation of z about the approach, which is normal to it.
     long_side = math.cos(roll) * np.array([0.0, 0.0, 1.0]) + math.sin(roll) * np.cross(approach, [0.0, 0.0, 1.0])
-    if middle is None or middle.straight:
+    if middle is None:
         return opposed_poses(np.array([0.0, 0.0, station]), approach, long_side)
     point, tangent = middle.at(station)
     tilt = shortest_turn(tangent)

@@ -5,13 +5,14 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from scipy.interpolate import RegularGridInterpolator
 
 from softjaw.fem.contact.path import Pressed
 from softjaw.fem.errors import CheckError
 from softjaw.fem.objects.gap import about_z
 from softjaw.fem.shell.element import Shell
 from softjaw.fem.shell.thin_walled import Grasp, ThinWalled, object_factors
-from softjaw.fem.shell.wall_mesh import MeshSize
+from softjaw.fem.shell.wall_mesh import MeshSize, all_round
 from softjaw.fem.shell.wall_model import faces
 from softjaw.friction.patch import FloatArray
 from softjaw.study.case.build import outer_surface
@@ -131,11 +132,9 @@ def _places(grasp: Grasp, shell: Shell, q: FloatArray) -> FloatArray:
     mesh = shell.mesh
     angles = 2 * np.pi * np.arange(AROUND) / AROUND
     theta, s = np.meshgrid(angles, np.linspace(mesh.s[0], mesh.s[-1], ALONG), indexing="ij")
-    # to the side that is meshed
-    x, y = np.cos(theta), np.sin(theta)
-    side = np.stack([np.where((x < 0) & grasp.mirrors[0], -1.0, 1.0), np.where((y < 0) & grasp.mirrors[1], -1.0, 1.0)])
-    angle = np.arctan2(side[1] * y, side[0] * x).ravel()
-    nodes, N = mesh.locate(angle, s.ravel())
-    place = mesh.surface.jets(angle, s.ravel())[:, 0] + np.einsum("na,nai->ni", N, (q[:, :3] + q[:, 3:])[nodes])
-    place[:, :2] *= side.reshape(2, -1).T
+    lines, parts = all_round(mesh, q[mesh.number])
+    moved = RegularGridInterpolator((lines, mesh.s), parts[..., :3] + parts[..., 3:], bounds_error=False,
+                                    fill_value=None)  # fmt: skip
+    at = lines[0] + (theta - lines[0]) % (2 * np.pi)
+    place = mesh.surface.jets(theta, s)[:, 0] + moved(np.stack([at.ravel(), s.ravel()], axis=1))
     return place @ about_z(-grasp.angle)

@@ -7,7 +7,7 @@ from softjaw.fem.objects.outer_surface import Section, of_revolution, of_section
 from softjaw.fem.objects.revolution import Revolution
 from softjaw.fem.shell.thin_walled import supported
 from softjaw.fem.shell.wall_material import WallMaterial, wall_material
-from softjaw.fem.shell.wall_mesh import MeshSize, body_mesh, divided, limited
+from softjaw.fem.shell.wall_mesh import MeshSize, all_round, body_mesh, divided, limited
 from softjaw.fem.shell.wall_model import LinearShell, faces
 
 FLASK = Revolution(
@@ -108,13 +108,14 @@ def test_grid_lines_are_fine_where_asked_miss_no_step_of_the_thickness_and_value
     assert limited(x, np.where(np.abs(x - 1) < 1e-9, 0.1, 9.0), 0.25) == pytest.approx(0.1 + 0.25 * np.abs(x - 1))
     assert divided(1.0, 3.0, x, np.full(201, 0.25)) == pytest.approx(np.linspace(1, 3, 9), abs=1e-12)
     assert len(divided(1.0, 3.0, x, np.full(201, 0.25), 3)) == 10
-    mesh = body_mesh(SURFACES["square"], 4e-4, COARSE)
-    theta, s = RNG.uniform(-9, 9, 100), RNG.uniform(mesh.s[1], mesh.s[-1], 100)
-    nodes, N = mesh.locate(theta, s)
-    at = np.full((len(mesh.X), 2), np.nan)
-    at[mesh.number[:-1]] = np.stack(np.meshgrid(np.cos(mesh.theta[:-1]), mesh.s, indexing="ij"), -1)
-    expected = np.column_stack([np.interp(theta % (2 * np.pi), mesh.theta, np.cos(mesh.theta)), s])
-    assert np.einsum("ni,nik->nk", N, at[nodes]) == pytest.approx(expected, rel=1e-12, abs=1e-12)
+    for symmetry in (QUARTER, (False, True), (False, False)):
+        mesh = body_mesh(SURFACES["square"], 4e-4, COARSE, symmetry)
+        lines, x = all_round(mesh, np.hstack([mesh.X, mesh.X])[mesh.number])
+        assert lines[-1] - lines[0] == pytest.approx(2 * np.pi)
+        assert x[-1] == pytest.approx(x[0], abs=1e-12)
+        turns = np.diff(np.unwrap(np.arctan2(x[:, -1, 1], x[:, -1, 0])))
+        assert (turns > 0).all()
+        assert turns.sum() == pytest.approx(2 * np.pi)
 
 
 def flask(symmetry, support="standing"):

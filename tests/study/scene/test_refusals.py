@@ -31,19 +31,19 @@ def test_an_outline_that_makes_no_body_is_refused(tmp_path, capsys, command):
     assert capsys.readouterr().err.startswith("error: object.profile_mm: ")
 
 
-def test_every_object_of_a_sweep_is_judged():
-    swept = at([60], FLASK, 'sweep.object.unit=["mm", "m"]', "sweep.friction.mu=[0.5, 0.8]")
-    assert [shape.unit for shape in shapes_of(swept)] == ["mm", "m"]
-    with pytest.raises(StudyError, match=r"object.mesh: .* an object of 120 m"):
-        check_object(swept)
-    check_object(at([60], FLASK))
-
-
 DOMED = 'shape = "revolution"\nprofile_mm = [[0, 0], [4, 18], [12, 28], [40, 30], [120, 30]]'
 NECKED = 'shape = "revolution"\nprofile_mm = [[0, 30], [40, 28], [80, 18], [120, 7], [150, 4], [160, 4], [170, 4]]'
 SQUARE = 'shape = "sections"' + "".join(
     f"\n[[object.sections]]\nz_mm = {z}\na_mm = 35\nexponent = 20" for z in (0, 40, 80, 120)
 )
+
+
+def test_every_object_of_a_sweep_is_judged():
+    swept = at([60], NECKED, "sweep.object.wall_mm=[1, 5]", "sweep.friction.mu=[0.5, 0.8]")
+    assert [shape.wall_mm for shape in shapes_of(swept)] == [1, 5]
+    with pytest.raises(StudyError, match=r"only 4 mm"):
+        check_object(swept)
+    check_object(at([60], NECKED, "object.wall_mm=1"))
 
 
 @pytest.mark.parametrize(("body", "key", "expected"), [

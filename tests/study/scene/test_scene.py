@@ -390,13 +390,14 @@ def test_a_scene_starts_no_heavy_machinery_is_that_of_tables_and_what_is_wrong_i
 
 
 def test_a_table_on_the_command_line_takes_the_place_of_another_and_a_key_of_one_is_put_in():
-    text = text_of('shape = "sphere"\nradius_mm = 30') + '[sweep]\n"friction.mu" = [0.3, 0.8]\n[uncertainty]\n'
+    text = text_of('shape = "sphere"\nradius_mm = 30') + '[sweep]\n"gripper.shear_modulus_kpa" = [30, 40]\n'
+    text += "[uncertainty]\n"
     text += 'spread = { "friction.mu" = 0.1, "candidates.roll_deg" = 1 }\n'
     cases = {
         'sweep={"gripper.pad_width_mm"=[20, 22]}': (["gripper.pad_width_mm"], 2),
-        "sweep.gripper.pad_width_mm=[20, 22]": (["friction.mu", "gripper.pad_width_mm"], 2),
-        'uncertainty.spread={"friction.mu"=0.05}': (["friction.mu"], 1),
-        'uncertainty.spread."friction.mu"=0.05': (["friction.mu"], 2),
+        "sweep.gripper.pad_width_mm=[20, 22]": (["gripper.shear_modulus_kpa", "gripper.pad_width_mm"], 2),
+        'uncertainty.spread={"friction.mu"=0.05}': (["gripper.shear_modulus_kpa"], 1),
+        'uncertainty.spread."friction.mu"=0.05': (["gripper.shear_modulus_kpa"], 2),
     }
     for override, (swept, uncertain) in cases.items():
         scene = parse_scene(text, overrides=[override])
