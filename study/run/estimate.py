@@ -1,4 +1,4 @@
-"""Seconds of a study: of load paths that are solved to time them, or that an earlier run has solved.
+"""Seconds of a study: of load paths that are solved to time them.
 
 What a load path takes depends on symmetry, friction that acts back, meshes that the accuracy asks for and the machine:
 nothing foretells it as well as the paths themselves. The first one that is timed also loads what all solve with.
@@ -8,14 +8,12 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from softjaw.friction.patch import FloatArray
-from softjaw.study.quantities import FAILED, LISTED
-from softjaw.study.result.store import open_result
+from softjaw.study.quantities import LISTED
 from softjaw.study.run.limits import require_room
 from softjaw.study.scene.sections import FINEST
 
@@ -36,7 +34,7 @@ def timed(units: Sequence[Any], budget: float = TIMED_S) -> tuple[list[float], f
     if not units:
         return [], 0.0
     require_room()
-    from numba.core.event import TimingListener, install_listener  # as the solver, not for a plan by an earlier run
+    from numba.core.event import TimingListener, install_listener  # slow to load, as the solver
 
     from softjaw.study.pipeline import solve_unit
 
@@ -114,32 +112,7 @@ def _listed(units: Sequence[Any], budget: float, solve_unit: Callable) -> float:
     return (2 if units[0].scene.object.mass_g is not None and last else 1) * sum(times) / len(times)
 
 
-def unit_seconds(plan: Any, seconds: np.ndarray) -> list[float]:
-    """Expected time of every unit that is tried [s]; empty where nothing was measured.
-
-    ``seconds (rows,)``: measured times of some cases, else NaN. Measured units keep theirs, others follow from costs.
-    """
-    # Candidates served by symmetry have no times, so the solved one speaks for the unit. A load path that is measured
-    # in part has none either: it would be taken for a cheap one.
-    times = np.array([seconds[list(unit.rows[0])].sum() for unit in plan.tried])
-    return _by_cost(plan.tried, times).tolist() if np.isfinite(times).any() else []
-
-
 def _by_cost(units: Sequence[Any], seconds: FloatArray) -> FloatArray:
     """Times ``(units,)`` [s] of which some are known; the others follow from those by their cost."""
     costs, known = np.array([unit.cost for unit in units]), np.isfinite(seconds)
     return np.where(known, seconds, seconds[known].sum() / costs[known].sum() * costs)
-
-
-def measured_seconds(plan: Any, path: Path) -> Any:
-    """Seconds of every solved case ``(rows,)`` in the result file of a plan; None where there is no such file.
-
-    Stations that a refinement added are left out. Raises `StudyError`: the file is of another scene.
-    """
-    if not path.is_file():
-        return None
-    with open_result(path) as result:
-        result.refuse_other(plan.header)
-        planned = np.flatnonzero(np.isin(result.axes[-3].values, plan.layout.axes[-3].values))
-        seconds = np.where(result.status == FAILED, np.nan, result.read("work/seconds_total"))
-        return seconds.take(planned, axis=-3).ravel()

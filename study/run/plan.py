@@ -27,7 +27,7 @@ from softjaw.study.case.candidates import decided
 from softjaw.study.quantities import ALONG, AROUND, NO_GRASP, STATES
 from softjaw.study.result.derived import derived
 from softjaw.study.result.layout import Header, Layout, is_case
-from softjaw.study.run.estimate import END_S, TIMED, measured_seconds, timed, unit_seconds
+from softjaw.study.run.estimate import END_S, TIMED, timed
 from softjaw.study.run.progress import duration
 from softjaw.study.run.refine import Rounds, added_cases, refined
 from softjaw.study.run.shares import makespan
@@ -156,7 +156,7 @@ def plan_rows(plan: Plan, scene: Any, path: Path, ranks: Sequence[int]) -> Itera
     for name, text in rows.items():
         if text:
             yield f"  {name:<10}  {text}"
-    yield f"  {'time':<10}  {_time(plan, scene, path, ranks)}"  # what is known at once need not wait for it
+    yield f"  {'time':<10}  {_time(plan, scene, ranks)}"  # what is known at once need not wait for it
 
 
 def _no_grasps(plan: Plan) -> str:
@@ -182,22 +182,18 @@ def _rounds(plan: Plan, scene: Any) -> str:
     return f"up to {asked // each} more {what}, {each} cases each; the time counts them, no other row does"
 
 
-def _time(plan: Plan, scene: Any, path: Path, ranks: Sequence[int]) -> str:
-    """Time on each of these numbers of ranks, by load paths of the file where there are some."""
-    seconds = measured_seconds(plan, path)
+def _time(plan: Plan, scene: Any, ranks: Sequence[int]) -> str:
+    """Time on each of these numbers of ranks."""
     if not plan.tried:
         return "no grasp is solved"
-    each, start = unit_seconds(plan, seconds) if seconds is not None else [], 0.0
-    judged = f"judged by those in {path}"
-    if not each:
-        before = time.process_time()  # what a run does before it solves, a plan did as well
-        each, loads = timed(plan.tried)
-        start, judged = before + loads + END_S, TIMED
+    before = time.process_time()  # what a run does before it solves, a plan did as well
+    each, loads = timed(plan.tried)
+    start = before + loads + END_S
     added = 1.0 + (scene.candidates.refine or 0) / (len(each) * plan.layout.shape[-1])
     counts = [plan.layout.shape[-1] if unit.apart else 1 for unit in plan.tried]  # forces that ranks may divide
     parts = [added * cost / n for cost, n in zip(each, counts, strict=True) for _ in range(n)]
     times = (f"{duration(start + makespan(parts, n))} on {n} rank{'s' * (n > 1)}" for n in ranks)
-    return f"about {', '.join(times)} for all cases, {judged}"
+    return f"about {', '.join(times)} for all cases, {TIMED}"
 
 
 def free_bytes(path: Path) -> int:

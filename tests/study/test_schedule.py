@@ -12,9 +12,9 @@ import pytest
 from softjaw.study import pipeline
 from softjaw.study.quantities import DONE, MISSING, SLIPS, WIDE
 from softjaw.study.run import estimate
-from softjaw.study.run.estimate import FIRST_FORCE_FACTOR, timed, unit_seconds
+from softjaw.study.run.estimate import FIRST_FORCE_FACTOR, timed
 from softjaw.study.run.load_path import settle
-from softjaw.study.run.plan import Plan, make_plan, plan_rows
+from softjaw.study.run.plan import make_plan, plan_rows
 from softjaw.study.run.progress import Progress
 from softjaw.study.run.shares import by_cost, makespan, shares
 from tests.study.launching import ROOT, launch
@@ -124,10 +124,6 @@ def test_ranks_are_busy_to_the_end(ranks):
 
 
 def test_times_follow_from_costs():
-    units = tuple(SimpleNamespace(rows=((2 * i, 2 * i + 1),), cost=c, state=0) for i, c in enumerate([1.0, 2.0, 4.0]))
-    plan = Plan(None, None, units)
-    assert unit_seconds(plan, np.array([3.0, 3.0, np.nan, 1.0, np.nan, np.nan])) == pytest.approx([6.0, 12.0, 24.0])
-    assert unit_seconds(plan, np.full(6, np.nan)) == []
     # 64 load paths of four seconds
     assert [makespan([4.0] * 64, ranks) for ranks in (1, 60, 64, 128)] == [256.0, 8.0, 4.0, 4.0]
 
