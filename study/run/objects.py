@@ -92,6 +92,28 @@ class _ObjectsRun:
         self._mine: dict[int, tuple[Plan, Work]] = {}
         self._failed: list[tuple[int, Row]] = []
         self._tried: set[int] = set()
+        for n in self._torn():
+            self.rows[n]["state"] = index.MISSING
+
+    def _torn(self) -> list[int]:
+        """Numbers of objects in whose files rows are torn, for which ranks look together.
+
+        Raises `StudyError` on every rank: files cannot be read.
+        """
+        torn, refused = list[int](), list[StudyError]()
+        for n, row in [*enumerate(self.rows)][self._comm.rank :: self._comm.size]:
+            path = self._out / row["file"]
+            if row["done"] > 0 and row["state"] in index.ENDED:
+                try:
+                    with open_result(path) as result:
+                        torn += [n] * bool(torn_rows(path, result.layout))
+                except StudyError as error:
+                    refused.append(error)
+        gathered = self._comm.allgather((torn, refused))
+        if damaged := [error for _, errors in gathered for error in errors]:
+            texts = first_of([error.message for error in damaged], 20, " such files")
+            raise StudyError(damaged[0].code, "\n".join(texts))
+        return [n for numbers, _ in gathered for n in numbers]
 
     def todo(self) -> list[int]:
         """Numbers of the objects that this run has still to take."""
@@ -248,7 +270,7 @@ def _rows_of(folder: ObjectFolder, out: Path, retry_failed: bool) -> list[Row]:
     again = {index.FAILED, index.REFUSED, index.NO_GRASP, index.SOME_FAILED} if retry_failed else set()
     if gone := known.keys() - {listed.name for listed in folder.objects}:
         print(f"note: {len(gone)} of {len(known)} objects in {path} are not in this run; their files stay", flush=True)
-    rows, damaged = list[Row](), list[StudyError]()
+    rows = list[Row]()
     for listed in folder.objects:
         row = index.blank_row(listed.name, file=f"{listed.name}.hdf", mesh=os.path.relpath(listed.mesh, out))
         before = known.get(listed.name, row)
@@ -262,23 +284,10 @@ def _rows_of(folder: ObjectFolder, out: Path, retry_failed: bool) -> list[Row]:
             change = _change(out / row["file"], scene)
             text = f"{path}: object '{listed.name}' was solved from another scene or mesh ({change})"
             raise StudyError(messages.OTHER_FILE, f"{text}; choose another folder with -o, or move this one away")
-        try:
-            if before["key"] == key and (before["done"] < 1 or _whole(out / row["file"])):
-                row = before | ({"state": index.MISSING} if before["state"] in again else {})
-        except StudyError as error:
-            damaged.append(error)
+        if before["key"] == key and (before["done"] < 1 or (out / row["file"]).exists()):
+            row = before | ({"state": index.MISSING} if before["state"] in again else {})
         rows.append(row | {"key": key} | ({} if mass is None else {"mass": in_si("mass_g", mass)}))
-    if damaged:
-        raise StudyError(damaged[0].code, "\n".join(first_of([error.message for error in damaged], 20, " such files")))
     return rows
-
-
-def _whole(path: Path) -> bool:
-    """Whether a result file is there without torn rows; raises `StudyError` where it is and cannot be read."""
-    if not path.exists():
-        return False
-    with open_result(path) as result:
-        return not torn_rows(path, result.layout)
 
 
 def _change(path: Path, scene: Scene) -> str:
