@@ -33,7 +33,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike
-from scipy.spatial import ConvexHull
+from scipy.spatial import ConvexHull, QhullError
 
 from softjaw.scoring.contact import Body, FloatArray, IntArray, SoftContact, discs_of, vertices_of
 
@@ -162,7 +162,10 @@ def _worst(grasp: _Grasp, gap: float) -> Payload:
             # a programme that did not fill its rows says nothing of the support
             before, basis = plane, bases[hull.simplices[nearest, 0]]
             upper, u = _looked(*search, plane[None, :3], basis, n, np.inf, upper, u)
-            hull.add_points(points[n : n + 1])
+            try:
+                hull.add_points(points[n : n + 1])
+            except QhullError:  # of points in the planes of its facets
+                hull = ConvexHull(points[: n + 1], incremental=True)
     force = min(lower, upper) if lower > ROUNDING_FORCE else 0.0
     return Payload(force, max(upper, 0.0), -u, upper >= -ROUNDING_FORCE)
 

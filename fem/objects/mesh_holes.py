@@ -13,6 +13,7 @@ import numpy as np
 from numba import njit
 
 from softjaw.fem.objects.gap import IntArray, edges_of
+from softjaw.fem.objects.triangle_tree import area_vectors
 from softjaw.friction.patch import FloatArray
 
 SMALL_HOLE = 0.02  # of the object's diagonal: smaller holes are filled, others stay open
@@ -25,18 +26,23 @@ def with_holes_filled(points: FloatArray, triangles: IntArray) -> tuple[FloatArr
     Triangles that hardly hang together have no holes to speak of, and stay as they are.
     """
     size = float(np.linalg.norm(np.ptp(points, axis=0)))
-    present = set(map(tuple, np.sort(triangles, axis=1).tolist()))
+    present, edges = (set(map(tuple, np.sort(of, axis=1).tolist())) for of in (triangles, edges_of(triangles)))
     middles, parts, places = [points], [triangles], []
     for loop in _holes(triangles):
         x, few, apex = points[loop], len(loop) <= FEW_SIDES, len(points) + len(middles) - 1
         across, middle = float(np.linalg.norm(np.ptp(x, axis=0))), x.mean(axis=0)
-        # a triangle or two that are missing can be meant in one way only: no point is added, and they may be larger
-        fan = np.insert(np.stack([loop, np.roll(loop, -1)], axis=1), 2, loop[0] if few else apex, axis=1)
-        new = fan[1:-1] if few else fan
+        # of a triangle or two that are missing it is hardly in doubt how: no point is added, and they may be larger
+        sides = np.stack([loop, np.roll(loop, -1)], axis=1)
+        fans = [np.insert(sides, 2, apex, axis=1)]
+        if few:
+            free = [k for k in range(len(loop) - 2) if len(loop) < 4 or tuple(sorted(loop[k::2])) not in edges]
+            fans = [np.insert(np.roll(sides, -k, axis=0)[1:-1], 2, loop[k], axis=1) for k in free]
         # the border of a triangle that stands alone is no hole
-        alone = any(tuple(sorted(t)) in present for t in new.tolist())
-        if alone or across > (LARGEST_GAP if few else SMALL_HOLE) * size:
+        fans = [fan for fan in fans if not any(tuple(sorted(t)) in present for t in fan.tolist())]
+        if not fans or across > (LARGEST_GAP if few else SMALL_HOLE) * size:
             continue
+        sizes = [np.linalg.norm(area_vectors(points, fan), axis=1).sum() if few else 0.0 for fan in fans]
+        new = fans[int(np.argmin(sizes))]
         places.append(f"{across * 1e3:.3g} mm near ({', '.join(f'{v:.4g}' for v in middle)}) m of the file's frame")
         parts.append(new)
         middles += [middle[None]] * (not few)

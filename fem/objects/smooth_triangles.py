@@ -142,7 +142,8 @@ def smooth_triangles(points: FloatArray, triangles: IntArray, crease_angle: floa
     if crease_angle <= CREASE_ANGLE:  # whoever raises the angle wants such edges round
         opposite = triangles.ravel()[_following(_following(halves[:, 1]))]
         inwards = np.einsum("ed,ed->e", normal[halves[:, 0] // 3], points[opposite] - points[ends[:, 0]]) < 0
-        crease |= _at_ends(length, narrower, np.where(inwards, turn, -turn), halves // 3, ~crease)
+        along = (points[ends[:, 1]] - points[ends[:, 0]]) / np.maximum(length, 1e-300)[:, None]
+        crease |= _at_ends(length, narrower, np.where(inwards, turn, -turn), along, halves // 3, ~crease)
     corner_normals = _corner_normals(points, triangles, area, normal, halves[~crease])
     inner = np.empty((len(ends), 2, 3))
     for end in (0, 1):
@@ -171,13 +172,13 @@ def _measures(
 
 
 def _at_ends(
-    length: FloatArray, narrower: FloatArray, bend: FloatArray, sides: IntArray, smooth: np.ndarray
+    length: FloatArray, narrower: FloatArray, bend: FloatArray, along: FloatArray, sides: IntArray, smooth: np.ndarray
 ) -> np.ndarray:
     """Which of the ``smooth (e,)`` edges are real ones at the ends of long facets, as of a straight shank and a cone.
 
     Whoever cuts a round surface into facets makes them as fine as it bends: one that were round there would bulge far
-    more than at its other edges. ``bend (e,)``: turn of an edge, negative where it is hollow [rad]; ``sides (e, 2)``:
-    both triangles of an edge.
+    more than at its other edges. ``bend (e,)``: turn of an edge, negative where it is hollow [rad]; ``along (e,
+    3)``: its direction; ``sides (e, 2)``: both of its triangles.
     """
     count, flat = int(sides.max()) + 1, smooth & (np.abs(bend) < FLAT)
     facet = components(sides[flat], count)
@@ -185,10 +186,10 @@ def _at_ends(
     # where two facets meet, whatever number of edges that has
     facets, joint = np.unique(np.sort(facet[sides[edges]], axis=1), axis=0, return_inverse=True)
     joint, each = joint.ravel(), narrower[edges] * np.abs(bend[edges]) / 8.0
-    bulge, bends = np.zeros(len(facets)), np.zeros(len(facets))
+    bulge, bends, lines = np.zeros(len(facets)), np.zeros(len(facets)), np.zeros((len(facets), 3))
     np.maximum.at(bulge, joint, each)
-    bends[joint] = bend[edges]
-    round_ = _in_a_row(_next_joints(facets, bulge), bends)
+    bends[joint], lines[joint] = bend[edges], along[edges]
+    round_ = _in_a_row(_next_joints(facets, bulge), bends, lines)
     real = np.zeros(len(smooth), dtype=bool)
     while True:  # of a cone between two straight walls the next end shows
         elsewhere = np.append(bulge, 0.0)[_next_joints(facets, bulge)].min(axis=1)
@@ -210,13 +211,13 @@ def _next_joints(facets: IntArray, bulge: FloatArray) -> IntArray:
     return np.where((flat[other] == flat) & (number[other] != number), number[other], -1).reshape(-1, 2)
 
 
-def _in_a_row(following: IntArray, bends: FloatArray) -> np.ndarray:
+def _in_a_row(following: IntArray, bends: FloatArray, lines: FloatArray) -> np.ndarray:
     """Which joints are among three in a row that bend the same way, by less than 3 times one another: a round surface.
 
-    ``following``: `_next_joints`.
+    ``following``: `_next_joints`; ``lines (k, 3)``: directions of the joints, of which those of a row are much alike.
     """
     ratio = np.append(bends, 0.0)[following] / bends[:, None]
-    alike = (ratio > 0.34) & (ratio < 1 / 0.34)
+    alike = (ratio > 0.34) & (ratio < 1 / 0.34) & (np.abs(np.einsum("ksd,kd->ks", lines[following], lines)) > 0.7)
     beyond = np.where(following >= 0, alike.sum(axis=1)[following], 0)
     return alike.all(axis=1) | (alike & (beyond > 1)).any(axis=1)
 

@@ -92,8 +92,10 @@ def test_a_straight_wall_between_cones_stays_straight_and_a_round_one_of_many_fa
     waist = np.vstack([[0, 0], np.column_stack([0.03 - 0.012 * np.sin(np.pi * z / 0.12), z]), [0, 0.12]])
     angle = np.linspace(0.0, np.pi, 13)
     bands = np.column_stack([0.06 * np.sin(angle).round(12), -0.06 * np.cos(angle)])
-    for profile, sharp, most in ((cones, 4 * 64, 5e-5), (waist, 0, np.inf), (bands, 0, np.inf)):
-        body = trimesh.creation.revolve(np.asarray(profile, float), sections=64)
+    single = [(0, 0), (0.015, 0), (0.025, 0.06), (0.015, 0.12), (0, 0.12)]  # joints round it turn by as much
+    cases = [(cones, 64, 4 * 64, 5e-5), (waist, 64, 0, np.inf), (bands, 64, 0, np.inf)]
+    for profile, sections, sharp, most in (*cases, *((single, n, n, 6e-4) for n in (16, 24, 32))):
+        body = trimesh.creation.revolve(np.asarray(profile, float), sections=sections)
         smooth = smooth_triangles(body.vertices, body.faces)
         turn = np.degrees(smooth.turn)
         assert (smooth.crease & (turn < 30)).sum() == sharp
