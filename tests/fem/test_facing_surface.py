@@ -186,6 +186,12 @@ def test_small_holes_are_filled_flipped_triangles_turned_and_a_large_hole_matter
     loops = border_loops(np.delete(triangles, beside, axis=0))
     assert sorted(map(len, loops)) == [4, 4]
     assert sum(13 in loop for loop in loops) == 2
+    # two triangles at an edge of a box: of both ways to fill the hole the edge is the shorter
+    box = trimesh.creation.box((0.1, 0.1, 0.1)).subdivide().subdivide().subdivide().subdivide()
+    for pair in box.face_adjacency[box.face_adjacency_angles > 1.0][::32]:
+        filled = cleaned(box.vertices, np.delete(box.faces, pair, axis=0))
+        volume = trimesh.Trimesh(filled.points, filled.triangles).volume
+        assert (len(filled.lids), volume) == (0, pytest.approx(1e-3, rel=1e-12))
 
 
 def test_the_tree_finds_what_all_triangles_give_and_the_edges_of_a_coarse_cylinder_are_all_creases():

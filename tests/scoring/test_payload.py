@@ -109,6 +109,17 @@ def test_a_couple_of_the_squeeze_uses_up_friction(share):
     assert found.borne
 
 
+def test_points_in_the_planes_of_facets_end_in_bounds_that_meet():
+    """Boxes, whose hulls Qhull once refused to widen."""
+    force, mu, e, distance = 2.830322673600437, 0.33575343309687694, 0.00012007769368455101, 0.027299709516401895
+    centre = [0.048199032374876494, -0.2613448862390836, -0.050086627753231305]
+    corners = np.array(np.meshgrid(*[[-1, 0, 1]] * 3)).reshape(3, -1).T * (force * mu * np.array([1, 1, e]))
+    contacts = [SoftContact(np.array([s * distance / 2, 0, 0]), np.array([[0, 0, s], [0, 1, 0], [-s, 0, 0]], float),
+                            PolytopeBody(corners)) for s in (-1, 1)]  # fmt: skip
+    found = payload(contacts, pushes(contacts, force), centre, None, "shared")
+    assert 0 < (1 - 2 * BOUND_GAP) * found.upper <= found.force <= (1 + 1e-9) * found.upper
+
+
 def test_a_squeeze_that_is_not_borne_and_contacts_that_slip_or_bear_no_torsion_hold_nothing():
     for direction in (None, [0, 0, -1], [1, 0, 0]):
         found = held(pair(1.05 * MU * D), direction=direction)
