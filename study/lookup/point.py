@@ -80,11 +80,14 @@ class GraspPoint(GraspNumbers):
 
     def value(self, name: str, model: str = "ccm") -> Any:
         """A quantity of the grasp, in SI units; NaN where there is none."""
+        if name == "flags":  # bits have no mean
+            return self.flags
         return self._shaped(np.where(self.states == INSIDE, self.map.interpolated(name, model, self.corners), np.nan))
 
     def error(self, name: str, model: str = "ccm") -> Any:
         """Stated error of `value`, of the cases around and of the interpolation, in the quantity's unit.
 
+        NaN where there is no value, and for what no file states an error of.
         See `study.lookup.GraspMap`.
         """
         errors, values = (of(name, model, self.corners) for of in (self.map.errors, self.map.interpolated))
@@ -95,7 +98,8 @@ class GraspPoint(GraspNumbers):
             cases = self.map.interpolated(stated, "ccm", self.corners)
             # one does not know of the other
             errors = np.hypot(BESIDE_CASES * errors, q.error_in_unit(cases, values) if q is not None else cases)
-        return self._shaped(np.where((self.states == INSIDE) & np.isfinite(values), errors, np.nan))
+        known = np.isfinite(values) & (q is None or bool(q.error))
+        return self._shaped(np.where((self.states == INSIDE) & known, errors, np.nan))
 
     def fingers(self, name: str, model: str = "ccm") -> FloatArray:
         """A quantity of both fingers ``(..., 2, ...)``: ``f_x_max`` or ``fingers/S``, ``limit_surface/rho``."""

@@ -20,6 +20,7 @@ from softjaw.study.table import PAPER, Column, Row, Table, as_text, with_unit, w
 from softjaw.study.units import shown, shown_unit
 
 Pair = tuple[xr.Dataset, xr.Dataset]
+SAME_AXES = 0.9986  # cosine of the angle between axes of one grasp: 3 deg
 SAME_PLACE = 1e-3  # distance of the middles of the pads of one grasp, which edges and meshes move by less [m]
 
 
@@ -114,7 +115,7 @@ def _matched(first: xr.Dataset, second: xr.Dataset) -> tuple[dict[str, Row], Pai
             same = np.array(a.options)[:, None] == np.array(b.options)
         # poses, of which samplers may have found others
         if a.name == "station" and not a.units and "finger_pose_origin" in first and "finger_pose_origin" in second:
-            same &= ~(np.linalg.norm(_middles(first)[:, None] - _middles(second), axis=-1) > SAME_PLACE)
+            same = _same_poses(first, second)
         only = a.values[~same.any(axis=1)], b.values[~same.any(axis=0)]
         if not same.any():
             raise StudyError(USAGE, f"{first.file} and {second.file} have no common {a.name}: nothing to compare")
@@ -124,9 +125,19 @@ def _matched(first: xr.Dataset, second: xr.Dataset) -> tuple[dict[str, Row], Pai
     return axes, pair
 
 
-def _middles(ds: xr.Dataset) -> FloatArray:
-    """Middle of both pads of each pose ``(n, 3)`` [m]; NaN where it was not solved."""
-    return np.asarray(ds.finger_pose_origin.mean("finger").max([*ds.status.dims[:-3], *ds.status.dims[-2:]]).values)
+def _same_poses(*both: xr.Dataset) -> NDArray[np.bool_]:
+    """Which solved poses of two files ``(n, m)`` are one grasp; fingers may be exchanged, and pads turned by half."""
+    places = []
+    for ds in both:
+        rest = [*ds.status.dims[:-3], *ds.status.dims[-2:]]  # along which a pose is the same wherever it is known
+        R = ds.finger_pose_rotation.isel(finger=0).max(rest).values
+        places.append((ds.finger_pose_origin.mean("finger").max(rest).values, R[..., 2], R[..., 0]))
+    (x, *axes), (y, *others) = places
+    same = np.linalg.norm(x[:, None] - y, axis=-1) <= SAME_PLACE
+    for one, other in zip(axes, others, strict=True):
+        same &= np.abs(one @ other.T) > SAME_AXES
+    same &= same.cumsum(axis=1) == 1  # each once
+    return np.asarray(same & (same.cumsum(axis=0) == 1))
 
 
 def _left_out(name: str, axis: dict[str, Any]) -> list[str]:

@@ -16,6 +16,7 @@ from softjaw.fem.objects.gap import Pose
 from softjaw.friction.patch import NEGLIGIBLE
 from softjaw.study.case.build import middle_of, outer_surface, surface_triangles
 from softjaw.study.quantities import ALONG, AROUND
+from softjaw.study.result.interpolation import CLOSING_GAP_RATIO
 
 FINER = 6  # places between those of the file among which the nearest is searched
 NOBODY = -1  # candidate of triangles that no candidate grasps
@@ -136,6 +137,7 @@ class Cells(NamedTuple):
         known, first = self._different()
         apart = np.abs((phi[:, None] - known + 0.5 * self.period) % self.period - 0.5 * self.period)
         j = first[apart.argmin(axis=1)]
+        inside &= apart.min(axis=1) <= self._half_cell
         if self._narrow:
             # Beyond a quarter turn the sine falls again, which would bring the far side back in.
             beside = np.hypot(x[:, 0], x[:, 1]) * np.sin(np.minimum(apart[:, 0], 0.5 * math.pi))
@@ -157,7 +159,18 @@ class Cells(NamedTuple):
         known, _ = self._different()
         if len(known) < 2:
             return np.empty(0)
+        if self._half_cell < math.inf:
+            return np.append(0.5 * (known[1:] + known[:-1]), [known[0] - self._half_cell, known[-1] + self._half_cell])
         return 0.5 * (known + np.append(known[1:], known[0] + self.period))
+
+    @property
+    def _half_cell(self) -> float:
+        """Angle on either side that belongs to a candidate at the ends of a row which closes no circle [rad]."""
+        known, _ = self._different()
+        widest = float(np.diff(known).max(initial=0.0))
+        closing = self.period - float(np.ptp(known))  # as the look-up bridges it
+        open_ = self.symmetry and len(known) > 1 and closing > CLOSING_GAP_RATIO * widest * (1 + NEGLIGIBLE)
+        return 0.5 * widest if open_ else math.inf
 
 
 def coloured(corners: np.ndarray, cells: Cells) -> tuple[np.ndarray, np.ndarray]:

@@ -12,6 +12,7 @@ import xarray as xr
 
 from softjaw.fem.objects.gap import IN_PLACE, Pose
 from softjaw.study.case.build import own_frame
+from softjaw.study.lookup import turning
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.pictures import span
 from softjaw.study.quantities import ALONG, AROUND, DONE, TABLE
@@ -227,8 +228,11 @@ def _check_station(ds: xr.Dataset, station: float | None) -> None:
 
 def _nearest(ds: xr.Dataset, best: Index, where: Place, k: int) -> Index:
     """The case at this force nearest to a station and an angle; the best one where only one of them is given."""
-    wanted = zip((ds.station.values, ds.angle.values), where, strict=True)
-    near = [None if value is None else nearest(values, value) for values, value in wanted]
+    station, angle = where
+    near: list[int | None] = [None if station is None else nearest(ds.station.values, station), None]
+    if angle is not None:
+        apart, period = ds.angle.values - angle, turning(ds, best[:-3])[0]  # after which a grasp is the same one
+        near[1] = nearest(apart - period * np.round(apart / period) if period else 0.0 * apart, 0.0)
     cases = (i for i in order(ds, k) if i[:-3] == best[:-3])
     fits = (i for i in cases if all(n in (None, m) for n, m in zip(near, i[-3:-1], strict=True)))
     given = tuple(b if n is None else n for n, b in zip(near, best[-3:-1], strict=True))

@@ -158,7 +158,7 @@ def test_nothing_is_interpolated_across_a_snap_in(tmp_path):
     assert "3 N and" in between.reason
     for force, sign in ((2.5, 0), (3, 0), (4, 8192), (4.5, 8192)):
         point = there.at(0.011, 0.1, force)
-        assert (point.state, point.flags) == (INSIDE, sign)
+        assert (point.state, point.flags, point.value("flags")) == (INSIDE, sign, sign)
         assert point.e_n == pytest.approx(jump(0.011, 0.1, force))
         assert point.error("e_n") == pytest.approx(0, abs=1e-15)
 

@@ -95,10 +95,11 @@ def test_a_missing_or_damaged_file_cannot_be_read(tmp_path, refused, name):
     ("a.vtp", (POINTS, CELLS, PRESSED), ("--unit", "m"), USAGE, "--pressure-unit"),
     ("a.vtp", (POINTS, CELLS, [("CPRESS", ONES), ("n", np.ones((len(CELLS), 3)))]), ("--unit", "m"), USAGE,
      "--pressure-name CPRESS"),
+    ("a.vtp", (POINTS, CELLS, [*PRESSED, ("pressure_kpa", ONES)]), SI, USAGE, "pressure, pressure_kpa"),
     ("a.vtu", (POINTS, [*CELLS[:-1], CELLS[-1] + 9], PRESSED), SI, OTHER_FILE, "point"),
     ("a.vtu", (CUBE, [[0, 1, 3, 2, 4, 5, 7, 6]], [("pressure", [1.0])], (), [12]), SI, USAGE, "cell 0"),
     ("a.vtu", (POINTS, TURNED, PRESSED), SI, USAGE, f"27 of {len(CELLS)}"),
-], ids=["unit", "pressure unit", "pressure", "points", "faces", "inside out"])  # fmt: skip
+], ids=["unit", "pressure unit", "pressure", "two", "points", "faces", "inside out"])  # fmt: skip
 def test_a_grid_that_is_no_patch(tmp_path, refused, name, grid, words, code, key):
     found, errors = refused(vtk(tmp_path / name, *grid), *words)
     assert found == code

@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import softjaw as sj
 from softjaw.study.messages import OTHER_FILE, USAGE, StudyError
@@ -119,12 +120,16 @@ def test_maps_that_share_nothing_are_refused(pair, tmp_path, axes, name):
 
 
 def test_poses_are_shown_by_label_sweeps_by_word_and_commands_give_the_usual_codes(tmp_path, pair):
-    def posed(name, place):
+    def posed(name, *places, turn=0.0):
         where = {"axes": grid_axes([0, 1], [0], poses=True), "labels": ("lid", "neck")}
-        at = np.array([0.0, place]).reshape(2, 1, 1, 1, 1)
-        return make(tmp_path / name, **where, fingers__pose_origin=lambda origin: 0.0 * origin + at)
+        at, R = np.array(places).reshape(2, 1, 1, 1, 1), Rotation.from_rotvec([[0, 0, 0], [0, 0, turn]]).as_matrix()
+        return make(tmp_path / name, **where, fingers__pose_origin=lambda origin: 0.0 * origin + at,
+                    fingers__pose_rotation=lambda x: 0.0 * x + R.reshape(2, 1, 1, 1, 3, 3))  # fmt: skip
 
-    poses, others = posed("a.hdf", 0.1), posed("b.hdf", 0.2)
+    poses, others = posed("a.hdf", 0.0, 0.1), posed("b.hdf", 0.0, 0.2)
+    otherwise, rolled = posed("c.hdf", 0.1, 0.0), posed("d.hdf", 0.0, 0.1, turn=1.0)
+    assert [row["label"] for row in compared(poses, otherwise).rows[::4]] == ["lid", "neck"]
+    assert {row["label"] for row in compared(poses, rolled).rows} == {"lid"}
     found = compared(poses, poses)
     assert [row["label"] for row in found.rows[::4]] == ["lid", "neck"]
     assert " neck " in compare_text(found)
