@@ -114,7 +114,7 @@ def mesh_errors(
         error = estimate(value, coarse_mesh[q.key], view_values, q.error, q.name in PAYLOADS, share)
         error += unseen.share(q, fine, acts or left_out > 0.0) * size
         if q.name in PAYLOADS:  # the larger, the more in doubt
-            error = max(error, min(error * (1.0 + 2.5 * error), 1.0))
+            error = max(error, min(error * (1.0 + 1.6 * error), 1.0))
         if q.error == "relative" and not np.all(coarse_mesh[q.key]):
             error = max(error, 1.0)  # a payload of which the coarse mesh has nothing
         apart = [s * distance(low[q.key], high[q.key], q.error, value) for low, high, s in compared if q.key in low]

@@ -109,7 +109,7 @@ def test_extents_scale_arms_contacts_that_lean_are_flagged_and_errors_are_differ
         expected = weights.OF_FARTHEST * abs(other[f"maps/{name}"][0] / values[f"maps/{name}"][0] - 1)
         assert errors[f"maps/{name}_error"] == pytest.approx(expected, rel=1e-9, abs=1e-12)
     alone = mesh_errors(fine, fine, values, {}, SETTINGS)
-    gap = BOUND_GAP * (1 + 2.5 * BOUND_GAP)
+    gap = BOUND_GAP * (1 + 1.6 * BOUND_GAP)
     assert {name: error for name, error in alone.items() if error} == {"maps/payload_error": gap}
     floor = mesh_errors(fine, fine, values, {}, SETTINGS, unseen=Unseen(0.01, 0.02, 0.5))
     found = [floor[f"maps/{name}_error"] for name in ("e_n", "f_x_max", "p_max")]
@@ -129,7 +129,7 @@ def test_extents_scale_arms_contacts_that_lean_are_flagged_and_errors_are_differ
     error = mesh_errors(fine, coarse, {**values, "maps/payload": [held]}, {}, task)["maps/payload_error"]
     apart = abs(less / held - 1)
     expected = weights.OF_FARTHEST * apart * (1 + apart) + BOUND_GAP
-    assert error == pytest.approx(expected * (1 + 2.5 * expected), rel=1e-9)
+    assert error == pytest.approx(expected * (1 + 1.6 * expected), rel=1e-9)
     held = {**values, "maps/payload": [held]}
     sharp, edged = (coarse_errors(fine, held, [fine, coarse], task, r)["maps/payload_error"] for r in (False, True))
     assert edged == pytest.approx(weights.EDGES_ROUNDED * sharp, rel=1e-12)
