@@ -44,8 +44,8 @@ def export(options: Namespace) -> str:
         refuse_unused(options, "force", "by", "model", "most", "min", "frame")
         listed, presets = solved_files(index)
         if len(presets) > 1 and not options.gripper:
-            found = ", ".join(sorted(preset or "no preset" for preset in presets))
-            raise StudyError(USAGE, f"{index}: found objects of several grippers ({found}): name one with --gripper")
+            names = ", ".join(sorted(preset or "no preset" for preset in presets))
+            raise StudyError(USAGE, f"{index}: found objects of several grippers ({names}): name one with --gripper")
         gripper = gripper_of(options, next(iter(presets), None))
         return write_data_set(index, listed, Path(options.output), options.form, gripper)
     if options.form in DATA_SETS:

@@ -207,11 +207,11 @@ def holds(ds: xr.Dataset, case: dict[str, Any], gripper: GripperFrame) -> dict[s
 def first(grasps: Sequence[RankedGrasp], top: int = 0) -> list[RankedGrasp]:
     """Those of the first ``top`` cases (0: all); ``merit`` is relative to the best of them, and falls."""
     few = list(dict.fromkeys(grasp.place for grasp in grasps))[: top or None]
-    kept, merit, best = list[RankedGrasp](), 1.0, max((grasp.merit for grasp in grasps[:1]), default=0.0)
+    listed, merit, best = list[RankedGrasp](), 1.0, max((grasp.merit for grasp in grasps[:1]), default=0.0)
     for grasp in (grasp for grasp in grasps if grasp.place in few):
         merit = min(merit, grasp.merit / best) if best > 0 else 0.0
-        kept.append(replace(grasp, merit=merit))
-    return kept
+        listed.append(replace(grasp, merit=merit))
+    return listed
 
 
 def usable(grasps: Sequence[RankedGrasp]) -> tuple[list[RankedGrasp], str]:

@@ -134,8 +134,8 @@ def _same_poses(*both: xr.Dataset) -> NDArray[np.bool_]:
         places.append((ds.finger_pose_origin.mean("finger").max(rest).values, R[..., 2], R[..., 0]))
     (x, *axes), (y, *others) = places
     same = np.linalg.norm(x[:, None] - y, axis=-1) <= SAME_PLACE
-    for one, other in zip(axes, others, strict=True):
-        same &= np.abs(one @ other.T) > SAME_AXES
+    for u, v in zip(axes, others, strict=True):
+        same &= np.abs(u @ v.T) > SAME_AXES
     same &= same.cumsum(axis=1) == 1  # each once
     return np.asarray(same & (same.cumsum(axis=0) == 1))
 
