@@ -7,8 +7,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 FloatArray = NDArray[np.float64]
 NEGLIGIBLE = 1e-9  # share of what there is, or difference [-, m, rad], that is only rounding; for decisions alone
@@ -156,9 +154,3 @@ def cross(a: FloatArray, b: FloatArray) -> FloatArray:
     """Vectors ``a x b (..., 3)`` as numpy's own has them, which takes six times as long for a few."""
     yzx, zxy = [1, 2, 0], [2, 0, 1]
     return a.take(yzx, axis=-1) * b.take(zxy, axis=-1) - a.take(zxy, axis=-1) * b.take(yzx, axis=-1)
-
-
-def components(pairs: NDArray[np.integer], count: int) -> NDArray[np.intp]:
-    """Number ``(count,)`` of the connected part of each of some things, that ``pairs (k, 2)`` of them link."""
-    links = coo_array((np.ones(len(pairs)), pairs.T), shape=(count, count))
-    return np.asarray(connected_components(links, directed=False)[1])

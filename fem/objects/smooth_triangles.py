@@ -15,9 +15,9 @@ from typing import NamedTuple
 import numpy as np
 
 from softjaw.fem.objects.gap import IntArray, edges_of
-from softjaw.fem.objects.triangle_tree import area_vectors
+from softjaw.fem.objects.triangle_tree import area_vectors, components
 from softjaw.fem.objects.triangles import neighbours
-from softjaw.friction.patch import FloatArray, components
+from softjaw.friction.patch import FloatArray
 
 CREASE_ANGLE = 30.0  # [deg]: edges that turn by less are taken for facets of a smooth surface
 STEEPEST_EDGE = 0.7  # an edge that leaves its tangent plane by more (sine) is kept straight: its normal is no use

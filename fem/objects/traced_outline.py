@@ -19,7 +19,8 @@ from softjaw.fem.objects.gap import IntArray
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.fem.objects.profile import Curve
 from softjaw.fem.objects.revolution import Revolution
-from softjaw.friction.patch import FloatArray, components
+from softjaw.fem.objects.triangle_tree import components
+from softjaw.friction.patch import FloatArray
 
 LEVELS = 400  # heights of the first look at a mesh
 FEW = 64  # rays per height of that look

@@ -12,6 +12,8 @@ from functools import cached_property
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from softjaw.fem.objects.gap import IntArray, edges_of
 from softjaw.friction.patch import NEGLIGIBLE, FloatArray
@@ -223,6 +225,12 @@ def _along(x, d, least, skipped, nodes):
     for i in range(len(x)):
         distance[i], hit[i] = first_hit(x[i], d[i], least, skipped[i], False, nodes, stack)
     return distance, hit
+
+
+def components(pairs: NDArray[np.integer], count: int) -> NDArray[np.intp]:
+    """Number ``(count,)`` of the connected part of each of some things, that ``pairs (k, 2)`` of them link."""
+    links = coo_array((np.ones(len(pairs)), pairs.T), shape=(count, count))
+    return np.asarray(connected_components(links, directed=False)[1])
 
 
 def area_vectors(points: FloatArray, triangles: IntArray) -> FloatArray:

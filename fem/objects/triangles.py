@@ -17,8 +17,8 @@ from softjaw.fem.errors import MeshError
 from softjaw.fem.objects.gap import IntArray, cone_volumes, edges_of
 from softjaw.fem.objects.mesh_file import LENGTHS
 from softjaw.fem.objects.mesh_holes import border_loops, lid_corners, with_holes_filled
-from softjaw.fem.objects.triangle_tree import TriangleTree, area_vectors
-from softjaw.friction.patch import FloatArray, components
+from softjaw.fem.objects.triangle_tree import TriangleTree, area_vectors, components
+from softjaw.friction.patch import FloatArray
 
 SMALLEST, LARGEST = 1e-3, 2.0  # plausible largest extent of an object that a gripper holds [m]
 HUGE_COORDINATE = 1e12  # of a coordinate, in any unit

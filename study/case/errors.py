@@ -27,7 +27,7 @@ from softjaw.study.quantities import TABLE, Quantity
 OF_FARTHEST, DOUBTED, FLOOR, POWER = 0.3, 2.0, 0.22, 0.75
 # How many times the floor: shares that a model or the curvature takes off are small differences of large numbers.
 WIDER = dict.fromkeys((q.name for q in TABLE if q.error == "absolute"), 10.0) | {
-    "f_x_max": 0.08, "f_y_max": 0.08, "indentation": 4.0, "wall_stress": 5.5, "wall_strain": 5.5,
+    "f_x_max": 0.2, "f_y_max": 0.2, "indentation": 4.0, "wall_stress": 5.5, "wall_strain": 5.5,
 }  # fmt: skip
 OF_WIDTH = {"closing": 0.33, "contact_area": 1.4, "p_max": 5.0}  # the same, of what depends on the contact's width
 # Of the share of the load that edges of the object bear: where such an edge lies within an element tells no mesh.
@@ -43,7 +43,7 @@ OF_PAIRS = {"p_max": 3.0}  # of what pairs differ by: peaks that an effect makes
 ALIGNED, LEANING = 0.2, np.radians(15.0)  # times the floor of a payload where contacts face each other; added per angle
 # Of forces along the face, which pressures alone give by balance, where friction acts back: times the floor, and of the
 # share of the load that the curvature takes off.
-ACTING, OF_LOSS = 5.0, 0.5
+ACTING, OF_LOSS = 2.0, 0.5
 # Of that share times that of the load on edges, where the contact lies round a corner: forces and what they make.
 OF_CORNERS = {"f_x_max": 1.5, "f_y_max": 1.5, "tau_z_max": 1.0, "quality": 6.0, "payload": 2.0, "safety_factor": 2.0}
 PAYLOADS = ("payload", "safety_factor")  # what arms and couples leave of the friction: little of it moves all of them
