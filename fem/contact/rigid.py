@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from copy import copy
+from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -43,6 +44,7 @@ class RigidProblem(ContactProblem):
     def __init__(self, pad: Pad, gap: Gap, mu: float | None = None) -> None:
         self.pad, self.closing_dof = pad, pad.closing_dof
         self.longest_closing = 0.1 * pad.shape.size[2]
+        self._evaluated: tuple[FloatArray, Any, list[Evaluated]] = (np.empty(0), None, [])
         super().__init__([Finger(pad, gap)], mu)
         [self.finger] = self.fingers
         self.foam, self.non_negative = self.finger.foam, self.finger.pressures
@@ -66,6 +68,15 @@ class RigidProblem(ContactProblem):
     def _parts(self) -> list[FloatArray]:
         """Views of the values: elements, face stiffness, force by pressure, gap by displacement, diagonal."""
         return np.split(self._values, self._ends[:-1])
+
+    def evaluate(self, x: FloatArray) -> list[Evaluated]:
+        """See `ContactProblem`; the last state is kept, for a tangent follows the residual of the same one."""
+        at, since, contacts = self._evaluated
+        anchors = self.friction and self.friction.anchors
+        if since is not anchors or not np.array_equal(at, x):
+            contacts = super().evaluate(x)
+            self._evaluated = x.copy(), anchors, contacts
+        return contacts
 
     def _met(self, k: int, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         points = self.finger.points(x).reshape(-1, 3)

@@ -25,10 +25,12 @@ def with_holes_filled(points: FloatArray, triangles: IntArray) -> tuple[FloatArr
 
     Triangles that hardly hang together have no holes to speak of, and stay as they are.
     """
+    if not (loops := _holes(triangles)):
+        return points, triangles, []
     size = float(np.linalg.norm(np.ptp(points, axis=0)))
     present, edges = (set(map(tuple, np.sort(of, axis=1).tolist())) for of in (triangles, edges_of(triangles)))
     middles, parts, places = [points], [triangles], []
-    for loop in _holes(triangles):
+    for loop in loops:
         x, few, apex = points[loop], len(loop) <= FEW_SIDES, len(points) + len(middles) - 1
         across, middle = float(np.linalg.norm(np.ptp(x, axis=0))), x.mean(axis=0)
         # of a triangle or two that are missing it is hardly in doubt how: no point is added, and they may be larger
@@ -45,6 +47,8 @@ def with_holes_filled(points: FloatArray, triangles: IntArray) -> tuple[FloatArr
         new = fans[int(np.argmin(sizes))]
         places.append(f"{across * 1e3:.3g} mm near ({', '.join(f'{v:.4g}' for v in middle)}) m of the file's frame")
         parts.append(new)
+        # the filling of the next hole must not use an edge of this one a third time
+        edges.update(map(tuple, np.sort(edges_of(new), axis=1).tolist()))
         middles += [middle[None]] * (not few)
     more = "; ..." if len(places) > 3 else ""
     notes = [f"small holes filled: {len(places)} ({'; '.join(places[:3])}{more})"] if places else []

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from softjaw.fem.objects.gap import IntArray, edges_of
-from softjaw.fem.objects.triangle_tree import area_vectors, components
+from softjaw.fem.objects.triangle_tree import area_vectors, components, corner_angles
 from softjaw.fem.objects.triangles import neighbours
 from softjaw.friction.patch import FloatArray
 
@@ -189,16 +189,18 @@ def _at_ends(
     bulge, bends, lines = np.zeros(len(facets)), np.zeros(len(facets)), np.zeros((len(facets), 3))
     np.maximum.at(bulge, joint, each)
     bends[joint], lines[joint] = bend[edges], along[edges]
-    round_ = _in_a_row(_next_joints(facets, bulge), bends, lines)
+    following = _next_joints(facets, bulge)
+    round_ = _in_a_row(following, bends, lines)
     real = np.zeros(len(smooth), dtype=bool)
     while True:  # of a cone between two straight walls the next end shows
-        elsewhere = np.append(bulge, 0.0)[_next_joints(facets, bulge)].min(axis=1)
+        elsewhere = np.append(bulge, 0.0)[following].min(axis=1)
         ends = (each > np.maximum(OUTSTANDING * elsewhere, BULGE)[joint]) & (narrower[edges] > SLENDER * length[edges])
         ends &= ~round_[joint] & ~real[edges]
         if not ends.any():
             return real
         real[edges[ends]] = True
         bulge[joint[ends]] = 0.0
+        following = _next_joints(facets, bulge)
 
 
 def _next_joints(facets: IntArray, bulge: FloatArray) -> IntArray:
@@ -234,12 +236,7 @@ def _corner_normals(
     before, after = smooth.T
     links = np.concatenate([np.stack([before, _following(after)], 1), np.stack([_following(before), after], 1)])
     group = components(links, triangles.size)
-    corners = points[triangles]
-    along = np.roll(corners, -1, axis=1) - corners
-    along /= np.maximum(np.linalg.norm(along, axis=2), 1e-300)[:, :, None]
-    # rounding can push the cosine beyond 1
-    angle = np.arccos(np.clip(-np.einsum("mkd,mkd->mk", along, np.roll(along, 1, axis=1)), -1.0, 1.0))
-    weight = (angle * np.einsum("md,md->m", area, area)[:, None]).ravel()
+    weight = (corner_angles(points, triangles) * np.einsum("md,md->m", area, area)[:, None]).ravel()
     total = np.stack([np.bincount(group, weight * np.repeat(normal[:, d], 3)) for d in range(3)], axis=1)
     return (total / np.maximum(np.linalg.norm(total, axis=1), 1e-300)[:, None])[group]
 

@@ -239,6 +239,15 @@ def area_vectors(points: FloatArray, triangles: IntArray) -> FloatArray:
     return np.cross(b - a, c - a)
 
 
+def corner_angles(points: FloatArray, triangles: IntArray) -> FloatArray:
+    """Angles ``(m, 3)`` of triangles at their corners [rad]."""
+    corners = points[triangles]
+    along = np.roll(corners, -1, axis=1) - corners
+    along /= np.maximum(np.linalg.norm(along, axis=2), 1e-300)[:, :, None]
+    # rounding can push the cosine beyond 1
+    return np.arccos(np.clip(-np.einsum("mkd,mkd->mk", along, np.roll(along, 1, axis=1)), -1.0, 1.0))
+
+
 @dataclass(frozen=True, eq=False)
 class TriangleTree:
     """Triangles that can be asked for closest points and for what a ray meets.
@@ -268,9 +277,7 @@ class TriangleTree:
         sides, count = edges_of(self.triangles), len(self.points)
         _, edge, times = np.unique(np.sort(sides, axis=1) @ [count, 1], return_inverse=True, return_counts=True)
         alone = times[edge.ravel()] == 1
-        along = np.diff(self.points[sides], axis=1).reshape(-1, 3, 3)
-        along /= np.maximum(np.linalg.norm(along, axis=2), 1e-300)[:, :, None]
-        angle = np.arccos(np.clip(-np.einsum("mkd,mkd->mk", along, np.roll(along, 1, axis=1)), -1.0, 1.0)).ravel()
+        angle = corner_angles(self.points, self.triangles).ravel()
         each, rim = np.repeat(self.face_normals, 3, axis=0), np.zeros(count, dtype=bool)
         rim[sides[alone]] = True
         of_edges = np.stack([np.bincount(edge.ravel(), each[:, d]) for d in range(3)], axis=1)[edge.ravel()]

@@ -109,8 +109,10 @@ def _merged(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArr
     points, inverse = np.unique(points[triangles.ravel()], axis=0, return_inverse=True)
     triangles = inverse.reshape(-1, 3).astype(np.int64)
     close = cKDTree(points).query_pairs(ROUNDED * np.abs(points).max(), output_type="ndarray")
-    group, notes = components(close, len(points)), []
-    points, triangles = _used(points, np.unique(group, return_index=True)[1][group][triangles])
+    notes = []
+    if len(close):
+        group = components(close, len(points))
+        points, triangles = _used(points, np.unique(group, return_index=True)[1][group][triangles])
     a, b, c = triangles.T
     proper = (a != b) & (b != c) & (c != a)
     if not proper.any():

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from softjaw.study.cli.options import GRIPPER, refuse_unused
 from softjaw.study.export.cases import as_csv, as_json
-from softjaw.study.export.data_set import FORMS, solved_files, write_data_set
+from softjaw.study.export.data_set import FORMS, checked_rows, write_data_set
 from softjaw.study.export.planners import CLOSING, as_graspgen, as_yaml
 from softjaw.study.export.rigid_body import body_of
 from softjaw.study.export.selection import GripperFrame, chosen, first, grasps, usable
@@ -42,12 +42,12 @@ def export(options: Namespace) -> str:
         raise StudyError(USAGE, f"-o: found '{options.output}', expected another file than the results")
     if index:
         refuse_unused(options, "force", "by", "model", "most", "min", "frame")
-        listed, presets = solved_files(index)
+        rows, presets = checked_rows(index)
         if len(presets) > 1 and not options.gripper:
             names = ", ".join(sorted(preset or "no preset" for preset in presets))
             raise StudyError(USAGE, f"{index}: found objects of several grippers ({names}): name one with --gripper")
         gripper = gripper_of(options, next(iter(presets), None))
-        return write_data_set(index, listed, Path(options.output), options.form, gripper)
+        return write_data_set(index, rows, Path(options.output), options.form, gripper)
     if options.form in DATA_SETS:
         raise StudyError(USAGE, f"--format {options.form}: found '{options.file}', expected a folder of objects")
     refuse_unused(options, *UNUSED.get(options.form, ()), form=options.form)
@@ -57,8 +57,7 @@ def export(options: Namespace) -> str:
 
         return f"written: {write_vtk(ds, Path(options.output), options.force)}"
     few = options.top if options.top is not None else 1 if options.form in SIMULATORS else 0
-    choice = {name: getattr(options, name) for name in ("model", "force", "by")}
-    choice |= {"least": dict(options.least)}
+    choice = {name: getattr(options, name) for name in ("model", "force", "by")} | {"least": dict(options.least)}
     if options.form in TABLES:
         asked = options.force or options.by or options.least or options.top is not None
         cases = chosen(ds, top=few, **choice)[0] if asked else None

@@ -114,7 +114,7 @@ def write_data_set(index: Path, rows: Sequence[Row], out: Path, form: str, gripp
              "object_in_gripper": "holds (a known mass with task.safety), does no harm, and this gripper can take it"}
     write_file(out / "data-set.json", json.dumps(about, indent=1))
     counts = " and ".join(f"{len(files)} for {split}" for split, files in listed.items())
-    others = len(read_index(index)[0]) - len(rows)
+    others = len(rows) - len(_solved(rows))
     without = f"; {others} objects without a solved grasp are left out" * bool(others)
     stale = sum(path.stat().st_mtime_ns == stamp for path, stamp in before.items())
     older = f"\nnote: {stale} files in {out} are from before and of other objects or formats" * bool(stale)
@@ -166,13 +166,13 @@ def _webdataset(grasps: ObjectGrasps) -> Files:
 FORMS = {"graspgen": _graspgen, "acronym": _acronym, "webdataset": _webdataset}
 
 
-def solved_files(index: Path) -> tuple[list[Row], set[str | None]]:
-    """Rows of a folder's objects that have solved cases, and the grippers that their scenes name.
+def checked_rows(index: Path) -> tuple[list[Row], set[str | None]]:
+    """Rows of a folder's objects, and the grippers that scenes of those name which have solved cases.
 
     Raises `StudyError`: a result file is missing or damaged, or a mesh is missing.
     """
-    rows, presets = [row for row in read_index(index)[0] if row["done"] > 0], set()
-    for row in rows:
+    (rows, _), presets = read_index(index), set()
+    for row in _solved(rows):
         path, mesh = index.parent / row["file"], index.parent / row["mesh"]
         with open_result(path) as result:
             presets.add(scene_table(result.scene, "gripper").get("preset"))
@@ -183,8 +183,12 @@ def solved_files(index: Path) -> tuple[list[Row], set[str | None]]:
     return rows, presets
 
 
+def _solved(rows: Sequence[Row]) -> list[Row]:
+    return [row for row in rows if row["done"] > 0]
+
+
 def _objects(index: Path, rows: Sequence[Row], gripper: GripperFrame) -> Iterator[ObjectGrasps]:
-    for row in rows:
+    for row in _solved(rows):
         ds, mesh = open(index.parent / row["file"]), index.parent / row["mesh"]
         scale = UNITS[task_keys(ds, "object").get("unit", "m")].size
         each = [grasp_arrays(ds, gripper._replace(approach=(way,))) for way in gripper.approach]

@@ -207,7 +207,7 @@ def holds(ds: xr.Dataset, case: dict[str, Any], gripper: GripperFrame) -> dict[s
 def first(grasps: Sequence[RankedGrasp], top: int = 0) -> list[RankedGrasp]:
     """Those of the first ``top`` cases (0: all); ``merit`` is relative to the best of them, and falls."""
     few = list(dict.fromkeys(grasp.place for grasp in grasps))[: top or None]
-    listed, merit, best = list[RankedGrasp](), 1.0, max((grasp.merit for grasp in grasps[:1]), default=0.0)
+    listed, merit, best = list[RankedGrasp](), 1.0, grasps[0].merit if grasps else 0.0
     for grasp in (grasp for grasp in grasps if grasp.place in few):
         merit = min(merit, grasp.merit / best) if best > 0 else 0.0
         listed.append(replace(grasp, merit=merit))

@@ -176,7 +176,7 @@ class GraspMap:
     def error(
         self, name: str, station: ArrayLike, angle: ArrayLike, force: ArrayLike, model: str = "ccm"
     ) -> FloatArray | float:
-        """Estimated error of `value` by the interpolation, in the quantity's unit; NaN where there is no value."""
+        """Stated error of `value`, in the quantity's unit; see `GraspPoint.error`."""
         return self.point(station, angle, force).error(name, model)
 
     def table(self, name: str, model: str = "ccm") -> FloatArray:

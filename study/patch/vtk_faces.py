@@ -91,15 +91,16 @@ def _corner_ids(path: Path, grid: Any) -> NDArray[np.int64]:
 
 def _pressure_array(path: Path, grid: Any, reading: Reading) -> tuple[str, NDArray[Any], bool]:
     """Name and values of the scalar array that holds the pressure, and whether it belongs to the points."""
-    both = ((False, grid.cell_data), (True, grid.point_data))
-    arrays = [(name, np.asarray(array), at_points) for at_points, data in both for name, array in data.items()]
-    arrays = [each for each in arrays if each[1].ndim == 1]
-    names = [name for name, *_ in arrays]
-    fits = [each for each in arrays if (split_header(each[0], reading.pressure_name) or ("",))[0] == "pressure"]
-    if len(fits) == 1:
-        return fits[0]
+    names: list[str] = []
+    for at_points, data in ((False, grid.cell_data), (True, grid.point_data)):  # cells come first
+        scalars = {name: np.asarray(array) for name, array in data.items() if np.ndim(array) == 1}
+        fits = [name for name in scalars if (split_header(name, reading.pressure_name) or ("",))[0] == "pressure"]
+        if len(fits) == 1:
+            return fits[0], scalars[fits[0]], at_points
+        names += fits or scalars
+        if fits:
+            break
     wanted = reading.pressure_name or "pressure"
     remedy = f"give its name with --pressure-name {closest(wanted, names) or (names[0] if names else 'NAME')}"
-    names = [name for name, *_ in fits] or names
     actual = f"the arrays {', '.join(names)}" if names else "no array of scalars"
-    raise refused(path, None, wanted, actual, "one of the pressure", remedy)
+    raise refused(path, None, wanted, actual, "one array of the pressure", remedy)

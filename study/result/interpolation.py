@@ -84,10 +84,19 @@ def circle(name: str, units: str, values: ArrayLike, period: float, half_turn: b
     x, swapped = folded[order], half_turn & (turns[order] % 2 == 1)
     if len(x) == 1:
         return Nodes(name, units, _point(float(x[0])), order.repeat(2), swapped.repeat(2), period, half_turn)
-    if x[0] + period - x[-1] <= CLOSING_GAP_RATIO * np.diff(x).max() * (1 + NEGLIGIBLE):
+    if closes(x, period):
         x, order = np.append(x, x[0] + period), np.append(order, order[0])
         swapped = np.append(swapped, swapped[0] ^ half_turn)
     return Nodes(name, units, x, order, swapped, period, half_turn, MOST_TURN)
+
+
+def closes(angles: FloatArray, period: float) -> bool:
+    """Whether rising angles within a period go all round: the gap that closes the circle is not much wider than others.
+
+    >>> closes(np.array([0.0, 1.0, 2.0]), 3.0), closes(np.array([0.0, 1.0]), 6.0)
+    (True, False)
+    """
+    return bool(period - np.ptp(angles) <= CLOSING_GAP_RATIO * np.diff(angles).max() * (1 + NEGLIGIBLE))
 
 
 def _point(x: float) -> FloatArray:

@@ -270,7 +270,7 @@ def _rows_of(folder: ObjectFolder, out: Path, retry_failed: bool) -> list[Row]:
     again = {index.FAILED, index.REFUSED, index.NO_GRASP, index.SOME_FAILED} if retry_failed else set()
     if gone := known.keys() - {listed.name for listed in folder.objects}:
         print(f"note: {len(gone)} of {len(known)} objects in {path} are not in this run; their files stay", flush=True)
-    rows = list[Row]()
+    rows = []
     for listed in folder.objects:
         row = index.blank_row(listed.name, file=f"{listed.name}.hdf", mesh=os.path.relpath(listed.mesh, out))
         before = known.get(listed.name, row)

@@ -178,7 +178,7 @@ class Scene(SceneSection):
             yield f"gripper.shear_modulus_kpa = {g.shear_modulus_kpa:g} is more than rubber has; foam: 8 to 80 kPa"
         where = self.candidates
         if where.refine and not where.sampled and where.refine < (each := self.cases // max(where.total, 1)):
-            yield f"candidates.refine = {where.refine} adds no grasp: one takes up to {each} cases"
+            yield f"candidates.refine = {where.refine} adds no grasp: one takes at least {each} cases"
         usual = Gripper()
         own_plate = (g.sheet_thickness_mm, g.sheet_modulus_gpa) != (usual.sheet_thickness_mm, usual.sheet_modulus_gpa)
         if g.tilt_stiffness_nm_per_rad is not None and own_plate:

@@ -115,7 +115,7 @@ def _matched(first: xr.Dataset, second: xr.Dataset) -> tuple[dict[str, Row], Pai
             same = np.array(a.options)[:, None] == np.array(b.options)
         # poses, of which samplers may have found others
         if a.name == "station" and not a.units and "finger_pose_origin" in first and "finger_pose_origin" in second:
-            same = _same_poses(first, second)
+            same = _same_poses(first, second, same)
         only = a.values[~same.any(axis=1)], b.values[~same.any(axis=0)]
         if not same.any():
             raise StudyError(USAGE, f"{first.file} and {second.file} have no common {a.name}: nothing to compare")
@@ -125,17 +125,22 @@ def _matched(first: xr.Dataset, second: xr.Dataset) -> tuple[dict[str, Row], Pai
     return axes, pair
 
 
-def _same_poses(*both: xr.Dataset) -> NDArray[np.bool_]:
-    """Which solved poses of two files ``(n, m)`` are one grasp; fingers may be exchanged, and pads turned by half."""
+def _same_poses(first: xr.Dataset, second: xr.Dataset, numbers: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Which poses of two files ``(n, m)`` are one grasp; fingers may be exchanged, and pads turned by half.
+
+    Where one was not solved that is not known, and the ``numbers (n, m)`` that are alike tell.
+    """
     places = []
-    for ds in both:
+    for ds in (first, second):
         rest = [*ds.status.dims[:-3], *ds.status.dims[-2:]]  # along which a pose is the same wherever it is known
         R = ds.finger_pose_rotation.isel(finger=0).max(rest).values
         places.append((ds.finger_pose_origin.mean("finger").max(rest).values, R[..., 2], R[..., 0]))
     (x, *axes), (y, *others) = places
-    same = np.linalg.norm(x[:, None] - y, axis=-1) <= SAME_PLACE
+    apart = np.linalg.norm(x[:, None] - y, axis=-1)
+    same = apart <= SAME_PLACE
     for u, v in zip(axes, others, strict=True):
         same &= np.abs(u @ v.T) > SAME_AXES
+    same |= np.isnan(apart) & numbers
     same &= same.cumsum(axis=1) == 1  # each once
     return np.asarray(same & (same.cumsum(axis=0) == 1))
 

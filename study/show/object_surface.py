@@ -16,7 +16,7 @@ from softjaw.fem.objects.gap import Pose
 from softjaw.friction.patch import NEGLIGIBLE
 from softjaw.study.case.build import middle_of, outer_surface, surface_triangles
 from softjaw.study.quantities import ALONG, AROUND
-from softjaw.study.result.interpolation import CLOSING_GAP_RATIO
+from softjaw.study.result.interpolation import closes
 
 FINER = 6  # places between those of the file among which the nearest is searched
 NOBODY = -1  # candidate of triangles that no candidate grasps
@@ -167,10 +167,9 @@ class Cells(NamedTuple):
     def _half_cell(self) -> float:
         """Angle on either side that belongs to a candidate at the ends of a row which closes no circle [rad]."""
         known, _ = self._different()
-        widest = float(np.diff(known).max(initial=0.0))
-        closing = self.period - float(np.ptp(known))  # as the look-up bridges it
-        open_ = self.symmetry and len(known) > 1 and closing > CLOSING_GAP_RATIO * widest * (1 + NEGLIGIBLE)
-        return 0.5 * widest if open_ else math.inf
+        if not self.symmetry or len(known) < 2 or closes(known, self.period):
+            return math.inf
+        return 0.5 * float(np.diff(known).max())
 
 
 def coloured(corners: np.ndarray, cells: Cells) -> tuple[np.ndarray, np.ndarray]:

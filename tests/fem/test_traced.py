@@ -236,6 +236,7 @@ def test_the_line_of_a_bent_tube_is_its_arc_and_no_handle_or_cavity_pulls_it_asi
     mesh = trimesh.creation.cylinder(0.03, 0.2, sections=64)
     mesh.vertices += 1e-5 * np.random.default_rng(0).normal(size=mesh.vertices.shape)
     line = centre_line(np.asarray(mesh.vertices), np.asarray(mesh.faces, dtype=np.int64), 0.025)
+    assert not line.middle.any()
     np.testing.assert_allclose(line.at(0.0123)[0], [0, 0, 0.0123], atol=1e-15)
     body = trimesh.creation.cylinder(0.04, 0.1, sections=64)
     cavity = trimesh.creation.cylinder(0.035, 0.08, sections=64)

@@ -123,8 +123,8 @@ def test_ranks_are_busy_to_the_end(ranks):
     assert makespan(costs, ranks) >= even
 
 
-def test_times_follow_from_costs():
-    # 64 load paths of four seconds
+def test_more_ranks_than_load_paths_gain_nothing():
+    """64 load paths of four seconds."""
     assert [makespan([4.0] * 64, ranks) for ranks in (1, 60, 64, 128)] == [256.0, 8.0, 4.0, 4.0]
 
 

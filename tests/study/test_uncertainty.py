@@ -117,8 +117,9 @@ def test_maps_have_what_the_samples_say_and_grasps_that_inputs_move_alike_are_to
     assert values.shape == (*given.status.shape, 8)
     third = softjaw.press(plain().with_values(scene().points[3]), station=0.0, angle=0.0, force=2.0)
     assert third.value("quality") == pytest.approx(values[0, 0, 0, 2], rel=1e-12)
-    within = np.abs(values - ds.quality.sel(model="ccm").values[..., None]) <= ds.quality_interval.values[..., None]
-    assert (within.sum(axis=-1) >= 7).all()  # of 8
+    changes = np.abs(values - ds.quality.sel(model="ccm").values[..., None])
+    expected = np.quantile(changes, 0.95, axis=-1, method="hazen")
+    assert ds.quality_interval.values == pytest.approx(expected, rel=1e-12)
     table = best(judge(ds))
     errors = {column.name: column.error for column in table.columns}
     assert (errors["quality"], errors["quality_interval"]) == ("", "")  # which never stands for the mesh's error

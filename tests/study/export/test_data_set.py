@@ -14,7 +14,7 @@ import trimesh
 
 from softjaw.study.cli import main
 from softjaw.study.export import data_set
-from softjaw.study.export.data_set import FORMS, grasp_arrays, solved_files, write_data_set
+from softjaw.study.export.data_set import FORMS, checked_rows, grasp_arrays, write_data_set
 from softjaw.study.export.selection import GripperFrame
 from softjaw.study.flags import Flag
 from softjaw.study.grippers import Hand, gripper_file
@@ -125,7 +125,7 @@ def test_graspgen_has_its_fields_and_splits_acronym_its_datasets_and_shards_both
     assert sorted(set(keys)) == ["bowl", "cup", "mug%2eold", "vase"]
     assert all(first == other for first, other in zip(keys[::2], keys[1::2], strict=True))
     assert found["cup.mesh.stl"] == b"cup"
-    rows, _ = solved_files(folder / "index.hdf")
+    rows, _ = checked_rows(folder / "index.hdf")
     assert "note" not in write_data_set(folder / "index.hdf", rows, out, "graspgen", GRIPPER)
     (out / "objects/plate.stl").touch()
     assert "note: 1 " in write_data_set(folder / "index.hdf", rows, out, "graspgen", GRIPPER)
@@ -154,7 +154,7 @@ def test_damage_ends_it_before_anything_is_written_shards_are_whole_one_by_one_a
     copy, out = tmp_path / "copy", tmp_path / "out"
     shutil.copytree(folder, copy)
     trimesh.creation.box((1.0, 2.0, 3.0)).export(copy / "cup.gltf")
-    rows, _ = solved_files(copy / "index.hdf")
+    rows, _ = checked_rows(copy / "index.hdf")
     rows = [row | {"mesh": row["mesh"].replace("cup.stl", "cup.gltf")} for row in rows]
     whole, form = list[int](), FORMS["webdataset"]
     monkeypatch.setattr(data_set, "SHARD", 1)

@@ -110,6 +110,9 @@ def test_pressure_at_points_is_averaged_over_each_face_and_triangles_leave_their
     file = vtk(tmp_path / "p.vtu", points, cells, on_points=[("pressure", at_points)])
     answer = told(file, "--unit", "m", "--pressure-unit", "pa")
     assert answer["patches"][0]["S"] == pytest.approx(at_points[cells].mean(axis=1) @ patch.area, rel=1e-12)
+    both = vtk(tmp_path / "both.vtu", points, cells, [("pressure", patch.pressure)], [("pressure", at_points)])
+    answer = told(both, "--unit", "m", "--pressure-unit", "pa")  # that of the cells comes first
+    assert answer["patches"][0]["S"] == pytest.approx(patch.pressure @ patch.area, rel=1e-12)
     # Unit square of a quadrilateral of half its area and two triangles: S = p, f = mu p.
     rows = ["0,0,0,.5,0,0,.5,1,0,0,1,0,2", ".5,0,0,1,0,0,1,1,0,,,,2", ".5,0,0,1,1,0,.5,1,0,,,,2"]
     names = [f"{c}{k}" for k in (1, 2, 3, 4) for c in "xyz"]

@@ -130,6 +130,8 @@ def test_poses_are_shown_by_label_sweeps_by_word_and_commands_give_the_usual_cod
     otherwise, rolled = posed("c.hdf", 0.1, 0.0), posed("d.hdf", 0.0, 0.1, turn=1.0)
     assert [row["label"] for row in compared(poses, otherwise).rows[::4]] == ["lid", "neck"]
     assert {row["label"] for row in compared(poses, rolled).rows} == {"lid"}
+    unsolved = posed("e.hdf", np.nan, 0.1)  # only its number is known
+    assert [row["label"] for row in compared(poses, unsolved).rows[::4]] == ["lid", "neck"]
     found = compared(poses, poses)
     assert [row["label"] for row in found.rows[::4]] == ["lid", "neck"]
     assert " neck " in compare_text(found)
