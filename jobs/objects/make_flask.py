@@ -14,8 +14,8 @@ import trimesh
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parents[1]))
 
-from softjaw.fem.objects.gap import grid_triangles  # noqa: E402
-from softjaw.fem.objects.shapes import Revolution  # noqa: E402
+from softjaw.fem.objects.gap import grid_triangles  # noqa: E402  (only found once the path is known)
+from softjaw.fem.objects.shapes import Revolution  # noqa: E402  (only found once the path is known)
 
 PROFILE_MM = [
     (0, 0), (0, 8), (0, 16), (0, 24), (4, 29.5), (15, 31), (30, 30), (45, 27), (58, 25.5), (70, 26.5), (80, 27),
