@@ -21,13 +21,12 @@ from softjaw.fem.contact.problem import SpringBed
 from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.friction.patch import FloatArray, NoContactError
 from softjaw.study.case.build import forces_apart
-from softjaw.study.case.evaluate import quality
+from softjaw.study.case.errors import grasp_values
 from softjaw.study.case.limit_surface import SurfaceFit
 from softjaw.study.case.model import contact_rules, pad_of, plate_compliance
 from softjaw.study.case.pressing import PressedContact, grasp_of
 from softjaw.study.case.result import surely_below
 from softjaw.study.case.solver import CandidateSolver, Levels, Solution, Solved, join_notes
-from softjaw.study.case.task import payload_alone
 from softjaw.study.case.wall import estimated_indentation, thin_body
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import E_N_TARGET, EFFECTS, REASONS
@@ -255,11 +254,11 @@ class EffectChoice:
     def _judged(self, contacts: Sequence[PressedContact]) -> tuple[float, float, float]:
         """e_n of the weaker finger [m], payload [kg] and quality, NaN where unknown."""
         e_n = min(c.limits["ccm"].e_n for c in contacts)
-        settings = self.solver.settings
         try:
-            return e_n, payload_alone(contacts, settings.task)["maps/payload"], quality(contacts, settings)
+            values = grasp_values(tuple(contacts), self.solver.settings)
         except (*TOO_SMALL, RuntimeError, ValueError):  # a contact without torque has no hull
             return e_n, nan, nan
+        return e_n, *values["maps/payload"], *values["maps/quality"]
 
     def coarse(self, k: int, levels: Levels) -> Sequence[PressedContact] | None:
         """Contacts at the ``k``-th force on the coarse mesh; None where it has none."""

@@ -191,7 +191,7 @@ def _on_mesh(values: Mapping[str, Any], contacts: Sequence[Contact]) -> dict[str
     return curved | _sums(contacts) | faces
 
 
-@lru_cache(maxsize=16)  # of one case: each refinement and each pair of solutions asks for some of them again
+@lru_cache(maxsize=32)  # of a candidate: each effect, refinement and pair of solutions asks for some of them again
 def grasp_values(contacts: tuple[Contact, ...], settings: EvaluationSettings) -> dict[str, Any]:
     """Quality of the ellipsoids and payload ``(1,)`` in the curved model."""
     values = {"maps/quality": quality(contacts, settings)}
