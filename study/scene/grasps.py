@@ -39,8 +39,8 @@ class GraspPose(SceneSection):
 
 
 def _budget(given: Any) -> Any:
-    """The default number of cases for true, none for false."""
-    return BUDGET if given is True else None if given is False else given
+    """The default number of cases for true, none for false and 0."""
+    return BUDGET if given is True else given or None
 
 
 class Candidates(SceneSection):
