@@ -37,8 +37,7 @@ def cases(
     Arrays are numpy arrays, NaN where a case has no result.
     """
     axes, status, messages = axes_of(ds), ds.status.values, ds.message.values
-    names = [name for name in maps_in(ds) if name != "flags"]
-    maps = {name: np.where(status == DONE, values_of(ds, name, model), np.nan) for name in names}
+    maps = {name: np.where(status == DONE, values_of(ds, name, model), np.nan) for name in maps_in(ds)}
     labels, flags, fingers = ds.label.values, ds.flags.values, _fingers(ds, model)
     for index in np.ndindex(status.shape) if which is None else which:
         yield {
@@ -102,7 +101,7 @@ def as_csv(ds: xr.Dataset, model: str = "ccm", listed: Iterable[dict[str, Any]] 
     axes = axes_of(ds)
     columns = [Column(axis.name, axis.units) for axis in axes]
     columns += [Column(name) for name in ("label", "state", "message", "flags")]
-    columns += [Column(name, unit) for name, unit in maps_in(ds).items() if name != "flags"]
+    columns += [Column(name, unit) for name, unit in maps_in(ds).items()]
     of_finger = []
     for name, (_, unit, parts) in _fingers(ds, model).items():
         units = [unit] * max(len(parts), 1) if isinstance(unit, str) else unit

@@ -156,7 +156,7 @@ def chosen(
         at, k, _ = at_level(ds, window(ds) if force is None else force)
     with fault_of(ds.attrs["file"], ValueError):
         by = score_of(at, by)
-    units = {name: unit for name, unit in maps_in(at).items() if name != "flags"}  # which have no least
+    units = maps_in(at)
     if unknown := [name for name in least if name not in units]:
         raise StudyError(USAGE, f"--min: found '{unknown[0]}', expected one of {', '.join(units)}")
     at = at.assign(flags=(at.status.dims, judged(at), at["flags"].attrs))

@@ -99,7 +99,7 @@ class GraspMap:
             self.data = self.data.assign_attrs(point=sweep_point(ds, self.index))
         self.status = self.data.status.values
         #: unit and definition of everything that `value` knows
-        self.quantities = {name: (unit, ds[name].definition) for name, unit in maps_in(ds).items()}
+        self.quantities = {name: (unit, ds[name].definition) for name, unit in [*maps_in(ds).items(), ("flags", "")]}
         self.by_poses = not station.units
         angles = circle("angle", "rad", angle.values, *((0.0, False) if self.by_poses else turning(ds, self.index)))
         name, most = ("candidate", 0.5) if self.by_poses else ("station", math.inf)

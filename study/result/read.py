@@ -255,8 +255,8 @@ def stated_error(ds: xr.Dataset, name: str) -> np.ndarray | None:
 
 
 def maps_in(ds: xr.Dataset) -> dict[str, str]:
-    """Name and unit of every map, and of what is derived for every case, or for all forces of a candidate together."""
-    names = [q.name for q in TABLE if q.group == "maps" and q.name in ds]
+    """Name and unit of every map but flags, and of what is derived for every case or all forces of a candidate."""
+    names = [q.name for q in TABLE if q.group == "maps" and q.name in ds and q.name != "flags"]
     over = ds.status.dims
     names += [name for name in ds.attrs["derived"].split() if name in ds and ds[name].dims in (over, over[:-1])]
     return {name: ds[name].attrs["units"] for name in names}

@@ -240,8 +240,8 @@ def _nearest(ds: xr.Dataset, best: Index, where: Place, k: int) -> Index:
 
 
 def maps_of(ds: xr.Dataset) -> list[str]:
-    """Names of the maps that have a value."""
-    return [q.name for q in TABLE if q.group == "maps" and field(ds, q.name) is not None]
+    """Names of the maps that have a value; flags are none."""
+    return [q.name for q in TABLE if q.group == "maps" and q.name != "flags" and field(ds, q.name) is not None]
 
 
 def quantity_of(ds: xr.Dataset, name: str | None) -> str:

@@ -189,8 +189,9 @@ def test_no_pads_are_invented_and_a_case_is_chosen_by_number_place_or_score(file
     with pytest.raises(StudyError, match="0 to 5") as refused:
         view_of(view.ds, 6, (None, None), None)
     assert refused.value.code == USAGE
-    with pytest.raises(StudyError, match="quality, e_n"):
-        quantity_of(view.ds, "beauty")
+    for name in ("beauty", "flags"):  # whose bits no colour tells
+        with pytest.raises(StudyError, match="quality, e_n"):
+            quantity_of(view.ds, name)
 
 
 def unpacked(packed, kind="<f4"):
