@@ -113,7 +113,8 @@ def objects_text(folder: ObjectFolder, out: Path, ranks: Sequence[int]) -> str:
     preparing = scale * (time.process_time() - begin)
     rows = {"objects": f"{len(objects)}, of which {len(some)} were looked at"}
     if planned:
-        each, loads = zip(*(timed(made.tried, TIMED_S / len(planned)) for made, _ in planned), strict=True)
+        plans, budget = [made for made, _ in planned], TIMED_S / len(planned)
+        each, loads = zip(*(timed(p.tried, budget, p.layout.inputs) for p in plans), strict=True)
         paths = [seconds for some in each for seconds in some]
         times = max(1, round(scale))
         many, solving, start = paths * times, scale / times, begin + sum(loads) + END_S

@@ -21,6 +21,7 @@ from softjaw.study.quantities import (
     MODELS,
     MONOMIALS,
     NEEDS,
+    REALISATION,
     Axis,
     Quantity,
     quantities,
@@ -126,6 +127,11 @@ class Layout:
     def rows(self) -> int:
         """Number of cases."""
         return int(np.prod(self.shape, dtype=np.int64))
+
+    @property
+    def inputs(self) -> int:
+        """Number of points for each of the sweep's: one with the scene's own inputs, others with samples of them."""
+        return self.shape[self.names.index(REALISATION)] if REALISATION in self.names else 1
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -25,11 +25,11 @@ MOST_PROMISING = 3  # sampled grasps that are solved as well as listed ones
 ROUNDS = 1.6  # of the grasps that a list shows: with those that fall out of it
 
 
-def timed(units: Sequence[Any], budget: float = TIMED_S) -> tuple[list[float], float]:
+def timed(units: Sequence[Any], budget: float = TIMED_S, inputs: int = 1) -> tuple[list[float], float]:
     """Expected time of each unit of work [s], by a few that are solved here, and what the first one has loaded [s].
 
     The results are thrown away. After ``budget`` [s] a path is left in the middle. Loops that had to be compiled are
-    kept for the run: then all is timed once more.
+    kept for the run: then all is timed once more. ``inputs``: as `Layout.inputs`, as often grasps are solved.
     """
     if not units:
         return [], 0.0
@@ -39,11 +39,11 @@ def timed(units: Sequence[Any], budget: float = TIMED_S) -> tuple[list[float], f
     from softjaw.study.pipeline import solve_unit
 
     with install_listener("numba:compile", compiling := TimingListener()):
-        times = _timed(units, budget, solve_unit)
-    return _timed(units, budget, solve_unit) if compiling.done else times
+        times = _timed(units, budget, inputs, solve_unit)
+    return _timed(units, budget, inputs, solve_unit) if compiling.done else times
 
 
-def _timed(units: Sequence[Any], budget: float, solve_unit: Callable) -> tuple[list[float], float]:
+def _timed(units: Sequence[Any], budget: float, inputs: int, solve_unit: Callable) -> tuple[list[float], float]:
     """See `timed`; what the first case loads counts for no unit."""
     seconds, first_case, spent = np.full(len(units), np.nan), np.nan, 0.0
     n = len(units)  # the middle first; the first few lie far apart: multiples of the golden section
@@ -69,7 +69,8 @@ def _timed(units: Sequence[Any], budget: float, solve_unit: Callable) -> tuple[l
     each = _by_cost(units, seconds)
     loads = max(first_case - FIRST_FORCE_FACTOR * each[first] / (forces - 1 + FIRST_FORCE_FACTOR), 0.0)
     if units[first].finest:
-        each += ROUNDS * _listed(units[:MOST_PROMISING], budget, solve_unit) * min(LISTED, len(units)) / len(units)
+        listed = min(LISTED * inputs, len(units)) / len(units)
+        each += ROUNDS * _listed(units[:MOST_PROMISING], budget, solve_unit) * listed
     return each.tolist(), float(loads)
 
 

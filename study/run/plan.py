@@ -104,8 +104,10 @@ def _about(scene: Any) -> dict[str, Any]:
 def _with_meshes(unit: Any, scene: Any, rounds: Rounds) -> Any:
     """A unit whose forces are solved on the coarse mesh, and on finer ones as often as rounds named a case of it."""
     named = Counter(case for some in rounds if is_case(some[0]) for case in some)
-    forces, count = len(scene.load.normal_force), scene.candidates.total
-    times = [max(named[*divmod(rows[0] // forces, count), k] for rows in unit.rows) for k in range(forces)]
+    forces, count, inputs = len(scene.load.normal_force), scene.candidates.total, len(scene.realisations)
+    places = [divmod(rows[0] // forces, count) for rows in unit.rows]
+    # a case is solved on the same meshes with all samples of uncertain inputs: their differences are no mesh's
+    times = [max(named[point // inputs, number, k] for point, number in places) for k in range(forces)]
     finest = tuple(min(COARSE + n, FINEST) for n in times)
     share = sum(1.0 if mesh else SCREENED_COST for mesh in finest) / forces
     return replace(unit, finest=finest, cost=unit.cost * share)
@@ -187,7 +189,7 @@ def _time(plan: Plan, scene: Any, ranks: Sequence[int]) -> str:
     if not plan.tried:
         return "no grasp is solved"
     before = time.process_time()  # what a run does before it solves, a plan did as well
-    each, loads = timed(plan.tried)
+    each, loads = timed(plan.tried, inputs=plan.layout.inputs)
     start = before + loads + END_S
     added = 1.0 + (scene.candidates.refine or 0) / (len(each) * plan.layout.shape[-1])
     counts = [plan.layout.shape[-1] if unit.apart else 1 for unit in plan.tried]  # forces that ranks may divide

@@ -101,7 +101,8 @@ def waits(result: Any) -> int:
     mesh = meshes(result)
     if mesh is None or not result.layout.finer:
         return 0
-    tried = mesh.reshape(-1, np.prod(mesh.shape[-3:-1]), mesh.shape[-1])
+    tried = mesh.reshape(-1, result.layout.inputs, np.prod(mesh.shape[-3:-1]), mesh.shape[-1])
+    tried = np.fmin.reduce(tried, axis=1)  # of all samples
     return sum(bool(tried[case] < min(COARSE + n, FINEST)) for case, n in result.layout.finer.items())
 
 

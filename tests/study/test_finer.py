@@ -12,7 +12,7 @@ from softjaw.study.result.store import open_result, torn_rows
 from softjaw.study.result.write import ResultWriter, record
 from softjaw.study.run.plan import make_plan
 from softjaw.study.run.rounds import next_cases, rivals
-from softjaw.study.show.status import unfinished
+from softjaw.study.show.status import unfinished, waits
 from tests.study.formula_results import written
 from tests.study.launching import contents, differing, launch
 from tests.study.scenes import BALL, mesh_of, pose_of, scene_of, text_of
@@ -113,6 +113,21 @@ def test_with_a_mass_finer_meshes_go_to_the_force_below_too(tmp_path, changes, l
         named = next_cases(result, made)
     assert {level for *_, level in named} == levels
     assert (0, 3, last) in named  # the scene's mesh may have a state where the coarse one has none
+
+
+def test_a_case_gets_its_finer_meshes_with_every_sample_of_uncertain_inputs_at_its_point_of_a_sweep(tmp_path):
+    uncertain = 'uncertainty={ samples = 8, spread = { "friction.mu" = 0.1 } }'
+    made = sampled(uncertain, 'sweep={ "gripper.shear_modulus_kpa" = [40, 50] }')
+    plan = make_plan(made, rounds=(((1, 2, 1),),))
+    wanted = plan.wanted.reshape(plan.layout.shape)
+    assert wanted.shape[:2] == (2, plan.layout.inputs) == (2, 9)
+    assert wanted[1, :, 2, 0, 1].tolist() == [1] * 9
+    assert wanted.sum() == 9
+    for mesh in (0, 1):
+        case = CaseResult({"maps/flags": 0.0, "work/mesh": mesh})
+        file = written(tmp_path / f"{mesh}.hdf", plan.layout, lambda _, case=case: case, plan.header)
+        with open_result(file) as result:
+            assert waits(result) == 1 - mesh
 
 
 @pytest.mark.long
