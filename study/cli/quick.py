@@ -21,6 +21,7 @@ from softjaw.study.run.progress import duration
 from softjaw.study.run.shares import makespan
 from softjaw.study.scene import Scene, SceneError, load_scene, start
 from softjaw.study.scene.objects import Mesh
+from softjaw.study.scene.text import quoted
 from softjaw.study.show.overview import aligned, listed, scene_text
 from softjaw.study.table import hanging, terminal_width
 from softjaw.study.units import in_si
@@ -148,7 +149,7 @@ def objects_of(options: Namespace) -> ObjectFolder | None:
     if options.objects is not None:
         meshes = Path(options.objects).absolute()
         pattern = meshes / "*" if meshes.is_dir() else meshes
-        options.overrides = [*options.overrides, f"object.mesh={json.dumps(str(pattern))}"]
+        options.overrides = [*options.overrides, f"object.mesh={quoted(str(pattern))}"]
     return folder_of(options.scene, [*options.overrides, *petsc_overrides(options.petsc)])
 
 

@@ -30,7 +30,7 @@ from softjaw.study.ranking import judged, task_keys
 from softjaw.study.result.index import arrays_file, read_index
 from softjaw.study.result.read import maps_in, open, scene_of
 from softjaw.study.result.store import open_result, torn_rows
-from softjaw.study.scene.text import scene_table
+from softjaw.study.scene.text import parse_toml, scene_table, toml_text
 from softjaw.study.table import Row, plain
 from softjaw.study.units import UNITS
 
@@ -190,6 +190,9 @@ def _solved(rows: Sequence[Row]) -> list[Row]:
 def _objects(index: Path, rows: Sequence[Row], gripper: GripperFrame) -> Iterator[ObjectGrasps]:
     for row in _solved(rows):
         ds, mesh = open(index.parent / row["file"]), index.parent / row["mesh"]
+        tables = parse_toml(ds.attrs["scene"], row["file"])
+        tables["object"] |= {"mesh": str(mesh.resolve())} if "mesh" in tables["object"] else {}  # where it is now
+        ds.attrs["scene"] = toml_text(tables)
         scale = UNITS[task_keys(ds, "object").get("unit", "m")].size
         each = [grasp_arrays(ds, gripper._replace(approach=(way,))) for way in gripper.approach]
         each = each or [grasp_arrays(ds, gripper)]

@@ -18,7 +18,7 @@ from softjaw.study.result.index import INDEX
 from softjaw.study.scene.model import Scene, file_digest, load_scene, put_overrides
 from softjaw.study.scene.objects import Mesh
 from softjaw.study.scene.section import SceneError
-from softjaw.study.scene.text import parse_toml, read_text
+from softjaw.study.scene.text import parse_toml, quoted, read_text
 
 Lines = list[tuple[str, dict[str, str]]]  # of each object where it is listed, and its cells, its name among them
 PATTERN = set("*?[")
@@ -76,7 +76,7 @@ def folder_of(scene_file: str, overrides: Sequence[str]) -> ObjectFolder | None:
     """
     path = Path(scene_file)
     data = parse_toml(read_text(path), scene_file)
-    put_overrides(data, overrides, {})
+    problems = put_overrides(data, overrides, {})
     table = data.get("object")
     mesh = table.get("mesh") if isinstance(table, dict) else None
     if not isinstance(table, dict) or not isinstance(mesh, str):
@@ -87,11 +87,17 @@ def folder_of(scene_file: str, overrides: Sequence[str]) -> ObjectFolder | None:
     file, in_table = path.parent / mesh, mesh.lower().endswith(".csv")
     if not in_table and (not PATTERN & set(mesh) or file.is_file()):
         return None
+    if problems:  # one of them may name the meshes
+        raise SceneError(problems)
     lines = _of_table(file) if in_table else _of_pattern(path.parent, mesh)
     if not lines:
         raise StudyError(USAGE, f"{scene_file}: object.mesh: found '{mesh}', which names no mesh; {EXPECTED}")
     objects: dict[str, Listed] = {}
     for place, line in lines:
+        try:
+            line["mesh"].encode()
+        except UnicodeEncodeError:
+            raise StudyError(USAGE, f"{ascii(line['mesh'])}: found a name that is no UTF-8; rename it") from None
         name = line["name"] + "-object" * (line["name"].lower() == INDEX)
         listed = Listed(name, place, line["mesh"], tuple(_override(key, cell) for key, cell in line.items() if cell))
         if (other := objects.setdefault(name.lower(), listed)) is not listed:
@@ -105,7 +111,7 @@ def _of_pattern(root: Path, pattern: str) -> Lines:
     parts = list(PurePath(pattern).parts)
     while len(parts) > 1 and (not PATTERN & set(parts[0]) or (root / parts[0]).exists()):
         root /= parts.pop(0)
-    paths = [path for path in sorted(root.glob("/".join(parts))) if path.suffix.lower() in ENDINGS]
+    paths = [p for p in sorted(root.glob("/".join(parts))) if p.suffix.lower() in ENDINGS and not p.is_dir()]
     places = [path.relative_to(root) for path in paths]
     names = ["-".join(place.with_suffix("").parts) for place in places]
     return [(str(p), {"name": n, "mesh": str(m.resolve())}) for p, n, m in zip(places, names, paths, strict=True)]
@@ -134,7 +140,7 @@ def _of_table(path: Path) -> Lines:
 
 
 def _override(key: str, cell: str) -> str:
-    return f"{key if '.' in key else f'object.{key}'}={json.dumps(cell) if key in TEXTS else cell}"
+    return f"{key if '.' in key else f'object.{key}'}={quoted(cell) if key in TEXTS else cell}"
 
 
 def key_of(scene: Scene) -> str:

@@ -71,7 +71,7 @@ def run_objects(
     with locked(path := out / f"{index.INDEX}.hdf", comm):
         run = _ObjectsRun(folder, out, study, work, comm, retry_failed)
         batch = min(max(BATCH_PER_RANK * comm.size, BATCH_PER_RANK), MOST_OPEN_FILES)
-        if not run.todo() and not on_rank0(comm, path.exists):  # all are refused
+        if not run.todo() and (run.moved or not on_rank0(comm, path.exists)):  # all are refused
             run.store()
         while todo := run.todo()[:batch]:
             if not run.solve(todo):
@@ -81,14 +81,17 @@ def run_objects(
 
 
 class _ObjectsRun:
-    """What all ranks know of a run: ``rows`` of the index, one an object; ``_mine`` is what this rank has planned."""
+    """What all ranks know of a run: ``rows`` of the index, one an object, and whether meshes have ``moved`` since it.
+
+    ``_mine`` is what this rank has planned.
+    """
 
     def __init__(
         self, folder: ObjectFolder, out: Path, study: Study, work: Work, comm: Any, retry_failed: bool
     ) -> None:
         self._folder, self._out, self._study, self._work, self._comm = folder, out, study, work, comm
         self._retry = retry_failed
-        self.rows = on_rank0(comm, _rows_of, folder, out, retry_failed)
+        self.rows, self.moved = on_rank0(comm, _rows_of, folder, out, retry_failed)
         self._mine: dict[int, tuple[Plan, Work]] = {}
         self._failed: list[tuple[int, Row]] = []
         self._tried: set[int] = set()
@@ -263,8 +266,8 @@ class _ObjectsRun:
         on_rank0(self._comm, index.write_index, self._out / f"{index.INDEX}.hdf", self.rows, about)
 
 
-def _rows_of(folder: ObjectFolder, out: Path, retry_failed: bool) -> list[Row]:
-    """A row for every object: what an earlier run has stored, or nothing yet; by one process."""
+def _rows_of(folder: ObjectFolder, out: Path, retry_failed: bool) -> tuple[list[Row], bool]:
+    """A row for every object: what an earlier run has stored, or nothing yet; whether a mesh moved; by one process."""
     path = out / f"{index.INDEX}.hdf"
     known = {row["object"]: row for row in index.read_index(path)[0]} if path.exists() else {}
     again = {index.FAILED, index.REFUSED, index.NO_GRASP, index.SOME_FAILED} if retry_failed else set()
@@ -285,9 +288,9 @@ def _rows_of(folder: ObjectFolder, out: Path, retry_failed: bool) -> list[Row]:
             text = f"{path}: object '{listed.name}' was solved from another scene or mesh ({change})"
             raise StudyError(messages.OTHER_FILE, f"{text}; choose another folder with -o, or move this one away")
         if before["key"] == key and (before["done"] < 1 or (out / row["file"]).exists()):
-            row = before | ({"state": index.MISSING} if before["state"] in again else {})
+            row = before | {"mesh": row["mesh"]} | ({"state": index.MISSING} if before["state"] in again else {})
         rows.append(row | {"key": key} | ({} if mass is None else {"mass": in_si("mass_g", mass)}))
-    return rows
+    return rows, any(row["mesh"] != known.get(row["object"], row)["mesh"] for row in rows)
 
 
 def _change(path: Path, scene: Scene) -> str:

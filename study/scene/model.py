@@ -45,7 +45,7 @@ from softjaw.study.scene.sections import (
     Uncertainty,
     petsc_rules,
 )
-from softjaw.study.scene.text import flat, parse_toml, read_text, toml_text
+from softjaw.study.scene.text import flat, parse_toml, quoted, read_text, toml_text
 
 Option = str | int | float | bool
 WATCHING = ("monitor", "view", "converged_reason")  # PETSc options that only print
@@ -177,7 +177,7 @@ class Scene(SceneSection):
         if g.shear_modulus_kpa > 1e4:
             yield f"gripper.shear_modulus_kpa = {g.shear_modulus_kpa:g} is more than rubber has; foam: 8 to 80 kPa"
         where = self.candidates
-        if where.refine and not where.sampled and where.refine < (each := self.cases // max(where.total, 1)):
+        if where.refine and where.refine < (each := self.cases // max(where.total, 1)):
             yield f"candidates.refine = {where.refine} adds no grasp: one takes at least {each} cases"
         usual = Gripper()
         own_plate = (g.sheet_thickness_mm, g.sheet_modulus_gpa) != (usual.sheet_thickness_mm, usual.sheet_modulus_gpa)
@@ -523,7 +523,7 @@ def _override(text: str) -> dict[str, Any] | None:
     """The tables that an override represents; None where it is no TOML."""
     key, equals, value = (part.strip() for part in text.partition("="))
     # Shells take the quotes of a text away.
-    for written in (value, json.dumps(value)) if value[:1] not in tuple("[{\"'") else (value,):
+    for written in (value, quoted(value)) if value[:1] not in tuple("[{\"'") else (value,):
         with suppress(ValueError, RecursionError):
             # What a terminal would obey has no place in a scene, nor in the messages about it.
             if equals and text.isprintable():

@@ -86,10 +86,20 @@ def _value(value: Any) -> str:
         nested = any(isinstance(v, list | tuple | Mapping) for v in value)
         members = [_value(v) for v in value]
         return "[\n  " + ",\n  ".join(members) + ",\n]" if nested else f"[{', '.join(members)}]"
-    if isinstance(value, str):  # JSON's escapes are TOML's, but for DEL
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, str):
+        return quoted(value)
     # repr of a float comes back as the same float, so that the digest does.
     return repr(value) if isinstance(value, float) else json.dumps(value)
+
+
+def quoted(text: str) -> str:
+    r"""A text as TOML writes it, in which whatever does not print is escaped.
+
+    >>> print(quoted("mug\x7f\xa02"))
+    "mug\U0000007f\U000000a02"
+    """
+    # JSON's escapes are TOML's, but for those of pairs beyond four digits
+    return "".join(c if c.isprintable() else f"\\U{ord(c):08x}" for c in json.dumps(text, ensure_ascii=False))
 
 
 def flat(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:

@@ -1,6 +1,7 @@
 """A folder of objects: which there are, one run over all of them, and what the index says."""
 
 import json
+import os
 import re
 import shutil
 from pathlib import Path
@@ -14,6 +15,7 @@ import softjaw
 from softjaw.study.messages import DONE, OTHER_FILE, SOME_FAILED, STOPPED, USAGE, StudyError
 from softjaw.study.result.index import blank_row, open_index, write_index
 from softjaw.study.run.object_folder import folder_of
+from softjaw.study.scene.text import quoted
 from tests.study import fake_objects
 from tests.study.launching import contents, differing, here, launch
 from tests.study.launching import softjaw as command
@@ -64,6 +66,11 @@ def test_a_pattern_and_a_table_list_objects_with_a_name_of_their_own(scene):
     assert (first.name, first.unit, first.mass_g) == ("rod", "m", 120.0)
     assert (second.name, second.unit, second.mass_g) == ("longest", "cm", None)
     assert folder_of(str(scene), ["object.mesh=meshes/a.stl"]) is None
+    (odd := scene.parent / "mug \N{SMILING FACE WITH SMILING EYES}\N{NO-BREAK SPACE}").mkdir()
+    shutil.copy(scene.parent / "meshes/a.stl", odd)
+    (odd / "folder.stl").mkdir()
+    [listed] = (folder := folder_of(str(scene), [f"object.mesh={quoted(str(odd))[:-1]}/*.stl\""])).objects
+    assert folder.scene(listed).object.mesh == str(odd / "a.stl")
     folder = folder_of(str(scene), ["object.mesh=mesh*/[ab]*.stl"])
     assert [listed.name for listed in folder.objects] == ["meshes-a", "meshes-bug"]
 
@@ -71,11 +78,14 @@ def test_a_pattern_and_a_table_list_objects_with_a_name_of_their_own(scene):
 @pytest.mark.parametrize("mesh", [
     "nothing/*.stl", "missing.csv", "scene.toml*", "mesh\nmeshes/a.stl\nmeshes/a.stl\n", "mesh;unit\nmeshes/a.stl;m\n",
     "mesh,name\nmeshes/a.stl,x\nmeshes/bug.stl,X\n", "mesh,unit,unit\nmeshes/a.stl,m,m\n", "mesh,name\nmeshes/a.stl,/a",
+    '"meshes/a*', "latin/*",
 ])  # fmt: skip
 def test_a_pattern_without_meshes_and_a_table_with_a_name_or_a_column_twice_are_refused(scene, mesh):
     if "\n" in mesh:
         (table := scene.parent / "wrong.csv").write_text(mesh)
         mesh = table.name
+    (latin := scene.parent / "latin").mkdir(exist_ok=True)
+    (latin / os.fsdecode(b"gr\xf6sse.stl")).write_bytes(b"")
     with pytest.raises(StudyError) as refusal:
         folder_of(str(scene), [f"object.mesh={mesh}"])
     assert refusal.value.code == USAGE
@@ -174,6 +184,11 @@ def test_again_nothing_is_solved_another_mesh_is_refused_and_a_signal_stops_in_o
     assert not (scene.parent / "set").exists()
     assert here(fake_objects.main, scene, solved)[0] == SOME_FAILED
     assert stored.exists()
+    for old, new in (("meshes", "moved"), ("moved", "meshes")):
+        (scene.parent / old).rename(scene.parent / new)
+        scene.write_text(SCENE.replace("meshes/", f"{new}/"))
+        assert here(fake_objects.main, scene, solved)[0] == SOME_FAILED
+        assert {Path(str(row.mesh.values)).parent.name for row in rows(solved).values()} == {new}
     mesh = scene.parent / "meshes/a.stl"
     content = mesh.read_bytes()
     mesh.unlink()
