@@ -162,7 +162,10 @@ class GraspMap:
         first = ranked(ds, k, ds.attrs["score"])[:n]
         station, angle = np.unravel_index(first, self.status.shape[:-1])
         use = np.where(np.isnan(low), forces[k], np.maximum(low, forces[0]))[first]
-        return [*map(self.point, station if self.by_poses else stations[station], angles[angle], use)]
+        place = station if self.by_poses else stations[station], angles[angle]
+        # where the contact changes between two solved forces, values are known from the higher one on
+        use = np.where(self.point(*place, use).ok, use, forces[np.searchsorted(forces, use)])
+        return [*map(self.point, *place, use)]
 
     def value(
         self, name: str, station: ArrayLike, angle: ArrayLike, force: ArrayLike, model: str = "ccm"
