@@ -27,7 +27,7 @@ from softjaw.study.flags import LOST
 from softjaw.study.messages import OTHER_FILE, USAGE, StudyError, beside, write_file
 from softjaw.study.quantities import BY_KEY, DONE, NO_GRASP, STATES
 from softjaw.study.ranking import judged, task_keys
-from softjaw.study.result.index import arrays_file, read_index
+from softjaw.study.result.index import STOPPED, arrays_file, read_index
 from softjaw.study.result.read import maps_in, open, scene_of
 from softjaw.study.result.store import open_result, torn_rows
 from softjaw.study.scene.text import parse_toml, scene_table, toml_text
@@ -116,6 +116,8 @@ def write_data_set(index: Path, rows: Sequence[Row], out: Path, form: str, gripp
     counts = " and ".join(f"{len(files)} for {split}" for split, files in listed.items())
     others = len(rows) - len(_solved(rows))
     without = f"; {others} objects without a solved grasp are left out" * bool(others)
+    begun = sum(row["state"] == STOPPED for row in _solved(rows))
+    without += f"; {begun} objects are not complete" * bool(begun)
     stale = sum(path.stat().st_mtime_ns == stamp for path, stamp in before.items())
     older = f"\nnote: {stale} files in {out} are from before and of other objects or formats" * bool(stale)
     return f"written: {out}: {counts}; {good} of {total} grasps are successful{without}{older}"

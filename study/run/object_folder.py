@@ -97,7 +97,7 @@ def folder_of(scene_file: str, overrides: Sequence[str]) -> ObjectFolder | None:
         try:
             line["mesh"].encode()
         except UnicodeEncodeError:
-            raise StudyError(USAGE, f"{ascii(line['mesh'])}: found a name that is no UTF-8; rename it") from None
+            raise StudyError(USAGE, f"{line['mesh']!a}: found a name that is no UTF-8; rename it") from None
         name = line["name"] + "-object" * (line["name"].lower() == INDEX)
         listed = Listed(name, place, line["mesh"], tuple(_override(key, cell) for key, cell in line.items() if cell))
         if (other := objects.setdefault(name.lower(), listed)) is not listed:

@@ -188,14 +188,14 @@ def test_where_the_contact_changes_its_kind_there_is_no_smooth_value(tmp_path):
         point = there.at(*place)
         assert point.nearest.ok
         assert point.nearest.place[0, [0, 2]] == pytest.approx([station, force])
+        assert point.nearest.e_n == pytest.approx(linear(station, 0, force))
+    assert there.at(0.01, 0.1, 2).nearest.e_n == pytest.approx(there.at(0.01, 0.1, 2).e_n)
     ds = open_dataset(make(tmp_path / "b.hdf", fingers__pieces=np.arange(len(FORCES))[:, None] + 1))
     low = (ds.status.dims[:-1], np.full(ds.status.shape[:-1], 0.5 * (FORCES[0] + FORCES[1])))
     ds = ds.assign(safety_factor=1.0 + 0.0 * ds.payload, force_low=low)
     for point in GraspMap(ds).best(2):  # the force to use lies between two kinds of contact
         assert point.ok
         assert point.place[0, 2] == FORCES[1]
-        assert point.nearest.e_n == pytest.approx(linear(station, 0, force))
-    assert there.at(0.01, 0.1, 2).nearest.e_n == pytest.approx(there.at(0.01, 0.1, 2).e_n)
 
 
 def test_angles_repeat_with_the_objects_symmetry_and_a_gap_is_bridged_for_round_objects_alone(tmp_path):
