@@ -99,8 +99,11 @@ class Prepared:
 def choice(monkeypatch):
     """Levels of the effects of a prepared candidate; its indicator leaves friction open."""
     monkeypatch.setattr(effects, "neglected_traction", lambda state, mu: 0.1)
-    monkeypatch.setattr(effects, "payload_alone", lambda contacts, task: {"maps/payload": contacts[0].payload})
-    monkeypatch.setattr(effects, "quality", lambda contacts, settings: 1.0)
+
+    def values(contacts, settings):
+        return {"maps/payload": [contacts[0].payload], "maps/quality": [1.0]}
+
+    monkeypatch.setattr(effects, "grasp_values", values)
     return lambda *arguments, **more: EffectChoice(Prepared(*arguments, **more))
 
 
