@@ -179,7 +179,9 @@ def test_no_effect_of_rigid_objects_is_skipped_wrongly(monkeypatch):
 @pytest.mark.long
 def test_no_shell_is_skipped_wrongly(monkeypatch):
     monkeypatch.chdir(ROOT)
-    monkeypatch.setattr(job, "WALLS", {name: own for name, own in job.WALLS.items() if name.startswith("cup")})
+    walls = {name: own for name, own in job.WALLS.items() if name.startswith("cup")}
+    walls["cup 1 mm, 15 GPa"] = (job.CUP, "wall_mm=[[0, 1], [110, 1]]", 15, "[50]", "[2]")  # linear is enough there
+    monkeypatch.setattr(job, "WALLS", walls)
     rows = list(job.wall_rows())
     for effect in (job.SHELL, job.SHELLS):
         taken, error = judged(rows, effect)
@@ -220,7 +222,7 @@ def test_sheets_behind_the_pads_on_a_thin_wall():
         (result,) = on_wall(CUP, *overrides, *forced, forces="[1]")
         closing[name] = result.values["maps/closing"]
     assert closing["steel"] == pytest.approx(closing["rigid"], rel=1e-3)
-    assert closing["plastic"] > 1.02 * closing["rigid"]
+    assert closing["plastic"] > 1.01 * closing["rigid"]
     (mounted,) = on_wall(CUP, "gripper.tilt_stiffness_nm_per_rad=10000", forces="[1]")
     assert mounted.values["maps/closing"] == pytest.approx(closing["rigid"], rel=1e-4)
 
