@@ -161,16 +161,18 @@ def offers(
     axis = axes[-1]
     # places that only a pad in their middle meets squarely, such as the bottom of a bowl, are seldom hit at random
     through_centre = [(np.asarray(task.centre_of_mass, float), direction) for direction in axes]
-    starts: list[JawsOnSurface] = []
+    starts: list[tuple[JawsOnSurface, bool]] = []  # and whether they meet the object squarely
     for place, normal in [*through_centre, *sampled(corners, normals, samples, seed)]:
         try:
             aimed = JawsOnSurface(surface, place, axes_of(-normal, axis), jaws)
             if state := state_of(aimed):
                 yield SampledGrasp(aimed.point, aimed.axes[:, 2], aimed.axes[:, 0], aimed.opening, 0.0, state), None
             start = straightened(surface, place, axes_of(-normal, axis), jaws)
-            if any(same_place(start, other) for other in starts):
+            square = start.tilt[2] > math.cos(STRAIGHT)
+            # one that is still turning leads elsewhere than one that has come to rest beside it
+            if any(same_place(start, other) and (rests or not square) for other, rests in starts):
                 continue
-            starts.append(start)
+            starts.append((start, square))
             for along in long_sides(start, axis):
                 grip = straightened(surface, start.point, axes_of(start.axes[:, 2], along), jaws)
                 yield judged(grip, task), lids is not None and grip.over(lids)

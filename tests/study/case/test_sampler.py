@@ -180,3 +180,11 @@ def test_grasps_that_the_hand_does_not_reach_are_left_out_and_it_reaches_a_slab_
     assert list(map(reached_by_hand(parse_scene(slab, "slab")), at)) == [True, True]
     hand = reached_by_hand(parse_scene(slab, "slab", ['gripper.preset="franka_hand"']))
     assert list(map(hand, at)) == [False, True]
+
+
+def test_a_start_that_is_still_turning_keeps_none_away_that_meets_parallel_faces_beside_it():
+    wedge = trimesh.convex.convex_hull([(x, y, z) for x, y in ((0, 0), (0.06, 0), (0, 0.03)) for z in (0, 0.04)])
+    mesh = surface(wedge)
+    best = antipodal_grasps(mesh, NARROW._replace(max_opening=0.085), Task(wedge.center_mass), 4, samples=60)[0]
+    assert abs(best.approach[2]) > 0.999
+    assert best.opening == pytest.approx(0.04, rel=1e-6)
