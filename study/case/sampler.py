@@ -218,9 +218,9 @@ def sampled(corners: FloatArray, normals: FloatArray, count: int, seed: int) -> 
 
 def principal_axes(corners: FloatArray, area: FloatArray) -> FloatArray:
     """Principal axes ``(3, 3)`` of the area of triangles ``corners (m, 3, 3)``, the last the one of largest extent."""
-    middle = corners.mean(axis=1)
-    off = middle - area @ middle / area.sum()
-    moments = (off * area[:, None]).T @ off
+    off = corners - area @ corners.mean(axis=1) / area.sum()
+    three = np.concatenate([off, off.sum(axis=1, keepdims=True)], axis=1)  # corners and their sum tell the integral
+    moments = np.einsum("n,nki,nkj->ij", area, three, three)
     # rounded, so that those of a round body are the same on every machine
     axes = np.linalg.eigh(np.round(moments / np.trace(moments), 6))[1].T
     return axes * np.sign(np.take_along_axis(axes, np.abs(axes).argmax(axis=1)[:, None], axis=1))
