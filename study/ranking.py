@@ -36,13 +36,15 @@ def judged(ds: Any) -> IntArray:
     A force is too weak where the grasp does not hold the object with the safety that is asked for, and too strong above
     ``force_high``. Files that derive no such range have their own flags only.
     """
-    flags = ds["flags"].values.copy()
-    if "force_low" in ds:
-        safety = task_keys(ds).get("safety", 1.0)
-        flags |= Flag.TOO_WEAK * (ds["safety_factor"].sel(model="ccm").values < safety * (1 - TIE))
-    if "force_high" in ds:
-        flags |= Flag.TOO_STRONG * (ds["normal_force"].values > ds["force_high"].values[..., None] * (1 + 1e-9))
-    return flags
+    factor = ds["safety_factor"].sel(model="ccm").values if "force_low" in ds else math.inf
+    high = ds["force_high"].values[..., None] if "force_high" in ds else math.inf
+    return ds["flags"].values | outside(ds, ds["normal_force"].values, factor, high)
+
+
+def outside(ds: Any, force: FloatArray, factor: Any, high: Any) -> IntArray:
+    """`Flag.TOO_WEAK` where a safety factor is below the one asked for, `Flag.TOO_STRONG` beyond a largest force."""
+    weak = factor < task_keys(ds).get("safety", 1.0) * (1 - TIE)
+    return np.asarray(Flag.TOO_WEAK * weak | Flag.TOO_STRONG * (force > high * (1 + 1e-9)))
 
 
 def task_keys(ds: Any, section: str = "task") -> dict[str, Any]:
@@ -202,7 +204,7 @@ def ranked(ds: xr.Dataset, k: int, by: str | None = None) -> IntArray:
     hopeless = marks & LOST > 0
     if all(name in ds for name in FORCE_RANGE):
         safe = (ds["force_low"] <= ds["force_high"]).values.ravel()[order]
-        hopeless &= ~(safe & (marks & LOST == Flag.TOO_WEAK))
+        hopeless &= ~(safe & (marks & LOST & ~(Flag.TOO_WEAK | Flag.TOO_STRONG | Flag.YIELDS) == 0))
     return order[np.lexsort((surely, marks != 0, marks & Flag.NOT_ANTIPODAL, group, hopeless))]
 
 

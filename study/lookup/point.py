@@ -13,6 +13,7 @@ from softjaw.study.case.result import GraspNumbers
 from softjaw.study.flags import flags_in
 from softjaw.study.quantities import BOTH_ENDS, BY_KEY, FAILED, FORCE_RANGE, MAIN, MISSING
 from softjaw.study.quantities import STATES as OF_CASES
+from softjaw.study.ranking import outside
 from softjaw.study.result.interpolation import BESIDE_CASES, Corners, FloatArray
 from softjaw.study.units import shown_text
 
@@ -121,10 +122,15 @@ class GraspPoint(GraspNumbers):
 
     @property
     def flags(self) -> Any:
-        """Flags of all cases around the point together (`study.flags.Flag`); 0 where there is no value."""
+        """Flags of all cases around the point together, and of its force by the safe ones; 0 where there is no value."""
         flags = np.nan_to_num(self.map.table("flags")[self.corners.index]).astype(int)
-        used = (self.corners.weight > 0) & (self.states == INSIDE)[:, None]
-        return self._shaped(np.bitwise_or.reduce(np.where(used, flags, 0), axis=1))
+        flags = np.bitwise_or.reduce(np.where(self.corners.weight > 0, flags, 0), axis=1)
+        factor, high = (
+            np.ravel(self.value(name)) if self.map.has(bound) else np.inf
+            for name, bound in (("safety_factor", FORCE_RANGE[0]), ("force_high", FORCE_RANGE[1]))
+        )
+        flags |= outside(self.map.data, self.place[:, 2], factor, high)
+        return self._shaped(np.where(self.states == INSIDE, flags, 0))
 
     def semi_axes(self, model: str = "ccm") -> FloatArray:
         """Largest f_x, f_y, tau_z of each finger ``(..., 2, 3)`` [N, N, N m]: the ellipsoid from three motions."""

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from softjaw.study.case.build import build_object
+from softjaw.study.flags import Flag
 from softjaw.study.lookup import GraspMap
 from softjaw.study.lookup.point import INSIDE, JUMP, NO_RESULT, OUTSIDE, SNAP
 from softjaw.study.quantities import Axis
@@ -191,11 +192,14 @@ def test_where_the_contact_changes_its_kind_there_is_no_smooth_value(tmp_path):
         assert point.nearest.e_n == pytest.approx(linear(station, 0, force))
     assert there.at(0.01, 0.1, 2).nearest.e_n == pytest.approx(there.at(0.01, 0.1, 2).e_n)
     ds = open_dataset(make(tmp_path / "b.hdf", fingers__pieces=np.arange(len(FORCES))[:, None] + 1))
-    low = (ds.status.dims[:-1], np.full(ds.status.shape[:-1], 0.5 * (FORCES[0] + FORCES[1])))
-    ds = ds.assign(safety_factor=1.0 + 0.0 * ds.payload, force_low=low)
+    about = {"units": "N", "definition": ""}
+    low = (ds.status.dims[:-1], np.full(ds.status.shape[:-1], 0.5 * (FORCES[0] + FORCES[1])), about)
+    ds = ds.assign(safety_factor=0.1 * ds.e_n, force_low=low, force_high=low)
+    ds.attrs["derived"] = "force_low force_high"
     for point in GraspMap(ds).best(2):  # the force to use lies between two kinds of contact
         assert point.ok
         assert point.place[0, 2] == FORCES[1]
+        assert point.flags == Flag.TOO_WEAK | Flag.TOO_STRONG
 
 
 def test_angles_repeat_with_the_objects_symmetry_and_a_gap_is_bridged_for_round_objects_alone(tmp_path):

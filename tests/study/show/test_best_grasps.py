@@ -130,6 +130,8 @@ def test_a_window_between_two_solved_forces_is_shown_where_it_lies():
     assert stations(table)[0] == 1.0
     assert table.rows[0]["payload"] == pytest.approx(0.3)
     assert safe_range(judge(ds), (1, 0, 0)) == "1.5..2"  # 5 N is the largest solved force there, too
+    hard = ds.assign(force_high=ds.force_low.copy(data=[[0.1], [2.0]]), flags=ds.flags | Flag.YIELDS)
+    assert stations(best(hard, by="quality", force=5.0)) == [1.0, 0.0]  # a smaller force suits the first one
     ds["finger_rims"] = ((*ds.status.dims, "finger"), np.zeros((*ds.status.shape, 2)), {"units": ""})
     ds["finger_pieces"] = ds["finger_holes"] = ds.finger_rims.copy(data=np.add(ds.finger_rims.values, [[1], [2]]))
     table = best(ds)  # contacts change on the way: the nearest that is solved, and what to do
