@@ -13,6 +13,7 @@ import math
 import re
 import warnings
 import zipfile
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -94,6 +95,20 @@ def lacking(path: Path) -> str:
     return f"at most {LARGEST_FILE >> 20} MiB; decimate the mesh, or save it as binary .stl" * (size > LARGEST_FILE)
 
 
+def stated_unit(path: Path) -> str:
+    """Unit of the coordinates that a file itself says: of 3MF as `LENGTHS` has it where it does; else empty."""
+    if path.suffix.lower() in (".glb", ".gltf"):
+        return "m"
+    if path.suffix.lower() != ".3mf":
+        return ""
+    with suppress(Exception), zipfile.ZipFile(path) as archive:  # reading it tells what is wrong with it
+        heads = [archive.open(name).read(4096) for name in archive.namelist() if name.endswith(".model")]
+        found = re.search(rb'<model[^>]*\sunit="(\w+)"', b"".join(heads))
+        word = found[1].decode() if found else "millimeter"
+        return {"millimeter": "mm", "centimeter": "cm", "meter": "m"}.get(word, word)
+    return ""
+
+
 def _is_text(data: bytes) -> bool:
     """Whether an STL file is text; binary ones may begin with "solid" too, but then have no facets near."""
     return data[:5].lower() == b"solid" and b"facet" in data[:1000].lower()
@@ -112,7 +127,8 @@ def _whole_binary_stl(path: Path, data: bytes) -> bytes:
 def _plain_obj(path: Path, data: bytes) -> bytes:
     """An OBJ file whose faces hold nothing but points: trimesh takes all faces to be written like the first."""
     # a backslash continues a line, and the patterns below look at whole lines
-    data = data.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ")
+    data = data.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ").replace(b"\t", b" ")
+    data = re.sub(rb"^ +| *#[^\r\n]*", b"", data, flags=re.MULTILINE)
     data = re.sub(rb"^f[ \t].*$", lambda face: re.sub(rb"/\S*", b"", face[0]), data, flags=re.MULTILINE)
     if re.search(rb"^f(?:.*[ \t])?0(?:\s|$)", data, re.MULTILINE):
         raise MeshError(f"{path}: is damaged: a face refers to point 0, but OBJ files count from 1; export it again")

@@ -21,7 +21,7 @@ import numpy as np
 from softjaw.fem.errors import MeshError
 from softjaw.fem.objects.facing_sheet import COARSE, FacingSheet, facing_sheet
 from softjaw.fem.objects.gap import IN_PLACE, Gap, IntArray, NoContactError, Pose, Surface
-from softjaw.fem.objects.mesh_file import read_triangles
+from softjaw.fem.objects.mesh_file import read_triangles, stated_unit
 from softjaw.fem.objects.mesh_holes import solid
 from softjaw.fem.objects.smooth_triangles import CREASE_ANGLE, SmoothTriangles, smooth_triangles
 from softjaw.fem.objects.splines import evaluate_grid, grid_coefficients
@@ -74,8 +74,10 @@ class MeshObject:
         low, high = points.min(axis=0), points.max(axis=0)
         origin = np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]])
         points, lids = np.ascontiguousarray(points - origin), clean.lids @ turn - origin
-        placed = Pose(turn, turn @ origin)
-        return cls(points, clean.triangles, grid_step, clean.notes, crease_angle, lids, placed, clean.closed)
+        placed, stated = Pose(turn, turn @ origin), stated_unit(Path(path))
+        doubt = (f"its coordinates are taken in {unit}, its file says {stated}",) * (stated not in ("", unit))
+        notes = (*clean.notes, *doubt)
+        return cls(points, clean.triangles, grid_step, notes, crease_angle, lids, placed, clean.closed)
 
     def first_touch(self, pose: Pose, points: FloatArray, reach: float) -> float:
         """Distance [m] along the approach to the first triangle before ``points (n, 3)`` of the pad's frame.

@@ -122,7 +122,7 @@ class GraspPoint(GraspNumbers):
 
     @property
     def flags(self) -> Any:
-        """Flags of all cases around the point together, and of its force by the safe ones; 0 where there is no value."""
+        """Flags of all cases around the point and of its force by the safe ones; 0 where there is no value."""
         flags = np.nan_to_num(self.map.table("flags")[self.corners.index]).astype(int)
         flags = np.bitwise_or.reduce(np.where(self.corners.weight > 0, flags, 0), axis=1)
         factor, high = (

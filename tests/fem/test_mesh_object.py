@@ -8,12 +8,13 @@ import trimesh
 
 from softjaw.fem.errors import MeshError
 from softjaw.fem.objects.gap import NoContactError, Pose, first_touch
-from softjaw.fem.objects.mesh_file import read_triangles
+from softjaw.fem.objects.mesh_file import read_triangles, stated_unit
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.fem.objects.shapes import Sphere
 from softjaw.fem.objects.splines import evaluate_grid, grid_coefficients
 from softjaw.fem.objects.triangles import cleaned
 from tests.fem.reference import slopes
+from tests.fuzz.readers import model_3mf, packed
 
 FLASK = Path(__file__).parents[2] / "jobs" / "objects" / "flask.stl"
 RADIUS = 0.03
@@ -161,6 +162,21 @@ def test_faces_that_are_not_convex_are_refused_and_the_unit_is_applied(tmp_path)
     for unit, factor in (("m", 1), ("mm", 1e-3), ("inch", 0.0254), ("cm", 0.01)):
         x, *_ = cleaned(points / factor, triangles, unit)
         assert np.ptp(x[:, 2]) == pytest.approx(np.ptp(points[:, 2]), rel=1e-12)
+
+
+def test_comments_tabs_and_indents_of_text_are_no_damage_and_a_unit_that_contradicts_the_file_is_a_note(tmp_path):
+    path = tmp_path / "block.obj"
+    obj(path, BLOCK, SIDES)
+    points, triangles = read_triangles(path)
+    path.write_text(path.read_text().replace("f ", "  f\t").replace("\n", " # of 1\n"))
+    np.testing.assert_array_equal(read_triangles(path)[0], points)
+    np.testing.assert_array_equal(read_triangles(path)[1], triangles)
+    for said, unit in (("inch", "inch"), ("inch", "mm"), ("mm", "mm")):
+        path = tmp_path / f"{said}{unit}.3mf"
+        path.write_bytes(packed(model_3mf().replace(b' unit="millimeter"', b"" if said == "mm" else b' unit="inch"')))
+        assert stated_unit(path) == said
+        notes = MeshObject.from_file(path, unit).notes
+        assert sum(f"file says {said}" in note for note in notes) == (said != unit)
 
 
 @pytest.mark.parametrize("name", DAMAGED)

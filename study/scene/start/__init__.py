@@ -11,13 +11,13 @@ from argparse import Namespace
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
+from softjaw.fem.objects.mesh_file import LENGTHS, stated_unit
 from softjaw.study.grippers import gripper_file
 from softjaw.study.messages import CANNOT_WRITE, USAGE, StudyError, write_file
 from softjaw.study.scene.section import numbers_text
 
 HERE = Path(__file__).parent
 PAD_LENGTH, OPENING = 50.0, 85.0  # mm, as in the template of a mesh, which names no gripper
-IN_METRES = (".glb", ".gltf")  # glTF has no other unit
 
 
 # The file's axis that is the object's; extents [mm], the last along it; stations [mm] at which a pad fits on; notes.
@@ -124,8 +124,8 @@ def with_gripper(text: str, name: str) -> str:
 
 def _about_mesh(options: Namespace, scene: Path, measure: Callable) -> tuple[dict[str, str], tuple[str, ...]]:
     """What the scene says about a mesh, its file, its size, and stations that fit it; notes on the mesh."""
-    if options.mesh and not options.unit and Path(options.mesh).suffix.lower() in IN_METRES:
-        options.unit = "m"
+    if options.mesh and not options.unit and (stated := stated_unit(Path(options.mesh))) in LENGTHS:
+        options.unit = stated
     if not options.mesh or not options.unit:
         needs = {"--mesh FILE": options.mesh, "--unit": options.unit}
         lacks = " and ".join(name for name, given in needs.items() if not given)
