@@ -98,6 +98,8 @@ def _about(scene: Any) -> dict[str, Any]:
         about["rejected"] = np.array(scene.candidates.rejected, np.float32)
     if scene.object.shape == "mesh" and not any(key.startswith("object.") for key in scene.sweep):
         about |= centroid_and_bounds(scene.object)
+        if scene.task.centre_of_mass is None:
+            about["object_centroid_error"] = np.array([geometry().mesh_object(scene.object).solid[2]])
     return about
 
 

@@ -205,7 +205,9 @@ def _notes(ds: xr.Dataset, accuracy: Sequence[str], marks: np.ndarray) -> list[s
     raised = sorted(filter(count.get, count), key=lambda flag: (-count[flag], flag))
     words = {flag: f"{flag.word} ({count[flag]} of {len(marks)})" for flag in raised}
     faults = [flag for flag in raised if not flag & FINER]
-    parts = {"accuracy": [*filter(None, accuracy), *(words[flag] for flag in raised if flag & FINER)],
+    off = float(ds.attrs.get("object_centroid_error", [0.0])[0])  # of a mesh that is not closed
+    centre = f"centre of mass known to {1e3 * off:.0f} mm, not in the errors: set task.centre_of_mass_mm" * (off > 1e-3)
+    parts = {"accuracy": [*filter(None, [centre, *accuracy]), *(words[flag] for flag in raised if flag & FINER)],
              "look at": [f"{words[f]}{f': {f.sentence}' * (len(faults) == 1)}" for f in faults],
              "not ended": [f"{to_come} cases are not computed yet"] * bool(to_come),
              "left out": [*no_grasps(states), *[f"{apart} whose contact changes between"] * (apart > 0)]}  # fmt: skip

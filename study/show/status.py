@@ -138,10 +138,10 @@ def largest_error(errors: Any, cases: Any, axes: Sequence[Any], labels: Any, mes
         return [NO_ERRORS] * bool(solved)
     known = np.where(done, errors, np.nan)
     count = int(np.count_nonzero(np.isfinite(known)))
-    name, target = aim(cases)
     if not count:
-        return [f"{name} errors: none of {solved} solved cases has one"]
+        return [f"errors: none of {solved} solved cases has one of accuracy.target_of"]
     worst = tuple(map(int, np.unravel_index(int(np.nanargmax(known)), status.shape)))
+    name, target = aim(cases)
     # where next to nothing is held the error may be many times what is
     most = f"up to {100 * known[worst]:.2g} %" if known[worst] < 1 else "above 100 %"
     parts = [f"{name} errors {most}"]

@@ -16,10 +16,10 @@ ONE = {
                       "candidates.refine=false"), None),
     "box-poses": ((), None),
     "flask-mesh": (("candidates.stations_mm=[30]", "candidates.angles_deg=[0]"), None),
-    "bottle": (("candidates.stations_mm=[112]", "candidates.angles_deg=[0]", "load.normal_force_n=[1, 8]"), (1.2, 1.6)),
+    "bottle": (("candidates.stations_mm=[112]", "candidates.angles_deg=[0]", "load.normal_force_n=[1, 8]"), (2.0, 3.0)),
     "cup": (("candidates.stations_mm=[55]", "load.normal_force_n=[0.5, 2]"), (1.0, 4.0)),
-    "fig5-candidate": ((), (0.2, 0.5)),
-    "fig7-force-study": (("load.normal_force_n=[1, 4]",), (0.2, 0.6)),
+    "fig5-candidate": ((), (0.6, 1.2)),
+    "fig7-force-study": (("load.normal_force_n=[1, 4]",), (0.8, 1.6)),
     "fig4-curvature": (("gripper.elements=[8, 20, 4]", 'effects.friction_pressure_coupling="none"'), None),
     "snap-in": (("load.normal_force_n=[1, 2]",), (0.7, 1.0)),
 }  # fmt: skip

@@ -121,6 +121,13 @@ def test_a_force_between_two_solved_ones_needs_both_and_carries_their_flags():
     assert not best(ds, force=2.0).rows
 
 
+def test_a_centre_of_mass_that_is_hardly_known_is_said_first():
+    ds = rising()
+    for error, count in ((0.0005, 0), (0.05, 1)):
+        notes = best(ds.assign_attrs(object_centroid_error=np.array([error]))).notes
+        assert sum("50 mm" in note for note in notes) == count
+
+
 def test_a_window_between_two_solved_forces_is_shown_where_it_lies():
     """150 g twice over need 3 and 1.5 N; the wall bears 2 N of 1 and 5."""
     ds = rising(0.15)
