@@ -32,7 +32,7 @@ from softjaw.study.result.layout import (
     layout_of,
 )
 from softjaw.study.result.lock import holder
-from softjaw.study.scene.text import differences
+from softjaw.study.scene.text import differences, parse_toml
 from softjaw.study.units import shown_text
 
 
@@ -62,6 +62,7 @@ class Result:
         if not unchecked and str(checksums.of_header(file, self.layout)) != file.attributes(ROOT).get("checksum"):
             what = "axes, layout, scene or definitions do not match their checksum"
             raise file.damaged(what, "restore it from a copy, or move it away and run the scene again")
+        parse_toml(self.scene, str(path))  # its error names the file; later ones could not
 
     def refuse_other(self, header: Header) -> None:
         """Raise `StudyError` unless the file was made from the scene of a header."""
