@@ -127,6 +127,7 @@ def test_a_bowl_is_held_from_outside_or_by_its_bottom_and_springs_on_a_face_hold
     assert at_origin(box(0.2, 1.001 * width, 0.05)).on_edges == pytest.approx(2 / GRID[1])
 
 
+@pytest.mark.long
 def test_no_pad_is_put_over_a_hole_and_grasps_are_spread_over_the_places_of_an_object():
     body = box(0.2, 0.2, 0.05)
 
@@ -173,6 +174,7 @@ def test_a_scene_without_a_grasp_between_the_pads_is_refused():
     assert "max_opening_mm" in str(refused.value)
 
 
+@pytest.mark.long
 def test_grasps_that_the_hand_does_not_reach_are_left_out_and_it_reaches_a_slab_as_far_as_its_fingers_do():
     body = surface(trimesh.creation.annulus(0.02, 0.03, 0.2))
 
