@@ -139,7 +139,7 @@ def largest_error(errors: Any, cases: Any, axes: Sequence[Any], labels: Any, mes
     known = np.where(done, errors, np.nan)
     count = int(np.count_nonzero(np.isfinite(known)))
     if not count:
-        return [f"errors of what accuracy.target_of names: none in {solved} solved cases"]
+        return [f"errors of what accuracy.target_of names: none of {solved} solved cases has one"]
     worst = tuple(map(int, np.unravel_index(int(np.nanargmax(known)), status.shape)))
     name, target = aim(cases)
     # where next to nothing is held the error may be many times what is
