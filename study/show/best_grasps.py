@@ -301,7 +301,9 @@ def _limit(ds: xr.Dataset, index: Index) -> str:
     k, high = index[-1], at(ds, "force_high", index)
     if high < largest_force(ds) * (1 - NEGLIGIBLE):
         friction = f"friction at {forces(ds)[k]:g} N, and " * bool(forces(ds)[k] < high)
-        parts = [f"{friction}the wall, which bears {_borne(ds, index)} at most"]
+        solved = ds.status.values[index[:-1]][forces(ds) > high * (1 + NEGLIGIBLE)] == DONE
+        bears = f"which bears {_borne(ds, index)} at most" if solved.any() else f"beyond {high:g} N nothing is solved"
+        parts = [f"{friction}the wall, {bears}"]
     else:
         parts = [f"friction at {forces(ds)[k]:g} N{_beyond(ds, index)}"]
     done = np.flatnonzero(ds["status"].values[..., k].ravel() == DONE)
