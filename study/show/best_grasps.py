@@ -194,7 +194,7 @@ def common(marks: np.ndarray) -> int:
 
 
 def _notes(ds: xr.Dataset, accuracy: Sequence[str], marks: np.ndarray) -> list[str]:
-    """At most four lines by what to do about them: how exact, which flags to look at, what is to come or left out.
+    """At most five lines by what to do about them: how exact, which flags to look at, what is to come or left out.
 
     Each has its first clause, and of the others what a line of a terminal has room for.
     """
@@ -206,8 +206,9 @@ def _notes(ds: xr.Dataset, accuracy: Sequence[str], marks: np.ndarray) -> list[s
     words = {flag: f"{flag.word} ({count[flag]} of {len(marks)})" for flag in raised}
     faults = [flag for flag in raised if not flag & FINER]
     off = float(ds.attrs.get("object_centroid_error", [0.0])[0])  # of a mesh that is not closed
-    centre = f"centre of mass known to {1e3 * off:.0f} mm, not in the errors: set task.centre_of_mass_mm" * (off > 1e-3)
-    parts = {"accuracy": [*filter(None, [centre, *accuracy]), *(words[flag] for flag in raised if flag & FINER)],
+    centre = f"known to {1e3 * off:.0f} mm, not in the errors: set task.centre_of_mass_mm"
+    parts = {"centre of mass": [centre] * (off > 1e-3),
+             "accuracy": [*filter(None, accuracy), *(words[flag] for flag in raised if flag & FINER)],
              "look at": [f"{words[f]}{f': {f.sentence}' * (len(faults) == 1)}" for f in faults],
              "not ended": [f"{to_come} cases are not computed yet"] * bool(to_come),
              "left out": [*no_grasps(states), *[f"{apart} whose contact changes between"] * (apart > 0)]}  # fmt: skip
