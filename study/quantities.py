@@ -387,6 +387,7 @@ ROWS = (
              "status"),
 )  # fmt: skip
 TABLE = tuple(row for q in ROWS for row in ((q, q.of_error) if q.error else (q,)))
+NUMERIC_MAPS = tuple(q for q in TABLE if q.group == "maps" and q.name != "flags")  # bits are no number
 MAIN = tuple(q.name for q in sorted((q for q in TABLE if q.rank), key=lambda q: q.rank))
 FIRST = ("payload", "quality", "e_n")  # maps that viewers of the file open at
 LEAST_FORCE = "force"  # that holds object.mass_g

@@ -38,12 +38,17 @@ def judged(ds: Any) -> IntArray:
     """
     factor = ds["safety_factor"].sel(model="ccm").values if "force_low" in ds else math.inf
     high = ds["force_high"].values[..., None] if "force_high" in ds else math.inf
-    return ds["flags"].values | outside(ds, ds["normal_force"].values, factor, high)
+    return ds["flags"].values | outside(ds["normal_force"].values, factor, high, safety_of(ds))
 
 
-def outside(ds: Any, force: FloatArray, factor: Any, high: Any) -> IntArray:
+def safety_of(ds: Any) -> float:
+    """The safety with which a grasp has to hold the object's mass; 1 where nothing is to be held."""
+    return float(task_keys(ds).get("safety", 1.0)) if "force_low" in ds else 1.0
+
+
+def outside(force: FloatArray, factor: Any, high: Any, safety: float) -> IntArray:
     """`Flag.TOO_WEAK` where a safety factor is below the one asked for, `Flag.TOO_STRONG` beyond a largest force."""
-    weak = factor < task_keys(ds).get("safety", 1.0) * (1 - TIE)
+    weak = factor < safety * (1 - TIE)
     return np.asarray(Flag.TOO_WEAK * weak | Flag.TOO_STRONG * (force > high * (1 + 1e-9)))
 
 

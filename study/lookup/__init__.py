@@ -19,7 +19,7 @@ from softjaw.study.flags import Flag
 from softjaw.study.lookup.point import INSIDE, JUMP, NO_RESULT, OUTSIDE, SNAP, GraspPoint
 from softjaw.study.messages import closest
 from softjaw.study.quantities import BY_KEY, DONE, checked_model
-from softjaw.study.ranking import judge, ranked
+from softjaw.study.ranking import judge, ranked, safety_of
 from softjaw.study.result.index import one_file
 from softjaw.study.result.interpolation import (
     KINDS,
@@ -100,7 +100,7 @@ class GraspMap:
         self.status = self.data.status.values
         #: unit and definition of everything that `value` knows
         self.quantities = {name: (unit, ds[name].definition) for name, unit in [*maps_in(ds).items(), ("flags", "")]}
-        self.by_poses = not station.units
+        self.by_poses, self.safety = not station.units, safety_of(ds)
         angles = circle("angle", "rad", angle.values, *((0.0, False) if self.by_poses else turning(ds, self.index)))
         name, most = ("candidate", 0.5) if self.by_poses else ("station", math.inf)
         stations = plain(name, station.units, station.values, most)

@@ -129,7 +129,7 @@ class GraspPoint(GraspNumbers):
             np.ravel(self.value(name)) if self.map.has(bound) else np.inf
             for name, bound in (("safety_factor", FORCE_RANGE[0]), ("force_high", FORCE_RANGE[1]))
         )
-        flags |= outside(self.map.data, self.place[:, 2], factor, high)
+        flags |= outside(self.place[:, 2], factor, high, self.map.safety)
         return self._shaped(np.where(self.states == INSIDE, flags, 0))
 
     def semi_axes(self, model: str = "ccm") -> FloatArray:

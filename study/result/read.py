@@ -24,6 +24,7 @@ from softjaw.study.quantities import (
     FORCE_RANGE,
     MISSING,
     MODELS,
+    NUMERIC_MAPS,
     REALISATION,
     TABLE,
     Axis,
@@ -256,7 +257,7 @@ def stated_error(ds: xr.Dataset, name: str) -> np.ndarray | None:
 
 def maps_in(ds: xr.Dataset) -> dict[str, str]:
     """Name and unit of every map but flags, and of what is derived for every case or all forces of a candidate."""
-    names = [q.name for q in TABLE if q.group == "maps" and q.name in ds and q.name != "flags"]
+    names = [q.name for q in NUMERIC_MAPS if q.name in ds]
     over = ds.status.dims
     names += [name for name in ds.attrs["derived"].split() if name in ds and ds[name].dims in (over, over[:-1])]
     return {name: ds[name].attrs["units"] for name in names}

@@ -58,11 +58,12 @@ class Result:
         self.axes, self.title, self.digest = self.layout.axes, printable(self.header.title), self.header.digest
         self._known = {d.path: d for d in self.layout.datasets}
         self._unchecked = unchecked
-        # With a wrong header, the sums of the rows would be looked for in the wrong places.
-        if not unchecked and str(checksums.of_header(file, self.layout)) != file.attributes(ROOT).get("checksum"):
-            what = "axes, layout, scene or definitions do not match their checksum"
-            raise file.damaged(what, "restore it from a copy, or move it away and run the scene again")
-        parse_toml(self.scene, str(path))  # its error names the file; later ones could not
+        if not unchecked:
+            # With a wrong header, the sums of the rows would be looked for in the wrong places.
+            if str(checksums.of_header(file, self.layout)) != file.attributes(ROOT).get("checksum"):
+                what = "axes, layout, scene or definitions do not match their checksum"
+                raise file.damaged(what, "restore it from a copy, or move it away and run the scene again")
+            parse_toml(self.scene, str(path))  # its error names the file; later ones could not
 
     def refuse_other(self, header: Header) -> None:
         """Raise `StudyError` unless the file was made from the scene of a header."""

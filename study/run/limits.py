@@ -54,13 +54,15 @@ class Stopper:
     """Listens to signals between ``with stopper:``; ``name`` is the signal that came, or empty; ``limit`` as below.
 
     ``on_stop``: called once, by the first signal. ``limit``: time of a single case [s]. It is looked at whenever the
-    solver comes back to Python, which PETSc does for every residual and every tangent. ``last_resort``: time after
-    which this process ends itself, and says where it was, because a case never came back to Python [s].
+    solver comes back to Python, which PETSc does for every residual and every tangent. ``last_resort``: whether
+    this process ends itself, and says where it was, if a case does not come back to Python for far longer than that.
     """
 
-    def __init__(self, on_stop: Callable[[], None], limit: float = math.inf, last_resort: float | None = None) -> None:
+    def __init__(self, on_stop: Callable[[], None], limit: float = math.inf, last_resort: bool = False) -> None:
         self.name, self.limit, self._solving = "", limit, False
-        self._on_stop, self._last_resort = on_stop, last_resort
+        # a short limit leaves time for alarms that were lost, too
+        last = max(PATIENCE * limit, limit + 5 * RAISE_AGAIN_S) if last_resort and limit < math.inf else None
+        self._on_stop, self._last_resort = on_stop, last
         self._before: dict[signal.Signals, Any] = {}
         self._leave = self._case_ends = math.inf
         self._raised: type[BaseException] | None = None

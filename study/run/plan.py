@@ -26,7 +26,7 @@ from softjaw.study.case.build import (
 from softjaw.study.case.candidates import decided
 from softjaw.study.quantities import ALONG, AROUND, NO_GRASP, STATES
 from softjaw.study.result.derived import derived
-from softjaw.study.result.layout import Header, Layout, is_case
+from softjaw.study.result.layout import Header, Layout
 from softjaw.study.run.estimate import END_S, TIMED, timed
 from softjaw.study.run.progress import duration
 from softjaw.study.run.refine import Rounds, added_cases, refined
@@ -76,9 +76,11 @@ def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = (), r
     digest, text = scene.digest, scene.effective_toml()
     scene = refined(scene, rounds)
     faces = math.prod(pad_shape(scene.gripper).patch_faces) if scene.run.patches != "none" else 0
+    layout = Layout(tuple(grasps.axes(scene)), faces, tuple(derived(scene)), has(scene), rounds)
     units: Sequence[Any] = decided(grasps.units(scene))
     if scene.candidates.sampled and forces_apart(scene):
-        units = [_with_meshes(unit, scene, rounds) for unit in units]
+        named = layout.finer
+        units = [_with_meshes(unit, layout, named) for unit in units]
     title = getattr(scene.object, "name", None) or Path(scene_file).stem
     petsc_options = " ".join(f"-{key} {value}" for key, value in scene.petsc.items())
     labels = tuple(candidate.label for candidate in grasps.candidates(scene))
@@ -86,7 +88,6 @@ def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = (), r
         digest=digest, scene=text, title=title, scene_file=scene_file, overrides=tuple(overrides),
         petsc_options=petsc_options, labels=labels, about=_about(scene),
     )  # fmt: skip
-    layout = Layout(tuple(grasps.axes(scene)), faces, tuple(derived(scene)), has(scene), rounds)
     return Plan(layout, header, tuple(units))
 
 
@@ -103,13 +104,12 @@ def _about(scene: Any) -> dict[str, Any]:
     return about
 
 
-def _with_meshes(unit: Any, scene: Any, rounds: Rounds) -> Any:
-    """A unit whose forces are solved on the coarse mesh, and on finer ones as often as rounds named a case of it."""
-    named = Counter(case for some in rounds if is_case(some[0]) for case in some)
-    forces, count, inputs = len(scene.load.normal_force), scene.candidates.total, len(scene.realisations)
+def _with_meshes(unit: Any, layout: Layout, named: Counter[Any]) -> Any:
+    """A unit whose forces are solved on the coarse mesh, and on finer ones as often as a case of it was ``named``."""
+    *_, count, _, forces = layout.shape  # explicit poses have one angle
     places = [divmod(rows[0] // forces, count) for rows in unit.rows]
     # a case is solved on the same meshes with all samples of uncertain inputs: their differences are no mesh's
-    times = [max(named[point // inputs, number, k] for point, number in places) for k in range(forces)]
+    times = [max(named[point // layout.inputs, number, k] for point, number in places) for k in range(forces)]
     finest = tuple(min(COARSE + n, FINEST) for n in times)
     share = sum(1.0 if mesh else SCREENED_COST for mesh in finest) / forces
     return replace(unit, finest=finest, cost=unit.cost * share)

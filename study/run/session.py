@@ -27,7 +27,7 @@ from softjaw.study.result.lock import Lock, OpenedFile
 from softjaw.study.result.skeleton import create, rewrite
 from softjaw.study.result.store import Result, open_result, torn_rows
 from softjaw.study.result.write import MESH, Files, ResultWriter, codes_on, verify
-from softjaw.study.run.limits import PATIENCE, RAISE_AGAIN_S, Stopper, early, limited_memory
+from softjaw.study.run.limits import Stopper, early, limited_memory
 from softjaw.study.run.load_path import PathSolver, rows_again, settle
 from softjaw.study.run.plan import Plan
 from softjaw.study.run.progress import Progress, code_of
@@ -255,10 +255,7 @@ class Session:
     def _solve_share(self, claims: Claims) -> str:
         """Solve this rank's share and wait for the others; the signal that came."""
         solver = PathSolver(self._files, self._work.solve_unit, self._work.image, claims, self._state)
-        limit = self._work.time_limit
-        # a short limit leaves time for alarms that were lost, too
-        last = max(PATIENCE * limit, limit + 5 * RAISE_AGAIN_S) if limit < math.inf else None
-        stopper = Stopper(solver.on_stop, limit, last)
+        stopper = Stopper(solver.on_stop, self._work.time_limit, last_resort=True)
         listening = install_listener("numba:compile", COMPILING) if self._comm.rank == 0 else contextlib.nullcontext()
         with stopper, limited_memory(self._work.memory, claims.node.size), listening:
             for position in claims:

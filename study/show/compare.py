@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from softjaw.friction.patch import FloatArray
 from softjaw.study.case.result import TIE
 from softjaw.study.messages import OTHER_FILE, USAGE, StudyError
-from softjaw.study.quantities import TABLE, map_row
+from softjaw.study.quantities import NUMERIC_MAPS, map_row
 from softjaw.study.ranking import falling
 from softjaw.study.result.layout import DONE
 from softjaw.study.result.read import axes_of, stated_error, values_of
@@ -42,7 +42,7 @@ def compare(first: xr.Dataset, second: xr.Dataset, quantity: str = "e_n", model:
     in_a, in_b = (ds.status.values == DONE for ds in pair)
     states = {"solved in both": in_a & in_b, "only in a": in_a & ~in_b, "only in b": ~in_a & in_b,
               "in neither": ~in_a & ~in_b}  # fmt: skip
-    names = [q.name for q in TABLE if q.group == "maps" and q.name != "flags" and q.name in first and q.name in second]
+    names = [q.name for q in NUMERIC_MAPS if q.name in first and q.name in second]
     if quantity not in names:
         raise StudyError(USAGE, f"--quantity: found '{quantity}', expected one of: {', '.join(names)}")
     units = map_row(quantity).unit

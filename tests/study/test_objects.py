@@ -119,9 +119,9 @@ def test_the_command_line_names_meshes_from_where_it_is(scene, objects, count, m
     code, text, _ = command(0, "check", "sub/scene.toml", "--objects", objects)
     assert code == DONE
     assert f"{count}: a" in text
-    if count == 1:  # a plan solves some
-        on = re.findall(r"on (\d) rank", command(0, "plan", "sub/scene.toml", "--objects", objects, "-n", "2,4")[1])
-        assert on == ["2", "4"]
+    monkeypatch.setattr("softjaw.study.cli.quick.TIMED_S", 0.1)  # what a plan solves is no matter here
+    on = re.findall(r"on (\d) rank", command(0, "plan", "sub/scene.toml", "--objects", objects, "-n", "2,4")[1])
+    assert on == ["2", "4"]
     assert command(0, "check", "sub/scene.toml", "--objects", "nothing/*.stl")[0] == USAGE
 
 

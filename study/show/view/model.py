@@ -15,7 +15,7 @@ from softjaw.study.case.build import own_frame
 from softjaw.study.lookup import turning
 from softjaw.study.messages import USAGE, StudyError
 from softjaw.study.pictures import span
-from softjaw.study.quantities import ALONG, AROUND, DONE, TABLE
+from softjaw.study.quantities import ALONG, AROUND, DONE, NUMERIC_MAPS
 from softjaw.study.ranking import nearest
 from softjaw.study.result.read import axes_of, read_field, read_patch, scene_of
 from softjaw.study.scene import SceneError
@@ -241,7 +241,7 @@ def _nearest(ds: xr.Dataset, best: Index, where: Place, k: int) -> Index:
 
 def maps_of(ds: xr.Dataset) -> list[str]:
     """Names of the maps that have a value; flags are none."""
-    return [q.name for q in TABLE if q.group == "maps" and q.name != "flags" and field(ds, q.name) is not None]
+    return [q.name for q in NUMERIC_MAPS if field(ds, q.name) is not None]
 
 
 def quantity_of(ds: xr.Dataset, name: str | None) -> str:
