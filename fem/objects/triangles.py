@@ -21,6 +21,7 @@ from softjaw.fem.objects.triangle_tree import TriangleTree, area_vectors, compon
 from softjaw.friction.patch import FloatArray
 
 SMALLEST, LARGEST = 1e-3, 2.0  # plausible largest extent of an object that a gripper holds [m]
+SEAM = 3e-4  # of the extent: corners of two borders this close are one
 HUGE_COORDINATE = 1e12  # of a coordinate, in any unit
 ROUNDED = 5e-7  # of the largest coordinate: corners this close are one; files hold numbers of single precision (6e-8)
 MOST_TRIANGLES, DECIMATED_TO = 500_000, 200_000
@@ -67,7 +68,14 @@ def cleaned(points: FloatArray, triangles: IntArray, unit: str = "m") -> Triangl
     """
     points, triangles = np.asarray(points, dtype=float), np.asarray(triangles)
     triangles, dropped = _finite(points, triangles)
-    points, triangles, merged = _merged(points, triangles)
+    # equal points first: STL files repeat every corner, and the tree then has less to search
+    points, triangles = np.unique(points[triangles.ravel()], axis=0, return_inverse=True)
+    close = cKDTree(points).query_pairs(ROUNDED * np.abs(points).max(), output_type="ndarray")
+    points, triangles, merged = _merged(points, triangles.reshape(-1, 3).astype(np.int64), close)
+    sewn: list[str] = []
+    if len(seams := _side_by_side(points, triangles)):
+        points, triangles, sewn = _merged(points, triangles, seams)
+        sewn = [f"corners of borders side by side made one: {len(seams)}", *sewn]
     # points that no triangle uses are gone by now and do not count for the size
     _check_size(float(np.ptp(points, axis=0).max()), unit)
     points, triangles, thinned = _with_fewer(points * UNITS[unit], triangles)
@@ -79,7 +87,7 @@ def cleaned(points: FloatArray, triangles: IntArray, unit: str = "m") -> Triangl
         points, triangles, shells = _without_shells(points, triangles)
     loops = border_loops(triangles)
     opened = [f"{len(loops)} hole{'s' * (len(loops) > 1)} left open"] if loops else []
-    notes = (*dropped, *merged, *thinned, *specks, *filled, *opened, *turned, *shells)
+    notes = (*dropped, *merged, *sewn, *thinned, *specks, *filled, *opened, *turned, *shells)
     return Triangles(points, triangles, notes, lid_corners(points, loops), closed)
 
 
@@ -103,15 +111,26 @@ def _check_size(extent: float, unit: str) -> None:
     raise MeshError(text)
 
 
-def _merged(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray, list[str]]:
-    """Points within rounding of each other as one, unused ones left out, collapsed and doubled triangles dropped."""
-    # equal points first: STL files repeat every corner, and the tree then has less to search
-    points, inverse = np.unique(points[triangles.ravel()], axis=0, return_inverse=True)
-    triangles = inverse.reshape(-1, 3).astype(np.int64)
-    close = cKDTree(points).query_pairs(ROUNDED * np.abs(points).max(), output_type="ndarray")
+def _side_by_side(points: FloatArray, triangles: IntArray) -> IntArray:
+    """Pairs of corners of borders that a seam between two sheets of one body leaves ``(p, 2)``."""
+    ends = np.sort(edges_of(triangles), axis=1)
+    _, first, count = np.unique(ends @ [len(points), 1], return_index=True, return_counts=True)
+    border = ends[first[count == 1]]
+    shortest = np.full(len(points), np.inf)
+    np.minimum.at(shortest, border, np.linalg.norm(np.subtract(*points[border.T]), axis=1)[:, None])
+    corners = np.unique(border)
+    pairs = corners[cKDTree(points[corners]).query_pairs(SEAM * np.ptp(points), output_type="ndarray")]
+    # two corners of one sheet are farther apart than that
+    return pairs[np.linalg.norm(np.subtract(*points[pairs.T]), axis=1) < 0.3 * shortest[pairs].min(axis=1)]
+
+
+def _merged(
+    points: FloatArray, triangles: IntArray, pairs: IntArray
+) -> tuple[FloatArray, IntArray, list[str]]:
+    """``pairs (p, 2)`` of points as one, unused points left out, collapsed and doubled triangles dropped."""
     notes = []
-    if len(close):
-        group = components(close, len(points))
+    if len(pairs):
+        group = components(pairs, len(points))
         points, triangles = _used(points, np.unique(group, return_index=True)[1][group][triangles])
     a, b, c = triangles.T
     proper = (a != b) & (b != c) & (c != a)

@@ -180,6 +180,23 @@ def test_a_wall_inside_where_two_bodies_share_triangles_does_not_move_the_centro
     assert np.linalg.norm(place - [0.02, 0.0, 0.0]) < error < 1e-4
 
 
+@pytest.mark.parametrize("move", ["sheets", "triangles"])
+def test_sheets_and_triangles_that_lie_side_by_side_are_one_body_and_those_farther_apart_are_not(move):
+    box = brick(50, 60, 120).subdivide().subdivide()
+    sheet = np.abs(box.face_normals).argmax(axis=1) + 3 * (box.face_normals.sum(axis=1) > 0)
+    by = np.random.default_rng(4).uniform(-1, 1, (6 if move == "sheets" else len(box.faces), 1, 3))
+    corners = box.triangles + 5e-3 * (by[sheet] if move == "sheets" else by)  # mm
+    for times, closed in ((1.0, True), (50.0, False)):
+        clean = cleaned((box.triangles + times * (corners - box.triangles)).reshape(-1, 3),
+                        np.arange(3 * len(box.faces)).reshape(-1, 3), "mm")  # fmt: skip
+        assert clean.closed == closed
+        if closed:
+            assert len(clean.triangles) == len(box.faces)
+            volume, place, _ = solid(clean.points, clean.triangles, clean.closed)
+            assert volume == pytest.approx(360e-6, rel=1e-3)
+            assert np.linalg.norm(place) < 1e-5
+
+
 @pytest.mark.parametrize("roll", [0.0, 0.5])
 def test_the_centroid_of_an_open_body_is_within_its_stated_error(roll):
     box = trimesh.creation.box((0.17, 0.11, 0.07)).subdivide().subdivide()
