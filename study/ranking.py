@@ -287,11 +287,7 @@ def window(ds: Any) -> float | None:
         return None
     low, first = ds["force_low"].values, ds["normal_force"].values[0]
     high = ds["force_high"].values if "force_high" in ds else np.full(low.shape, np.inf)
-    # straight lines tell where a range begins, power laws what holds there: a little more is tried, too
-    begins = np.sort(low[(low >= first) & (low <= high)])[:LISTED]
-    for force in (float(begin * more) for begin, more in product(begins, (1.0, 1.02, 1.05))):
-        if force > ds["normal_force"].values[-1]:
-            continue
+    for force in map(float, np.sort(low[(low >= first) & (low <= high)])[:LISTED]):
         interpolated = at_force(ds, force)
         if ((interpolated["status"].values == DONE) & (judged(interpolated) & LOST == 0)).any():
             return force

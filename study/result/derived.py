@@ -7,17 +7,20 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from softjaw.friction.patch import FloatArray
 from softjaw.study.case.build import geometry
 from softjaw.study.case.candidates import axes
 from softjaw.study.case.result import UNDECIDED
 from softjaw.study.quantities import FORCE_RANGE, Quantity
+from softjaw.study.result.interpolation import BESIDE_CASES, law_claims, plain
 from softjaw.study.scene import Scene
 
 LOW, HIGH = FORCE_RANGE
 LOW_ERROR, HIGH_ERROR = f"{LOW}_error", f"{HIGH}_error"
+SLOPES = 0.5, 2.0  # of maps over forces, as logarithms: what contacts do that begin from nothing
+UNSURE = 0.15  # of such an exponent below the first force: payloads that torques limit change theirs
 # maps that they follow from, of the curved model
 SOURCES = ("safety_factor", "payload_error", "indentation", "indentation_error", "wall_stress", "wall_stress_error")
 
@@ -40,10 +43,10 @@ def derived(scene: Scene) -> list[Quantity]:
         listed += [
             Quantity(LOW, over, "N", "force to use",
                      "Smallest normal force per finger at which safety_factor (CCM) passes task.safety, between the"
-                     " solved forces and 0 by straight lines. NaN: none of them holds it.", "derived"),
+                     " solved forces and below them by power laws. NaN: none of them holds it.", "derived"),
             Quantity(LOW_ERROR, over, "N", "error of the force to use",
-                     "What the stated error of the payload and the bend of safety_factor over the solved forces may "
-                     "move it; NaN where fewer than two of them are solved up to it.", "derived"),
+                     "What the stated error of the payload and the interpolation of safety_factor may move it; NaN"
+                     " where no two forces are solved, or the payload's error is not known.", "derived"),
         ]  # fmt: skip
     if getattr(scene.object, "wall", None) is not None:
         listed += [
@@ -77,9 +80,8 @@ def force_ranges(scene: Scene, values: Mapping[str, FloatArray], ended: ArrayLik
     """
     forces, ranges = np.asarray(scene.load.normal_force), dict[str, FloatArray]()
     if scene.object.mass is not None:
-        factor, stated = values["safety_factor"], values.get("payload_error", 0.0)
-        ranges[LOW] = first_crossing(forces, factor, scene.task.safety)
-        ranges[LOW_ERROR] = crossing_error(forces, factor, scene.task.safety, stated)
+        stated = values.get("payload_error", np.nan)
+        ranges[LOW], ranges[LOW_ERROR] = crossing(forces, values["safety_factor"], scene.task.safety, stated)
     if getattr(scene.object, "wall", None) is not None:
         dent: float | None = getattr(scene.object, "allowed_dent", None)
         limits = {"indentation": dent, "wall_stress": geometry().material_of(scene.object).yield_strength}
@@ -89,65 +91,54 @@ def force_ranges(scene: Scene, values: Mapping[str, FloatArray], ended: ArrayLik
         def largest(share: float) -> FloatArray:
             """With values that are larger by a share of their errors."""
             larger = {n: values[n] * (1.0 + share * np.nan_to_num(values.get(f"{n}_error", 0.0))) for n in limits}
-            crossings = [first_crossing(forces, larger[n], most) for n, most in limits.items() if most is not None]
+            crossings = [crossing(forces, larger[n], most)[0] for n, most in limits.items() if most is not None]
             # fmin, not minimum: a limit that is never passed is NaN and bounds nothing.
             return np.fmin.reduce([solved, *crossings])
 
         ranges[HIGH] = largest(0.0)
-        ranges[HIGH_ERROR] = ranges[HIGH] - largest(1.0)
+        stated = any(f"{n}_error" in values for n in limits)
+        ranges[HIGH_ERROR] = ranges[HIGH] - largest(1.0) if stated else np.full(solved.shape, np.nan)
     return ranges
 
 
-def crossing_error(forces: ArrayLike, values: ArrayLike, limit: float, stated: ArrayLike = 0.0) -> FloatArray:
-    """Error of `first_crossing` [N]: that of a straight line in a curve that bends as much as the values beside it do.
+def crossing(
+    forces: ArrayLike, values: ArrayLike, limit: float, stated: ArrayLike = np.nan
+) -> tuple[FloatArray, FloatArray]:
+    """Force at which values ``(..., k)`` first pass a limit [N], NaN for never, and the error of that.
 
-    The errors of the values, ``stated (..., k)`` as shares, move the crossing, too: by their share of the limit over
-    the slope; the larger of those beside the crossing counts. NaN where no three values lie about the crossing, the one
-    at no force counted.
+    Between solved forces by power laws, as look-ups interpolate, below the first by the law of the first two. A solved
+    value within `UNDECIDED` of the limit has passed it; what comes after a NaN is not used. The error is that of a
+    look-up there, from what the values ``stated (..., k)`` as shares; below the first force also what another exponent
+    makes of it, that of the next two forces or one that differs by `UNSURE`. NaN where no two forces tell a law.
 
-    >>> crossing_error([1.0, 2.0], [[1.0, 4.0]], 2.5).round(3).tolist()  # x^2, which passes at 1.581 and not at 1.5
-    [0.083]
-    >>> crossing_error([1.0, 2.0], [[1.0, 4.0]], 2.5, [[0.02, 0.03]]).round(3).tolist()  # 3 % of 2.5 over 3
-    [0.108]
+    >>> [v.round(3).tolist() for v in crossing([1.0, 2.0], [[0.5, 2.0], [0.5, 0.9]], 1.0, 0.1)]
+    [[1.414, nan], [0.261, nan]]
+    >>> [v.round(3).tolist() for v in crossing([1.0, 2.0, 4.0], [1.0, 2.0, 8.0], 0.5, 0.0)]  # linear, then quadratic
+    [0.5, 0.347]
     """
-    x, y = _from_nothing(forces, values)
-    at = first_crossing(forces, values, limit)
-    if len(x) < 3:
-        return np.full(at.shape, np.nan)
-    step = np.diff(x)
-    slope = np.diff(y, axis=-1) / step
-    bend = np.abs(2 * np.diff(slope, axis=-1) / (step[1:] + step[:-1]))  # of every node but the first and the last
-    k = np.clip(np.searchsorted(x, at) - 1, 0, len(step) - 1)[..., None]  # interval of the crossing
+    x, y = np.asarray(forces, float), np.asarray(values, float)
+    passed = np.cumprod(np.isfinite(y), axis=-1).astype(bool) & (y >= limit * (1.0 - UNDECIDED))
+    k = passed.argmax(axis=-1)
 
-    def at_ends(parts: FloatArray) -> list[FloatArray]:
-        """What there is at both ends of the interval: at no force there is neither a bend nor an error."""
-        return [np.take_along_axis(parts, np.clip(k + i, 0, parts.shape[-1] - 1), -1)[..., 0] for i in (-1, 0)]
+    def taken(parts: ArrayLike, i: NDArray[np.int64]) -> FloatArray:
+        return np.asarray(np.take_along_axis(np.broadcast_to(parts, y.shape), i[..., None], -1)[..., 0], float)
 
-    ends, shares = at_ends(bend), at_ends(np.broadcast_to(stated, np.shape(values)))
-    rise, k = np.take_along_axis(slope, k, -1)[..., 0], k[..., 0]
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray((np.fmax(*ends) / 2 * (at - x[k]) * (x[k + 1] - at) + np.fmax(*shares) * limit) / rise)
-
-
-def _from_nothing(forces: ArrayLike, values: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Forces and values with those at no force before them."""
-    return np.append(0.0, np.asarray(forces, float)), np.insert(np.asarray(values, float), 0, 0.0, axis=-1)
-
-
-def first_crossing(forces: ArrayLike, values: ArrayLike, limit: float) -> FloatArray:
-    """Force at which values ``(..., k)`` first pass a limit, by straight lines from 0 at no force; NaN for never.
-
-    A solved value within `UNDECIDED` of the limit has passed it; what comes after a NaN is not used.
-
-    >>> first_crossing([1.0, 2.0], [[0.5, 1.5], [0.5, 0.9]], 1.0).tolist()
-    [1.5, nan]
-    """
-    x, y = _from_nothing(forces, values)
-    # Nothing beyond the first gap is used: the true crossing may lie inside it.
-    above = np.cumprod(np.isfinite(y), axis=-1).astype(bool) & (y >= limit * (1.0 - UNDECIDED))
-    k = np.maximum(above.argmax(axis=-1), 1)[..., None]
-    low, high = np.take_along_axis(y, k - 1, -1)[..., 0], np.take_along_axis(y, k, -1)[..., 0]
-    # Equal neighbours would divide by 0; the clip then gives an end of their interval.
-    share = np.clip((limit - low) / np.where(high > low, high - low, 1.0), 0.0, 1.0)
-    crossing = x[k[..., 0] - 1] + share * (x[k[..., 0]] - x[k[..., 0] - 1])
-    return np.where(above.any(axis=-1), crossing, np.nan)
+        slopes = np.diff(np.log(np.where(y > 0.0, y, np.nan))) / np.diff(np.log(x))
+        first = np.clip(np.nan_to_num(slopes[..., :1], nan=1.0), *SLOPES) if len(x) > 1 else np.ones_like(y)
+        exponents = np.concatenate([first, slopes], axis=-1)
+        below, low, high, exponent = np.maximum(k - 1, 0), taken(y, k - 1), taken(y, k), taken(exponents, k)
+        law = x[k] * (limit / high) ** (1.0 / exponent)
+        line = x[below] + (limit - low) / (high - low) * (x[k] - x[below])  # from a force at which there is nothing
+        nothing = (k > 0) & (low <= 0.0)
+        at = np.where(passed.any(axis=-1), np.minimum(np.where(nothing, line, law), x[k]), np.nan)
+        if len(x) < 2:
+            return at, np.full(at.shape, np.nan)
+        share = np.clip(np.log(at / x[below]) / np.log(x[below + 1] / x[below]), 0.0, 1.0)
+        claims = law_claims(y, plain("force", "N", x), np.zeros(y.shape, bool))
+        of_law = BESIDE_CASES * taken(claims, below) * share * (1.0 - share)
+        error = np.hypot(of_law, np.fmax(taken(stated, below), taken(stated, k)))
+        changes = np.abs(np.diff(slopes[..., :2])).max(axis=-1, initial=UNSURE)
+        error += np.where(k > 0, 0.0, np.log(x[0] / at) * np.fmax(changes, UNSURE))
+        error = np.where(nothing, np.fmax(at - x[below], x[k] - at), at * error / exponent)
+    return at, np.where(np.isfinite(y[..., 1]) | (k > 0), error, np.nan)

@@ -201,14 +201,21 @@ def place_claims(table: FloatArray, axes: Sequence[Nodes], side: NDArray[np.bool
 def force_claims(table: FloatArray, forces: Nodes, side: NDArray[np.bool_]) -> tuple[FloatArray, NDArray[np.bool_]]:
     """`bend` along forces, the last axis, as claims: the largest beside; and of which maps they are relative.
 
-    So they are, of a power law, where all values over station, angle and force are positive. Of two forces a guess is
-    left: how far from constant or from proportional, whatever is nearer.
+    So they are, of a power law, where all values over station, angle and force are positive.
     """
     power = ~(table <= 0.0).any(axis=(-3, -2, -1), keepdims=True)  # NaN, of no case, is not
-    logs, along = np.log(np.where(power, table, np.nan)), forces._replace(x=np.log(forces.x))
+    lines = CLAIM_FACTOR * OF_FORCES * around(bend(table, forces, side), [table.ndim - 1])
+    return np.where(power, law_claims(table, forces, side), lines), power
+
+
+def law_claims(table: FloatArray, forces: Nodes, side: NDArray[np.bool_]) -> FloatArray:
+    """The same of power laws alone, relative: `bend` of logarithms. Of two forces a guess is left.
+
+    That is how far from constant or from proportional, whatever is nearer.
+    """
+    logs, along = np.log(np.where(table > 0.0, table, np.nan)), forces._replace(x=np.log(forces.x))
     laws = np.minimum(bend(logs, along, side), bend(logs - along.x, along, side))
-    bent = np.where(power, laws, bend(table, forces, side))
-    return CLAIM_FACTOR * OF_FORCES * around(bent, [bent.ndim - 1]), power
+    return CLAIM_FACTOR * OF_FORCES * around(laws, [laws.ndim - 1])
 
 
 def error(claims: FloatArray, at: Corners, axes: Sequence[int]) -> FloatArray:

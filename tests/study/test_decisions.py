@@ -18,7 +18,7 @@ from softjaw.study.case.pressing import OBLIQUE, state_flags
 from softjaw.study.case.result import TIE
 from softjaw.study.flags import Flag
 from softjaw.study.ranking import Sure, falling, judged, largest, nearest, ranking
-from softjaw.study.result.derived import first_crossing
+from softjaw.study.result.derived import crossing
 from softjaw.study.result.interpolation import CLOSING_GAP_RATIO, circle
 from tests.turns import ULPS, seeded, seeds, tries
 
@@ -72,8 +72,8 @@ def test_rounding_is_no_difference_of_two_grasps(values, seed):
 def test_a_window_ends_at_the_same_force(values, seed):
     """Values that just reach the limit, also where they fall again or the forces end."""
     forces = 1.0 + np.arange(len(values))
-    one = first_crossing(forces, values, 1.0)
-    other = first_crossing(forces, moved(values, seed), 1.0)
+    one = crossing(forces, values, 1.0)[0]
+    other = crossing(forces, moved(values, seed), 1.0)[0]
     assert other == pytest.approx(one, rel=1e-9, nan_ok=True)
 
 

@@ -5,11 +5,12 @@ import json
 import numpy as np
 import pytest
 import xarray as xr
+from scipy.interpolate import CubicSpline
 
 import softjaw
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import DONE, FAILED, MISSING, STATES
-from softjaw.study.result.derived import first_crossing
+from softjaw.study.result.derived import crossing
 from softjaw.study.result.interpolation import at_force, force_claims, plain
 from softjaw.study.result.read import FIELDS, read_field
 from softjaw.study.result.store import open_result
@@ -133,4 +134,19 @@ def test_flags_are_bits_that_attributes_name_patches_are_read_on_demand_and_stat
     ([0.1, np.nan, 5.0, 5.0], 1.0, np.nan),
 ])  # fmt: skip
 def test_the_force_at_which_a_limit_is_crossed(values, limit, force):
-    assert first_crossing([1.0, 2.0, 4.0, 8.0], values, limit) == pytest.approx(force, rel=1e-12, nan_ok=True)
+    """As look-ups interpolate, by power laws; from a force at which there is nothing by a straight line."""
+    assert crossing([1.0, 2.0, 4.0, 8.0], values, limit)[0] == pytest.approx(force, rel=1e-12, nan_ok=True)
+
+
+@pytest.mark.parametrize("power", [0.8, 1.0, 4 / 3])
+@pytest.mark.parametrize("wanted", [0.5, 3.0])
+def test_below_and_between_solved_forces_a_crossing_is_where_the_law_of_the_contact_has_it(power, wanted):
+    """A law that bends over the forces is off, within the error; without a stated error there is none of the force."""
+    x = np.array([1.0, 2.0, 4.0, 8.0])
+    at, error = crossing(x, x**power, wanted**power, 0.02)
+    assert at == pytest.approx(wanted, rel=1e-12)
+    assert 0.02 / power * wanted * (1 - 1e-9) < error < 0.17 * wanted
+    law = CubicSpline([-3, 0, 1, 2, 3], [-3.9, 0.0, 1.25, 2.35, 3.4])  # of logarithms: exponents from 1.3 to 1
+    at, error = crossing(x, 2 ** law(np.log2(x)), 2 ** law(np.log2(wanted)), 0.0)
+    assert abs(at - wanted) < error < 0.25 * wanted
+    assert np.isnan(crossing(x, x**power, wanted**power)[1])

@@ -91,7 +91,9 @@ def test_what_an_unfinished_run_has_solved_is_judged_by_its_wall(solved, tmp_pat
     ds, whole = open(tmp_path / "a.hdf"), open(can)
     assert ds.force_high.values[0, 0] == whole.force_high.values[0, 0] < 3
     assert np.isnan(ds.force_high.values[1, 0])
-    assert (ds.force_low.values == whole.force_low.values).all()
+    assert ds.force_low.values[0, 0] == whole.force_low.values[0, 0]
+    # below the first force the second one tells the law; it is still to come
+    assert ds.force_low.values[1, 0] == pytest.approx(whole.force_low.values[1, 0], rel=0.1)
     assert judged(ds)[0, 0, 1] & Flag.TOO_STRONG
     assert 0 < ds.force_high_error.values[0, 0] < 1
     assert any("1 cases" in note for note in best(ds).notes)
