@@ -326,17 +326,18 @@ def judge(
     by: str | None = None,
     top: int = LISTED,
     lines: bool = True,
+    hand: Hand | None = None,
 ) -> xr.Dataset:
     """The dataset at a force [N] with `judged` flags and decisions as attributes.
 
     ``score``: the map that grasps are ranked by; ``level`` and ``why``: the force level that is shown, and why it is
     that one; ``best``: index of the best case there, or None; ``chosen``: the case that was asked for; ``reach``: of
-    the ``top`` places (of grasps where not ``lines``) the direction from which the scene's hand comes, see
-    `approach_of`. Those that it does not reach are ranked last, and the next ones are looked at.
+    the ``top`` places (of grasps where not ``lines``) the direction from which the ``hand`` comes, by default the
+    scene's, see `approach_of`. Those that it does not reach are ranked last, and the next ones are looked at.
 
     Raises `ValueError` for a force outside of the solved ones.
     """
-    hand, reach = hand_of(ds), dict(ds.attrs.get("reach", {}))
+    hand, reach = hand or hand_of(ds), dict(ds.attrs.get("reach", {}))
     about = {"title": ds.attrs.get("title") or Path(ds.attrs.get("file", "")).stem, "chosen": chosen, "reach": reach}
     while True:
         flags = ds["flags"].values.copy()

@@ -29,7 +29,7 @@ from softjaw.study.flags import LOST, Flag, flag_words, flags_in
 from softjaw.study.grippers import Hand
 from softjaw.study.messages import USAGE, StudyError, fault_of
 from softjaw.study.quantities import BY_KEY, FORCE_RANGE, LEAST_FORCE, MAIN
-from softjaw.study.ranking import at_level, index_of, judged, ranked, score_of, window
+from softjaw.study.ranking import index_of, judge, ranked, score_of, window
 from softjaw.study.result.read import axes_of, maps_in
 from softjaw.study.result.store import place_text
 from softjaw.study.units import shown, shown_text
@@ -86,7 +86,8 @@ class RankedGrasp:
     @property
     def reasons(self) -> tuple[str, ...]:
         """Why it is no grasp to write: it slips, does harm, holds nothing, or is none for this gripper."""
-        lost = tuple(flag.word for flag in flags_in(self.case["flags"] & LOST))
+        known = Flag.OUT_OF_REACH * bool(self.hold.unfit)  # which says it better
+        lost = tuple(flag.word for flag in flags_in(self.case["flags"] & LOST & ~known))
         return (*lost, *(("payload 0",) if self.maps.get("payload", np.nan) <= 0 else ()), *self.hold.unfit)
 
     @property
@@ -143,23 +144,24 @@ def _middle(case: dict[str, Any]) -> FloatArray:
 
 def chosen(
     ds: xr.Dataset, model: str = "ccm", force: float | None = None, by: str | None = None, top: int = 0,
-    least: Mapping[str, float] = MappingProxyType({}),
+    least: Mapping[str, float] = MappingProxyType({}), hand: Hand | None = None,
 ) -> tuple[list[dict[str, Any]], list[str], str]:  # fmt: skip
     """Cases of the first ``top`` grasps (0: all), the best first, the same in words, and the map that ranks them.
 
-    They are ranked ``by`` a map at a ``force`` [N]. ``least`` gives smallest values by the name of a map, in the unit
-    in which ``softjaw show`` prints it; a grasp with less is left out.
+    They are ranked ``by`` a map at a ``force`` [N], as ``softjaw show`` does, for this ``hand`` or the scene's.
+    ``least`` gives smallest values by the name of a map, in the unit in which ``softjaw show`` prints it; a grasp with
+    less is left out.
 
     Raises `StudyError`: A force outside of the solved ones, or a map that the file does not have.
     """
-    with fault_of("--force", ValueError):
-        at, k, _ = at_level(ds, window(ds) if force is None else force)
     with fault_of(ds.attrs["file"], ValueError):
-        by = score_of(at, by)
+        score = score_of(ds, by)
+    with fault_of("--force", ValueError):
+        at = judge(ds, force=window(ds) if force is None else force, by=score, top=top or 1, hand=hand)
+    k, by = at.attrs["level"], at.attrs["score"]
     units = maps_in(at)
     if unknown := [name for name in least if name not in units]:
         raise StudyError(USAGE, f"--min: found '{unknown[0]}', expected one of {', '.join(units)}")
-    at = at.assign(flags=(at.status.dims, judged(at), at["flags"].attrs))
     which = [index_of(at, int(c), k) for c in ranked(at, k, by)]
     bounds = {name: value / shown(1.0, units[name]) for name, value in least.items()}
     # NaN is not at least anything, so a grasp without the value is left out.
@@ -173,7 +175,8 @@ def chosen(
 
 def grasps(ds: xr.Dataset, gripper: GripperFrame, **choice: Any) -> list[RankedGrasp]:
     """The `chosen` grasps with the gripper's pose, one for each direction of approach."""
-    cases, places, by = chosen(ds, **choice)
+    hand = gripper.hand if gripper.hand != Hand() else None
+    cases, places, by = chosen(ds, **choice, hand=hand)
     values = [case["maps"][by] if by != LEAST_FORCE else 1.0 / case["maps"]["force_low"] for case in cases]
     score = np.nan_to_num([max(float(value), 0.0) for value in values])
     best, units = max(score, default=0.0), maps_in(ds)

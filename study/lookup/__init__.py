@@ -165,7 +165,8 @@ class GraspMap:
         place = station if self.by_poses else stations[station], angles[angle]
         # where the contact changes between two solved forces, values are known from the higher one on
         use = np.where(self.point(*place, use).ok, use, forces[np.searchsorted(forces, use)])
-        return [*map(self.point, *place, use)]
+        marks = ds["flags"].values[..., k].ravel()[first] & Flag.OUT_OF_REACH
+        return [replace(self.point(*at), marks=int(mark)) for *at, mark in zip(*place, use, marks, strict=True)]
 
     def value(
         self, name: str, station: ArrayLike, angle: ArrayLike, force: ArrayLike, model: str = "ccm"

@@ -32,6 +32,7 @@ class GraspPoint(GraspNumbers):
     place: FloatArray  # (m, 3) station [m], angle [rad], force [N] as asked for
     corners: Corners
     states: np.ndarray  # (m,)
+    marks: int = 0  # flags of the grasp that no case has: what the hand does not reach
 
     @property
     def station(self) -> Any:
@@ -130,7 +131,7 @@ class GraspPoint(GraspNumbers):
             for name, bound in (("safety_factor", FORCE_RANGE[0]), ("force_high", FORCE_RANGE[1]))
         )
         flags |= outside(self.place[:, 2], factor, high, self.map.safety)
-        return self._shaped(np.where(self.states == INSIDE, flags, 0))
+        return self._shaped(np.where(self.states == INSIDE, flags | self.marks, 0))
 
     def semi_axes(self, model: str = "ccm") -> FloatArray:
         """Largest f_x, f_y, tau_z of each finger ``(..., 2, 3)`` [N, N, N m]: the ellipsoid from three motions."""

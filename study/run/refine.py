@@ -16,11 +16,14 @@ from numpy.typing import NDArray
 from softjaw.friction.patch import FloatArray
 from softjaw.study.case.poses import pose_of
 from softjaw.study.case.result import UNDECIDED
-from softjaw.study.flags import LOST
+from softjaw.study.flags import LOST, Flag
 from softjaw.study.quantities import DONE, MISSING
+from softjaw.study.ranking import judge
 from softjaw.study.result.layout import is_case
+from softjaw.study.result.read import dataset
 from softjaw.study.scene import Scene
 from softjaw.study.scene.grasps import GraspPose
+from softjaw.study.scene.text import scene_table
 
 Rounds = tuple[tuple[Any, ...], ...]  # as `study.result.layout.Layout.rounds`
 Place = tuple[float, ...]  # share of the first step, then point [mm], approach and long side, as a scene gives them
@@ -82,8 +85,15 @@ def _scores(result: Any) -> tuple[FloatArray, NDArray[np.bool_]]:
     """The payload, by which grasps are ranked, CCM, NaN where nothing is solved; and whether a grasp can be used."""
     values = _cases(result, result.read("payload/ccm"))
     flags = np.nan_to_num(_cases(result, result.read("flags/flags"))).astype(np.int64)
+    if _preset(result):  # what its hand does not reach cannot be used either
+        reach = judge(dataset(result)).attrs["reach"]
+        flags.reshape(-1, flags.shape[-1])[[c for c, approach in reach.items() if approach == ()]] |= Flag.OUT_OF_REACH
     values = np.where(_cases(result, result.status) == DONE, values, np.nan)
     return values, np.isfinite(values) & (flags & LOST == 0)
+
+
+def _preset(result: Any) -> bool:
+    return bool(scene_table(result.scene, "gripper").get("preset"))
 
 
 def scores_of_poses(result: Any) -> FloatArray:
@@ -154,6 +164,8 @@ def about(result: Any) -> str:
     text = f"{stations - count} {what} of the scene and {count} added in {_counted(len(rounds), 'round')}"
     if (result.status == MISSING).any():
         return f"{text}, the last of which is not complete"
+    if _preset(result):  # what its hand reaches takes longer to tell than a status may
+        return text
     if what == "poses":
         by = gained(scores_of_poses(result), stations - count)
         return f"{text}, the last by {rounds[-1][0][0]:g} of the first step; the best gained {by:.1%} at most"

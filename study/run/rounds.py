@@ -29,9 +29,9 @@ from softjaw.study.case.poses import STANDOFF, explicit_poses, in_file
 from softjaw.study.case.result import UNDECIDED, surely_below
 from softjaw.study.case.sampler import lids_of
 from softjaw.study.case.task import task_of
-from softjaw.study.flags import LOST
+from softjaw.study.flags import LOST, Flag
 from softjaw.study.quantities import FAILED, LISTED, NO_GRASP
-from softjaw.study.ranking import at_level, distinct, judged, largest, rank_values, ranked, sure
+from softjaw.study.ranking import distinct, judge, largest, rank_values, ranked, sure
 from softjaw.study.result.read import dataset, other_levels
 from softjaw.study.run.refine import Place, gained, next_stations, scores_of_poses, with_places
 from softjaw.study.scene import Scene
@@ -139,14 +139,15 @@ def next_cases(result: Any, scene: Scene) -> tuple[Case, ...]:
     """Cases of the next round; none where the best are known as well as the scene asks for."""
     if not scene.candidates.sampled or "work/mesh" not in {q.key for q in result.layout.quantities}:
         return ()
-    ds, k, _ = at_level(dataset(result))
+    ds = judge(dataset(result), by="payload")
+    k = ds.attrs["level"]
     order, known = [int(i) for i in ranked(ds, k, "payload")], sure(ds, "payload", k)
     if known is None:
         return ()
     named, shape = result.layout.finer, ds.status.shape
     times = np.array([named[case_of(i, k, shape)] for i in range(len(known.value))])
-    flags = judged(ds)[..., k].ravel()
-    lost = [i for i in order if flags[i] & LOST][:LISTED]
+    flags = ds["flags"].values[..., k].ravel()
+    lost = [i for i in order if flags[i] & LOST and not flags[i] & Flag.OUT_OF_REACH][:LISTED]
     order = [i for i in order if not flags[i] & LOST and np.isfinite(known.value[i])]
     places = distinct(ds, order, rank_values(ds, "payload", k), k)
     error = np.nan_to_num(known.error, nan=np.inf)

@@ -12,7 +12,18 @@ from softjaw.friction.patch import NEGLIGIBLE
 from softjaw.study.case.result import TIE
 from softjaw.study.flags import LOST, OF_FILE, Flag, flag_words, flags_in
 from softjaw.study.quantities import BY_KEY, FORCE_RANGE, LEAST_FORCE, LISTED, MAIN, MISSING, MODELS, STATES, map_row
-from softjaw.study.ranking import distinct, index_of, judge, passed_over, rank_values, score_of, sure, task_keys, window
+from softjaw.study.ranking import (
+    distinct,
+    hand_of,
+    index_of,
+    judge,
+    passed_over,
+    rank_values,
+    score_of,
+    sure,
+    task_keys,
+    window,
+)
 from softjaw.study.result.layout import DONE
 from softjaw.study.result.read import axes_of, dataset, other_levels, values_of
 from softjaw.study.show.grasps import Index, at, candidate_of, forces, largest_force, note, order, place
@@ -37,6 +48,7 @@ if TYPE_CHECKING:
 NOTES_WIDTH, OTHERS_WIDTH, LABEL_WIDTH = 13, 16, 20  # characters
 PLANAR_E_N = f"e_n_{MODELS[1]}"  # column
 BRIEF = ("payload", "opening", "quality", "e_n")  # maps of a table in a terminal
+FAULTS = Flag.SLIPS | Flag.COLLISION | Flag.NOT_BORNE | Flag.OUT_OF_REACH  # for which no grasp can be used
 FINER = Flag.COARSE | Flag.NO_FIT | Flag.NO_CORNERS | Flag.NODAL | Flag.LEFT_OUT  # what a finer mesh or effect cures
 
 
@@ -271,7 +283,13 @@ def _force(ds: xr.Dataset, index: Index) -> tuple[str, str]:
         if at(ds, "force_high", index) < low:
             return "none is safe", f"{wanted} need {least} N per finger ({covers}), the wall bears {_borne(ds, index)}"
         usable = (ds.status.values[index[:-1]] == DONE) & (ds["flags"].values[index[:-1]] & LOST == 0)
-        alone = "; no solved force does without harm: solve one" * (not usable.any() and "between" not in ds.attrs)
+        reached = not int(ds["flags"].values[index]) & Flag.OUT_OF_REACH  # another force would not help
+        harm = not usable.any() and reached and "between" not in ds.attrs
+        alone = "; no solved force does without harm: solve one" * harm
+        hand = hand_of(ds)
+        if hand and low < hand.force_n[0]:
+            press, name = f"{hand.force_n[0]:g} N per finger", Path(task_keys(ds, "gripper")["preset"]).stem
+            return press, f"the least of {name}; {least} N hold {wanted} ({covers}){alone}"
         return f"{least} N per finger", f"the least that holds {wanted} ({covers}){alone}"
     weak = not at(ds, "safety_factor", index) >= safety * (1 - TIE)
     return pressed, f"no solved force holds {wanted}" if weak else f"the smallest solved force that holds {wanted}"
@@ -302,8 +320,10 @@ def _limit(ds: xr.Dataset, index: Index) -> str:
     k, high = index[-1], at(ds, "force_high", index)
     if high < largest_force(ds) * (1 - NEGLIGIBLE):
         friction = f"friction at {forces(ds)[k]:g} N, and " * bool(forces(ds)[k] < high)
-        solved = ds.status.values[index[:-1]][forces(ds) > high * (1 + NEGLIGIBLE)] == DONE
-        bears = f"which bears {_borne(ds, index)} at most" if solved.any() else f"beyond {high:g} N nothing is solved"
+        solved = (ds.status.values[index[:-1]][forces(ds) > high * (1 + NEGLIGIBLE)] == DONE).any()
+        # between two solved forces those beyond are not known, but a bound that is none of them is the wall's own
+        solved |= "between" in ds.attrs and not np.isclose(ds.attrs["between"], high).any()
+        bears = f"which bears {_borne(ds, index)} at most" if solved else f"beyond {high:g} N nothing is solved"
         parts = [f"{friction}the wall, {bears}"]
     else:
         parts = [f"friction at {forces(ds)[k]:g} N{_beyond(ds, index)}"]
@@ -314,7 +334,7 @@ def _limit(ds: xr.Dataset, index: Index) -> str:
     if better:
         top = f"{short_name(ds, int(done[better[0]]))} with {shown_text(values[better[0]], ds[name].units, 3)}"
         parts.append(f"{len(better)} with more {name} cannot be used ({top}): {lacks}")
-    faults = flags_in(int(ds["flags"].values[index]) & (Flag.SLIPS | Flag.COLLISION | Flag.NOT_BORNE))
+    faults = flags_in(int(ds["flags"].values[index]) & FAULTS)
     return "; ".join([*(fault.sentence for fault in faults), *parts])
 
 

@@ -45,7 +45,7 @@ def rounds_until_known(formula, budget=30):
         stations = np.array(sorted([*GIVEN, *(s for some in added for s in some)]))
         values = {"payload/ccm": formula(stations)[:, None, None], "flags/flags": np.zeros((len(stations), 1, 1))}
         result = SimpleNamespace(
-            layout=SimpleNamespace(added=tuple(added), shape=(len(stations), 1, 1)), read=values.get,
+            layout=SimpleNamespace(added=tuple(added), shape=(len(stations), 1, 1)), read=values.get, scene="",
             axes=[SimpleNamespace(values=1e-3 * stations), None, None], status=np.full((len(stations), 1, 1), DONE),
         )  # fmt: skip
         more = next_stations(result, scene, 1)

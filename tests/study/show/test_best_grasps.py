@@ -7,6 +7,7 @@ import pytest
 import xarray as xr
 from scipy.spatial.transform import Rotation
 
+from softjaw.study.export.selection import chosen
 from softjaw.study.flags import Flag
 from softjaw.study.lookup import GraspMap
 from softjaw.study.quantities import DONE, FAILED, MODELS, quantities
@@ -14,6 +15,7 @@ from softjaw.study.ranking import distinct, judge
 from softjaw.study.result import read
 from softjaw.study.result.store import open_result
 from softjaw.study.run.objects import row_of
+from softjaw.study.run.refine import scores_of_poses
 from softjaw.study.show.best_grasps import best, safe_range
 from softjaw.study.show.status import grouped
 from softjaw.study.table import MOST_NOTES, PAPER, as_csv, as_json
@@ -258,9 +260,16 @@ def test_a_grasp_that_the_hand_of_the_scene_does_not_reach_comes_last(tmp_path, 
     table = best(ds, lines=True)
     assert stations(table) == order
     assert judge(ds).attrs["best"] == (int(order[0]), 0, 1)
-    assert [point.place[0, 0] for point in GraspMap(path).best(2)] == order
+    points, reached = GraspMap(path).best(2), order[0] == 0.0
+    assert [point.place[0, 0] for point in points] == order
+    assert [bool(point.flags & Flag.OUT_OF_REACH) for point in points] == [False, not reached]
+    assert [case["place"]["station"] for case in chosen(ds)[0]] == order
     with open_result(path) as result:
         assert row_of(result)["best"] == order[0]
+        assert np.isfinite(scores_of_poses(result)).all(axis=1).tolist() == [reached, True]
+    if not reached:  # where nothing else is left the answer says so, and no other force would help
+        alone = best(ds.isel(station=[0]), lines=True).facts["answer"]
+        assert Flag.OUT_OF_REACH.sentence in alone["limit"]
     assert any("p00" in note for note in table.notes) == (order[0] == 1.0)
 
 
