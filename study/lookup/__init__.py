@@ -199,7 +199,7 @@ class GraspMap:
 
     def interpolated(self, name: str, model: str, at: Corners) -> FloatArray:
         """A quantity at many points, whether they can be trusted or not."""
-        values = blend(self.table(name, model), at)
+        values = blend(self.table(name, model), at, name)
         return np.where(_like(at.swap, values, 0), values[:, ::-1], values) if "/" in name else values
 
     def errors(self, name: str, model: str, at: Corners) -> FloatArray:

@@ -31,6 +31,7 @@ OF_ANGLES, OF_FORCES = 3.0, 2.6  # times that along these: along angles payload 
 MOST_TURN = math.radians(25)  # between angles farther apart even such claims hold for half of the points
 BESIDE_CASES = 0.45  # of what interpolation claims alone, where the cases state errors: those err on the safe side, too
 CLOSING_GAP_RATIO = 1.5  # a gap that closes a circle may be this much wider than the others
+SEMI_AXES = "limit_surface/semi_axes"
 KINDS = {"pieces": 7, "holes": 7, "rims": 1}  # what identifies a kind of contact, and the largest number that counts
 UPPER = np.array(list(np.ndindex(2, 2, 2)))  # which corners of a cell are its upper ones, along each axis
 
@@ -146,16 +147,16 @@ def corners(axes: Sequence[Nodes], points: FloatArray) -> Corners:
     return Corners(index, np.where(UPPER, share[:, None], 1 - share[:, None]).prod(-1), share, power, inside, swap)
 
 
-def blend(table: FloatArray, at: Corners) -> FloatArray:
+def blend(table: FloatArray, at: Corners, name: str = "") -> FloatArray:
     """Values of ``table (nodes, ...)`` at ``m`` points, ``(m, ...)``; corners without weight do not count.
 
-    Along the force by a power law between positive values of cases and fingers.
+    Along the force by a power law between positive values of cases and fingers, and lengths of semi-axes.
     """
     values = table[at.index]
     weight = at.weight.reshape(at.weight.shape + (1,) * (table.ndim - 1))
     parts = np.where(weight > 0, values * weight, 0.0)
     line = np.asarray(parts.sum(axis=1))
-    if table.ndim > 2:  # coefficients of limit surfaces stay convex on straight lines
+    if table.ndim > 2 and name != SEMI_AXES:  # coefficients of limit surfaces stay convex on straight lines
         return line
     share, power = (s.reshape(-1, *(1,) * (table.ndim - 1)) for s in (at.share[:, 2], at.power))
     low, high = parts[:, ::2].sum(axis=1), parts[:, 1::2].sum(axis=1)  # times 1 - share, and share
@@ -266,7 +267,7 @@ def at_force(ds: xr.Dataset, force: float) -> xr.Dataset:
         dims, first, last = ds[name].dims, low[name].values, high[name].values
         if ds[name].dtype.kind == "f":
             values = (1 - share) * first + share * last
-            if not {"component", "monomial", "wrench"} & set(dims):
+            if name == SEMI_AXES.replace("/", "_") or not {"component", "monomial", "wrench"} & set(dims):
                 values = power_law(first, last, power, values)
             between[name] = (dims, values, ds[name].attrs)
         elif name == "flags":

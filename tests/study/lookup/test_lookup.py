@@ -303,6 +303,12 @@ def test_limit_surfaces_come_between_those_of_the_cases_around_and_bounds_of_the
         values[..., 3, :, :, :] = known.quartic(16.0, 16.0, 16.0)  # at 8 N: half as far along every axis
         return values
 
+    def lengthening(values):  # the torque's grows with the third power of the force
+        values[..., 3, :, :, 2] = 0.032
+        return values
+
+    there = GraspMap(make(tmp_path / "b.hdf", limit_surface__semi_axes=lengthening))
+    assert there.at(0.01, 0.1, 6).semi_axes()[0] == pytest.approx([4.8, 4.8, 0.032 * 1.5**3])
     there = GraspMap(make(tmp_path / "a.hdf", limit_surface__coefficients=growing))
     exact = there.at(0.01, 0.1, 4).limit_surface(2)
     assert exact.semi_axes == pytest.approx(np.array([1, 1, 0.02 / 4**0.25]) * 0.8 * 4, rel=1e-9)
