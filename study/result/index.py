@@ -78,7 +78,8 @@ def code_of(rows: Sequence[Row]) -> int:
     states = {row["state"] for row in rows}
     if states & {MISSING, STOPPED}:
         return messages.STOPPED
-    return messages.SOME_FAILED if states - {DONE, NO_GRASP} else messages.DONE
+    some = any(row["failed"] > 0 for row in rows)  # also of an object that has no grasp
+    return messages.SOME_FAILED if some or states - {DONE, NO_GRASP} else messages.DONE
 
 
 def write_index(path: Path, rows: Sequence[Row], attributes: Mapping[str, Any]) -> None:

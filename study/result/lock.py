@@ -40,7 +40,7 @@ class Lock:
             holder = os.read(self._fd, 200).decode(errors="replace").strip()
             self.release()
             if attempt == 5:
-                raise self._in_use(holder or "name unknown")
+                raise self.in_use(holder or "name unknown")
             time.sleep(0.1)
         with self._writing():
             # A shorter name must not keep the end of a longer one that a killed run left.
@@ -70,9 +70,10 @@ class Lock:
         """On rank 0, when all ranks hold the lock: raise `StudyError` if another run was quicker."""
         holder = os.pread(self._fd, 200, 0).decode(errors="replace").strip()
         if holder != self.owner:
-            raise self._in_use(holder)
+            raise self.in_use(holder)
 
-    def _in_use(self, holder: str) -> StudyError:
+    def in_use(self, holder: str) -> StudyError:
+        """That another run has it."""
         return StudyError(IN_USE, f"{self.result}: in use by another run ({holder}); wait for it")
 
     def remove(self) -> None:

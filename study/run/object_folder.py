@@ -128,6 +128,8 @@ def _of_table(path: Path) -> Lines:
     if "mesh" not in columns or len(set(columns)) < len(columns):
         text = f"{path}:1: found {shown(', '.join(columns))}, expected columns with commas between them"
         raise StudyError(USAGE, f"{text}, each once and one of them `mesh`")
+    if of_run := [name for name in columns if name.startswith("run.")]:
+        raise StudyError(USAGE, f"{path}:1: found the column {of_run[0]}, expected it in the scene, for all objects")
     for place, line in lines:
         if None in line or not line["mesh"]:
             what = "more cells than columns" if None in line else "no mesh"

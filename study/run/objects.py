@@ -25,6 +25,7 @@ from softjaw.study.flags import LOST, Flag, flag_words
 from softjaw.study.messages import NoGraspError, StudyError, complain, first_of, shortened
 from softjaw.study.ranking import judge, largest, task_keys
 from softjaw.study.result import index
+from softjaw.study.result.lock import Lock, holder
 from softjaw.study.result.read import dataset, values_of
 from softjaw.study.result.skeleton import rewrite
 from softjaw.study.result.store import open_result, torn_rows
@@ -68,10 +69,10 @@ def run_objects(
     Raises `StudyError` on every rank: what is wrong for all objects alike, ``out`` is in use, of another
     scene, or cannot be written.
     """
-    with locked(path := out / f"{index.INDEX}.hdf", comm):
+    with locked(out / f"{index.INDEX}.hdf", comm):
         run = _ObjectsRun(folder, out, study, work, comm, retry_failed)
         batch = min(max(BATCH_PER_RANK * comm.size, BATCH_PER_RANK), MOST_OPEN_FILES)
-        if not run.todo() and (run.moved or not on_rank0(comm, path.exists)):  # all are refused
+        if run.changed and not run.todo():
             run.store()
         while todo := run.todo()[:batch]:
             if not run.solve(todo):
@@ -81,7 +82,7 @@ def run_objects(
 
 
 class _ObjectsRun:
-    """What all ranks know of a run: ``rows`` of the index, one an object, and whether meshes have ``moved`` since it.
+    """What all ranks know of a run: ``rows`` of the index, one an object, and whether they have ``changed`` since it.
 
     ``_mine`` is what this rank has planned.
     """
@@ -91,7 +92,7 @@ class _ObjectsRun:
     ) -> None:
         self._folder, self._out, self._study, self._work, self._comm = folder, out, study, work, comm
         self._retry = retry_failed
-        self.rows, self.moved = on_rank0(comm, _rows_of, folder, out, retry_failed)
+        self.rows, self.changed = on_rank0(comm, _rows_of, folder, out, retry_failed)
         self._mine: dict[int, tuple[Plan, Work]] = {}
         self._failed: list[tuple[int, Row]] = []
         self._tried: set[int] = set()
@@ -181,6 +182,8 @@ class _ObjectsRun:
     def _prepared(self, n: int) -> Part:
         begin, listed = time.perf_counter(), self._folder.objects[n]
         overrides, path = self._folder.overrides_of(listed), self._out / f"{listed.name}.hdf"
+        if other := holder(path):
+            raise Lock(path, "").in_use(other)
         plan, work = self._study(self._folder.scene(listed), overrides)
         if work.grown and (rounds := rounds_in(path, plan)):
             plan, work = work.grown(rounds)
@@ -267,7 +270,7 @@ class _ObjectsRun:
 
 
 def _rows_of(folder: ObjectFolder, out: Path, retry_failed: bool) -> tuple[list[Row], bool]:
-    """A row for every object: what an earlier run has stored, or nothing yet; whether a mesh moved; by one process."""
+    """A row for every object: what an earlier run has stored, or nothing yet; whether any changed; by one process."""
     path = out / f"{index.INDEX}.hdf"
     known = {row["object"]: row for row in index.read_index(path)[0]} if path.exists() else {}
     again = {index.FAILED, index.REFUSED, index.NO_GRASP, index.SOME_FAILED} if retry_failed else set()
@@ -290,7 +293,9 @@ def _rows_of(folder: ObjectFolder, out: Path, retry_failed: bool) -> tuple[list[
         if before["key"] == key and (before["done"] < 1 or (out / row["file"]).exists()):
             row = before | {"mesh": row["mesh"]} | ({"state": index.MISSING} if before["state"] in again else {})
         rows.append(row | {"key": key} | ({} if mass is None else {"mass": in_si("mass_g", mass)}))
-    return rows, any(row["mesh"] != known.get(row["object"], row)["mesh"] for row in rows)
+    told = "object", "mesh", "state", "reason"
+    stored, now = ([[row[name] for name in told] for row in these] for these in (known.values(), rows))
+    return rows, stored != now
 
 
 def _change(path: Path, scene: Scene) -> str:

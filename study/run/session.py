@@ -23,7 +23,8 @@ from numba.core.event import Event, Listener, install_listener
 from softjaw.study.messages import CANNOT_WRITE, STOPPED, StudyError, complain, launched, make_folders
 from softjaw.study.quantities import DONE, FAILED, MISSING
 from softjaw.study.result import provenance
-from softjaw.study.result.lock import Lock, OpenedFile
+from softjaw.study.result.index import INDEX
+from softjaw.study.result.lock import Lock, OpenedFile, holder
 from softjaw.study.result.skeleton import create, rewrite
 from softjaw.study.result.store import Result, open_result, torn_rows
 from softjaw.study.result.write import MESH, Files, ResultWriter, codes_on, verify
@@ -113,8 +114,10 @@ def locked(path: Path, comm: Any) -> Iterator[None]:
     """
     # Host and process: two runs on one file system must not have the same name.
     owner = f"host {os.uname().nodename}, process {os.getpid()}, {comm.size} rank{'s' * (comm.size > 1)}"
-    lock = Lock(path, owner)
+    lock, index = Lock(path, owner), path.with_name(f"{INDEX}.hdf")
     try:
+        if index != path and (other := on_rank0(comm, holder, index)):  # the run of a folder holds its files, too
+            raise lock.in_use(other)
         on_rank0(comm, _take, lock, path)
         if comm.rank:
             lock.join()

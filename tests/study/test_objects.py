@@ -10,11 +10,13 @@ import h5py
 import numpy as np
 import pytest
 import trimesh
+from mpi4py import MPI
 
 import softjaw
-from softjaw.study.messages import DONE, OTHER_FILE, SOME_FAILED, STOPPED, USAGE, StudyError
-from softjaw.study.result.index import blank_row, open_index, write_index
+from softjaw.study.messages import DONE, IN_USE, OTHER_FILE, SOME_FAILED, STOPPED, USAGE, StudyError
+from softjaw.study.result.index import NO_GRASP, blank_row, code_of, open_index, write_index
 from softjaw.study.run.object_folder import folder_of
+from softjaw.study.run.session import locked
 from softjaw.study.scene.text import quoted
 from tests.study import fake_objects
 from tests.study.launching import contents, differing, here, launch
@@ -77,7 +79,8 @@ def test_a_pattern_and_a_table_list_objects_with_a_name_of_their_own(scene):
 
 @pytest.mark.parametrize("mesh", [
     "nothing/*.stl", "missing.csv", "scene.toml*", "mesh\nmeshes/a.stl\nmeshes/a.stl\n", "mesh;unit\nmeshes/a.stl;m\n",
-    "mesh,name\nmeshes/a.stl,x\nmeshes/bug.stl,X\n", "mesh,unit,unit\nmeshes/a.stl,m,m\n", "mesh,name\nmeshes/a.stl,/a",
+    "mesh,run.time_limit_s\nmeshes/a.stl,9\n", "mesh,name\nmeshes/a.stl,x\nmeshes/bug.stl,X\n",
+    "mesh,unit,unit\nmeshes/a.stl,m,m\n", "mesh,name\nmeshes/a.stl,/a",
     '"meshes/a*', "latin/*",
 ])  # fmt: skip
 def test_a_pattern_without_meshes_and_a_table_with_a_name_or_a_column_twice_are_refused(scene, mesh):
@@ -192,13 +195,20 @@ def test_again_nothing_is_solved_another_mesh_is_refused_and_a_signal_stops_in_o
         assert {Path(str(row.mesh.values)).parent.name for row in rows(solved).values()} == {new}
     mesh = scene.parent / "meshes/a.stl"
     content = mesh.read_bytes()
-    mesh.unlink()
-    assert "note: 1 of 7" in here(fake_objects.main, scene, solved)[1]
     trimesh.creation.box((0.02, 0.02, 0.02)).export(mesh)
     try:
         assert here(fake_objects.main, scene, solved)[0] == OTHER_FILE
+        mesh.unlink()
+        (unread := mesh.with_name("unread.stl")).write_bytes(b"")
+        code, text, _ = here(fake_objects.main, scene, solved)
+        assert (code, "note: 1 of 7" in text) == (SOME_FAILED, True)
+        # nothing was left to solve, but the index says what there is now
+        assert sorted(rows(solved)) == sorted(path.stem for path in mesh.parent.glob("*.stl"))
+        unread.unlink()
     finally:
         mesh.write_bytes(content)
+    assert here(fake_objects.main, scene, solved)[0] == SOME_FAILED
+    assert rows(solved)["a"].state.values.item() == "complete"
     out = scene.parent / "stopped"
     assert here(fake_objects.main, scene, out, "--stop-after", 40)[0] == STOPPED
     assert "not complete" in open_index(out / "index.hdf").state.values
@@ -261,3 +271,19 @@ def test_an_object_of_a_folder_has_the_bits_of_a_run_of_its_own(tmp_path):
     assert command(0, "report", out)[0] == DONE
     assert (out / "index.html").read_text().count("data:image/png") == 2
     assert command(0, "export", out, "--format", "graspgen", "-o", tmp_path / "set")[0] == DONE
+
+
+def test_an_object_without_a_grasp_some_of_whose_cases_failed_has_the_code_of_those():
+    none = blank_row("none", state=NO_GRASP, failed=0)
+    assert code_of([none]) == DONE
+    assert code_of([none, none | {"failed": 1}]) == SOME_FAILED
+
+
+def test_a_run_of_one_object_of_a_folder_waits_for_the_folder_and_the_folder_for_it(scene, tmp_path):
+    comm, other = MPI.COMM_SELF, tmp_path / "a.hdf"
+    for held, wanted in ((tmp_path / "index.hdf", other), (other, other)):
+        with locked(held, comm), pytest.raises(StudyError) as refusal, locked(wanted, comm):
+            pass
+        assert refusal.value.code == IN_USE
+    with locked(other, comm):
+        assert here(fake_objects.main, scene, tmp_path)[0] == IN_USE

@@ -33,7 +33,7 @@ BEST = 6
 SHOWN = ("payload", "quality", "quality_fitted", "e_n", "f_x_max", "f_y_max", "tau_z_max", "indentation", "wall_stress",
          "wall_strain", "support_force", "safety_factor")  # fmt: skip
 SAFE = "Safe forces per finger hold the object's weight and are borne by its wall; +: also the largest solved force is."
-STRESS = "Wall stress: largest von Mises stress on both faces. Support force: what table or clamp bears along the axis."
+STRESS = "Wall stress: largest von Mises stress on both faces. Support force: what bears the push across the approach."
 
 
 def best_grasps(ds: xr.Dataset) -> list[Block]:
