@@ -18,7 +18,7 @@ from softjaw.study.run.limits import require_room
 from softjaw.study.scene.sections import FINEST
 
 TIMED = "judged by a few load paths that were solved for it"  # what a time follows from
-TIMED_S = 15.0  # seconds of the processor after which no further load path is begun
+TIMED_S = 7.0  # seconds of the processor after which no further load path is begun
 END_S = 2.0  # seconds to pack a file and list its grasps
 FIRST_FORCE_FACTOR = 2.0  # times as long the first force takes, which begins with a coarse step
 MOST_PROMISING = 3  # sampled grasps that are solved as well as listed ones
