@@ -106,6 +106,7 @@ def test_the_surface_approaches_the_body_with_the_square_of_the_facet_size():
     assert straight == pytest.approx([-2 / 3] * 3, rel=0.02)
 
 
+@pytest.mark.long
 def test_a_leaning_body_is_followed_and_the_noise_of_a_scan_smoothed():
     exact = Stacked(LEANING)
     surface, report = traced(sampled(LEANING, 0.003))

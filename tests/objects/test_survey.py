@@ -91,7 +91,10 @@ def test_nine_of_ten_errors_are_inside_the_stated_ones_and_these_are_not_far_too
     assert stated[known].mean() < 6.0 * true[known].mean()  # 2 to 4 on 144 scenes, ten swing
 
 
-@pytest.mark.parametrize("name", MADE)
+SHORT = "mug", "banana with holes"
+
+
+@pytest.mark.parametrize("name", [*SHORT, *(pytest.param(n, marks=pytest.mark.long) for n in MADE if n not in SHORT)])
 def test_it_loads_and_can_be_grasped(name, tmp_path):
     path = tmp_path / "body.stl"
     MADE[name]().export(path)

@@ -50,7 +50,8 @@ def bits(result):
     return values, {k: v.tobytes() for k, v in result.patch.items()}, result.message, result.effects
 
 
-@pytest.mark.parametrize("overrides", [(), ROUGH, WALL], ids=["rigid", "friction", "wall"])
+@pytest.mark.parametrize("overrides", [ROUGH, *(pytest.param(of, marks=pytest.mark.long) for of in ((), WALL))],
+                         ids=["friction", "rigid", "wall"])  # fmt: skip
 def test_a_force_has_the_same_bits_whichever_others_are_asked_for(overrides):
     assert list(whole(overrides)) == [0, 1, 2]
     for wanted in ([2], [1], (2, 0)) if not overrides else ([2], [1]):
@@ -228,6 +229,7 @@ def test_the_target_may_be_for_another_quantity(of):
     assert finer[f"maps/{of}_error"] != two
 
 
+@pytest.mark.long
 def test_a_fourth_mesh_follows_where_the_error_is_above_the_target_no_fifth_and_steps_are_part_of_errors():
     values = refined(*aim(2e-4), wanted=[0])[0].values
     assert values["maps/e_n_error"] > 2e-4

@@ -58,7 +58,7 @@ def test_e_n_converges_with_an_order_from_1_to_13_n(place, hex8, hex27):
         assert least < order < 4, element
 
 
-@pytest.mark.parametrize("width", [18, 22, 24])
+@pytest.mark.parametrize("width", [22, *(pytest.param(mm, marks=pytest.mark.long) for mm in (18, 24))])
 def test_errors_hold_where_the_edge_of_a_face_lies_within_an_element(width):
     """Both meshes may agree on a contact that is wider than the face, by up to an element on either side."""
     box = f"[object]\nshape = 'box'\nsize_mm = [40, {width}, 80]\nedge_radius_mm = 3\n" + PAD.format(50, 22, 15)

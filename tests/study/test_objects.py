@@ -110,7 +110,10 @@ def test_check_reports_every_object_with_its_line_and_a_wrong_first_one_stops_no
     assert set(re.findall(r"note: (\w+): ", text)) == {"open", "wide"}
 
 
-@pytest.mark.parametrize(("objects", "count"), [("meshes/[al]*.stl", 3), ("odd [1]", 1), ("some.csv", 2)])
+@pytest.mark.parametrize(("objects", "count"), [
+    pytest.param("meshes/[al]*.stl", 3, marks=pytest.mark.long), pytest.param("odd [1]", 1, marks=pytest.mark.long),
+    ("some.csv", 2),
+])  # fmt: skip
 def test_the_command_line_names_meshes_from_where_it_is(scene, objects, count, monkeypatch):
     """A folder, a pattern or a table; not from the scene's folder, as a key of the scene would be."""
     (scene.parent / "sub").mkdir(exist_ok=True)

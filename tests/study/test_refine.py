@@ -189,6 +189,7 @@ def test_the_top_of_a_hill_is_found_no_pose_tried_twice_and_new_ones_stand_in_th
     assert all(abs(x[1]) < 0.5 for x in level)  # between the faces x = -30 and 30 mm
 
 
+@pytest.mark.long
 def test_no_neighbour_is_put_over_a_hole_and_a_search_ends_where_finer_steps_gain_nothing(tmp_path):
     body = trimesh.creation.box((60, 40, 120)).subdivide_to_size(6.0)
     middle = body.triangles_center

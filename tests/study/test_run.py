@@ -75,6 +75,7 @@ def test_a_case_that_kills_the_process_twice_is_given_up(tmp_path, uninterrupted
     assert differing(path, uninterrupted) == []
 
 
+@pytest.mark.long
 def test_a_failed_case_has_its_reason_and_stops_nobody_nor_other_forces_that_are_apart(tmp_path, uninterrupted):
     path = tmp_path / "failed.hdf"
     ended(2, path, "--fail", 9, "--raises", 25, code=6)

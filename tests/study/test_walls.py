@@ -75,7 +75,7 @@ def test_the_level_follows_the_indentation_and_compression_is_a_strain_too(monke
     assert values["maps/support_force"] == pytest.approx(3.0)
 
 
-@pytest.mark.parametrize("support", ["standing", "free"])
+@pytest.mark.parametrize("support", ["free", pytest.param("standing", marks=pytest.mark.long)])
 def test_on_a_slope_a_stiff_wall_is_a_rigid_object_and_stiffness_and_force_scale_together(support):
     made = SLOPE, f"object.support='{support}'", "object.wall_mm=2.5", "effects.friction_pressure_coupling='none'"
 
@@ -119,6 +119,7 @@ def test_a_wall_that_is_taken_as_rigid_holds_what_the_rigid_object_does():
         assert ours == pytest.approx(theirs, rel=1e-3)
 
 
+@pytest.mark.long
 def test_a_foot_that_a_table_would_have_to_pull_down_is_named():
     pulled, heavy, free = (
         solved(CUP, *changes, "effects.object='nonlinear_shell'")[-1].message
@@ -160,6 +161,7 @@ def test_a_tilted_approach_keeps_one_plane_and_one_along_the_axis_is_refused():
         solved(CUP, where=pose_of((0, 0, 50), [0, 0, 1], [1, 0, 0]))
 
 
+@pytest.mark.long
 def test_images_of_a_grasp_are_what_their_own_solution_would_be_whatever_was_solved_before():
     where = "stations_mm = [40]\nangles_deg = [0, 37]"
     unit = walled(CUP, where=where)[0]
@@ -182,6 +184,7 @@ def test_images_of_a_grasp_are_what_their_own_solution_would_be_whatever_was_sol
             assert not differing(a, b, 0.0)
 
 
+@pytest.mark.long
 def test_two_meshes_tell_the_error_a_tube_gives_way_more_than_a_cup_and_a_collapse_fails_the_case(monkeypatch):
     result = solved(CUP, "accuracy.meshes=2", forces="[2]", elements="[8, 8, 4]")[0]
     assert 0 < result.values["maps/e_n_error"] < 0.3
@@ -215,6 +218,7 @@ def test_two_meshes_tell_the_error_a_tube_gives_way_more_than_a_cup_and_a_collap
         assert (Flag.SLIDES_OUT.sentence in result.message) == slides
 
 
+@pytest.mark.long
 def test_a_light_touch_of_a_large_flat_wall_is_solved():
     """A canister of 180 x 250 mm: the rounding of its residual grows with its extent and thickness."""
     canister = 'shape = "sections"\nwall_mm = 1.2\nwall_material = "HDPE"\n' + "".join(

@@ -82,7 +82,7 @@ def test_a_very_stiff_wall_is_a_rigid_object():
 
 @pytest.mark.parametrize(("allowed", "level", "control"), [
     ((True, True), "nonlinear", FORCE), ((True, False), "linear", FORCE),
-    ((False, False), "nonlinear", Control(closing=1.5e-3)),
+    pytest.param((False, False), "nonlinear", Control(closing=1.5e-3), marks=pytest.mark.long),
 ])  # fmt: skip
 def test_so_is_that_of_a_grasp_with_friction(allowed, level, control):
     """From a state with a history: some points stick, some slip, some are open."""
@@ -104,6 +104,7 @@ def test_so_is_that_of_a_grasp_with_friction(allowed, level, control):
     check_tangent(problem, x, 1e-10, 1e-7)
 
 
+@pytest.mark.long
 def test_where_gaps_have_no_state_the_path_goes_on_with_the_next_kind_and_without_friction_nothing_changes(monkeypatch):
     expected = [s.fingers[0].closing for s in grip(thin(), elements=(4, 2, 2)).load_path(FORCES)]
     problem, level, failed = grip(thin(), elements=(4, 2, 2)).problem, Grip._level, []

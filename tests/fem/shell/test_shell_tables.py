@@ -60,6 +60,7 @@ def path_of(case, largest_factor):
             return np.array(path).T
 
 
+@pytest.mark.long
 def test_hinged_roof_past_both_limit_points():
     table = TABLES["hinged_roof_12.7"]
     w, P = path_of(shell_problems.hinged_roof(12.7), 1.0)

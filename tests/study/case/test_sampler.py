@@ -38,6 +38,7 @@ def box(*size):
     return surface(trimesh.creation.box(extents=size))
 
 
+@pytest.mark.long
 def test_height_fields_of_a_ball_are_its_caps_a_bar_is_held_across_its_short_side_a_cylinder_through_its_axis():
     radius = 0.03
     points, triangles = surface(trimesh.creation.icosphere(5, radius))
@@ -66,6 +67,7 @@ def test_height_fields_of_a_ball_are_its_caps_a_bar_is_held_across_its_short_sid
     assert best.opening == pytest.approx(0.06, rel=5e-3)
 
 
+@pytest.mark.long
 def test_inner_walls_do_not_count_large_fingers_meet_a_step_and_the_same_seed_gives_the_same_grasps():
     outer, inner = trimesh.creation.icosphere(4, 0.03), trimesh.creation.icosphere(4, 0.028)
     hollow = trimesh.util.concatenate([outer, inner])

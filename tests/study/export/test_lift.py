@@ -73,6 +73,7 @@ def cylinder(tmp_path_factory):
     return path
 
 
+@pytest.mark.long
 def test_it_holds_nine_tenths_of_the_payload_lets_go_at_twelve_tenths_and_a_plate_does_not_creep(cylinder, tmp_path):
     """The long test has more objects and more time."""
     assert holds(*best(cylinder), 0.9, 0.5).all()

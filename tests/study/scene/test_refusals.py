@@ -78,6 +78,7 @@ def test_a_pad_that_just_meets_the_object_is_not_refused():
 
 
 @pytest.mark.ranks
+@pytest.mark.long
 def test_a_run_refuses_poses_off_the_object_by_their_labels(tmp_path):
     text = text_of(BALL, pose_of(label="near") + pose_of((0, 38, 50), label="far"))
     (tmp_path / "scene.toml").write_text(text)
