@@ -232,14 +232,17 @@ def split_of(seconds: dict[str, NDArray[np.float64]]) -> list[str]:
 
 
 def sessions(result: Any, running: bool, width: int = PAPER) -> list[str]:
-    """One line for each time the study was started."""
-    lines = []
-    for i, s in enumerate(result.sessions, start=1):
-        now = running and i == len(result.sessions)
+    """One line for each time the study was started, and for each further round."""
+    lines, number, turn, stored = [], 0, 1, result.sessions
+    for i, s in enumerate(stored, start=1):
+        # what follows on a complete one is its next round
+        further = i > 1 and stored[i - 2]["reason"] == "complete"
+        number, turn = (number, turn + 1) if further else (number + 1, 1)
+        now = running and i == len(stored)
         reason = s["reason"] if s["stop"] else "running" if now else "no end was recorded (killed?)"
         ranks = f"{s['ranks']} rank{'s' * (s['ranks'] != 1)} on {s['host']}"
         took = lasted(s["start"], s["stop"]) if s["stop"] else ""
-        parts = (f"session {i}: {s['start']}", ranks, took, reason)
+        parts = (f"session {number}{f', round {turn}' * further}: {s['start']}", ranks, took, reason)
         lines.append(wrapped(", ".join(filter(None, parts)), width, "  ", "  "))
     return lines
 

@@ -1,6 +1,7 @@
 """The best grasps: which force, which order, which errors; the same numbers in text, CSV and JSON."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ from softjaw.study.result.store import open_result
 from softjaw.study.run.objects import row_of
 from softjaw.study.run.refine import scores_of_poses
 from softjaw.study.show.best_grasps import best, safe_range
-from softjaw.study.show.status import grouped
+from softjaw.study.show.status import grouped, sessions
 from softjaw.study.table import MOST_NOTES, PAPER, as_csv, as_json
 from tests.study import formula_results
 from tests.study.scenes import pose_of
@@ -304,3 +305,11 @@ def test_the_safe_forces_of_a_grasp(low, high, text):
     row = json.loads(as_json(best(ds)))["grasps"][0]
     assert row["force_high"] == (None if np.isnan(high) else high)
     assert "safe_forces" not in row
+
+
+def test_what_follows_on_a_complete_session_is_its_next_round():
+    reasons = "stopped by SIGTERM", "complete", "complete", "stopped by SIGUSR1", "complete"
+    each = {"start": "2026-01-01T00:00:00", "stop": "2026-01-01T00:01:00", "ranks": 1, "host": "a"}
+    stored = [each | {"reason": reason} for reason in reasons]
+    heads = [line.split(":")[0].split()[1:] for line in sessions(SimpleNamespace(sessions=stored), False)]
+    assert heads == [["1"], ["2"], ["2,", "round", "2"], ["2,", "round", "3"], ["3"]]
