@@ -21,7 +21,6 @@ from softjaw.fem.objects.triangle_tree import TriangleTree, area_vectors, compon
 from softjaw.friction.patch import FloatArray
 
 SMALLEST, LARGEST = 1e-3, 2.0  # plausible largest extent of an object that a gripper holds [m]
-SEAM = 3e-4  # of the extent: corners of two borders this close are one
 HUGE_COORDINATE = 1e12  # of a coordinate, in any unit
 ROUNDED = 5e-7  # of the largest coordinate: corners this close are one; files hold numbers of single precision (6e-8)
 MOST_TRIANGLES, DECIMATED_TO = 500_000, 200_000
@@ -119,8 +118,8 @@ def _side_by_side(points: FloatArray, triangles: IntArray) -> IntArray:
     shortest = np.full(len(points), np.inf)
     np.minimum.at(shortest, border, np.linalg.norm(np.subtract(*points[border.T]), axis=1)[:, None])
     corners = np.unique(border)
-    pairs = corners[cKDTree(points[corners]).query_pairs(SEAM * np.ptp(points), output_type="ndarray")]
-    # two corners of one sheet are farther apart than that
+    # of the extent, and of an edge: two corners of one sheet are farther apart
+    pairs = corners[cKDTree(points[corners]).query_pairs(3e-4 * np.ptp(points), output_type="ndarray")]
     return pairs[np.linalg.norm(np.subtract(*points[pairs.T]), axis=1) < 0.3 * shortest[pairs].min(axis=1)]
 
 

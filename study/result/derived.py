@@ -19,8 +19,6 @@ from softjaw.study.scene import Scene
 
 LOW, HIGH = FORCE_RANGE
 LOW_ERROR, HIGH_ERROR = f"{LOW}_error", f"{HIGH}_error"
-SLOPES = 0.5, 2.0  # of maps over forces, as logarithms: what contacts do that begin from nothing
-UNSURE = 0.15  # of such an exponent below the first force: payloads that torques limit change theirs
 # maps that they follow from, of the curved model
 SOURCES = ("safety_factor", "payload_error", "indentation", "indentation_error", "wall_stress", "wall_stress_error")
 
@@ -109,7 +107,7 @@ def crossing(
     Between solved forces by power laws, as look-ups interpolate, below the first by the law of the first two. A solved
     value within `UNDECIDED` of the limit has passed it; what comes after a NaN is not used. The error is that of a
     look-up there, from what the values ``stated (..., k)`` as shares; below the first force also what another exponent
-    makes of it, that of the next two forces or one that differs by `UNSURE`. NaN where no two forces tell a law.
+    makes of it, that of the next two forces or one that differs by 0.15. NaN where no two forces tell a law.
 
     >>> [v.round(3).tolist() for v in crossing([1.0, 2.0], [[0.5, 2.0], [0.5, 0.9]], 1.0, 0.1)]
     [[1.414, nan], [0.261, nan]]
@@ -125,7 +123,8 @@ def crossing(
 
     with np.errstate(divide="ignore", invalid="ignore"):
         slopes = np.diff(np.log(np.where(y > 0.0, y, np.nan))) / np.diff(np.log(x))
-        first = np.clip(np.nan_to_num(slopes[..., :1], nan=1.0), *SLOPES) if len(x) > 1 else np.ones_like(y)
+        # exponents of contacts that begin from nothing
+        first = np.clip(np.nan_to_num(slopes[..., :1], nan=1.0), 0.5, 2.0) if len(x) > 1 else np.ones_like(y)
         exponents = np.concatenate([first, slopes], axis=-1)
         below, low, high, exponent = np.maximum(k - 1, 0), taken(y, k - 1), taken(y, k), taken(exponents, k)
         law = x[k] * (limit / high) ** (1.0 / exponent)
@@ -138,7 +137,8 @@ def crossing(
         claims = law_claims(y, plain("force", "N", x), np.zeros(y.shape, bool))
         of_law = BESIDE_CASES * taken(claims, below) * share * (1.0 - share)
         error = np.hypot(of_law, np.fmax(taken(stated, below), taken(stated, k)))
-        changes = np.abs(np.diff(slopes[..., :2])).max(axis=-1, initial=UNSURE)
-        error += np.where(k > 0, 0.0, np.log(x[0] / at) * np.fmax(changes, UNSURE))
+        # payloads that torques limit change their exponent by as much
+        changes = np.fmax(np.abs(np.diff(slopes[..., :2])).max(axis=-1, initial=0.0), 0.15)
+        error += np.where(k > 0, 0.0, np.log(x[0] / at) * changes)
         error = np.where(nothing, np.fmax(at - x[below], x[k] - at), at * error / exponent)
     return at, np.where(np.isfinite(y[..., 1]) | (k > 0), error, np.nan)
