@@ -20,7 +20,7 @@ from softjaw.study.grippers import Hand, gripper_file
 from softjaw.study.messages import StudyError
 from softjaw.study.quantities import DONE, FORCE_RANGE, LEAST_FORCE, LISTED
 from softjaw.study.result.interpolation import at_force
-from softjaw.study.result.read import half_width, scene_of, stated_error, values_of
+from softjaw.study.result.read import half_width, scene_of, stated_error, swept_values, values_of
 from softjaw.study.scene.text import scene_table
 
 if TYPE_CHECKING:
@@ -41,12 +41,14 @@ def judged(ds: Any) -> IntArray:
     return ds["flags"].values | outside(ds["normal_force"].values, factor, high, safety_of(ds))
 
 
-def safety_of(ds: Any) -> float:
-    """The safety with which a grasp has to hold the object's mass; 1 where nothing is to be held."""
-    return float(task_keys(ds).get("safety", 1.0)) if "force_low" in ds else 1.0
+def safety_of(ds: Any) -> FloatArray:
+    """The safety with which grasps have to hold the object's mass ``(..., 1, 1, 1)``; 1 where nothing is to be held."""
+    points = ds["status"].shape[:-3] if "force_low" in ds else ()
+    each = [keys_at(ds, at).get("safety", 1.0) if "force_low" in ds else 1.0 for at in np.ndindex(*points)]
+    return np.reshape(np.array(each, float), (*points, 1, 1, 1))
 
 
-def outside(force: FloatArray, factor: Any, high: Any, safety: float) -> IntArray:
+def outside(force: FloatArray, factor: Any, high: Any, safety: FloatArray) -> IntArray:
     """`Flag.TOO_WEAK` where a safety factor is below the one asked for, `Flag.TOO_STRONG` beyond a largest force."""
     weak = factor < safety * (1 - TIE)
     return np.asarray(Flag.TOO_WEAK * weak | Flag.TOO_STRONG * (force > high * (1 + 1e-9)))
@@ -55,6 +57,12 @@ def outside(force: FloatArray, factor: Any, high: Any, safety: float) -> IntArra
 def task_keys(ds: Any, section: str = "task") -> dict[str, Any]:
     """Keys of a section of the scene, defaults filled in; nothing where there is no scene."""
     return scene_table(ds.attrs.get("scene", ""), section)
+
+
+def keys_at(ds: Any, index: Sequence[int] = (), section: str = "task") -> dict[str, Any]:
+    """The same at a case, whose point of the sweep may have others."""
+    swept = {key.partition(".")[2]: v for key, v in swept_values(ds, index).items() if key.startswith(f"{section}.")}
+    return task_keys(ds, section) | swept
 
 
 def falling(values: np.ndarray) -> np.ndarray:

@@ -49,7 +49,7 @@ def broken_rows(file: StoredFile, layout: Layout, path: str, values: Any, rows: 
 def stored_sums(file: StoredFile, layout: Layout, path: str, *, anew: bool = False) -> NDArray[np.uint32]:
     """Checksums of all rows for the dataset at a path, or of the states; as they were read first, or ``anew``."""
     if anew or SUMS not in file.early:
-        file.early[SUMS] = file.values(SUMS, (*layout.shape, len(layout.summed)), np.dtype("<u4"))
+        file.early[SUMS] = file.values(SUMS, (*layout.shape, len(layout.summed)), np.dtype("<u4"), anew=anew)
     return np.asarray(file.early[SUMS][..., layout.summed.index(path)]).ravel()
 
 

@@ -3,7 +3,8 @@
 The safe force range of a candidate is enough to hold the object's weight, and not so much that its wall is damaged.
 """
 
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,8 @@ LOW_ERROR, HIGH_ERROR = f"{LOW}_error", f"{HIGH}_error"
 # maps that they follow from, of the curved model
 SOURCES = ("safety_factor", "payload_error", "indentation", "indentation_error", "wall_stress", "wall_stress_error")
 
+# on which they depend besides
+LIMITS = {"task.safety", "object.allowed_dent_mm", "object.yield_strength_mpa", "object.wall_material"}
 SWEPT = {"object.semi_axis_a_mm", "object.semi_axis_b_mm"}  # give the axes that curvature studies are drawn over
 
 
@@ -77,19 +80,29 @@ def force_ranges(scene: Scene, values: Mapping[str, FloatArray], ended: ArrayLik
     ``ended``: which candidates have no case that is still to come, beyond which nothing is known of the others.
     """
     forces, ranges = np.asarray(scene.load.normal_force), dict[str, FloatArray]()
+    swept = {*scene.sweep, *scene.uncertainty.spread}
+    points = [scene.at(point) for point in scene.points] if swept & LIMITS else [scene]
+
+    def at_points(limit: Callable[[Scene], float | None]) -> FloatArray:
+        """A limit at the points of the sweep, as maps have them but for the force; infinite where there is none."""
+        each = np.array([math.inf if (value := limit(point)) is None else value for point in points])
+        return each.reshape(*next(iter(values.values())).shape[:-3], 1, 1) if len(points) > 1 else each[0]
+
     if scene.object.mass is not None:
-        stated = values.get("payload_error", np.nan)
-        ranges[LOW], ranges[LOW_ERROR] = crossing(forces, values["safety_factor"], scene.task.safety, stated)
+        safety, stated = at_points(lambda point: point.task.safety), values.get("payload_error", np.nan)
+        ranges[LOW], ranges[LOW_ERROR] = crossing(forces, values["safety_factor"], safety, stated)
     if getattr(scene.object, "wall", None) is not None:
-        dent: float | None = getattr(scene.object, "allowed_dent", None)
-        limits = {"indentation": dent, "wall_stress": geometry().material_of(scene.object).yield_strength}
+        limits = {
+            "indentation": at_points(lambda point: getattr(point.object, "allowed_dent", None)),
+            "wall_stress": at_points(lambda point: geometry().material_of(point.object).yield_strength),
+        }
         known = np.isfinite(values["indentation"])
         solved = np.where(known.any(axis=-1) & ended, np.where(known, forces, 0.0).max(axis=-1), np.nan)
 
         def largest(share: float) -> FloatArray:
             """With values that are larger by a share of their errors."""
             larger = {n: values[n] * (1.0 + share * np.nan_to_num(values.get(f"{n}_error", 0.0))) for n in limits}
-            crossings = [crossing(forces, larger[n], most)[0] for n, most in limits.items() if most is not None]
+            crossings = [crossing(forces, larger[n], most)[0] for n, most in limits.items()]
             # fmin, not minimum: a limit that is never passed is NaN and bounds nothing.
             return np.fmin.reduce([solved, *crossings])
 
@@ -100,9 +113,9 @@ def force_ranges(scene: Scene, values: Mapping[str, FloatArray], ended: ArrayLik
 
 
 def crossing(
-    forces: ArrayLike, values: ArrayLike, limit: float, stated: ArrayLike = np.nan
+    forces: ArrayLike, values: ArrayLike, limit: ArrayLike, stated: ArrayLike = np.nan
 ) -> tuple[FloatArray, FloatArray]:
-    """Force at which values ``(..., k)`` first pass a limit [N], NaN for never, and the error of that.
+    """Force at which values ``(..., k)`` first pass a ``limit (...)`` [N], NaN for never, and the error of that.
 
     Between solved forces by power laws, as look-ups interpolate, below the first by the law of the first two. A solved
     value within `UNDECIDED` of the limit has passed it; what comes after a NaN is not used. The error is that of a
@@ -114,8 +127,8 @@ def crossing(
     >>> [v.round(3).tolist() for v in crossing([1.0, 2.0, 4.0], [1.0, 2.0, 8.0], 0.5, 0.0)]  # linear, then quadratic
     [0.5, 0.347]
     """
-    x, y = np.asarray(forces, float), np.asarray(values, float)
-    passed = np.cumprod(np.isfinite(y), axis=-1).astype(bool) & (y >= limit * (1.0 - UNDECIDED))
+    x, y, limit = (np.asarray(v, float) for v in (forces, values, limit))
+    passed = np.cumprod(np.isfinite(y), axis=-1).astype(bool) & (y >= limit[..., None] * (1.0 - UNDECIDED))
     k = passed.argmax(axis=-1)
 
     def taken(parts: ArrayLike, i: NDArray[np.int64]) -> FloatArray:

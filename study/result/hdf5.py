@@ -67,9 +67,15 @@ class StoredFile:
         return [text_of(text) for text in self.values(path).tolist()]
 
     def values(
-        self, path: str, shape: tuple[int, ...] | None = None, dtype: np.dtype | None = None, index: Any = ()
-    ) -> Any:
-        """Values of a dataset, all or those of an index; with ``shape`` and ``dtype`` those of a `checked` one."""
+        self, path: str, shape: tuple[int, ...] | None = None, dtype: np.dtype | None = None, index: Any = (),
+        *, anew: bool = False,
+    ) -> Any:  # fmt: skip
+        """Values of a dataset, all or those of an index; with ``shape`` and ``dtype`` those of a `checked` one.
+
+        ``anew``: as they stand in the file now; HDF5 buffers small datasets as long as they are open.
+        """
+        if anew:
+            self._nodes.pop(path, None)
         dataset = self.plain(path) if shape is None or dtype is None else self.checked(path, shape, dtype)
         with self._damage(path):
             return dataset[index]

@@ -37,6 +37,7 @@ from softjaw.study.result.store import Result, open_result
 from softjaw.study.scene import Scene, SceneError, parse_scene
 from softjaw.study.scene.model import file_digest
 from softjaw.study.scene.sections import UPPER
+from softjaw.study.scene.text import scene_table
 from softjaw.study.units import in_si
 
 if TYPE_CHECKING:
@@ -210,6 +211,14 @@ def sweep_point(ds: xr.Dataset, index: Sequence[int] = ()) -> tuple[int, ...]:
         known = range(len(options)) if texts else [in_si(key, option) for option in options]
         point.append(int(np.abs(np.asarray(known) - value).argmin()))
     return tuple(point)
+
+
+def swept_values(ds: xr.Dataset, index: Sequence[int] = ()) -> dict[str, Any]:
+    """Values of the swept keys at a point of a dataset, see `sweep_point`, in the scene's words and units."""
+    if not scene_table(ds.attrs.get("scene", ""), "sweep"):
+        return {}
+    sweep = _parsed(ds.attrs["scene"]).sweep
+    return {key: options[i] for (key, options), i in zip(sweep.items(), sweep_point(ds, index), strict=False)}
 
 
 @lru_cache(maxsize=64)

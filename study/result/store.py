@@ -82,8 +82,13 @@ class Result:
             return self._values(path)
         # States before values: a row that is marked has all its values.
         rows = np.flatnonzero(self.status != MISSING)
-        values = self._values(path)
-        self._refuse(self._still(checksums.broken_rows(self.file, self.layout, full, values, rows), self.status), path)
+        for patience in (0.0, 0.02, 0.2):  # a run may store a row anew between a look at its values and at its sums
+            time.sleep(patience)
+            values = self._values(path, anew=patience > 0.0)
+            broken = self._still(checksums.broken_rows(self.file, self.layout, full, values, rows), self.status)
+            if not broken.size:
+                return values
+        self._refuse(broken, path)
         return values
 
     def patch(self, row: int) -> dict[str, np.ndarray]:
@@ -117,7 +122,7 @@ class Result:
     @property
     def codes(self) -> np.ndarray:
         """State of every case as the file has it now, whether it is right or wrong."""
-        return self._values("status/code")
+        return self._values("status/code", anew=True)
 
     @property
     def messages(self) -> np.ndarray:
@@ -182,8 +187,8 @@ class Result:
     def _closing(self, name: str) -> np.ndarray:
         """What is filled after all rows, by its name in ``layout.closing``."""
         for patience in (0.02, 0.2, 0.0):  # a run may be writing it just now
-            values = self._values(name) if f"{ROOT}/{name}" in self._known else self._text(name)
-            stored = self._values("checksums/closing")[self.layout.closing.index(name)]
+            values = self._values(name, anew=True) if f"{ROOT}/{name}" in self._known else self._text(name)
+            stored = self._values("checksums/closing", anew=True)[self.layout.closing.index(name)]
             if self._unchecked or checksums.of_array(values) == stored:
                 return values
             time.sleep(patience)
@@ -193,14 +198,14 @@ class Result:
         cure = "restore it from a copy, or run the scene again, which solves damaged cases anew"
         return self.file.damaged(what, cure)
 
-    def _values(self, path: str, index: Any = ()) -> np.ndarray:
+    def _values(self, path: str, index: Any = (), *, anew: bool = False) -> np.ndarray:
         expected = self._known.get(f"{ROOT}/{path}")
         if expected is None:
             raise KeyError(f"{path} is not a dataset of this file; it has {', '.join(sorted(self._known))}")
-        return np.asarray(self.file.values(expected.path, expected.shape, expected.dtype, index))
+        return np.asarray(self.file.values(expected.path, expected.shape, expected.dtype, index, anew=anew))
 
     def _text(self, name: str) -> np.ndarray:
-        text = np.asarray(self.file.values(f"{ROOT}/{name}"))
+        text = np.asarray(self.file.values(f"{ROOT}/{name}", anew=True))
         if text.shape != () or text.dtype.kind != "S":
             raise self._damaged(f"{ROOT}/{name} is not a text")
         return text

@@ -17,6 +17,7 @@ from softjaw.study.ranking import (
     hand_of,
     index_of,
     judge,
+    keys_at,
     passed_over,
     rank_values,
     score_of,
@@ -267,7 +268,7 @@ def value_text(ds: xr.Dataset, name: str, index: Index, digits: int = 4, unit: b
 
 def _force(ds: xr.Dataset, index: Index) -> tuple[str, str]:
     """How hard to press: the least force that holds the mass, else what some forces hold and how to name a mass."""
-    mass, safety = task_keys(ds, "object").get("mass_g"), task_keys(ds).get("safety", 1.0)
+    mass, safety = keys_at(ds, index, "object").get("mass_g"), keys_at(ds, index).get("safety", 1.0)
     pressed = f"{number(forces(ds)[index[-1]], 3)} N per finger"
     if mass is None:
         some = [(*index[:-1], k) for k in other_levels(len(forces(ds)), index[-1])]
@@ -305,7 +306,7 @@ def _held(ds: xr.Dataset, index: Index) -> tuple[str, str]:
     """What is held at the force shown, and what its error covers."""
     if not np.isfinite(at(ds, "payload", index)):
         return "", ""
-    aims = task_keys(ds).get("weight_direction", "worst") != "worst"
+    aims = keys_at(ds, index).get("weight_direction", "worst") != "worst"
     every = "in the direction of its weight" if aims else "pulled in any direction"
     every += f" at {forces(ds)[index[-1]]:g} N" * ("force_low" in ds)
     share = at(ds, "payload_error", index)

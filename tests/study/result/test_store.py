@@ -2,6 +2,8 @@
 
 import os
 import re
+import subprocess
+import sys
 from dataclasses import replace
 
 import h5py
@@ -307,3 +309,21 @@ def test_a_lock_keeps_a_second_run_away_goes_with_its_holder_and_withdraws_when_
     with pytest.raises(StudyError):
         lock.confirm()
     lock.release()
+
+
+def test_a_row_that_a_run_stores_anew_while_a_file_is_read_is_no_damage(path):
+    layout, result = small(), fake_result(3)
+    patch = {name: values[:, :4] for name, values in result.patch.items()}
+    put(path, layout, 10, record(layout, replace(result, patch=patch)))
+    code = (  # another process, as HDF5 shares files within one
+        "import sys, zlib, h5py\n"
+        "with h5py.File(sys.argv[1], 'r+') as file:\n"
+        "    values, sums = file['study/e_n/ccm'], file['study/checksums/rows']\n"
+        "    values[1, 1, 1] *= 2.0\n"
+        f"    sums[1, 1, 1, {layout.summed.index('/study/e_n/ccm')}] = zlib.crc32(values[1, 1, 1].tobytes())\n"
+    )
+    with open_result(path) as read:
+        assert read.read("S/S")[1, 1, 1] == result.values["maps/S"]
+        unlocked = {**os.environ, "HDF5_USE_FILE_LOCKING": "FALSE"}
+        assert subprocess.run([sys.executable, "-c", code, path], env=unlocked, check=False).returncode == 0
+        assert read.read("e_n/ccm")[1, 1, 1] == 2.0 * result.values["maps/e_n"][0]
