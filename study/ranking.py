@@ -42,10 +42,15 @@ def judged(ds: Any) -> IntArray:
 
 
 def safety_of(ds: Any) -> FloatArray:
-    """The safety with which grasps have to hold the object's mass ``(..., 1, 1, 1)``; 1 where nothing is to be held."""
-    points = ds["status"].shape[:-3] if "force_low" in ds else ()
-    each = [keys_at(ds, at).get("safety", 1.0) if "force_low" in ds else 1.0 for at in np.ndindex(*points)]
-    return np.reshape(np.array(each, float), (*points, 1, 1, 1))
+    """The safety with which grasps have to hold the object's mass; 1 where nothing is to be held.
+
+    At the points of a sweep ``(..., 1, 1, 1)``.
+    """
+    if "force_low" not in ds:
+        return np.ones(())
+    points = ds["flags"].shape[:-3]
+    each = np.array([keys_at(ds, at).get("safety", 1.0) for at in np.ndindex(*points)], float)
+    return each.reshape(*points, 1, 1, 1) if points else each[0]
 
 
 def outside(force: FloatArray, factor: Any, high: Any, safety: FloatArray) -> IntArray:

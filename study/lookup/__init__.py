@@ -100,7 +100,7 @@ class GraspMap:
         self.status = self.data.status.values
         #: unit and definition of everything that `value` knows
         self.quantities = {name: (unit, ds[name].definition) for name, unit in [*maps_in(ds).items(), ("flags", "")]}
-        self.by_poses, self.safety = not station.units, safety_of(self.data).ravel()
+        self.by_poses, self.safety = not station.units, np.ravel(safety_of(self.data))
         angles = circle("angle", "rad", angle.values, *((0.0, False) if self.by_poses else turning(ds, self.index)))
         name, most = ("candidate", 0.5) if self.by_poses else ("station", math.inf)
         stations = plain(name, station.units, station.values, most)

@@ -44,7 +44,8 @@ def derived(scene: Scene) -> list[Quantity]:
         listed += [
             Quantity(LOW, over, "N", "force to use",
                      "Smallest normal force per finger at which safety_factor (CCM) passes task.safety, between the"
-                     " solved forces and below them by power laws. NaN: none of them holds it.", "derived"),
+                     " solved forces and below them by power laws. NaN: none holds it, or one below is not solved.",
+                     "derived"),
             Quantity(LOW_ERROR, over, "N", "error of the force to use",
                      "What the stated error of the payload and the interpolation of safety_factor may move it; NaN"
                      " where no two forces are solved, or the payload's error is not known.", "derived"),
@@ -55,7 +56,7 @@ def derived(scene: Scene) -> list[Quantity]:
                      "Normal force per finger at which indentation passes object.allowed_dent_mm or stress the yield"
                      " strength, as force_low; else the largest solved force. NaN: wall taken as rigid.", "derived"),
             Quantity(HIGH_ERROR, over, "N", "error of the largest force that the wall bears",
-                     "How much less it is where indentation and stress are larger by their stated errors.", "derived"),
+                     "What their stated errors and the interpolation may move it, to less.", "derived"),
         ]  # fmt: skip
     return listed
 
@@ -106,9 +107,11 @@ def force_ranges(scene: Scene, values: Mapping[str, FloatArray], ended: ArrayLik
             # fmin, not minimum: a limit that is never passed is NaN and bounds nothing.
             return np.fmin.reduce([solved, *crossings])
 
-        ranges[HIGH] = largest(0.0)
-        stated = any(f"{n}_error" in values for n in limits)
-        ranges[HIGH_ERROR] = ranges[HIGH] - largest(1.0) if stated else np.full(solved.shape, np.nan)
+        high = ranges[HIGH] = largest(0.0)
+        ranges[HIGH_ERROR] = np.full(solved.shape, np.nan)
+        if any(f"{n}_error" in values for n in limits):
+            told = [crossing(forces, values[n], most, values.get(f"{n}_error", np.nan)) for n, most in limits.items()]
+            ranges[HIGH_ERROR] = np.fmax.reduce([high - largest(1.0), *(np.where(at == high, e, 0) for at, e in told)])
     return ranges
 
 
@@ -119,11 +122,12 @@ def crossing(
 
     Between solved forces by power laws, as look-ups interpolate, below the first by the law of the first two. A solved
     value within `UNDECIDED` of the limit has passed it; what comes after a NaN is not used. The error is that of a
-    look-up there, from what the values ``stated (..., k)`` as shares; below the first force also what another exponent
-    makes of it, that of the next two forces or one that differs by 0.15. NaN where no two forces tell a law.
+    look-up there, from what the values ``stated (..., k)`` as shares, and how far a straight line leads elsewhere, of
+    which half below the first force; there also what another exponent makes of it, that of the next two forces or one
+    that differs by a tenth. NaN where no two forces tell a law.
 
     >>> [v.round(3).tolist() for v in crossing([1.0, 2.0], [[0.5, 2.0], [0.5, 0.9]], 1.0, 0.1)]
-    [[1.414, nan], [0.261, nan]]
+    [[1.414, nan], [0.342, nan]]
     >>> [v.round(3).tolist() for v in crossing([1.0, 2.0, 4.0], [1.0, 2.0, 8.0], 0.5, 0.0)]  # linear, then quadratic
     [0.5, 0.347]
     """
@@ -141,17 +145,21 @@ def crossing(
         exponents = np.concatenate([first, slopes], axis=-1)
         below, low, high, exponent = np.maximum(k - 1, 0), taken(y, k - 1), taken(y, k), taken(exponents, k)
         law = x[k] * (limit / high) ** (1.0 / exponent)
-        line = x[below] + (limit - low) / (high - low) * (x[k] - x[below])  # from a force at which there is nothing
-        nothing = (k > 0) & (low <= 0.0)
+        begin, end = taken(y, below), taken(y, np.minimum(below + 1, len(x) - 1))
+        line = x[below] + (limit - begin) / (end - begin) * (x[np.minimum(below + 1, len(x) - 1)] - x[below])
+        nothing = (k > 0) & (low <= 0.0)  # a straight line from a force at which there is none
         at = np.where(passed.any(axis=-1), np.minimum(np.where(nothing, line, law), x[k]), np.nan)
         if len(x) < 2:
             return at, np.full(at.shape, np.nan)
         share = np.clip(np.log(at / x[below]) / np.log(x[below + 1] / x[below]), 0.0, 1.0)
         claims = law_claims(y, plain("force", "N", x), np.zeros(y.shape, bool))
         of_law = BESIDE_CASES * taken(claims, below) * share * (1.0 - share)
-        error = np.hypot(of_law, np.fmax(taken(stated, below), taken(stated, k)))
+        ends = taken(stated, below), taken(stated, k)
+        error = np.hypot(of_law, np.where(share < 1.0, (1.0 - share) * ends[0] + share * ends[1], ends[1]))
         # payloads that torques limit change their exponent by as much
-        changes = np.fmax(np.abs(np.diff(slopes[..., :2])).max(axis=-1, initial=0.0), 0.15)
+        changes = np.fmax(np.abs(np.diff(slopes[..., :2])).max(axis=-1, initial=0.0), 0.1)
+        changes = np.fmax(changes, np.abs(slopes[..., 0] - first[..., 0]))
         error += np.where(k > 0, 0.0, np.log(x[0] / at) * changes)
-        error = np.where(nothing, np.fmax(at - x[below], x[k] - at), at * error / exponent)
+        away = np.where(k > 0, 1.0, 0.5) * np.abs(np.clip(line, 0.0, x[k]) - at)
+        error = np.where(nothing, np.fmax(at - x[below], x[k] - at), at * error / exponent + away)
     return at, np.where(np.isfinite(y[..., 1]) | (k > 0), error, np.nan)
