@@ -108,8 +108,8 @@ def with_mass(scene: Scene) -> Scene:
         return scene
     check_object(scene)
     with fault_of("object.density", ValueError, ending="; write object.mass_g instead"):
-        if any(key.startswith("object.") for key in scene.sweep):
-            raise ValueError("the object changes along the sweep")
+        if any(key.startswith("object.") for key in (*scene.sweep, *scene.uncertainty.spread)):
+            raise ValueError("the object changes along the sweep, or is uncertain")
         mass = max(round(converted(density * volume(scene.object), "kg", "g"), 2), 0.01)
     return scene.model_copy(update={"object": scene.object.model_copy(update={"density": None, "mass_g": mass})})
 

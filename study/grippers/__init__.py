@@ -149,7 +149,7 @@ def filled_in(
         gripper.pop(key, None)
     for key, value in keys.items():
         gripper.setdefault(key, value)
-    thickness, most = gripper.get("pad_thickness_mm"), hand.stroke_mm / 2
+    thickness, most = gripper.get("pad_thickness_mm", 15.0), hand.stroke_mm / 2  # by default as a scene's
     if math.isfinite(most) and isinstance(thickness, int | float) and "max_opening_mm" not in gripper:
         if thickness >= most:
             return "gripper.pad_thickness_mm", thickness, f"less than {most:g} mm, of which two fill the stroke"

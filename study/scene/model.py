@@ -485,12 +485,13 @@ def _fill_in(data: dict[str, Any], path: Path) -> None:
         shape["mesh"] = str((path.parent / shape["mesh"]).resolve())
     for key, values in sweep.items() if isinstance(sweep, dict) else ():
         section, _, name = key.partition(".")
-        table = data.get(section)
+        table = data.setdefault(section, {}) if section in SECTIONS else data.get(section)
         if not isinstance(table, dict) or not isinstance(values, list) or not values or key in NOT_SWEPT:
             continue
         if (model := models_of(str(table.get("shape"))).get(section)) and name in model.model_fields:
-            # A swept key needs a value at which the sections can be checked.
-            table.setdefault(name, values[0])
+            # A swept key needs a value at which the sections can be checked; the modulus follows from given terms.
+            if not (name == "shear_modulus_kpa" and "terms_kpa" in table):
+                table.setdefault(name, values[0])
 
 
 def put_overrides(data: dict[str, Any], overrides: Sequence[str], given: dict[KeyPath, Place]) -> list[Problem]:

@@ -82,7 +82,8 @@ class Gripper(SceneSection):
         if not data.get("terms_kpa"):
             return {**data, "terms_kpa": ((-2.0, data.get("shear_modulus_kpa", 40.0)),)}
         with suppress(TypeError, ValueError):  # of terms that are refused
-            return {"shear_modulus_kpa": sum(modulus for _, modulus in data["terms_kpa"]), **data}
+            if (modulus := sum(modulus for _, modulus in data["terms_kpa"])) > 0:
+                return {"shear_modulus_kpa": modulus, **data}
         return data
 
     @property

@@ -29,6 +29,8 @@ def test_a_preset_sets_pad_and_opening_and_is_gone(tmp_path, name):
     assert found.max_opening_mm == pytest.approx(hand.stroke_mm - 2 * found.pad_thickness_mm)
     scene = load_scene(tmp_path / "scene.toml")
     assert Scene.of_tables(scene.effective()) == scene
+    (tmp_path / "mine.toml").write_text("[gripper]\npad_length_mm = 30\n[hand]\nstroke_mm = 60")  # pads as by default
+    assert loaded(tmp_path, "mine.toml").max_opening_mm == 60 - 2 * loaded(tmp_path, "mine.toml").pad_thickness_mm
 
 
 def test_keys_of_the_scene_come_first_and_a_preset_may_stand_on_the_command_line(tmp_path):

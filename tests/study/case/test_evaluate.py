@@ -211,7 +211,9 @@ def test_a_mass_is_density_times_volume_and_what_has_no_volume_or_several_is_ref
     assert ball.object.density is None
     tube = with_sampled_grasps(scene_of(OVAL, "object.density=500"))
     assert tube.object.mass == pytest.approx(500 * math.pi * 0.025 * 0.02 * 0.12, rel=5e-3)
-    for shape, *change in (['shape = "plane"\nthickness_mm = 30'], [BALL, "sweep.object.radius_mm=[20, 30]"]):
+    uncertain = 'uncertainty.spread={"object.radius_mm"=1}'
+    for shape, *change in (['shape = "plane"\nthickness_mm = 30'], [BALL, "sweep.object.radius_mm=[20, 30]"],
+                           [BALL, uncertain]):  # fmt: skip
         with pytest.raises(StudyError, match="mass_g"):
             with_sampled_grasps(scene_of(shape, "object.density=1000", *change))
 

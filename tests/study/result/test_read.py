@@ -160,7 +160,8 @@ def test_bounds_of_the_force_are_those_of_their_point_of_a_sweep_and_errors_hold
     factor = np.broadcast_to([1.0, 4.0], (3, 2, 1, 2))
     ranges = force_ranges(scene, {"safety_factor": factor, "payload_error": np.full(factor.shape, 0.01)})
     assert ranges["force_low"] == pytest.approx(np.broadcast_to([[[1.0]], [[2.0]], [[4.0]]], (3, 2, 1)))
-    tube = 'shape = "revolution"\nprofile_mm = [[0, 30], [40, 30], [60, 30], [100, 30]]\nwall_mm = 1\nwall_material = "PP"'
+    tube = 'shape = "revolution"\nprofile_mm = [[0, 30], [40, 30], [60, 30], [100, 30]]'
+    tube += '\nwall_mm = 1\nwall_material = "PP"'
     limits = ["object.allowed_dent_mm=1", "sweep.object.allowed_dent_mm=[0.5, 3, 9]"]
     scene = parse_scene(text_of(tube, stations="[50]", forces="[1, 2, 4]"), "x.toml", limits)
     dent = np.broadcast_to([1e-3, 2e-3, 4e-3], (3, 1, 1, 3))

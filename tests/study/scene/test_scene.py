@@ -261,6 +261,12 @@ def test_combinations_of_a_sweep_that_make_no_scene_are_named_and_too_many_refus
     # Each value fits the scene alone; together they make elements of 0.2 x 5 mm.
     p = problem(BALL, "sweep.gripper.pad_width_mm=[22, 2]", "sweep.gripper.pad_thickness_mm=[15, 30]")
     assert (p.key, p.value) == ("sweep", '"gripper.pad_width_mm = 2, gripper.pad_thickness_mm = 30"')
+    # a section that is not there is one of defaults, and terms of a foam scale with its modulus
+    loads = "sweep.task.drive=['shared', 'fixed']", "sweep.task.weight_direction=[[0, 0, -1], [1, 0, 0]]"
+    assert parse_scene(BALL, "x.toml", loads).cases == 4 * parse_scene(BALL).cases
+    foam = "gripper.material='hyperfoam'", "gripper.terms_kpa=[[8, 30], [-2, 10]]"
+    swept = parse_scene(BALL, "x.toml", [*foam, "sweep.gripper.shear_modulus_kpa=[20]"])
+    assert swept.at(swept.points[0]).gripper.terms_kpa == ((8.0, 15.0), (-2.0, 5.0))
     many = "candidates.stations=10000", "candidates.stations_mm=[-30, 30]", f"load.normal_force_n={[*range(1, 60)]}"
     assert problem(BALL, *many).value == "1180000"
     swept = [f"sweep.friction.mu={[i / 100 for i in range(101)]}", f"sweep.gripper.pad_width_mm={list(range(15, 115))}"]
