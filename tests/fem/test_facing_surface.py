@@ -93,7 +93,9 @@ def test_a_straight_wall_between_cones_stays_straight_and_a_round_one_of_many_fa
     angle = np.linspace(0.0, np.pi, 13)
     bands = np.column_stack([0.06 * np.sin(angle).round(12), -0.06 * np.cos(angle)])
     single = [(0, 0), (0.015, 0), (0.025, 0.06), (0.015, 0.12), (0, 0.12)]  # joints round it turn by as much
+    handle = [(0, 0), (0.016, 0), (0.016, 0.09), (0, 0.13)]  # of few sides, none of which goes on smoothly but in a tip
     cases = [(cones, 64, 4 * 64, 5e-5), (waist, 64, 0, np.inf), (bands, 64, 0, np.inf)]
+    cases += [(handle, sides, sides, 1e-15) for sides in (4, 6, 8)]
     for profile, sections, sharp, most in (*cases, *((single, n, n, 6e-4) for n in (16, 24, 32))):
         body = trimesh.creation.revolve(np.asarray(profile, float), sections=sections)
         smooth = smooth_triangles(body.vertices, body.faces)
