@@ -48,9 +48,11 @@ def safety_of(ds: Any) -> FloatArray:
     """
     if "force_low" not in ds:
         return np.ones(())
-    points = ds["flags"].shape[:-3]
-    each = np.array([keys_at(ds, at).get("safety", 1.0) for at in np.ndindex(*points)], float)
-    return each.reshape(*points, 1, 1, 1) if points else each[0]
+    points, alike = ds["flags"].shape[:-3], float(task_keys(ds).get("safety", 1.0))
+    if "task.safety" not in swept_values(ds, (0,) * len(points)):
+        return np.array(alike)
+    each = [swept_values(ds, at)["task.safety"] for at in np.ndindex(*points)]
+    return np.reshape(np.array(each, float), (*points, 1, 1, 1) if points else ())
 
 
 def outside(force: FloatArray, factor: Any, high: Any, safety: FloatArray) -> IntArray:

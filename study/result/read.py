@@ -214,11 +214,13 @@ def sweep_point(ds: xr.Dataset, index: Sequence[int] = ()) -> tuple[int, ...]:
 
 
 def swept_values(ds: xr.Dataset, index: Sequence[int] = ()) -> dict[str, Any]:
-    """Values of the swept keys at a point of a dataset, see `sweep_point`, in the scene's words and units."""
+    """Values of the swept keys at a point of a dataset in the scene's words and units; none where these are lost."""
     if not scene_table(ds.attrs.get("scene", ""), "sweep"):
         return {}
     sweep = _parsed(ds.attrs["scene"]).sweep
-    return {key: options[i] for (key, options), i in zip(sweep.items(), sweep_point(ds, index), strict=False)}
+    with suppress(ValueError):
+        return {key: options[i] for (key, options), i in zip(sweep.items(), sweep_point(ds, index), strict=False)}
+    return {}
 
 
 @lru_cache(maxsize=64)

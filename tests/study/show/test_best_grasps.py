@@ -12,16 +12,17 @@ from softjaw.study.export.selection import chosen
 from softjaw.study.flags import Flag
 from softjaw.study.lookup import GraspMap
 from softjaw.study.quantities import DONE, FAILED, MODELS, quantities
-from softjaw.study.ranking import distinct, judge
+from softjaw.study.ranking import distinct, judge, judged, keys_at
 from softjaw.study.result import read
 from softjaw.study.result.store import open_result
 from softjaw.study.run.objects import row_of
 from softjaw.study.run.refine import scores_of_poses
+from softjaw.study.scene import parse_scene
 from softjaw.study.show.best_grasps import best, safe_range
 from softjaw.study.show.status import grouped, sessions
 from softjaw.study.table import MOST_NOTES, PAPER, as_csv, as_json
 from tests.study import formula_results
-from tests.study.scenes import pose_of
+from tests.study.scenes import BALL, pose_of, text_of
 
 FORCES = np.array([1.0, 5.0])
 WIDE = ("mass", "wall", "two meshes")
@@ -313,3 +314,17 @@ def test_what_follows_on_a_complete_session_is_its_next_round():
     stored = [each | {"reason": reason} for reason in reasons]
     heads = [line.split(":")[0].split()[1:] for line in sessions(SimpleNamespace(sessions=stored), False)]
     assert heads == [["1"], ["2"], ["2,", "round", "2"], ["2,", "round", "3"], ["3"]]
+
+
+def test_the_safety_that_is_swept_is_that_of_its_point():
+    swept = parse_scene(text_of(BALL), "x.toml", ["object.mass_g=100", "sweep.task.safety=[1, 3]"])
+    over, shape = ("safety", "station", "angle", "normal_force"), (2, 1, 1, 1)
+    known = {"flags": (over, np.zeros(shape, np.int64)), "status": (over, np.full(shape, DONE)),
+             "safety_factor": ((*over, "model"), np.full((*shape, 1), 2.0)),
+             "force_low": (over[:-1], np.ones(shape[:-1]))}  # fmt: skip
+    safety = xr.DataArray([1.0, 3.0], dims="safety", attrs={"long_name": "task.safety"})
+    axes = {"safety": safety, "normal_force": [1.0], "model": ["ccm"]}
+    ds = xr.Dataset(known, axes, {"scene": swept.effective_toml()})
+    assert (judged(ds) & Flag.TOO_WEAK > 0).ravel().tolist() == [False, True]
+    assert [keys_at(ds, (i, 0, 0, 0))["safety"] for i in range(2)] == [1, 3]
+    assert (judged(ds.isel(safety=[1])) & Flag.TOO_WEAK > 0).ravel().tolist() == [True]
