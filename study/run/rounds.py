@@ -139,7 +139,7 @@ def next_cases(result: Any, scene: Scene) -> tuple[Case, ...]:
     """Cases of the next round; none where the best are known as well as the scene asks for."""
     if not scene.candidates.sampled or "work/mesh" not in {q.key for q in result.layout.quantities}:
         return ()
-    ds = judge(dataset(result), by="payload")
+    ds = judge(dataset(result))
     k = ds.attrs["level"]
     order, known = [int(i) for i in ranked(ds, k, "payload")], sure(ds, "payload", k)
     if known is None:
