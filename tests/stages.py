@@ -56,9 +56,9 @@ def tests(mark: str, *words: str) -> tuple[str, ...]:
     return (sys.executable, "-m", "pytest", "-q", "-m", mark, *words)
 
 
-def naming(text: str) -> list[str]:
+def naming(text: str, pattern: str = "test_*.py") -> list[str]:
     """Files of tests with a text in them: collecting all takes a sixth of a short stage."""
-    files = sorted((ROOT / "tests").rglob("test_*.py"))
+    files = sorted((ROOT / "tests").rglob(pattern))
     return [str(file.relative_to(ROOT)) for file in files if text in file.read_text()]
 
 
@@ -72,7 +72,7 @@ def fast() -> list[Stage]:
 
 def thorough() -> list[Stage]:
     """What ``make test-long`` runs."""
-    decisions = [file for file in naming("") if file.endswith("decisions.py")]
+    decisions = naming("", "test_*decisions.py")
     kernels = [
         Stage(f"kernel-{kernel}", tests("not long and not ranks", *workers(), *NUMERICAL), 20,
               variables={"OPENBLAS_CORETYPE": kernel})

@@ -62,14 +62,20 @@ def _holes(triangles: IntArray) -> list[list[int]]:
     return loops if len(loops) <= 2 + 0.05 * len(triangles) else []
 
 
+def border_edges(triangles: IntArray) -> IntArray:
+    """Edges of one triangle alone ``(b, 2)``, as they run and in the order of the triangles."""
+    sides = edges_of(triangles)
+    edge = np.sort(sides, axis=1) @ [triangles.max(initial=0) + 1, 1]
+    _, first, count = np.unique(edge, return_index=True, return_counts=True)
+    return sides[np.sort(first[count == 1])]
+
+
 def border_loops(triangles: IntArray) -> list[list[int]]:
     """Points along each hole, so that ``(p_k, p_k+1)`` runs against the triangle beside it; smallest number first.
 
     Neighbouring triangles may disagree about their sense: edges are joined whichever way they run.
     """
-    sides = edges_of(triangles)
-    _, first, count = np.unique(np.sort(sides, axis=1), axis=0, return_index=True, return_counts=True)
-    border = sides[np.sort(first[count == 1])]
+    border = border_edges(triangles)
     at: dict[int, list[int]] = {}
     for k, (a, b) in enumerate(border.tolist()):
         at.setdefault(a, []).append(k)

@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 from softjaw.fem.errors import MeshError
 from softjaw.fem.objects.gap import IntArray, cone_volumes, edges_of
 from softjaw.fem.objects.mesh_file import LENGTHS
-from softjaw.fem.objects.mesh_holes import border_loops, lid_corners, with_holes_filled
+from softjaw.fem.objects.mesh_holes import border_edges, border_loops, lid_corners, with_holes_filled
 from softjaw.fem.objects.triangle_tree import TriangleTree, area_vectors, components
 from softjaw.friction.patch import FloatArray
 
@@ -112,9 +112,7 @@ def _check_size(extent: float, unit: str) -> None:
 
 def _side_by_side(points: FloatArray, triangles: IntArray) -> IntArray:
     """Pairs of corners of borders that a seam between two sheets of one body leaves ``(p, 2)``."""
-    ends = np.sort(edges_of(triangles), axis=1)
-    _, first, count = np.unique(ends @ [len(points), 1], return_index=True, return_counts=True)
-    border = ends[first[count == 1]]
+    border = border_edges(triangles)
     shortest = np.full(len(points), np.inf)
     np.minimum.at(shortest, border, np.linalg.norm(np.subtract(*points[border.T]), axis=1)[:, None])
     corners = np.unique(border)
@@ -123,9 +121,7 @@ def _side_by_side(points: FloatArray, triangles: IntArray) -> IntArray:
     return pairs[np.linalg.norm(np.subtract(*points[pairs.T]), axis=1) < 0.3 * shortest[pairs].min(axis=1)]
 
 
-def _merged(
-    points: FloatArray, triangles: IntArray, pairs: IntArray
-) -> tuple[FloatArray, IntArray, list[str]]:
+def _merged(points: FloatArray, triangles: IntArray, pairs: IntArray) -> tuple[FloatArray, IntArray, list[str]]:
     """``pairs (p, 2)`` of points as one, unused points left out, collapsed and doubled triangles dropped."""
     notes = []
     if len(pairs):

@@ -99,19 +99,14 @@ def force_ranges(scene: Scene, values: Mapping[str, FloatArray], ended: ArrayLik
         }
         known = np.isfinite(values["indentation"])
         solved = np.where(known.any(axis=-1) & ended, np.where(known, forces, 0.0).max(axis=-1), np.nan)
-
-        def largest(share: float) -> FloatArray:
-            """With values that are larger by a share of their errors."""
-            larger = {n: values[n] * (1.0 + share * np.nan_to_num(values.get(f"{n}_error", 0.0))) for n in limits}
-            crossings = [crossing(forces, larger[n], most)[0] for n, most in limits.items()]
-            # fmin, not minimum: a limit that is never passed is NaN and bounds nothing.
-            return np.fmin.reduce([solved, *crossings])
-
-        high = ranges[HIGH] = largest(0.0)
-        ranges[HIGH_ERROR] = np.full(solved.shape, np.nan)
-        if any(f"{n}_error" in values for n in limits):
-            told = [crossing(forces, values[n], most, values.get(f"{n}_error", np.nan)) for n, most in limits.items()]
-            ranges[HIGH_ERROR] = np.fmax.reduce([high - largest(1.0), *(np.where(at == high, e, 0) for at, e in told)])
+        shares = {name: values.get(f"{name}_error", np.nan) for name in limits}
+        bounds = [crossing(forces, values[name], most, shares[name]) for name, most in limits.items()]
+        larger = {name: values[name] * (1.0 + np.nan_to_num(share)) for name, share in shares.items()}
+        # fmin, not minimum: a limit that is never passed is NaN and bounds nothing.
+        high = ranges[HIGH] = np.fmin.reduce([solved, *(at for at, _ in bounds)])
+        least = np.fmin.reduce([solved, *(crossing(forces, larger[name], most)[0] for name, most in limits.items())])
+        off = np.fmax.reduce([high - least, *(np.where(at == high, error, 0.0) for at, error in bounds)])
+        ranges[HIGH_ERROR] = off if any(f"{name}_error" in values for name in limits) else np.full(off.shape, np.nan)
     return ranges
 
 
@@ -134,6 +129,9 @@ def crossing(
     x, y, limit = (np.asarray(v, float) for v in (forces, values, limit))
     passed = np.cumprod(np.isfinite(y), axis=-1).astype(bool) & (y >= limit[..., None] * (1.0 - UNDECIDED))
     k = passed.argmax(axis=-1)
+    if len(x) < 2:  # proportional to the force, as far as one tells
+        at = np.asarray(np.minimum(x[0] * limit / np.where(passed[..., 0], y[..., 0], np.nan), x[0]))
+        return at, np.full(at.shape, np.nan)
 
     def taken(parts: ArrayLike, i: NDArray[np.int64]) -> FloatArray:
         return np.asarray(np.take_along_axis(np.broadcast_to(parts, y.shape), i[..., None], -1)[..., 0], float)
@@ -141,17 +139,15 @@ def crossing(
     with np.errstate(divide="ignore", invalid="ignore"):
         slopes = np.diff(np.log(np.where(y > 0.0, y, np.nan))) / np.diff(np.log(x))
         # exponents of contacts that begin from nothing
-        first = np.clip(np.nan_to_num(slopes[..., :1], nan=1.0), 0.5, 2.0) if len(x) > 1 else np.ones_like(y)
-        exponents = np.concatenate([first, slopes], axis=-1)
-        below, low, high, exponent = np.maximum(k - 1, 0), taken(y, k - 1), taken(y, k), taken(exponents, k)
-        law = x[k] * (limit / high) ** (1.0 / exponent)
-        begin, end = taken(y, below), taken(y, np.minimum(below + 1, len(x) - 1))
-        line = x[below] + (limit - begin) / (end - begin) * (x[np.minimum(below + 1, len(x) - 1)] - x[below])
+        first = np.clip(np.nan_to_num(slopes[..., :1], nan=1.0), 0.5, 2.0)
+        exponent = taken(np.concatenate([first, slopes], axis=-1), k)
+        law = x[k] * (limit / taken(y, k)) ** (1.0 / exponent)
+        above = np.maximum(k, 1)  # of the two forces about the crossing; below the first one of the first two
+        below, low = above - 1, taken(y, above - 1)
+        line = x[below] + (limit - low) / (taken(y, above) - low) * (x[above] - x[below])
         nothing = (k > 0) & (low <= 0.0)  # a straight line from a force at which there is none
         at = np.where(passed.any(axis=-1), np.minimum(np.where(nothing, line, law), x[k]), np.nan)
-        if len(x) < 2:
-            return at, np.full(at.shape, np.nan)
-        share = np.clip(np.log(at / x[below]) / np.log(x[below + 1] / x[below]), 0.0, 1.0)
+        share = np.clip(np.log(at / x[below]) / np.log(x[above] / x[below]), 0.0, 1.0)
         claims = law_claims(y, plain("force", "N", x), np.zeros(y.shape, bool))
         of_law = BESIDE_CASES * taken(claims, below) * share * (1.0 - share)
         ends = taken(stated, below), taken(stated, k)

@@ -31,7 +31,7 @@ OF_ANGLES, OF_FORCES = 3.0, 2.6  # times that along these: along angles payload 
 MOST_TURN = math.radians(25)  # between angles farther apart even such claims hold for half of the points
 BESIDE_CASES = 0.45  # of what interpolation claims alone, where the cases state errors: those err on the safe side, too
 CLOSING_GAP_RATIO = 1.5  # a gap that closes a circle may be this much wider than the others
-SEMI_AXES = "limit_surface/semi_axes"
+SEMI_AXES = "semi_axes"  # lengths with a component each, as vectors have them
 KINDS = {"pieces": 7, "holes": 7, "rims": 1}  # what identifies a kind of contact, and the largest number that counts
 UPPER = np.array(list(np.ndindex(2, 2, 2)))  # which corners of a cell are its upper ones, along each axis
 
@@ -156,7 +156,7 @@ def blend(table: FloatArray, at: Corners, name: str = "") -> FloatArray:
     weight = at.weight.reshape(at.weight.shape + (1,) * (table.ndim - 1))
     parts = np.where(weight > 0, values * weight, 0.0)
     line = np.asarray(parts.sum(axis=1))
-    if table.ndim > 2 and name != SEMI_AXES:  # coefficients of limit surfaces stay convex on straight lines
+    if table.ndim > 2 and not name.endswith(SEMI_AXES):  # coefficients of limit surfaces stay convex on straight lines
         return line
     share, power = (s.reshape(-1, *(1,) * (table.ndim - 1)) for s in (at.share[:, 2], at.power))
     low, high = parts[:, ::2].sum(axis=1), parts[:, 1::2].sum(axis=1)  # times 1 - share, and share
@@ -267,7 +267,7 @@ def at_force(ds: xr.Dataset, force: float) -> xr.Dataset:
         dims, first, last = ds[name].dims, low[name].values, high[name].values
         if ds[name].dtype.kind == "f":
             values = (1 - share) * first + share * last
-            if name == SEMI_AXES.replace("/", "_") or not {"component", "monomial", "wrench"} & set(dims):
+            if name.endswith(SEMI_AXES) or not {"component", "monomial", "wrench"} & set(dims):
                 values = power_law(first, last, power, values)
             between[name] = (dims, values, ds[name].attrs)
         elif name == "flags":

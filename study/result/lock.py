@@ -40,7 +40,7 @@ class Lock:
             holder = os.read(self._fd, 200).decode(errors="replace").strip()
             self.release()
             if attempt == 5:
-                raise self.in_use(holder or "name unknown")
+                raise in_use(self.result, holder or "name unknown")
             time.sleep(0.1)
         with self._writing():
             # A shorter name must not keep the end of a longer one that a killed run left.
@@ -70,11 +70,7 @@ class Lock:
         """On rank 0, when all ranks hold the lock: raise `StudyError` if another run was quicker."""
         holder = os.pread(self._fd, 200, 0).decode(errors="replace").strip()
         if holder != self.owner:
-            raise self.in_use(holder)
-
-    def in_use(self, holder: str) -> StudyError:
-        """That another run has it."""
-        return StudyError(IN_USE, f"{self.result}: in use by another run ({holder}); wait for it")
+            raise in_use(self.result, holder)
 
     def remove(self) -> None:
         """On rank 0, at the end of the run, while all ranks still hold the lock: take the file away."""
@@ -98,6 +94,11 @@ class Lock:
                 raise
             self.warning = f"{self.path.parent} has no file locks: make sure that only one run writes {self.result}"
         return True
+
+
+def in_use(result: Path, holder: str) -> StudyError:
+    """That another run has a file."""
+    return StudyError(IN_USE, f"{result}: in use by another run ({holder}); wait for it")
 
 
 def holder(result: Path) -> str:

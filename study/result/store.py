@@ -87,7 +87,7 @@ class Result:
             values = self._values(path, anew=patience > 0.0)
             broken = self._still(checksums.broken_rows(self.file, self.layout, full, values, rows), self.status)
             if not broken.size:
-                return values
+                break
         self._refuse(broken, path)
         return values
 

@@ -25,7 +25,7 @@ from softjaw.study.flags import LOST, Flag, flag_words
 from softjaw.study.messages import NoGraspError, StudyError, complain, first_of, shortened
 from softjaw.study.ranking import judge, largest, task_keys
 from softjaw.study.result import index
-from softjaw.study.result.lock import Lock, holder
+from softjaw.study.result.lock import holder, in_use
 from softjaw.study.result.read import dataset, values_of
 from softjaw.study.result.skeleton import rewrite
 from softjaw.study.result.store import open_result, torn_rows
@@ -183,7 +183,7 @@ class _ObjectsRun:
         begin, listed = time.perf_counter(), self._folder.objects[n]
         overrides, path = self._folder.overrides_of(listed), self._out / f"{listed.name}.hdf"
         if other := holder(path):
-            raise Lock(path, "").in_use(other)
+            raise in_use(path, other)
         plan, work = self._study(self._folder.scene(listed), overrides)
         if work.grown and (rounds := rounds_in(path, plan)):
             plan, work = work.grown(rounds)

@@ -86,8 +86,7 @@ def _scores(result: Any) -> tuple[FloatArray, NDArray[np.bool_]]:
     values = _cases(result, result.read("payload/ccm"))
     flags = np.nan_to_num(_cases(result, result.read("flags/flags"))).astype(np.int64)
     if _preset(result):  # what its hand does not reach cannot be used either
-        reach = judge(dataset(result)).attrs["reach"]
-        flags.reshape(-1, flags.shape[-1])[[c for c, approach in reach.items() if approach == ()]] |= Flag.OUT_OF_REACH
+        flags |= _cases(result, judge(dataset(result))["flags"].values) & Flag.OUT_OF_REACH
     values = np.where(_cases(result, result.status) == DONE, values, np.nan)
     return values, np.isfinite(values) & (flags & LOST == 0)
 

@@ -24,7 +24,7 @@ from softjaw.study.messages import CANNOT_WRITE, STOPPED, StudyError, complain, 
 from softjaw.study.quantities import DONE, FAILED, MISSING
 from softjaw.study.result import provenance
 from softjaw.study.result.index import INDEX
-from softjaw.study.result.lock import Lock, OpenedFile, holder
+from softjaw.study.result.lock import Lock, OpenedFile, holder, in_use
 from softjaw.study.result.skeleton import create, rewrite
 from softjaw.study.result.store import Result, open_result, torn_rows
 from softjaw.study.result.write import MESH, Files, ResultWriter, codes_on, verify
@@ -117,7 +117,7 @@ def locked(path: Path, comm: Any) -> Iterator[None]:
     lock, index = Lock(path, owner), path.with_name(f"{INDEX}.hdf")
     try:
         if index != path and (other := on_rank0(comm, holder, index)):  # the run of a folder holds its files, too
-            raise lock.in_use(other)
+            raise in_use(path, other)
         on_rank0(comm, _take, lock, path)
         if comm.rank:
             lock.join()

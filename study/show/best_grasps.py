@@ -10,7 +10,7 @@ import numpy as np
 
 from softjaw.friction.patch import NEGLIGIBLE
 from softjaw.study.case.result import TIE
-from softjaw.study.flags import LOST, OF_FILE, Flag, flag_words, flags_in
+from softjaw.study.flags import BORNE, LOST, OF_FILE, Flag, flag_words, flags_in
 from softjaw.study.quantities import BY_KEY, FORCE_RANGE, LEAST_FORCE, LISTED, MAIN, MISSING, MODELS, STATES, map_row
 from softjaw.study.ranking import (
     distinct,
@@ -49,7 +49,6 @@ if TYPE_CHECKING:
 NOTES_WIDTH, OTHERS_WIDTH, LABEL_WIDTH = 13, 16, 20  # characters
 PLANAR_E_N = f"e_n_{MODELS[1]}"  # column
 BRIEF = ("payload", "opening", "quality", "e_n")  # maps of a table in a terminal
-FAULTS = Flag.SLIPS | Flag.COLLISION | Flag.NOT_BORNE | Flag.OUT_OF_REACH  # for which no grasp can be used
 FINER = Flag.COARSE | Flag.NO_FIT | Flag.NO_CORNERS | Flag.NODAL | Flag.LEFT_OUT  # what a finer mesh or effect cures
 
 
@@ -335,7 +334,7 @@ def _limit(ds: xr.Dataset, index: Index) -> str:
     if better:
         top = f"{short_name(ds, int(done[better[0]]))} with {shown_text(values[better[0]], ds[name].units, 3)}"
         parts.append(f"{len(better)} with more {name} cannot be used ({top}): {lacks}")
-    faults = flags_in(int(ds["flags"].values[index]) & FAULTS)
+    faults = flags_in(int(ds["flags"].values[index]) & LOST & ~BORNE)
     return "; ".join([*(fault.sentence for fault in faults), *parts])
 
 
