@@ -275,7 +275,7 @@ class Accuracy(SceneSection):
         "auto", description="how gaps are collocated; auto is blended for hex8, else weighted"
     )
     wall_element_mm: float = Field(
-        1.5, ge=0.2, le=50, description="size of a wall's elements round it under the pads; up to 4 times elsewhere"
+        1.5, ge=0.2, le=10, description="size of a wall's elements round it under the pads; up to 4 times elsewhere"
     )
 
     def rules(self) -> Errors:
