@@ -69,6 +69,7 @@ def payload(
     kind: str = "shared",
     drive: ArrayLike | None = None,
     gap: float = BOUND_GAP,
+    least: float = 0.0,
 ) -> Payload:
     """Largest force at the centre of mass that two contacts hold, along ``direction`` or the worst of all.
 
@@ -88,6 +89,8 @@ def payload(
         Force with which the gripper presses each finger [N]; by default that of its pressure.
     gap : float
         Of the bounds, relative, at which the search ends.
+    least : float
+        Force below which the search ends, however far apart the bounds are [N].
     """
     centre, P = np.asarray(centre_of_mass, float), np.asarray(pressure, float)
     length = max(float(np.linalg.norm(c.position - centre)) for c in contacts) or 1.0
@@ -99,7 +102,7 @@ def payload(
     drives = [p @ c[:3] / (p @ p) for p, c in zip(pressed, C, strict=True)]
     first, other = (_surface(contact.body, size, d) for contact, d in zip(contacts, drives, strict=True))
     grasp = C, first, other, KINDS.index(kind)
-    answer = _along(grasp, np.asarray(direction, float)) if direction is not None else _worst(grasp, gap)
+    answer = _along(grasp, np.asarray(direction, float)) if direction is not None else _worst(grasp, gap, least / size)
     return Payload(size * answer.force, size * answer.upper, answer.direction, answer.borne)
 
 
@@ -136,7 +139,7 @@ def _along(grasp: _Grasp, d: FloatArray) -> Payload:
     return Payload(held, upper, d, True)
 
 
-def _worst(grasp: _Grasp, gap: float) -> Payload:
+def _worst(grasp: _Grasp, gap: float, least: float) -> Payload:
     """Largest load in every direction, and one in which a larger one is lost."""
     rows = np.hstack([np.zeros((3, 3)), np.eye(3)])
     points, bases = np.zeros((MOST_POINTS, 3)), np.zeros((MOST_POINTS, 4, 8))
@@ -149,15 +152,15 @@ def _worst(grasp: _Grasp, gap: float) -> Payload:
     thin = np.linalg.svd(points[:6] - points[:6].mean(axis=0), full_matrices=False)[2][-1]
     upper, u = _looked(*search, np.stack([thin, -thin]), bases[5], 6, -np.inf, upper, u)
     extent = np.linalg.svd(points[:8] - points[:8].mean(axis=0), compute_uv=False)
-    lower = 0.0
-    if extent[-1] > ROUNDING_FORCE and upper > ROUNDING_FORCE:
+    lower, least = 0.0, max(least, ROUNDING_FORCE)
+    if extent[-1] > ROUNDING_FORCE and upper > least:
         hull, before = ConvexHull(points[:8], incremental=True), np.zeros(4)
         for n in range(8, MOST_POINTS):
             nearest = hull.equations[:, 3].argmax()
             plane = hull.equations[nearest].copy()
             lower = -plane[3]
             # a point that the hull has already ends the search: along its nearest facet both bounds are the same
-            if (plane == before).all() or upper < ROUNDING_FORCE or lower >= upper * (1.0 - gap):
+            if (plane == before).all() or upper < least or lower >= upper * (1.0 - gap):
                 break
             # a programme that did not fill its rows says nothing of the support
             before, basis = plane, bases[hull.simplices[nearest, 0]]

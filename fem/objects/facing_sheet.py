@@ -46,7 +46,7 @@ def _seen(which, normals, sides, directions, spacing, rotation, origin, lower, u
     ``sides`` is 2 where backs of triangles can be seen, too.
     """
     corners = nodes[0]
-    stack, spot = np.empty(DEPTH, np.int64), np.empty(3)
+    stack, spot, backwards = np.empty(DEPTH, np.int64), np.empty(3), -directions
     visibility, hides = np.zeros(len(which), np.int64), np.zeros(len(directions), np.int64)
     for m in range(len(which)):
         p, normal = corners[which[m]], normals[which[m]]
@@ -61,20 +61,25 @@ def _seen(which, normals, sides, directions, spacing, rotation, origin, lower, u
             if abs(visibility[m]) == 2 or b + c >= 1.0:
                 continue
             for s in range(sides):
-                sign = 1.0 - 2.0 * s
+                sign, inside = 1.0 - 2.0 * s, abs(visibility[m]) < 2
                 for d in range(3):
                     spot[d] = p[0, d] + b * (p[1, d] - p[0, d]) + c * (p[2, d] - p[0, d]) + sign * lift * normal[d]
-                y = (spot - origin) @ rotation
-                if (y < lower).any() or (y > upper).any() or abs(visibility[m]) == 2:
+                # component by component: an array of three takes as long to make as a line takes to follow
+                for d in range(3):
+                    y = 0.0
+                    for k in range(3):
+                        y += (spot[k] - origin[k]) * rotation[k, d]
+                    inside = inside and lower[d] <= y <= upper[d]
+                if not inside:
                     continue
                 for k in range(len(directions)):
                     # seen on a slant already: only the straight line, which comes first, can tell more
                     if visibility[m] != 0 and k > 0:
                         break
+                    back = backwards[k]
                     # a line at a smaller sine to a triangle runs along it and does not see it
-                    if sign * (normal * directions[k]).sum() > -0.01:
+                    if sign * (normal[0] * back[0] + normal[1] * back[1] + normal[2] * back[2]) < 0.01:
                         continue
-                    back = -directions[k]
                     # what hid the spot before mostly hides this one, too
                     if hides[k] != which[m] and 0.0 < hits(spot, back, corners, hides[k]) < np.inf:
                         continue

@@ -7,7 +7,7 @@ need no closed mesh and no normals, and inner walls or thin parts behind do not 
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numba import njit
@@ -22,6 +22,14 @@ from softjaw.study.case.task import Task, payload_alone
 GRID = (25, 11)  # points of a pad's face along length and width
 CRUSHED = 0.25  # strain of the bed at its highest pressure that leaves half of a grasp
 INNER = (slice(1, -1), slice(1, -1))  # of height fields that reach one cell beyond the pad's face
+ALONG, ACROSS = (np.gradient(np.eye(n), axis=0) for n in GRID)  # differences of neighbouring cells
+
+
+@lru_cache(maxsize=8)
+def cells(length: float, width: float) -> tuple[list[FloatArray], list[FloatArray]]:
+    """Places of cells along both sides of a face, one more even step at both ends, and x and y of its own [m]."""
+    wider = [side * ((np.arange(-1, n + 1) + 0.5) / n - 0.5) for side, n in zip((length, width), GRID, strict=True)]
+    return wider, list(np.meshgrid(*(part[1:-1] for part in wider), indexing="ij"))
 
 
 @njit(cache=True)
@@ -60,12 +68,13 @@ class Side:
     """What one pad meets: closing at which each cell of its face touches ``height (m, n)`` [m], normals, pressures."""
 
     def __init__(self, height: FloatArray, x: FloatArray, y: FloatArray, jaws: Jaws) -> None:
-        self.jaws, (self.x, self.y) = jaws, np.meshgrid(x, y, indexing="ij")
-        self.touch, steps = float(height.min()), (x[1] - x[0], y[1] - y[0])
-        self.height, self.cell = np.ascontiguousarray(height - self.touch), steps[0] * steps[1]
+        self.jaws, self.x, self.y = jaws, x, y
+        self.touch, self.steps = float(height.min()), (x[1, 0] - x[0, 0], y[0, 1] - y[0, 0])
+        self.height, self.cell = np.ascontiguousarray(height - self.touch), self.steps[0] * self.steps[1]
         depth = bed_closing(self.height, jaws.force / (jaws.stiffness * self.cell))
         self.pressure = jaws.stiffness * np.maximum(depth - self.height, 0.0)
-        slope = np.stack(np.gradient(np.where(np.isfinite(self.height), self.height, jaws.pad[2]), *steps), axis=-1)
+        z = np.where(np.isfinite(self.height), self.height, jaws.pad[2])
+        slope = np.stack([ALONG @ z / self.steps[0], z @ ACROSS.T / self.steps[1]], axis=-1)
         # a cell whose neighbour misses the object, or lies far behind it, is at a silhouette: its slope says nothing;
         # one that is steeper than this is the object's flank
         self.slope = np.where((np.abs(slope) > 3.0).any(axis=-1, keepdims=True), 0.0, slope)
@@ -103,10 +112,7 @@ class JawsOnSurface:
 
     def __init__(self, surface: tuple[FloatArray, IntArray], point: FloatArray, axes: FloatArray, jaws: Jaws) -> None:
         self.point, self.axes, self.jaws = point, axes, jaws
-        length, width, _ = jaws.pad
-        # with one more even step at both ends
-        wider = [side * ((np.arange(-1, n + 1) + 0.5) / n - 0.5) for side, n in zip((length, width), GRID, strict=True)]
-        x, y = (part[1:-1] for part in wider)
+        wider, (x, y) = cells(*jaws.pad[:2])
         self.local, self.triangles = np.ascontiguousarray((surface[0] - point) @ axes), surface[1]
         low, high = height_fields(self.local, self.triangles, *wider)
         if not np.isfinite(low[INNER]).any():
@@ -171,8 +177,8 @@ class JawsOnSurface:
         shares = []
         for side, height in zip(self.sides, self._fields, strict=True):
             z = np.where(np.isfinite(height), height, side.touch + side.jaws.pad[2])
-            edge, dx, dy = np.zeros(z.shape, dtype=bool), side.x[1, 0] - side.x[0, 0], side.y[0, 1] - side.y[0, 0]
-            for field, mask, step in ((z, edge, dx), (z.T, edge.T, dy)):
+            edge = np.zeros(z.shape, dtype=bool)
+            for field, mask, step in zip((z, z.T), (edge, edge.T), side.steps, strict=True):
                 jump = np.abs(np.diff(field, axis=0)) > 3.0 * abs(step)
                 mask[:-1] |= jump
                 mask[1:] |= jump
@@ -205,9 +211,9 @@ def grips(
             yield grip
 
 
-def spring_payload(contacts: Sequence[Contact], task: Task) -> float:
-    """Payload of contacts on a bed of springs [kg]; 0 where they bear no torque at all."""
+def spring_payload(contacts: Sequence[Contact], task: Task, least: float = 0.0) -> float:
+    """Payload of contacts on a bed of springs [kg], or less than ``least``; 0 where they bear no torque at all."""
     try:
-        return payload_alone(contacts, task)["maps/payload"]
+        return payload_alone(contacts, task, least)["maps/payload"]
     except (ArithmeticError, QhullError, RuntimeError, ValueError):
         return 0.0

@@ -193,8 +193,9 @@ def improved(
         rolls = [axes[:, 0] + sign * math.tan(share * ROLLED / SEARCH_STEPS[0]) * axes[:, 1] for sign in (1.0, -1.0)]
         frames = [*((place, axes) for place in shifts), *((point, axes_of(axes[:, 2], roll)) for roll in rolls)]
         for grip in grips(surface, frames, jaws, lids):
-            other = judged(grip, task)
-            if not other.state and other.payload > (1.0 + WORTHWHILE) * grasp.payload:
+            wanted = (1.0 + WORTHWHILE) * grasp.payload
+            other = judged(grip, task, wanted)
+            if not other.state and other.payload > wanted:
                 grasp = replace(other, point=grip.middle)
     return grasp
 
@@ -236,11 +237,11 @@ def state_of(grip: JawsOnSurface) -> int:
     return int(state or (SLIPS if slips(grip.misalignment[1], grip.jaws.mu) else MISSING))
 
 
-def judged(grip: JawsOnSurface, task: Task) -> SampledGrasp:
-    """State of a grasp on a bed of springs, with its payload there."""
+def judged(grip: JawsOnSurface, task: Task, least: float = 0.0) -> SampledGrasp:
+    """State of a grasp on a bed of springs, with its payload there, or one below ``least``."""
     state = state_of(grip)
-    inward = 1.0 - min(grip.on_edges, EDGE_COST)
-    worth = 0.0 if state else grip.peak * inward * spring_payload(grip.contacts, task)
+    share = grip.peak * (1.0 - min(grip.on_edges, EDGE_COST))
+    worth = 0.0 if state else share * spring_payload(grip.contacts, task, least / share)
     return SampledGrasp(grip.point, grip.axes[:, 2], grip.axes[:, 0], grip.opening, worth, state)
 
 

@@ -46,9 +46,9 @@ def payload_values(contacts: Sequence[Contact], task: Task) -> tuple[dict[str, A
     return _maps(np.array([p.force for p in payloads]), task), Flag(0) if payloads[0].borne else Flag.NOT_BORNE
 
 
-def payload_alone(contacts: Sequence[Contact], task: Task) -> dict[str, Any]:
-    """The maps of `payload_values` in the curved model."""
-    return _maps(_payload(contacts, MODELS[0], task).force, task)
+def payload_alone(contacts: Sequence[Contact], task: Task, least: float = 0.0) -> dict[str, Any]:
+    """The maps of `payload_values` in the curved model; of a payload below ``least`` [kg] any bound below it."""
+    return _maps(_payload(contacts, MODELS[0], task, least * GRAVITY).force, task)
 
 
 def _maps(force: Any, task: Task) -> dict[str, Any]:
@@ -57,9 +57,9 @@ def _maps(force: Any, task: Task) -> dict[str, Any]:
     return {"maps/payload": mass} | ({} if task.mass is None else {"maps/safety_factor": mass / task.mass})
 
 
-def _payload(contacts: Sequence[Contact], model: str, task: Task) -> Payload:
+def _payload(contacts: Sequence[Contact], model: str, task: Task, least: float = 0.0) -> Payload:
     soft = [c.soft(DiscBody(friction_discs(c.local, c.mu, model))) for c in contacts]
     pressure = [c.pressure_wrench for c in contacts]
     drive = [c.drive(p) for c, p in zip(contacts, pressure, strict=True)]
     gap = BOUND_GAP if model == MODELS[0] else PLANAR_GAP
-    return payload(soft, pressure, task.centre_of_mass, task.direction, task.kind, drive, gap)
+    return payload(soft, pressure, task.centre_of_mass, task.direction, task.kind, drive, gap, least)
