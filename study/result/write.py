@@ -95,7 +95,8 @@ class ResultWriter:
         values = [np.asarray(h5py.Dataset(column.dataset)[self._index(row)]) for column in self._columns]
         values[[c.key for c in self.layout.columns].index(MESH)] = self._wanted[row]
         known = text_of(bytes(values[-1].item()))
-        values[-1] = np.array(text_bytes("; ".join(filter(None, (known, NOT_FINER + message))), MESSAGE_BYTES))
+        reason = NOT_FINER + message.partition("; ")[0]  # a retry would begin with the coarse mesh
+        values[-1] = np.array(text_bytes("; ".join(filter(None, (known, reason))), MESSAGE_BYTES))
         return values
 
     def write(self, row: int, values: Sequence[np.ndarray], state: int = DONE) -> None:
@@ -105,9 +106,8 @@ class ResultWriter:
         if self._code[index] in (DONE, FAILED):
             if self.codes()[row] == DONE:
                 raise ValueError(f"row {row} is done already and must not be written again")
-            self._code[index], self._attempts[index] = MISSING, 1  # a later round may name it again
-        if not self._attempts[index]:  # a row that is stored is begun: only such a one may be without its mark
-            self._attempts[index] = 1
+            self._code[index] = MISSING  # a later round may name it again
+        self._attempts[index] = 1  # a row that is stored was begun: what killed it before is no sign for a finer mesh
         # Values, sums, state: a kill in between leaves a row that reads as not computed.
         for place, column, value in zip(self._columns, self.layout.columns, values, strict=True):
             place.write(index, np.asarray(value, column.dtype, "C"))

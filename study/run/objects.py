@@ -136,8 +136,9 @@ class _ObjectsRun:
             self.rows[n] |= {} if isinstance(answer, Part) else answer
         parts = [answer for answer in answers.values() if isinstance(answer, Part)]
         names = {part.number: part.seconds for part in parts}
+        retry = self._retry
         while parts and not stopped:
-            stopped = self._cases(parts)
+            stopped, retry = self._cases(parts, retry), False  # once, and not in every round
             mine = [part for part in parts if part.number in self._mine]
             grown = [] if stopped else [self._alone(part.number, self._grown, part) for part in mine]
             parts = self._gathered(part for part in grown if part)
@@ -193,13 +194,13 @@ class _ObjectsRun:
 
     # --- solving ------------------------------------------------------------------------------------------------------
 
-    def _cases(self, parts: list[Part]) -> bool:
-        """Solve what is missing of some objects; whether a signal came."""
+    def _cases(self, parts: list[Part], retry: bool) -> bool:
+        """Solve what is missing of some objects, and what has failed if asked to; whether a signal came."""
         writers = [ResultWriter(part.path, part.plan.layout, self._comm, part.plan.wanted) for part in parts]
         files = Files(self._out, writers)
 
         def states() -> list[np.ndarray]:
-            return [settle(w, part.plan.units, part.torn, self._retry) for w, part in zip(writers, parts, strict=True)]
+            return [settle(w, part.plan.units, part.torn, retry) for w, part in zip(writers, parts, strict=True)]
 
         codes = np.concatenate(on_rank0(self._comm, states))
         if self._comm.rank == 0:  # in each round of further grasps and finer meshes counts begin anew
@@ -324,27 +325,27 @@ def _why(error: BaseException, limit: float) -> Row:
 def row_of(result: Any) -> Row:
     """What the index says of an open result file."""
     ds = judge(dataset(result))
-    status, flags = ds.status.values, ds.flags.values
-    done, failed = (status == quantities.DONE), (status == quantities.FAILED)
-    row: Row = {"cases": int(status.size), "done": int(done.sum()), "failed": int(failed.sum())}
-    row |= {"seconds": float(np.nansum(ds["work_seconds_total"].values))}
+    codes, done, flags = result.status, ds.status.values == quantities.DONE, ds.flags.values
+    row: Row = {"cases": codes.size, "seconds": float(np.nansum(result.read("work/seconds_total")))}
+    for name, code in (("done", quantities.DONE), ("failed", quantities.FAILED)):
+        row[name] = int(np.count_nonzero(codes == code))  # also of samples of uncertain inputs
     if mass := task_keys(ds, "object").get("mass_g"):  # also what the scene's density makes
         row["mass"] = in_si("mass_g", mass)
-    if (status == quantities.MISSING).any():
+    if (codes == quantities.MISSING).any():
         return row | {"state": index.STOPPED, "reason": ""}
     usable, payload = done & (flags & LOST == 0), np.nan_to_num(values_of(ds, "payload"))
     # A grasp that holds the object with less safety than is asked for is one.
     holding = usable if usable.any() else done & (flags & LOST == Flag.TOO_WEAK) & (payload > 0)
     row["reason"] = _reason(ds, done, flags[holding if holding.any() else done] & LOST)
     if not holding.any():
-        return row | {"state": index.FAILED if failed.any() and not done.any() else index.NO_GRASP}
+        return row | {"state": index.FAILED if row["failed"] and not done.any() else index.NO_GRASP}
     if not holding[at := ds.attrs["best"]]:
         at = tuple(map(int, np.unravel_index(largest(np.where(holding, payload, -1.0)), holding.shape)))
-    k, best = at[-1], int(np.ravel_multi_index(at[:-1], status.shape[:-1]))
+    k, best = at[-1], int(np.ravel_multi_index(at[:-1], done.shape[:-1]))
     maps = [name for name in ("payload", "opening", "e_n", "quality", "payload_error") if name in ds]
     row |= {name: float(values_of(ds, name)[at]) for name in maps}
     row |= {"force": float(ds.normal_force.values[k]), "best": best, "grasps": int(usable[..., k].sum())}
-    return row | {"state": index.SOME_FAILED if failed.any() else index.DONE}
+    return row | {"state": index.SOME_FAILED if row["failed"] else index.DONE}
 
 
 def _reason(ds: Any, done: np.ndarray, lost: np.ndarray) -> str:

@@ -14,6 +14,7 @@ from softjaw.study.flags import flag_sentences, flags_in
 from softjaw.study.quantities import DONE, FAILED, MISSING, NO_GRASP, PARTS, STATES, map_row, misses
 from softjaw.study.result.index import index_path
 from softjaw.study.result.lock import holder
+from softjaw.study.result.skeleton import UNFINISHED
 from softjaw.study.result.store import open_result, place_text
 from softjaw.study.run.progress import duration
 from softjaw.study.run.refine import about
@@ -108,7 +109,8 @@ def waits(result: Any) -> int:
 
 def unfinished(result: Any) -> bool:
     """Whether a run of the same command has something to do."""
-    return bool(np.any(result.status == MISSING)) or waits(result) > 0
+    # a run that was killed between two rounds left no report
+    return bool(np.any(result.status == MISSING)) or waits(result) > 0 or result.report == UNFINISHED
 
 
 def largest_stated_error(result: Any) -> str:

@@ -12,14 +12,15 @@ from rich.console import Console
 from rich.live import Live
 from rich.text import Text
 
-from softjaw.study.quantities import DONE, FAILED, MAIN, MISSING
+from softjaw.study.messages import STOPPED
+from softjaw.study.quantities import DONE, FAILED, MAIN
 from softjaw.study.ranking import index_of, ranked
 from softjaw.study.result.lock import holder
 from softjaw.study.result.read import dataset
 from softjaw.study.result.store import open_result, place_text
 from softjaw.study.run.progress import Progress, code_of
 from softjaw.study.show.best_grasps import value_text
-from softjaw.study.show.status import RESUME, lasted, reasons
+from softjaw.study.show.status import RESUME, lasted, reasons, unfinished
 from softjaw.study.table import terminal_width
 
 INTERRUPTED = 130  # what shells say of a program that Ctrl-C ended
@@ -74,7 +75,7 @@ def file_look(path: Path) -> Look:
             rounds = len(result.layout.added)
             counts = f"{progress.line(codes)}{f', round {rounds} of further grasps' * bool(rounds)}"
             if not runner:
-                return [counts, *_end(result, codes)], code_of(codes)
+                return [counts, *_end(result)], STOPPED if unfinished(result) else code_of(codes)
             title = f" ({result.title})" * bool(result.title)
             since = lasted(result.sessions[-1]["start"]) if result.sessions else ""
             about = f"{result.path}{title}: {runner}{f', for {since}' * bool(since)}"
@@ -84,10 +85,10 @@ def file_look(path: Path) -> Look:
     return look
 
 
-def _end(result: Any, codes: np.ndarray) -> list[str]:
+def _end(result: Any) -> list[str]:
     """Last words of a run that has ended."""
-    if missing := int(np.sum(codes == MISSING)):
-        return [f"{missing} cases are not computed; {RESUME}"]
+    if unfinished(result):
+        return [f"not complete: {RESUME}"]
     return ["complete", *reasons(result, terminal_width()), f"'softjaw show {result.path}' lists the best grasps"]
 
 

@@ -42,6 +42,7 @@ def main(arguments=None):
     for name in ("kill-after", "stop-after"):
         parser.add_argument(f"--{name}", type=int, default=-1)  # cases of this rank
     parser.add_argument("--retry-failed", action="store_true")
+    parser.add_argument("--fail", type=int, default=7001)
     parser.add_argument("--delay", type=float, default=0.0)
     options = parser.parse_args(arguments)
     from mpi4py import MPI
@@ -51,7 +52,7 @@ def main(arguments=None):
     from softjaw.study.run.objects import run_objects
     from softjaw.study.run.session import Work
     solved = 0
-    nothing = SimpleNamespace(hang=-1, stuck=-1, greedy=-1, unplug=-1, remove=-1, kill=-1, raises=-1, fail=7001)
+    nothing = SimpleNamespace(hang=-1, stuck=-1, greedy=-1, unplug=-1, remove=-1, kill=-1, raises=-1, fail=options.fail)
     cases = fake_run.fake_path(SimpleNamespace(**vars(nothing), delay=options.delay))
 
     def solve_unit(unit, wanted):

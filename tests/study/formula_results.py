@@ -11,7 +11,7 @@ from softjaw.study.result import checksums
 from softjaw.study.result.datasets import CLOSING_SUMS, SUMS
 from softjaw.study.result.hdf5 import StoredFile
 from softjaw.study.result.layout import ROOT, Header, Layout
-from softjaw.study.result.skeleton import create
+from softjaw.study.result.skeleton import create, report_bytes
 from softjaw.study.result.store import Result
 from softjaw.study.result.write import ResultWriter, record
 from softjaw.study.scene import SceneError, parse_scene
@@ -122,7 +122,7 @@ def make(
         study["limit_surface/rho"][...] = 0.02
         study["limit_surface/semi_axes"][...] = [0.8, 0.8, 0.008]
         study["limit_surface/coefficients"][...] = quartic(1.0, 1.0, 4.0)
-        study["status/code"][...] = 1
+        study["status/code"][...], study["report"][()] = 1, report_bytes("made")
         for name, values in datasets.items():
             target = study[name.replace("__", "/")]
             target[...] = values(target[()]) if callable(values) else values

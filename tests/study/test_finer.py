@@ -65,10 +65,12 @@ def test_a_case_keeps_its_coarse_values_until_finer_ones_replace_them(tmp_path):
     writer.tidy(number)  # as after a kill: the coarse values stand
     assert writer.attempts()[number] == 1
     assert torn_rows(path, first.layout) == []
-    writer.fail(number, "it did not converge")
+    writer.fail(number, "it did not converge; run --retry-failed")
     assert (writer.codes() == DONE).all()
     assert writer.read("payload/ccm").ravel()[number] == 1.0
-    assert b"it did not converge" in writer.read("status/message").ravel()[number]
+    message = writer.read("status/message").ravel()[number]
+    assert b"it did not converge" in message
+    assert b"retry" not in message  # there is nothing to try again: the case is done
     with pytest.raises(ValueError, match="done already"):
         writer.write(number, filled(first.layout, 2.0, 1))
     writer.close()
@@ -88,6 +90,7 @@ def test_a_case_that_rounds_name_three_times_counts_as_begun_once(tmp_path):
         assert writer.codes()[5] == FAILED
         assert writer.attempts()[7] == 0
         writer.count_attempt(7)
+        writer.count_attempt(7)  # as after a kill on each mesh
         values = CaseResult({"maps/payload": [1.0] * 3, "maps/flags": 0.0, "work/mesh": mesh})
         writer.write(7, record(first.layout, values))
         assert writer.codes()[7] == DONE

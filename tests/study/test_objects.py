@@ -13,15 +13,20 @@ import trimesh
 from mpi4py import MPI
 
 import softjaw
+from softjaw.study.case.result import CaseResult
 from softjaw.study.messages import DONE, IN_USE, OTHER_FILE, SOME_FAILED, STOPPED, USAGE, StudyError
 from softjaw.study.result.index import NO_GRASP, blank_row, code_of, open_index, write_index
+from softjaw.study.result.store import open_result
 from softjaw.study.run.object_folder import folder_of
+from softjaw.study.run.objects import row_of
+from softjaw.study.run.plan import make_plan
 from softjaw.study.run.session import locked
 from softjaw.study.scene.text import quoted
 from tests.study import fake_objects
+from tests.study.formula_results import written
 from tests.study.launching import contents, differing, here, launch
 from tests.study.launching import softjaw as command
-from tests.study.scenes import mesh_of
+from tests.study.scenes import BALL, mesh_of, scene_of
 
 SCRIPT = Path(__file__).parent / "fake_objects.py"
 NAMES = ("a", "bug", "grows", "late", "longest", "none")
@@ -274,6 +279,32 @@ def test_an_object_of_a_folder_has_the_bits_of_a_run_of_its_own(tmp_path):
     assert command(0, "report", out)[0] == DONE
     assert (out / "index.html").read_text().count("data:image/png") == 2
     assert command(0, "export", out, "--format", "graspgen", "-o", tmp_path / "set")[0] == DONE
+
+
+def test_what_has_failed_is_tried_again_once_and_not_in_every_round(scene, tmp_path):
+    for name in ("a", "grows"):
+        shutil.copy(scene.parent / f"meshes/{name}.stl", tmp_path)
+    (tmp_path / "scene.toml").write_text(SCENE.replace("meshes/", ""))
+    run = (fake_objects.main, tmp_path / "scene.toml", tmp_path / "out", "--retry-failed", "--fail", "5001")
+    for first in (60, 2):
+        code, text, _ = here(*run)
+        counts = [int(line.split()[2]) for line in text.splitlines() if "to solve" in line]
+        assert (code, counts[0]) == (SOME_FAILED, first)
+        assert counts[1:] == [6, 12, 18] * (first == 60)
+
+
+def test_an_object_is_as_complete_as_the_samples_of_its_uncertain_inputs(tmp_path):
+    made = scene_of(BALL, 'uncertainty={ samples = 8, spread = { "friction.mu" = 0.1 } }')
+    plan = make_plan(made)
+
+    def case(at):
+        values = {"maps/payload": [1.0] * 3, "maps/flags": 0.0, "work/seconds_total": 2.0}
+        return "no state" if at == (3, 0, 0, 0) else CaseResult(values)
+
+    with open_result(written(tmp_path / "a.hdf", plan.layout, case, plan.header)) as result:
+        row = row_of(result)
+    assert (row["cases"], row["done"], row["failed"], row["seconds"]) == (9, 8, 1, 16.0)
+    assert code_of([row]) == SOME_FAILED
 
 
 def test_an_object_without_a_grasp_some_of_whose_cases_failed_has_the_code_of_those():

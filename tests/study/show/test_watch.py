@@ -9,6 +9,7 @@ import pytest
 from softjaw.study.cli import main
 from softjaw.study.messages import OTHER_FILE
 from softjaw.study.quantities import DONE, FAILED, MISSING
+from softjaw.study.result.skeleton import UNFINISHED, report_bytes
 from softjaw.study.show import watch as view
 from softjaw.study.show.watch import INTERRUPTED, file_look, watch
 from tests.study.formula_results import grid_axes, make, sealed
@@ -19,9 +20,9 @@ SIZE = 4 * 6 * 4  # cases of the file
 class Run:
     """A run that solves some more cases whenever the watcher sleeps, and ends after the last of its steps."""
 
-    def __init__(self, path, steps, monkeypatch):
+    def __init__(self, path, steps, monkeypatch, **about):
         self.path, self.steps, self.slept = path, list(steps), []
-        make(path, axes=grid_axes(np.arange(4) * 0.01), status__code=MISSING)
+        make(path, axes=grid_axes(np.arange(4) * 0.01), status__code=MISSING, **about)
         monkeypatch.setattr(view, "holder", lambda _: "host node7, 8 ranks" if self.steps else "")
 
     def sleep(self, seconds):
@@ -70,9 +71,14 @@ def test_a_round_is_another_file_with_more_cases_and_a_finished_run_ends_the_vie
     assert watch(file_look(run.path), 1.0, io.StringIO(), interrupted) == INTERRUPTED
 
 
-@pytest.mark.parametrize(("last", "code"), [((8, FAILED), 6), ((4, DONE), 75)])
-def test_failed_and_missing_cases_are_told_by_the_exit_code(tmp_path, monkeypatch, last, code):
-    run = Run(tmp_path / "a.hdf", [(SIZE - 8, DONE), last], monkeypatch)
+BETWEEN_ROUNDS = {"report": report_bytes(UNFINISHED)}
+
+
+@pytest.mark.parametrize(("last", "code", "about"), [
+    ((8, FAILED), 6, {}), ((4, DONE), 75, {}), ((8, DONE), 75, BETWEEN_ROUNDS),
+])  # fmt: skip
+def test_failed_and_missing_cases_are_told_by_the_exit_code(tmp_path, monkeypatch, last, code, about):
+    run = Run(tmp_path / "a.hdf", [(SIZE - 8, DONE), last], monkeypatch, **about)
     found, text = watched(run, io.StringIO())
     assert found == code
     assert ("8 x failed" in text) == (code == 6)
