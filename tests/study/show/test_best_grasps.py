@@ -26,8 +26,8 @@ from tests.study.scenes import BALL, pose_of, text_of
 
 FORCES = np.array([1.0, 5.0])
 WIDE = ("mass", "wall", "two meshes")
-WALL = '[object]\nshape = "box"\nsize_mm = [300, 40, 300]\nedge_radius_mm = 2\n[gripper]\npreset = "franka_hand"\n'
-WALL += "[load]\nnormal_force_n = [1, 5]\n" + "".join(pose_of((x, 0, 0), (0, 1, 0), (1, 0, 0)) for x in (0, 140))
+WALL = '[object]\nshape = "box"\nsize_mm = [140, 40, 140]\nedge_radius_mm = 2\n[gripper]\npreset = "franka_hand"\n'
+WALL += "[load]\nnormal_force_n = [1, 5]\n" + "".join(pose_of((x, 0, 0), (0, 1, 0), (1, 0, 0)) for x in (0, 60))
 
 
 def study(quality, flags=0.0, labels=None, status=DONE, needs=()):
@@ -247,10 +247,10 @@ def test_grasps_less_than_half_a_pad_apart_share_a_line_unless_they_are_rolled()
 
 @pytest.mark.parametrize(("scene", "order"), [(WALL, [1.0, 0.0]), (WALL.replace("preset", "# preset"), [0.0, 1.0])])
 def test_a_grasp_that_the_hand_of_the_scene_does_not_reach_comes_last(tmp_path, scene, order):
-    """Franka's fingers are 38 mm longer than its palm; the middle of a wall of 300 x 300 mm holds more."""
+    """Franka's fingers are 38 mm longer than its palm; the middle of a wall of 140 x 140 mm holds more."""
     axes = formula_results.grid_axes((0, 1), (0.0,), FORCES, poses=True)
     origin, turn = np.zeros((2, 1, 2, 2, 3)), np.zeros((2, 1, 2, 2, 3, 3))
-    origin[1, ..., 0], origin[..., 0, 1], origin[..., 1, 1] = 0.14, -0.02, 0.02
+    origin[1, ..., 0], origin[..., 0, 1], origin[..., 1, 1] = 0.06, -0.02, 0.02
     for finger, y in enumerate((1.0, -1.0)):
         turn[..., finger, :, :] = np.column_stack([[1.0, 0, 0], [0, 0, -y], [0, y, 0]])
     path = formula_results.make(
