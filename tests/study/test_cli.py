@@ -197,7 +197,7 @@ def test_every_command_that_writes_says_what_it_cannot_write(file, place, comman
 
 
 @pytest.mark.parametrize(
-    "command", ["show", "schema", *(pytest.param(n, marks=pytest.mark.long) for n in ("status", "export", "compare"))]
+    "command", ["schema", *(pytest.param(n, marks=pytest.mark.long) for n in ("show", "status", "export", "compare"))]
 )
 def test_an_output_that_cannot_be_written_has_the_same_code(file, command):
     words = {"export": (file, "--csv"), "schema": (), "compare": (file, file)}.get(command, (file,))

@@ -23,7 +23,7 @@ from tests.study.scenes import CONE, NO_COUPLING, pose_of, scene_of, units_of
 POSE = pose_of((0, 0, 75), (1, 0, 0.02))
 WALL = ("object.wall_mm=0.8", "effects.object='nonlinear_shell'", "accuracy.wall_element_mm=5",
         "load.normal_force_n=[1, 2, 3]", "gripper.elements=[6, 4, 2]")  # fmt: skip
-BOTH = pytest.mark.parametrize("overrides", [(), WALL], ids=["rigid", "wall"])
+BOTH = pytest.mark.parametrize("overrides", [(), pytest.param(WALL, marks=pytest.mark.long)], ids=["rigid", "wall"])
 ROUGH = ("effects.friction_pressure_coupling='tangential'",)
 OWN, FINER, FINEST = (8, 4, 2), (10, 6, 3), (12, 8, 4)
 PLAIN = Levels("rigid", "rigid", "none")
