@@ -170,7 +170,7 @@ def test_small_holes_are_filled_flipped_triangles_turned_and_a_large_hole_matter
     assert {tuple(sorted(map(tuple, sound.points[t]))) for t in sound.triangles} == {
         tuple(sorted(map(tuple, x[t]))) for t in triangles
     }
-    hollow, solid = (traced(MeshObject(*turned(bottle(wall))))[0] for wall in (0.003, None))
+    hollow, solid = (traced(MeshObject(*turned(bottle(wall), 48)))[0] for wall in (0.003, None))
     theta, s = np.meshgrid(np.linspace(0, 6, 20), np.linspace(*solid.wall, 30))
     assert hollow.jets(theta, s)[:, 0] == pytest.approx(solid.jets(theta, s)[:, 0], abs=1e-5)
     whole = MeshObject(*ball())
