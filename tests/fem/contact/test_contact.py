@@ -63,16 +63,6 @@ def test_tangent_of_triquadratic_elements(law):
     assert reference.tangent_error(problem, contacting_state(problem), direction, 3e-8) < 1e-7
 
 
-def test_the_displacement_block_is_symmetric_and_the_pressures_couple_transposed():
-    problem = problem_of(OBJECTS["sphere"])
-    problem.control, problem.complementarity = Control(force=2.0), True
-    K = reference.dense(problem, contacting_state(problem))
-    n = problem.pad.closing_dof + 1
-    assert np.abs(K[:n, :n] - K[:n, :n].T).max() < 1e-13 * np.abs(K).max()
-    assert np.abs(K[:n, n:] + K[n:, :n].T).max() < 1e-15 * np.abs(K).max()
-    assert not K[n:, n:].any()
-
-
 @pytest.mark.parametrize("plate", [None, PLATE], ids=["rigid plate", "elastic plate"])
 @pytest.mark.parametrize("control", [Control(force=2.0), Control(closing=1e-3)], ids=["force", "closing"])
 @pytest.mark.parametrize("contact", ["weighted", "nodal"])
