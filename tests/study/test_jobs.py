@@ -33,6 +33,7 @@ def test_every_shipped_scene_passes_check(name, capsys):
     assert told.err == ""
 
 
+@pytest.mark.long  # tests/test_docs.py runs it on two ranks in the fast stage
 def test_the_smoke_scene_runs_as_it_is(tmp_path):
     path = tmp_path / "smoke.hdf"
     assert "4 of 4 cases complete, 0 failed, 0 not computed" in solve(0, JOBS["smoke"], path)
