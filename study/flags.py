@@ -82,7 +82,9 @@ class Flag(IntFlag):
     TOO_WEAK = 1 << 20, "too weak", "this force does not hold the object's mass with the safety that [task] asks for"
     TOO_STRONG = 1 << 21, "too strong", "this force dents the wall deeper than is allowed, or makes it yield"
     # of no file: of the few best grasps, where the scene names a gripper
-    OUT_OF_REACH = 1 << 26, "out of reach", "palm or fingers of the hand meet the object, from whichever side it comes"
+    OUT_OF_REACH = 1 << 26, "out of reach", (
+        "the hand does not open so wide, has not this force, or meets the object from whichever side it comes"
+    )  # fmt: skip
 
 
 DERIVED = Flag.TOO_WEAK | Flag.TOO_STRONG | Flag.OUT_OF_REACH

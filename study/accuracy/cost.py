@@ -17,7 +17,7 @@ from softjaw.study.table import aligned
 FINENESS = (0.5, 0.7, 1.0, 1.4)  # elements per direction over those of the scene
 WALL_SIZES = (2.0, 1.0, 0.7)  # of a wall's elements, over those of the scene
 REPRESENTATIVE = 3  # candidates, and forces, that stand for all
-SMALLEST = ("accuracy.wall_element_mm",)  # keys whose smallest value is the most accurate one; of others it is the last
+SMALLEST = ("accuracy.wall_element_mm", "object.grid_step_mm")  # whose smallest value is the most accurate; else the last
 JUDGED = ("payload", "quality", "e_n")
 LOOKS = (("#12436d", "o"), ("#c05a00", "s"), ("#2a8c82", "^"), ("#801650", "D"))
 
@@ -91,7 +91,8 @@ def settings_in(ds: xr.Dataset) -> list[Setting]:
     claims = {name: _by_point(values_of(ds, f"{name}_error"), shape) for name in maps if f"{name}_error" in ds}
     best = tuple(0 if axis.long_name in SMALLEST else length - 1 for axis, length in zip(swept, shape, strict=True))
     last = int(np.ravel_multi_index(best, shape))
-    errors = {name: np.abs(values - values[last]) / np.abs(values[last]) for name, values in maps.items()}
+    with np.errstate(divide="ignore", invalid="ignore"):  # where nothing is held
+        errors = {name: np.abs(values - values[last]) / np.abs(values[last]) for name, values in maps.items()}
     tables = scene.with_values({}).effective()
     settings = []
     for i, index in enumerate(np.ndindex(shape)):

@@ -208,7 +208,20 @@ def warnings(scene: Scene) -> tuple[str, ...]:
     edges = (scene.candidates.warnings(shape, axis_span(shape), scene.gripper) for shape in shapes)
     walls = [geometry().trace_warning(shape) for shape in shapes if shape.shape == "mesh" and shape.wall is not None]
     placed = next((warned for warned in map(tuple, edges) if warned), ())
-    return (*scene.warnings, *placed, *_remarks(scene), *walls)
+    return (*scene.warnings, *placed, *_remarks(scene), *filter(None, map(_swing, dict.fromkeys(shapes))), *walls)
+
+
+def _swing(shape: Any) -> str:
+    """What there is to say of a smooth outline that leaves the extent of its points; mostly nothing."""
+    if shape.shape not in ("revolution", "sections"):
+        return ""
+    low, high = np.transpose([shape.spans_mm[axis] for axis in "xy"])
+    bounds = 1e3 * build_object(shape).bounds[:, :2]
+    off = float(np.max([low - bounds[0], bounds[1] - high]))
+    # share of the width: less is how a round outline with few points is meant
+    if off < 0.02 * float(np.max(high - low)):
+        return ""
+    return f"object: the outline swings {off:.2g} mm beyond its points; three points on a line draw a straight wall"
 
 
 def notices(scene: Scene) -> list[str]:

@@ -60,7 +60,7 @@ def boxes(hand: Hand, pad: FloatArray, opening: float, depth: float) -> FloatArr
         box[:, 2] = start - WAY, tip
         made.append(box)
     if hand.palm_mm is not None:
-        made.append(np.array(hand.palm_mm) / 1e3 - [[0.0, 0.0, WAY], [0.0, 0.0, 0.0]])
+        made.append(np.sort(hand.palm_mm, axis=0) / 1e3 - [[0.0, 0.0, WAY], [0.0, 0.0, 0.0]])
     return np.stack(made)
 
 

@@ -114,6 +114,10 @@ def gripper_file(name: str) -> tuple[dict[str, Any], Hand]:
     try:
         tables = tomllib.loads(path.read_text(encoding="utf-8"))
         hand = Hand.model_validate(tables.get("hand", {}))
+        if not (tables.keys() <= {"gripper", "hand"} and isinstance(tables.get("gripper", {}), dict)):
+            raise ValueError(f"found {', '.join(tables)}, expected tables [gripper] and [hand] alone")
+        if not 0 <= hand.force_n[0] <= hand.force_n[1]:
+            raise ValueError(f"hand.force_n: found {list(hand.force_n)}, expected the least and the largest force")
     except OSError as error:
         text = f"gripper: found '{name}', expected one of {', '.join(PRESETS)}, or a file of the same form"
         raise StudyError(USAGE, text) from error

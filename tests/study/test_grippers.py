@@ -84,7 +84,10 @@ def test_joints_are_half_the_gap_within_the_stroke_or_the_angle_of_a_linkage():
     assert 0 < hand.values(0.085)["finger_joint"] < 0.02
 
 
-@pytest.mark.parametrize("text", ["[hand]\nfingers = 3", "[hand]\nstroke_mm = -1", "[hand]\nclosing = 'z'", "hand ="])
+@pytest.mark.parametrize("text", [
+    "[hand]\nfingers = 3", "[hand]\nstroke_mm = -1", "[hand]\nclosing = 'z'", "hand =", "[Hand]\nstroke_mm = 40",
+    "gripper = 3", "[hand]\nforce_n = [35, 1]", "[hand]\nforce_n = [1, nan]",
+])  # fmt: skip
 def test_a_file_with_wrong_keys_is_refused(tmp_path, text):
     (tmp_path / "mine.toml").write_text(text)
     with pytest.raises(StudyError) as error:

@@ -90,6 +90,7 @@ def test_errors_are_distances_from_the_last_or_smallest_point_and_failed_cases_c
     assert [s.reference for s in found] == [True, False, False]
     assert [s.given for s in found] == [False, True, False]
     ds = softjaw.open(file).copy(deep=True)
+    assert np.isnan(settings_in(ds.assign(payload=0.0 * ds.payload))[0].worst["payload"])  # of nothing
     for name in ("e_n", "payload", "quality", "work_seconds_total"):
         ds[name].values[0, 0, 0, 0, 0] = np.nan
     failed, *others = settings_in(ds)

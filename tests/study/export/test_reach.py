@@ -53,6 +53,7 @@ def test_a_hand_comes_from_above_where_its_palm_stays_over_the_object_and_opens_
 
 @pytest.mark.parametrize(("hand", "why"), [
     (Hand(depth_mm=10, palm_mm=[[-100, -100, -20], [100, 100, 5]]), "every side"),
+    (Hand(depth_mm=10, palm_mm=[[100, -100, 5], [-100, 100, -20]]), "every side"),  # other corners of the same box
     (Hand(stroke_mm=60), "30 mm"),  # pads of 15 mm leave half of it, and the object is 40 mm wide
     (Hand(stroke_mm=16), "no opening left"),
     (Hand(force_n=[5, 50]), "5 to 50 N"),

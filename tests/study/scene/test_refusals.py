@@ -120,3 +120,5 @@ def test_a_swept_pad_that_leaves_the_object_and_stations_in_metres_get_a_warning
     metres = ("candidates.stations=7", "candidates.stations_mm=[0.025, 0.175]")
     assert len(warnings(at([100], BOTTLE, *metres))) > len(warnings(at([100, 101], BOTTLE))) == 0
     assert len(warnings(at([0.1], BOTTLE))) == 1  # the pad leaves the bottle
+    swings = at([100], BOTTLE.replace("[100, 29], [200, 20]", "[80, 20], [200, 20]"))
+    assert len(warnings(swings)) == 1  # 2 points do not make a straight wall: its radius is 33 mm
