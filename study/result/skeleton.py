@@ -187,26 +187,22 @@ def report_bytes(text: str) -> np.ndarray:
 
 def _create_dataset(file: h5py.File, dataset: Dataset, packed: bool) -> None:
     plist = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
-    plist.set_obj_track_times(False)
-    if packed:
-        plist.set_chunk(_chunk(dataset))
-        plist.set_shuffle()
-        plist.set_deflate(DEFLATE_LEVEL)
-    else:  # contiguous and allocated at once: only so can ranks write independently of each other
+    if not packed:  # contiguous and allocated at once: only so can ranks write independently of each other
         plist.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
     # Filled now: a case that is never written reads as not computed, not as what the disk held.
     plist.set_fill_time(h5py.h5d.FILL_TIME_ALLOC)
     strings = dataset.dtype.kind == "S"
     dtype = h5py.string_dtype("utf-8", dataset.dtype.itemsize) if strings else dataset.dtype
-    if not strings:  # text is filled with zero bytes anyway
-        plist.set_fill_value(np.array(dataset.fill))
-    kind, space = h5py.h5t.py_create(dtype, logical=True), h5py.h5s.create_simple(dataset.shape)
-    made = h5py.h5d.create(file.id, dataset.path.encode(), kind, space, plist)
+    fill = None if strings else dataset.fill  # text is filled with zero bytes anyway
+    how = {"chunks": _chunk(dataset), "shuffle": True, "compression": DEFLATE_LEVEL} if packed else {}
+    made = file.create_dataset(
+        dataset.path, dataset.shape, dtype, dcpl=plist, fillvalue=fill, track_times=False, **how
+    )  # fmt: skip
     for key, value in dataset.attributes.items():
         # of fixed length: texts of any length stand elsewhere in the file, 40 kB more in all
         text = value.encode()
         fixed = np.array(text, h5py.string_dtype("utf-8", len(text))) if packed and text else value
-        _write_attribute(made, key, fixed)
+        _write_attribute(made.id, key, fixed)
 
 
 def _chunk(dataset: Dataset) -> tuple[int, ...]:
