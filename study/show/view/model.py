@@ -4,6 +4,7 @@ Positions are in m in the frame of the object's own file unless a unit is named.
 """
 
 from collections.abc import Iterator
+from contextlib import suppress
 from functools import cached_property
 from typing import Any
 
@@ -43,11 +44,8 @@ class View:
     def __init__(self, ds: xr.Dataset, point: Index = ()) -> None:
         self.ds, self.point, self.note = ds, point, ""
         self.scene: Any = None
-        self._unread: SceneError | None = None
-        try:
+        with suppress(SceneError):
             self.scene = scene_of(ds, point)
-        except SceneError as error:
-            self._unread = error
         self._faces: dict[int, xr.Dataset] = {}
 
     @property
@@ -99,9 +97,7 @@ class View:
     def surface(self) -> Surface:
         """The object's surface; empty with a `note`."""
         try:
-            if self._unread:
-                raise self._unread
-            surface = surface_of(self.scene, axes_of(self.ds), self._feet())
+            surface = surface_of(self.scene or scene_of(self.ds, self.point), axes_of(self.ds), self._feet())
         except (ValueError, OSError) as error:
             self.note = f"the object is not drawn: {error}"
             return Surface(np.empty((0, 3)), np.empty((0, 3), int), np.empty(0, int), np.empty(0, int))
