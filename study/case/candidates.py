@@ -247,13 +247,9 @@ def path_cost(scene: Scene) -> float:
     """Work of one load path in element solves: forces x elements x nodes per element, and the coarse mesh's share."""
     # A triquadratic element has eight times the nodes that it does not share.
     nodes = {"hex8": 1, "hex27": 8}[scene.gripper.element]
-    return len(scene.load.normal_force_n) * math.prod(scene.gripper.elements) * nodes * meshes_cost(scene)
-
-
-def meshes_cost(scene: Scene) -> float:
-    """Elements of all meshes of a case over those of the fine one."""
-    shares = [math.prod(pad_shape(scene.gripper, coarser).elements) for coarser in (False, True)]
-    return sum(shares[: scene.accuracy.meshes]) / shares[0]
+    elements = [math.prod(pad_shape(scene.gripper, coarser).elements) for coarser in (False, True)]
+    share = sum(elements[: scene.accuracy.meshes]) / elements[0]
+    return len(scene.load.normal_force_n) * math.prod(scene.gripper.elements) * nodes * share
 
 
 def decided(units: Sequence[Unit]) -> list[Unit]:

@@ -138,7 +138,12 @@ class PathSolver:
         self._begun = []
         failed = {k: pending.pop(k) for k in ([min(pending)] if unit.apart else [*pending])}
         with self._state.writing():
-            fail_from(self._files, failed, message, NOT_TRIED, seconds)
+            for k, served in failed.items():
+                text = message if k == min(failed) else NOT_TRIED.format(text=message)
+                for n, (_, row) in enumerate(served):
+                    writer, at = self._files.at(row)
+                    # the time is spent once for all candidates that are served
+                    writer.fail(at, text, seconds=math.nan if n or k > min(failed) else seconds)
 
     def _count(self, pending: dict[int, list[tuple[int, int]]]) -> None:
         rows = [row for _, row in pending[min(pending)]]
@@ -157,17 +162,6 @@ class PathSolver:
         with self._state.writing():
             for writer, at in map(self._files.at, rows):
                 writer.count_attempt(at, change)
-
-
-def fail_from(files: Files, pending: Pending, message: str, above: str, seconds: float = math.nan) -> None:
-    """Store why the lowest of the pending forces failed, after ``seconds``, and of those ``above`` why not tried."""
-    lowest = min(pending, default=0)
-    for k, served in pending.items():
-        for n, (_, row) in enumerate(served):
-            first = k == lowest and n == 0  # the time is spent once for all candidates that are served
-            text = message if k == lowest else above.format(text=message)
-            writer, at = files.at(row)
-            writer.fail(at, text, seconds=seconds if first else math.nan)
 
 
 def _pending(share: Share, codes: np.ndarray) -> Pending:

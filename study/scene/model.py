@@ -221,13 +221,9 @@ class Scene(SceneSection):
         """Values of the uncertain inputs by dotted key: the scene's own, which are none, then those of the samples."""
         if not self.uncertainty.spread:
             return [{}]
-        return [{}, *self.uncertainty.inputs(self._means)]
-
-    @property
-    def _means(self) -> dict[str, float]:
-        """The scene's own values of the uncertain inputs."""
         keys = {key: key.partition(".") for key in self.uncertainty.spread}
-        return {key: getattr(getattr(self, section), name) for key, (section, _, name) in keys.items()}
+        means = {key: getattr(getattr(self, section), name) for key, (section, _, name) in keys.items()}
+        return [{}, *self.uncertainty.inputs(means)]
 
     def effective(self) -> dict[str, Any]:
         """Every value in effect, defaults filled in, as the tables of a scene file."""
