@@ -137,10 +137,6 @@ class GraspPoint(GraspNumbers):
         """Largest f_x, f_y, tau_z of each finger ``(..., 2, 3)`` [N, N, N m]: the ellipsoid from three motions."""
         return self.fingers("limit_surface/semi_axes", model) * self.fingers("S")[..., None]
 
-    def coefficients(self, model: str = "ccm") -> FloatArray:
-        """Coefficients of the fitted quartics ``(..., 2, 15)``, in the units of ``limit_surface/coefficients``."""
-        return self.fingers("limit_surface/coefficients", model)
-
     def limit_surface(self, finger: int, model: str = "ccm", fitted: bool = True) -> LimitSurface:
         """Limit surface of finger 1 or 2 in (f_x, f_y, tau_z) [N, N, N m], with ``support``, ``holds`` and the rest.
 

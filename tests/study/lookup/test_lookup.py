@@ -320,7 +320,7 @@ def test_limit_surfaces_come_between_those_of_the_cases_around_and_bounds_of_the
     low, high = (there.at(0.01, 0.1, f).limit_surface(1).scaled(np.full(3, 6 / f)).support(t) for f in (8, 4))
     assert ((low <= surface.support(t)) & (surface.support(t) <= high)).all()
     assert between.limit_surface(1, fitted=False).semi_axes == pytest.approx([4.8, 4.8, 0.048])
-    assert between.coefficients().shape == (2, 15)
+    assert between.fingers("limit_surface/coefficients").shape == (2, 15)
     with pytest.raises(ValueError, match="expected 1 or 2"):
         between.limit_surface(0)
     with pytest.raises(ValueError, match="one point"):
