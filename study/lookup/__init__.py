@@ -58,8 +58,7 @@ class GraspMap:
     file : path or xarray.Dataset
         Result file; one that a run is still writing will do. Or what `softjaw.open` gives, or a part of it.
     where : mapping, optional
-        The point of a sweep: a value for each swept key, in the scene's words (``{"object.radius_mm": 20}``) or by the
-        axis' name in SI units.
+        The point of a sweep: a value for each swept key, in the scene's words, ``{"object.radius_mm": 20}``.
 
     Raises
     ------
@@ -300,9 +299,6 @@ def _sweep_point(axes: Any, where: Mapping[str, Any]) -> tuple[int, ...]:
         key, factor = axis.long_name, in_si(axis.long_name, 1.0)
         options: list[Any] = [*axis.options] or [v / factor for v in axis.values.tolist()]
         known = f"{key} = {', '.join(map(_text, options))}"
-        if key not in rest and axis.name in rest:
-            value = rest.pop(axis.name)
-            rest[key] = value if isinstance(value, str) else value / factor
         if key not in rest and len(options) > 1:
             raise ValueError(f"where is missing {key}: give one of {known}")
         given = rest.pop(key, options[0])

@@ -260,16 +260,17 @@ def test_a_sweep_is_asked_at_one_of_its_points(tmp_path):
         return b + 10 * material + 0 * station * angle * force
 
     path = make(tmp_path / "a.hdf", formula, grid_axes(sweep=sweep), scene=ROUND)
+    point = {"object.semi_axis_b_mm": 25, "gripper.material": "blatz_ko"}
     for where, value in (
         ({"object.semi_axis_b_mm": 10, "gripper.material": "neo_hooke"}, 10.01),
-        ({"semi_axis_b": 0.025, "material": "blatz_ko"}, 0.025),
+        (point, 0.025),
     ):
         assert GraspMap(path, where=where).at(0.01, 0.1, 2).e_n == pytest.approx(value)
     for where, word in (
         ({}, r"missing object.semi_axis_b_mm: give one of .* = 10, 25"),
-        ({"semi_axis_b": 0.015, "material": "blatz_ko"}, "= 15: expected one of"),
-        ({"semi_axis_b": 0.025, "material": "steel"}, "expected one of gripper.material = blatz_ko, neo_hooke"),
-        ({"semi_axis_b": 0.025, "material": "blatz_ko", "mu": 1}, "where has mu"),
+        (point | {"object.semi_axis_b_mm": 15}, "= 15: expected one of"),
+        (point | {"gripper.material": "steel"}, "expected one of gripper.material = blatz_ko, neo_hooke"),
+        (point | {"mu": 1}, "where has mu"),
     ):
         with pytest.raises(ValueError, match=word):
             GraspMap(path, where=where)
