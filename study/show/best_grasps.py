@@ -95,7 +95,7 @@ def best(
     error = largest_error(errors, alone, axes_of(ds), ds.label.values) if known else []
     notes = _notes(ds, [certainty(ds, [place.best for place in places], score, k), *error], marks)
     answers = {key: ", ".join(filter(None, texts)) for key, texts in answer(ds, ranking[0]).items()}
-    facts = {"answer": answers, "force": float(forces(ds)[k]), "ranked_by": score,
+    facts = {"answer": answers, "pads": pads(ds, ranking[0]), "force": float(forces(ds)[k]), "ranked_by": score,
              "largest_error": "; ".join(error)}  # fmt: skip
     return Table(title, columns if lines else table.columns, rows if lines else table.rows, notes, facts, "grasps")
 
@@ -346,3 +346,11 @@ def _beyond(ds: xr.Dataset, index: Index) -> str:
     payload = f"it holds {value_text(ds, 'payload', last, 3, unit=True)}" * bool(np.isfinite(at(ds, "payload", last)))
     more = flag_words(int(ds["flags"].values[last]) & LOST) or payload
     return f"; at {forces(ds)[-1]:g} N {more}" if more else ""
+
+
+def pads(ds: xr.Dataset, index: Index) -> dict[str, Any]:
+    """Middle of both pads [m], the way finger 1 closes and their long side, in the frame of the object's own file."""
+    if "finger_pose_origin" not in ds:
+        return {}
+    turn = ds.finger_pose_rotation.values[index][0]
+    return {"middle": ds.finger_pose_origin.values[index].mean(axis=0), "closing": turn[:, 2], "long_side": turn[:, 0]}
