@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Mapping
 from contextlib import suppress
+from functools import lru_cache
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
@@ -300,6 +301,16 @@ class Accuracy(SceneSection):
         return self.meshes if self.target is None else MOST_MESHES
 
 
+@lru_cache(maxsize=8)
+def _normal(samples: int, inputs: int) -> Any:
+    """Latin hypercube ``(samples, inputs)`` of normal distributions, over the half-width of their 95 % intervals."""
+    from scipy.special import ndtri  # scenes without uncertain inputs are read without scipy
+    from scipy.stats import qmc
+
+    cube = qmc.LatinHypercube(inputs, scramble=False, optimization="random-cd", seed=SAMPLES_SEED)
+    return ndtri(cube.random(samples)) / ndtri(UPPER)
+
+
 class Uncertainty(SceneSection):
     """Inputs that are uncertain: the study is solved again for samples of them, which gives maps an interval.
 
@@ -317,13 +328,7 @@ class Uncertainty(SceneSection):
 
         Each input takes the middles of as many intervals of equal probability as there are samples, each once.
         """
-        import numpy as np  # scenes without uncertain inputs are read without it and scipy
-        from scipy.special import ndtri
-        from scipy.stats import qmc
-
-        cube = qmc.LatinHypercube(len(self.spread), scramble=False, optimization="random-cd", seed=SAMPLES_SEED)
-        normal = ndtri(cube.random(self.samples)) / ndtri(UPPER)
-        values = np.array([means[key] for key in self.spread]) + normal * np.array([*self.spread.values()])
+        values = [means[key] for key in self.spread] + _normal(self.samples, len(self.spread)) * [*self.spread.values()]
         # digits of a sample, so that no rounding error of a machine makes another one
         return [dict(zip(self.spread, (float(f"{v:.9g}") for v in row), strict=True)) for row in values]
 
