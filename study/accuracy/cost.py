@@ -53,7 +53,8 @@ def mesh_sweep(scene: Scene) -> dict[str, Any]:
     meshes[FINENESS.index(1.0)] = scene.gripper.elements
     sweep: dict[str, Any] = {"gripper.elements": list(dict.fromkeys(meshes))}
     if has_wall(scene.object) and scene.effects.object != "rigid":
-        return sweep | {"accuracy.wall_element_mm": [f * scene.accuracy.wall_element_mm for f in WALL_SIZES]}
+        sizes = [min(f * scene.accuracy.wall_element_mm, 10.0) for f in WALL_SIZES]
+        return sweep | {"accuracy.wall_element_mm": list(dict.fromkeys(sizes))}
     return sweep | {"gripper.element": ["hex8", "hex27"]}
 
 

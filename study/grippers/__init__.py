@@ -114,8 +114,8 @@ def gripper_file(name: str) -> tuple[dict[str, Any], Hand]:
     try:
         tables = tomllib.loads(path.read_text(encoding="utf-8"))
         hand = Hand.model_validate(tables.get("hand", {}))
-        if not (tables.keys() <= {"gripper", "hand"} and isinstance(tables.get("gripper", {}), dict)):
-            raise ValueError(f"found {', '.join(tables)}, expected tables [gripper] and [hand] alone")
+        if other := [k for k, keys in tables.items() if k not in ("gripper", "hand") or not isinstance(keys, dict)]:
+            raise ValueError(f"found {', '.join(other)}, expected tables [gripper] and [hand] alone")
         if not 0 <= hand.force_n[0] <= hand.force_n[1]:
             raise ValueError(f"hand.force_n: found {list(hand.force_n)}, expected the least and the largest force")
     except OSError as error:

@@ -95,7 +95,9 @@ class ResultWriter:
         values = [np.asarray(h5py.Dataset(column.dataset)[self._index(row)]) for column in self._columns]
         values[[c.key for c in self.layout.columns].index(MESH)] = self._wanted[row]
         known = text_of(bytes(values[-1].item()))
-        reason = NOT_FINER + message.partition("; ")[0]  # a retry would begin with the coarse mesh
+        # a retry tries what has no values
+        parts = (part for part in message.split("; ") if "--retry-failed" not in part)
+        reason = NOT_FINER + "; ".join(parts)
         values[-1] = np.array(text_bytes("; ".join(filter(None, (known, reason))), MESSAGE_BYTES))
         return values
 

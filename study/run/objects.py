@@ -336,7 +336,7 @@ def row_of(result: Any) -> Row:
     usable, payload = done & (flags & LOST == 0), np.nan_to_num(values_of(ds, "payload"))
     # A grasp that holds the object with less safety than is asked for is one.
     holding = usable if usable.any() else done & (flags & LOST == Flag.TOO_WEAK) & (payload > 0)
-    row["reason"] = _reason(ds, done, flags[holding if holding.any() else done] & LOST)
+    row["reason"] = _reason(result, flags[holding if holding.any() else done] & LOST)
     if not holding.any():
         return row | {"state": index.FAILED if row["failed"] and not done.any() else index.NO_GRASP}
     if not holding[at := ds.attrs["best"]]:
@@ -348,11 +348,11 @@ def row_of(result: Any) -> Row:
     return row | {"state": index.SOME_FAILED if row["failed"] else index.DONE}
 
 
-def _reason(ds: Any, done: np.ndarray, lost: np.ndarray) -> str:
+def _reason(result: Any, lost: np.ndarray) -> str:
     """The flags ``lost`` in words, and the most frequent message of what failed or is no grasp."""
     texts = [flag_words(int(np.bitwise_or.reduce(lost)))]
-    messages_ = [str(text) for text in ds["message"].values[~done] if text]
+    messages_ = [str(text) for text in result.messages[result.status != quantities.DONE] if text]
     if messages_:
         text, count = Counter(messages_).most_common(1)[0]
-        texts.append(f"{count} of {done.size} cases: {text}")
+        texts.append(f"{count} of {result.status.size} cases: {text}")
     return shortened("; ".join(filter(None, texts)), REASON_LETTERS)

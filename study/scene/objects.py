@@ -185,7 +185,7 @@ class RevolutionShape(Walled):
     shape: Literal["revolution"]
     profile_mm: tuple[Point, ...] = Field(
         min_length=4, max_length=2000, description="outline as points [z, radius] with rising z",
-        examples=[[[0, 30], [50, 30], [80, 20], [100, 20]]],
+        examples=[[[0, 30], [30, 30], [60, 30], [90, 20]]],
     )  # fmt: skip
 
     def _geometry(self) -> tuple[int, dict[str, Span]]:

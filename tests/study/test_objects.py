@@ -307,7 +307,7 @@ def test_an_object_is_as_complete_as_the_samples_of_its_uncertain_inputs(tmp_pat
     with open_result(written(tmp_path / "a.hdf", plan.layout, case, plan.header)) as result:
         row = row_of(result)
     assert (row["cases"], row["done"], row["failed"], row["seconds"]) == (9, 8, 1, 16.0)
-    assert code_of([row]) == SOME_FAILED
+    assert (row["reason"], code_of([row])) == ("1 of 9 cases: no state", SOME_FAILED)
 
 
 def test_an_object_without_a_grasp_some_of_whose_cases_failed_has_the_code_of_those():

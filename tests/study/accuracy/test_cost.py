@@ -32,6 +32,8 @@ def test_a_few_cases_are_solved_on_meshes_of_both_kinds_of_walls_too_without_wha
     assert parse_scene(scene.effective_toml()) == scene
     bottle = Scene.from_file(ROOT / "jobs" / "bottle.toml")
     assert mesh_sweep(bottle)["accuracy.wall_element_mm"] == pytest.approx([3, 1.5, 1.05])
+    coarse = bottle.with_values({"accuracy.wall_element_mm": 10.0})
+    assert mesh_sweep(coarse)["accuracy.wall_element_mm"] == pytest.approx([10, 7])
     assert "gripper.element" in mesh_sweep(bottle.with_values({"effects.object": "rigid"}))
     assert cost_scene(bottle).cases == 4 * 3 * 9
     scene = Scene.from_file(ROOT / "jobs" / "box-poses.toml", ["accuracy.target=0.01", "candidates.refine=true"])
