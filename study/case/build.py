@@ -207,8 +207,9 @@ def warnings(scene: Scene) -> tuple[str, ...]:
     shapes = shapes_of(scene)
     edges = (scene.candidates.warnings(shape, axis_span(shape), scene.gripper) for shape in shapes)
     walls = [geometry().trace_warning(shape) for shape in shapes if shape.shape == "mesh" and shape.wall is not None]
+    swings = dict.fromkeys(filter(None, map(_swing, dict.fromkeys(shapes))))
     placed = next((warned for warned in map(tuple, edges) if warned), ())
-    return (*scene.warnings, *placed, *_remarks(scene), *dict.fromkeys(filter(None, map(_swing, dict.fromkeys(shapes)))), *walls)
+    return (*scene.warnings, *placed, *_remarks(scene), *swings, *walls)
 
 
 def _swing(shape: Any) -> str:
