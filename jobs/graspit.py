@@ -45,6 +45,8 @@ def volume_share(first: ArrayLike, second: ArrayLike, torques: float) -> float:
 
 
 if __name__ == "__main__":
+    if len(sys.argv) != 2:
+        sys.exit(__doc__)
     data = sj.open(sys.argv[1])
     semi_axes = data.limit_surface_semi_axes.sel(model="ccm").transpose(..., "finger", "component").values
     pairs = semi_axes.reshape(-1, *semi_axes.shape[-2:])

@@ -93,6 +93,8 @@ def main() -> None:
     head = ["grasp", "force [N]", "f_x [N]", "f_y [N]", "tau_z [N mm]", *LOADS]
     print("| " + " | ".join(head) + " |\n|" + "---|" * len(head))
     worst = 0.0
+    if len(sys.argv) != 2:
+        sys.exit(__doc__)
     for row in rows(sys.argv[1]):
         print("| " + " | ".join(row) + " |", flush=True)
         worst = max(worst, *(abs(float(value) - 1) for value in row[-len(LOADS) :]))

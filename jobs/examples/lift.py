@@ -25,8 +25,7 @@ scene = sj.Scene.from_file(Path(__file__).parents[1] / "flask-mesh.toml").with_v
     "candidates.angles_deg": [90],
     "load.normal_force_n": [5],
 })  # fmt: skip
-if not FILE.exists():
-    sj.run(scene, FILE)
+sj.run(scene, FILE)
 subprocess.run([sys.executable, "-m", "softjaw", "export", FILE, "--format", "mjcf", "-o", MODEL], check=True)
 payload = float(sj.open(FILE)["payload"].sel(model="ccm").max())
 

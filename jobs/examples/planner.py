@@ -23,8 +23,7 @@ scene = sj.Scene.from_file(Path(__file__).parents[1] / "bottle-rigid.toml").with
     "load.normal_force_n": [2, 5, 10],
     "run.patches": "none",
 })  # fmt: skip
-if not FILE.exists():
-    sj.run(scene, FILE)
+sj.run(scene, FILE)
 grasps = sj.GraspMap(FILE)
 
 # %% The robot stands at -y, a table lies at z = 0, and the hand is 90 mm high and opens to 70 mm

@@ -110,7 +110,7 @@ def fitted_surfaces(ds: xr.Dataset) -> tuple[Any, str]:
         draw = partial(_body, found=found, shape=shapes[name], error=error, top=top)
         image = drawing.rendered(draw, (0.9, 0.75, 0.45), (0, 0, 1), (1300, 1100))
         fit, mean, most = FITS[name][0], number(100 * at(ds, name, index), 2), number(error.max(), 2)
-        drawing.placed(panel, image, f"({letter}) {fit}: {mean} % off on average")
+        drawing.placed(panel, image, f"({letter}) {fit}: {mean} % off, mean over motions")
         grid = number(100 * errors_on_grid(found)[name], 2)
         results.append(f"{fit}: mean {mean} % over even motions, {grid} % on the paper's grid, largest {most} %")
     drawing.scale(drawn, axes, "distance from the exact limit surface, of its radius [%]", ERRORS, (0, top))
