@@ -90,23 +90,23 @@ class UnitSolver:
 
 
 # of units, by scene and number; the last one used comes last
-_SOLVERS: dict[tuple[Scene, int], UnitSolver] = {}
+SOLVERS: dict[tuple[Scene, int], UnitSolver] = {}
 
 
 def solver_of(unit: Any, scene: Scene) -> UnitSolver:
     """Solver of a unit, with what an earlier round or question has solved if it was kept."""
-    solver = _SOLVERS.pop((scene, unit.index), None) or UnitSolver(unit, scene)
+    solver = SOLVERS.pop((scene, unit.index), None) or UnitSolver(unit, scene)
     solver.unit = unit
     return solver
 
 
 def keep(unit: Any, scene: Scene, solver: UnitSolver, ready: int = 0) -> None:
     """Keep what a solver has solved; the last few, ``ready``, keep their meshes and factors, too."""
-    _SOLVERS[scene, unit.index] = solver
-    for older in list(_SOLVERS.values())[: len(_SOLVERS) - ready]:
+    SOLVERS[scene, unit.index] = solver
+    for older in list(SOLVERS.values())[: len(SOLVERS) - ready]:
         older.solver.put_away()
-    if len(_SOLVERS) > MOST_SOLVERS:
-        del _SOLVERS[next(iter(_SOLVERS))]
+    if len(SOLVERS) > MOST_SOLVERS:
+        del SOLVERS[next(iter(SOLVERS))]
 
 
 def _result(choice: EffectChoice, k: int, solved: Solved, unit: Any, begun: float, before: Seconds) -> CaseResult:

@@ -251,11 +251,11 @@ def distinct(ds: xr.Dataset, order: Sequence[int], score: np.ndarray, k: int, to
     count = int(np.prod(shape))
     index = np.array(np.unravel_index(np.arange(count), shape)).T
     origin, turn = (ds[name].values if name in ds else None for name in ("finger_pose_origin", "finger_pose_rotation"))
-    pad = task_keys(ds, "gripper")
     opening = np.nan_to_num(values_of(ds, "opening")[..., k].ravel()) if "opening" in ds else score
-    half = 0.5e-3 * np.array([pad.get(f"pad_{side}_mm", 0.0) for side in ("length", "width", "width")])
     while len(rest) and not 0 < top <= len(places):
         head = rest[0]
+        pad = keys_at(ds, index[head], "gripper")
+        half = 0.5e-3 * np.array([pad.get(f"pad_{side}_mm", 0.0) for side in ("length", "width", "width")])
         same_point = (index[rest, :-2] == index[head, :-2]).all(axis=1)
         alike = np.all([np.abs(v[rest] - v[head]) <= TIE * abs(v[head]) for v in (score, opening)], axis=0)
         images = same_point & (index[rest, -2] == index[head, -2]) & alike & (not ds.attrs["poses"])

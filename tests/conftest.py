@@ -12,4 +12,4 @@ from softjaw.study import pipeline
 @pytest.fixture(autouse=True)
 def nothing_solved(monkeypatch):
     """Each test begins without what others have solved."""
-    monkeypatch.setattr(pipeline, "_SOLVERS", {})
+    monkeypatch.setattr(pipeline, "SOLVERS", {})

@@ -302,6 +302,7 @@ def _sweep_point(axes: Any, where: Mapping[str, Any]) -> tuple[int, ...]:
         if key not in rest and len(options) > 1:
             raise ValueError(f"where is missing {key}: give one of {known}")
         given = rest.pop(key, options[0])
+        given = " x ".join(map(_text, given)) if isinstance(given, list | tuple) else given  # as a file has it
         matching = [i for i, option in enumerate(options) if _same(option, given)]
         if not matching:
             raise ValueError(f"where has {key} = {_text(given)}: expected one of {known}; there is no interpolation")

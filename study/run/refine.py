@@ -86,7 +86,7 @@ def _scores(result: Any) -> tuple[FloatArray, NDArray[np.bool_]]:
     values = _cases(result, result.read("payload/ccm"))
     flags = np.nan_to_num(_cases(result, result.read("flags/flags"))).astype(np.int64)
     if _preset(result):  # what its hand does not reach cannot be used either
-        flags |= _cases(result, judge(dataset(result))["flags"].values) & Flag.OUT_OF_REACH
+        flags |= judge(dataset(result))["flags"].values.reshape(flags.shape) & Flag.OUT_OF_REACH
     values = np.where(_cases(result, result.status) == DONE, values, np.nan)
     return values, np.isfinite(values) & (flags & LOST == 0)
 
@@ -102,8 +102,8 @@ def scores_of_poses(result: Any) -> FloatArray:
 
 
 def _cases(result: Any, values: np.ndarray) -> np.ndarray:
-    """Values of all cases as points of the sweep, stations, angles, forces."""
-    return values.reshape(-1, *result.layout.shape[-3:])
+    """Values of all cases as points of the sweep, stations, angles, forces; of uncertain inputs the scene's own."""
+    return values.reshape(-1, *result.layout.shape[-3:])[:: result.layout.inputs]
 
 
 def gained(values: FloatArray, before: int) -> float:

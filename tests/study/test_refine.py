@@ -14,7 +14,7 @@ from softjaw.study.quantities import DONE, MISSING, WIDE
 from softjaw.study.result.skeleton import rewrite
 from softjaw.study.result.store import open_result, torn_rows
 from softjaw.study.run.plan import make_plan
-from softjaw.study.run.refine import FINEST_SPACING_SHARE, chances, gained, next_stations, with_places
+from softjaw.study.run.refine import FINEST_SPACING_SHARE, chances, gained, next_stations, scores_of_poses, with_places
 from softjaw.study.run.rounds import FINEST_STEP_SHARE, SAME_POSE_STEPS, apart, next_poses
 from softjaw.study.scene import load_scene, parse_scene
 from tests.study.formula_results import written
@@ -45,7 +45,8 @@ def rounds_until_known(formula, budget=30):
         stations = np.array(sorted([*GIVEN, *(s for some in added for s in some)]))
         values = {"payload/ccm": formula(stations)[:, None, None], "flags/flags": np.zeros((len(stations), 1, 1))}
         result = SimpleNamespace(
-            layout=SimpleNamespace(added=tuple(added), shape=(len(stations), 1, 1)), read=values.get, scene="",
+            layout=SimpleNamespace(added=tuple(added), shape=(len(stations), 1, 1), inputs=1),
+            read=values.get, scene="",
             axes=[SimpleNamespace(values=1e-3 * stations), None, None], status=np.full((len(stations), 1, 1), DONE),
         )  # fmt: skip
         more = next_stations(result, scene, 1)
@@ -210,6 +211,24 @@ def test_no_neighbour_is_put_over_a_hole_and_a_search_ends_where_finer_steps_gai
     assert sum(map(len, searched(hill, scene_with(13), each=2)[0])) == 6
     # What does not fit is not solved, and costs nothing.
     assert len(searched(flat, scene_with(2), state=WIDE)[1]) == len(values)
+
+
+@pytest.mark.parametrize("hand", ["", 'preset = "franka_hand"\n'])
+def test_of_uncertain_inputs_the_scenes_own_say_which_grasps_are_good_at_every_point_of_a_sweep(tmp_path, hand):
+    text = posed(12).replace("[gripper]\n", f"[gripper]\n{hand}")
+    uncertain = '[uncertainty]\nsamples = 8\nspread = { "friction.mu" = 0.1 }\n'
+    plan = make_plan(parse_scene(f"{text}\n{uncertain}[sweep]\n'gripper.shear_modulus_kpa' = [40, 80]\n"))
+
+    def case(index):
+        point, sample, pose, _, force = index
+        held = 1.0 + point + 0.1 * pose + 0.01 * force + 10.0 * sample
+        return CaseResult({"maps/payload": [held] * 3, "maps/flags": 0.0})
+
+    with open_result(written(tmp_path / "a.hdf", plan.layout, case, plan.header)) as result:
+        scores = scores_of_poses(result)
+    assert scores.shape == (2, 4)
+    if not hand:  # of which nothing is known where the pads stand
+        assert scores == pytest.approx(np.add.outer([0.0, 0.1], [1.0, 1.01, 2.0, 2.01]))
 
 
 def test_a_grown_file_of_poses_keeps_rows_labels_and_places_and_samplers_can_be_refined(tmp_path):

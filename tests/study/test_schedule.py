@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from numba import njit
 
 from softjaw.study import pipeline
 from softjaw.study.quantities import DONE, MISSING, SLIPS, WIDE
@@ -213,6 +214,21 @@ def test_a_plan_times_paths_that_lie_far_apart_and_what_the_first_one_loads_is_n
     assert max(paths[:3]) - min(paths[:3]) >= 4
     assert loads == pytest.approx(50.0)
     assert timed(units, budget=60.0)[1] == pytest.approx(0.0)
+
+
+def test_what_was_solved_while_loops_were_compiled_is_solved_again_to_time_it(monkeypatch):
+    known = []
+
+    def solve_unit(*_):
+        known.append(len(pipeline.SOLVERS))
+        if len(known) == 1:
+            njit(lambda x: x + 1)(1)
+        pipeline.SOLVERS[len(known)] = None
+        yield 0, None
+
+    monkeypatch.setattr(pipeline, "solve_unit", solve_unit)
+    timed(units_that_take([1.0]))
+    assert known == [0, 0]
 
 
 def test_a_path_is_left_when_the_time_is_up_and_one_that_fails_counts_what_it_took(paths):

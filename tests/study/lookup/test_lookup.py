@@ -254,13 +254,14 @@ def test_a_sweep_is_asked_at_one_of_its_points(tmp_path):
     sweep = (
         Axis("semi_axis_b", np.array([0.01, 0.025]), "m", "object.semi_axis_b_mm"),
         Axis("material", np.array([0.0, 1.0]), "", "gripper.material", ("blatz_ko", "neo_hooke")),
+        Axis("elements", np.array([0.0]), "", "gripper.elements", ("8 x 4 x 2",)),
     )
 
-    def formula(b, material, station, angle, force):
+    def formula(b, material, _, station, angle, force):
         return b + 10 * material + 0 * station * angle * force
 
     path = make(tmp_path / "a.hdf", formula, grid_axes(sweep=sweep), scene=ROUND)
-    point = {"object.semi_axis_b_mm": 25, "gripper.material": "blatz_ko"}
+    point = {"object.semi_axis_b_mm": 25, "gripper.material": "blatz_ko", "gripper.elements": [8, 4, 2]}
     for where, value in (
         ({"object.semi_axis_b_mm": 10, "gripper.material": "neo_hooke"}, 10.01),
         (point, 0.025),

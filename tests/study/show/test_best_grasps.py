@@ -243,6 +243,12 @@ def test_grasps_less_than_half_a_pad_apart_share_a_line_unless_they_are_rolled()
     assert [(place.best, place.near, place.images) for place in places] == [(0, [1], []), (2, [], []), (3, [], [])]
     assert places[0].within == pytest.approx(0.02, rel=1e-9)
     assert len(distinct(ds, order, np.array([5.0, 4, 3, 2]), 0, top=2)) == 2
+    lengths = xr.DataArray([0.02, 0.1], dims="pad_length", attrs={"units": "m", "long_name": "gripper.pad_length_mm"})
+    swept = xr.concat([ds, ds], "pad_length").assign_coords(pad_length=lengths)
+    scene = text_of(BALL, elements="[8, 4, 2]\npad_width_mm = 22")
+    swept.attrs["scene"] = f"{scene}\n[sweep]\n'gripper.pad_length_mm' = [20, 100]"
+    places = distinct(swept, range(8), np.array([5.0, 4, 3, 2] * 2), 0)
+    assert [(place.best, place.near) for place in places][4:] == [(4, [5]), (6, []), (7, [])]
 
 
 @pytest.mark.parametrize(("scene", "order"), [(WALL, [1.0, 0.0]), (WALL.replace("preset", "# preset"), [0.0, 1.0])])
