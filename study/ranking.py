@@ -167,10 +167,9 @@ class Sure(NamedTuple):
 def sure(ds: xr.Dataset, name: str, k: int) -> Sure | None:
     """A map (CCM) of all candidates at a force level; None where a file knows no error of it."""
     error, samples = stated_error(ds, name), ds.get(f"{name}_samples")
-    if error is None and samples is None:
+    if error is None:
         return None
-    values = values_of(ds, name)[..., k].ravel()
-    of_mesh = np.zeros(values.shape) if error is None else error[..., k].ravel()
+    values, of_mesh = values_of(ds, name)[..., k].ravel(), error[..., k].ravel()
     if samples is None:
         return Sure(values, of_mesh, np.zeros((len(values), 1)))
     return Sure(values, of_mesh, samples.values[..., k, :].reshape(len(values), -1) - values[:, None])

@@ -105,7 +105,7 @@ def force_ranges(scene: Scene, values: Mapping[str, FloatArray], ended: ArrayLik
         # fmin, not minimum: a limit that is never passed is NaN and bounds nothing.
         high = ranges[HIGH] = np.fmin.reduce([solved, *(at for at, _ in bounds)])
         least = np.fmin.reduce([solved, *(crossing(forces, larger[name], most)[0] for name, most in limits.items())])
-        off = np.fmax.reduce([high - least, *(np.where(at == high, error, 0.0) for at, error in bounds)])
+        off = np.maximum.reduce([high - least, *(np.where(at == high, error, 0.0) for at, error in bounds)])
         ranges[HIGH_ERROR] = off if any(f"{name}_error" in values for name in limits) else np.full(off.shape, np.nan)
     return ranges
 

@@ -170,8 +170,8 @@ def _error(ds: xr.Dataset, name: str, model: str) -> FloatArray | None:
     if map_row(name).by_model and model != "ccm":
         return None
     parts = [values_of(ds, f"{name}_interval")] if f"{name}_interval" in ds else []
-    parts += [stated] if (stated := stated_error(ds, name)) is not None else []
-    return np.sqrt(sum(part**2 for part in parts)) if parts else None
+    stated = stated_error(ds, name)
+    return None if stated is None else np.sqrt(sum(part**2 for part in [*parts, stated]))
 
 
 def _summary(name: str, values: dict[str, NDArray[Any]]) -> Row:

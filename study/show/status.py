@@ -146,9 +146,8 @@ def largest_error(errors: Any, cases: Any, axes: Sequence[Any], labels: Any, mes
     name, target = aim(cases)
     # where next to nothing is held the error may be many times what is
     most = f"up to {100 * known[worst]:.2g} %" if known[worst] < 1 else "above 100 %"
-    parts = [f"{name} errors {most}"]
-    if above := int(np.count_nonzero(misses(known, target))):
-        parts.append(f"{above} of {count} above {100 * target:g} %")
+    above = int(np.count_nonzero(misses(known, target)))
+    parts = [f"{name} errors {most}" + f", {above} of {count} above {100 * target:g} %" * (above > 0)]
     if count < solved:
         parts.append(f"{solved - count} of {solved} have none")
     if coarse := int(np.count_nonzero(status == DONE)) - solved:

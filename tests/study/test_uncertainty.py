@@ -7,7 +7,7 @@ from scipy.stats import norm
 import softjaw
 from softjaw.study.case.candidates import axes, candidates
 from softjaw.study.case.poses import axis_poses, moved
-from softjaw.study.ranking import Sure, judge
+from softjaw.study.ranking import Sure, judge, sure
 from softjaw.study.result.read import half_width
 from softjaw.study.run.plan import make_plan
 from softjaw.study.scene import SceneError, parse_scene
@@ -123,6 +123,7 @@ def test_maps_have_what_the_samples_say_and_grasps_that_inputs_move_alike_are_to
     table = best(judge(ds))
     errors = {column.name: column.error for column in table.columns}
     assert (errors["quality"], errors["quality_interval"]) == ("", "")  # which never stands for the mesh's error
+    assert sure(ds, "quality", 0) is None
     # at the middle of a ball pads face each other: e_n does not depend on mu, and quality goes with its fifth power
     moduli = np.array([p["gripper.shear_modulus_kpa"] for p in scene().points[1:]])
     mu = np.array([p["friction.mu"] for p in scene().points[1:]])
