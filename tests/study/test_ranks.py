@@ -22,7 +22,7 @@ pytestmark = pytest.mark.ranks
 
 # Two stations x three angles: 205 degrees is the image of 25, so there are four load paths of two forces.
 ROUNDED = BOX.replace("edge_radius_mm = 4", "edge_radius_mm = 8")
-CHANGES = ("limit_surface.samples=80", "accuracy.target=0.01", "accuracy.target_of='e_n'", NO_COUPLING)
+CHANGES = ("limit_surface.samples=80", "accuracy.target=0.03", "accuracy.target_of='e_n'", NO_COUPLING)
 PLACES = {"stations": "[0, 30]", "angles": "[0, 5, 185]", "forces": "[1, 3]"}
 SCENE = scene_of(ROUNDED, *CHANGES, **PLACES)
 CASES = 12
@@ -95,7 +95,7 @@ def test_any_number_of_ranks_writes_the_same_bits(tmp_path, scene, alone, ranks)
         assert f"study/{name}" in expected
     with open_result(path) as result:
         elements = result.read("pad_elements/pad_elements")
-    # the scene's mesh is 8 x 4 x 2, further ones are 12 x 6 x 3 and 16 x 8 x 4
+    # the scene's mesh is 8 x 4 x 2, further ones of some cases are 10 x 6 x 3 and 12 x 8 x 4
     assert elements.max() > 8 * 4 * 2
     assert differing(path, expected) == []
 
