@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from contextlib import suppress
+from functools import cache
 from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -251,10 +252,15 @@ def distinct(ds: xr.Dataset, order: Sequence[int], score: np.ndarray, k: int, to
     index = np.array(np.unravel_index(np.arange(count), shape)).T
     origin, turn = (ds[name].values if name in ds else None for name in ("finger_pose_origin", "finger_pose_rotation"))
     opening = np.nan_to_num(values_of(ds, "opening")[..., k].ravel()) if "opening" in ds else score
+
+    @cache
+    def half(*point: int) -> FloatArray:
+        """Half the sides of the pads at a point of the sweep [m]."""
+        pad = keys_at(ds, point, "gripper")
+        return 0.5e-3 * np.array([pad.get(f"pad_{side}_mm", 0.0) for side in ("length", "width", "width")])
+
     while len(rest) and not 0 < top <= len(places):
         head = rest[0]
-        pad = keys_at(ds, index[head], "gripper")
-        half = 0.5e-3 * np.array([pad.get(f"pad_{side}_mm", 0.0) for side in ("length", "width", "width")])
         same_point = (index[rest, :-2] == index[head, :-2]).all(axis=1)
         alike = np.all([np.abs(v[rest] - v[head]) <= TIE * abs(v[head]) for v in (score, opening)], axis=0)
         images = same_point & (index[rest, -2] == index[head, -2]) & alike & (not ds.attrs["poses"])
@@ -265,7 +271,7 @@ def distinct(ds: xr.Dataset, order: Sequence[int], score: np.ndarray, k: int, to
             for i, pads in product((head, *rest[images]), (x[rest], x[rest][:, ::-1])):
                 rolled = np.abs(R[rest, 0, :, 0] @ R[i, 0, :, 0]) < MIN_ROLL_COSINE
                 apart = np.einsum("nfi,fij->nfj", pads - x[i], R[i])
-                close = (np.abs(apart) < half).all(axis=(1, 2)) & same_point & ~rolled
+                close = (np.abs(apart) < half(*index[head, :-2])).all(axis=(1, 2)) & same_point & ~rolled
                 near, far = near | close, np.where(close, np.linalg.norm(apart, axis=2).max(axis=1), far)
         near[0] = images[0] = False
         near &= ~images

@@ -4,12 +4,22 @@ import os
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # before numpy: bits must not depend on the machine's cores
 
+from functools import partial
+
 import pytest
 
 from softjaw.study import pipeline
+from softjaw.study.case import sampler
 
 
 @pytest.fixture(autouse=True)
 def nothing_solved(monkeypatch):
     """Each test begins without what others have solved."""
     monkeypatch.setattr(pipeline, "SOLVERS", {})
+
+
+@pytest.fixture
+def plans_in_no_time(monkeypatch):
+    """Of plans what they solve to time it is no matter, and few places tell whether there is a sampled grasp."""
+    monkeypatch.setattr(pipeline, "solve_unit", lambda unit, *_: iter(unit.rows[0]))
+    monkeypatch.setattr(sampler, "antipodal_grasps", partial(sampler.antipodal_grasps, samples=6))

@@ -8,7 +8,7 @@ import shutil
 import subprocess
 import sys
 import tomllib
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +16,6 @@ import pytest
 
 import softjaw as sj
 from docs.generate import PAGES
-from softjaw.study.case import sampler
 from softjaw.study.cli import main
 from softjaw.study.cli.options import COMMANDS
 from softjaw.study.doctor import launch_environment
@@ -173,10 +172,8 @@ def blocks(of_many_minutes: bool) -> list:
 
 
 @pytest.mark.parametrize("block", blocks(False))
-def test_commands_of_a_block(block, folder, monkeypatch):
-    cases = lambda unit, *_: iter(unit.rows[0])  # noqa: E731 (what a plan solves to time it is no matter here)
-    monkeypatch.setattr("softjaw.study.pipeline.solve_unit", cases)
-    monkeypatch.setattr(sampler, "antipodal_grasps", partial(sampler.antipodal_grasps, samples=6))
+@pytest.mark.usefixtures("plans_in_no_time")
+def test_commands_of_a_block(block, folder):
     if any("results/smoke.hdf" in line for line in block) and not any(" run " in line for line in block):
         pytest.fail("a block must make the file that it shows")
     run_in(folder, block)

@@ -53,6 +53,7 @@ def mesh_sweep(scene: Scene) -> dict[str, Any]:
     meshes[FINENESS.index(1.0)] = scene.gripper.elements
     sweep: dict[str, Any] = {"gripper.elements": list(dict.fromkeys(meshes))}
     if has_wall(scene.object) and scene.effects.object != "rigid":
+        # 10 mm are the largest that the key takes
         sizes = [min(f * scene.accuracy.wall_element_mm, 10.0) for f in WALL_SIZES]
         return sweep | {"accuracy.wall_element_mm": list(dict.fromkeys(sizes))}
     return sweep | {"gripper.element": ["hex8", "hex27"]}

@@ -207,7 +207,9 @@ def warnings(scene: Scene) -> tuple[str, ...]:
     shapes = shapes_of(scene)
     edges = (scene.candidates.warnings(shape, axis_span(shape), scene.gripper) for shape in shapes)
     walls = [geometry().trace_warning(shape) for shape in shapes if shape.shape == "mesh" and shape.wall is not None]
-    swings = dict.fromkeys(filter(None, map(_swing, dict.fromkeys(shapes))))
+    # one of each outline: samples of uncertain inputs mostly change something else
+    outlines = {getattr(shape, "profile_mm", None) or getattr(shape, "sections", None): shape for shape in shapes}
+    swings = dict.fromkeys(filter(None, map(_swing, outlines.values())))
     placed = next((warned for warned in map(tuple, edges) if warned), ())
     return (*scene.warnings, *placed, *_remarks(scene), *swings, *walls)
 

@@ -212,6 +212,11 @@ def axes(scene: Scene) -> list[Axis]:
     return [*_sweep_axes(scene.sweep), *scene_axes]
 
 
+def option_text(value: Any) -> str:
+    """A swept word or list of numbers as a file has it."""
+    return value if isinstance(value, str) else " x ".join(f"{x:g}" for x in value)
+
+
 def _sweep_axes(sweep: Mapping[str, Sequence[Any]]) -> list[Axis]:
     """One axis per key, named by the key without section and unit where that is unambiguous."""
     stems = [split_unit(key.partition(".")[2]) for key in sweep]
@@ -221,8 +226,7 @@ def _sweep_axes(sweep: Mapping[str, Sequence[Any]]) -> list[Axis]:
         # Keys of two sections with one stem keep their section in the name.
         name = stem if known.count(stem) == 1 else split_unit(key.replace(".", "_"))[0]
         if isinstance(values[0], str | tuple):
-            texts = tuple(v if isinstance(v, str) else " x ".join(f"{x:g}" for x in v) for v in values)
-            made.append(Axis(name, np.arange(len(values), dtype=float), "", key, texts))
+            made.append(Axis(name, np.arange(len(values), dtype=float), "", key, tuple(map(option_text, values))))
         else:
             units = UNITS[unit].si if unit else ""
             made.append(Axis(name, np.array([in_si(key, v) for v in values], dtype=float), units, key))

@@ -14,7 +14,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from softjaw.study.case.candidates import touching_pads
+from softjaw.study.case.candidates import option_text, touching_pads
 from softjaw.study.flags import Flag
 from softjaw.study.lookup.point import INSIDE, JUMP, NO_RESULT, OUTSIDE, SNAP, GraspPoint
 from softjaw.study.messages import closest
@@ -302,7 +302,7 @@ def _sweep_point(axes: Any, where: Mapping[str, Any]) -> tuple[int, ...]:
         if key not in rest and len(options) > 1:
             raise ValueError(f"where is missing {key}: give one of {known}")
         given = rest.pop(key, options[0])
-        given = " x ".join(map(_text, given)) if isinstance(given, list | tuple) else given  # as a file has it
+        given = option_text(given) if isinstance(given, list | tuple) else given
         matching = [i for i, option in enumerate(options) if _same(option, given)]
         if not matching:
             raise ValueError(f"where has {key} = {_text(given)}: expected one of {known}; there is no interpolation")

@@ -4,7 +4,6 @@ import json
 import os
 import re
 import shutil
-from functools import partial
 from pathlib import Path
 
 import h5py
@@ -14,7 +13,6 @@ import trimesh
 from mpi4py import MPI
 
 import softjaw
-from softjaw.study.case import sampler
 from softjaw.study.case.result import CaseResult
 from softjaw.study.messages import DONE, IN_USE, OTHER_FILE, SOME_FAILED, STOPPED, USAGE, StudyError
 from softjaw.study.result.index import NO_GRASP, blank_row, code_of, open_index, write_index
@@ -121,6 +119,7 @@ def test_check_reports_every_object_with_its_line_and_a_wrong_first_one_stops_no
     pytest.param("meshes/[al]*.stl", 3, marks=pytest.mark.long), pytest.param("odd [1]", 1, marks=pytest.mark.long),
     ("some.csv", 2),
 ])  # fmt: skip
+@pytest.mark.usefixtures("plans_in_no_time")
 def test_the_command_line_names_meshes_from_where_it_is(scene, objects, count, monkeypatch):
     """A folder, a pattern or a table; not from the scene's folder, as a key of the scene would be."""
     (scene.parent / "sub").mkdir(exist_ok=True)
@@ -132,9 +131,6 @@ def test_the_command_line_names_meshes_from_where_it_is(scene, objects, count, m
     code, text, _ = command(0, "check", "sub/scene.toml", "--objects", objects)
     assert code == DONE
     assert f"{count}: a" in text
-    cases = lambda unit, *_: iter(unit.rows[0])  # noqa: E731 (what a plan solves to time it is no matter here)
-    monkeypatch.setattr("softjaw.study.pipeline.solve_unit", cases)
-    monkeypatch.setattr(sampler, "antipodal_grasps", partial(sampler.antipodal_grasps, samples=6))
     on = re.findall(r"on (\d) rank", command(0, "plan", "sub/scene.toml", "--objects", objects, "-n", "2,4")[1])
     assert on == ["2", "4"]
     assert command(0, "check", "sub/scene.toml", "--objects", "nothing/*.stl")[0] == USAGE
