@@ -41,7 +41,7 @@ PACKED_VERSIONS = ("v110", "v110")  # of a file that nobody writes to: an index 
 TEXT = h5py.string_dtype("utf-8")
 SESSION_ROWS, REPORT = f"{ROOT}/provenance/sessions", f"{ROOT}/report"
 CHUNK_BYTES, DEFLATE_LEVEL = 2**20, 4
-# What a grown file has of its own, or what is filled again once nothing is missing.
+# What is filled again once nothing is missing.
 NOT_COPIED = (f"{ROOT}/derived/", CLOSING_SUMS)
 TEXTS = {
     "title": "name of the object or of the scene",
@@ -81,13 +81,13 @@ def rewrite(path: Path, layout: Layout, header: Header, *, packed: bool = False)
 
     The old file has its name until the new one is whole and on disk, so that a kill at any time leaves one of them.
     Rows are copied with their checksums: a torn one stays torn, and is solved again. What is filled once nothing is
-    missing is copied where no station is added.
+    missing is copied into a packed file only: another one is about to change.
     """
     with beside(path, part=path.with_name(path.name + ".new")) as new:
         create(new, layout, header, packed=packed)
         with open_result(path, unchecked=True) as old, h5py.File(new, "r+", libver=HDF5_VERSIONS) as file:
             stations = _places(old.layout, layout)
-            left_out = () if old.layout.shape == layout.shape else NOT_COPIED
+            left_out = () if packed else NOT_COPIED
             known = {d.path for d in old.layout.datasets}
             for dataset in (d for d in layout.datasets if d.path in known and not d.path.startswith(left_out)):
                 values = old.file.values(dataset.path)

@@ -1,5 +1,6 @@
 """Refinement of the stations: where the next ones go, what a grown file keeps, and the same bits on any ranks."""
 
+from contextlib import closing
 from itertools import combinations
 from types import SimpleNamespace
 
@@ -11,8 +12,9 @@ from scipy.spatial.transform import Rotation
 
 from softjaw.study.case.result import CaseResult
 from softjaw.study.quantities import DONE, MISSING, WIDE
-from softjaw.study.result.skeleton import rewrite
+from softjaw.study.result.skeleton import UNFINISHED, rewrite
 from softjaw.study.result.store import open_result, torn_rows
+from softjaw.study.result.write import ResultWriter
 from softjaw.study.run.plan import make_plan
 from softjaw.study.run.refine import FINEST_SPACING_SHARE, chances, gained, next_stations, scores_of_poses, with_places
 from softjaw.study.run.rounds import FINEST_STEP_SHARE, SAME_POSE_STEPS, apart, next_poses
@@ -247,6 +249,12 @@ def test_a_grown_file_of_poses_keeps_rows_labels_and_places_and_samplers_can_be_
         assert (after.codes.reshape(8, 2)[2:] == MISSING).all()
         assert after.labels.ravel()[:2].tolist() == ["wide", "p01"]
         assert after.labels.ravel()[2:].tolist() == [f"p{i:02d}" for i in range(2, 8)]
+    with closing(ResultWriter(path, big.layout, None)) as writer:
+        writer.write_report("ended")
+    for packed, report in ((True, "ended"), (False, UNFINISHED)):  # as before a retry, which may be killed
+        rewrite(path, big.layout, big.header, packed=packed)
+        with open_result(path) as result:
+            assert result.report == report
     assert load_scene("jobs/box-poses.toml", ["candidates.refine=true"]).candidates.refine == 120
     assert load_scene("jobs/smoke.toml", ["candidates.refine=true"]).candidates.refine == 120
     assert load_scene("jobs/smoke.toml", ["candidates.refine=false"]).candidates.refine is None
