@@ -213,14 +213,18 @@ def _wall(surface: OuterSurface, thickness: Thickness, base: float | None, s: Fl
     # the edges of lids are rounded by the program: a thick wall is thinner there, where nobody grasps it
     lids = (s < surface.wall[0]) | (s > surface.wall[1])
     t = np.where(lids & (bend * t > MOST_BENT), MOST_BENT / np.maximum(bend, NEGLIGIBLE), t)
-    # a wall that reaches its centre of curvature has no inner face
-    if (bend * t > 1.0 - 1e-6).any():
-        k = int(np.argmax(bend * t))
-        raise ValueError(
-            f"the wall is {1e3 * t[k]:.4g} mm thick at z = {1e3 * z[k]:.4g} mm, where the outline's radius of "
-            f"curvature is only {1e3 / bend[k]:.4g} mm; round it more or make the wall thinner"
-        )
+    _refuse_bent(bend, t, z, "the outline's")
     return t
+
+
+def _refuse_bent(bend: FloatArray, t: FloatArray, z: FloatArray, whose: str) -> None:
+    """Refuse a wall of thickness ``t`` at heights ``z`` that reaches its centre of curvature: it has no inner face."""
+    k = int(np.argmax(bend * t))
+    if bend[k] * t[k] > 1.0 - 1e-6:
+        raise ValueError(
+            f"the wall is {1e3 * t[k]:.4g} mm thick at z = {1e3 * z[k]:.4g} mm, where {whose} radius of curvature "
+            f"is only {1e3 / bend[k]:.4g} mm; round it more or make the wall thinner"
+        )
 
 
 def refuse_thick_sections(surface: OuterSurface, thickness: Thickness) -> None:
@@ -234,14 +238,7 @@ def refuse_thick_sections(surface: OuterSurface, thickness: Thickness) -> None:
     turn = (surface.normals(at + step, s) - surface.normals(at - step, s)) / (2.0 * step)
     # on the axis, where sections are points, lines round the body have no direction and the outline tells
     bend = np.einsum("ni,ni->n", turn, along_it) / np.maximum(np.einsum("ni,ni->n", along_it, along_it), NEGLIGIBLE**2)
-    t = _wall(surface, thickness, None, s)
-    if (bend * t > 1.0 - 1e-6).any():
-        k = int(np.argmax(bend * t))
-        z = surface.curve.derivative(s[k : k + 1])[0, 0]
-        raise ValueError(
-            f"the wall is {1e3 * t[k]:.4g} mm thick at z = {1e3 * z:.4g} mm, where its section's radius of curvature "
-            f"is only {1e3 / bend[k]:.4g} mm; round it more or make the wall thinner"
-        )
+    _refuse_bent(bend, _wall(surface, thickness, None, s), surface.curve.derivative(s)[:, 0], "its section's")
 
 
 def _planes(symmetry: tuple[bool, bool], theta: FloatArray, number: IntArray, nodes: int) -> FloatArray:
