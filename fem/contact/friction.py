@@ -113,7 +113,7 @@ class Anchor(NamedTuple):
     closed : (n,) array of bool
         Whether the point pressed.
     nodes, N : (n, 4) arrays
-        Nodes of the wall's elements that they faced and shape functions there; of a rigid object None.
+        Nodes of the wall's elements that they faced and shape functions there; a rigid object has none.
     """
 
     at: FloatArray

@@ -321,8 +321,9 @@ class ContactProblem(ABC):
 
     def _untouched(self, f: Finger) -> Anchor:
         """What friction is measured from where nothing has touched yet."""
-        nowhere = np.zeros((f.pad.face_area.size, 3))
-        return Anchor(nowhere, nowhere, np.zeros(len(nowhere), dtype=bool))
+        n = f.pad.face_area.size
+        nowhere, none = np.zeros((n, 3)), np.zeros((n, 4))
+        return Anchor(nowhere, nowhere, np.zeros(n, dtype=bool), none.astype(np.int32), none)
 
     def _anchor(self, f: Finger, x: FloatArray, c: Evaluated) -> Anchor:
         """What friction is measured from after the state ``x``."""

@@ -262,11 +262,6 @@ class WallProblem(ContactProblem):
         pads = (np.arange(f.offset, f.closing_dof) for f in self.fingers)
         return np.concatenate([np.arange(self.model.size), *pads])
 
-    def _untouched(self, f: Finger) -> Anchor:
-        open_face = super()._untouched(f)
-        n = len(open_face.at)
-        return open_face._replace(nodes=np.zeros((n, 4), np.int32), N=np.zeros((n, 4)))
-
     def _anchor(self, f: Finger, x: FloatArray, c: Evaluated) -> Anchor:
         faced = super()._anchor(f, x, c)._replace(nodes=c.surface.nodes, N=c.surface.N)
         return faced._replace(at=faced.at - self._displaced(x, faced))
