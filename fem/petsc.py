@@ -101,6 +101,10 @@ class Problem(Protocol):
     A problem with a method ``keep(x, first) -> bool`` lets steps be made with older factors, see `NonlinearSolver`; it
     says whether the step from ``x`` may. ``first``: the factors are from the end of the solve before, whose solution is
     ``x``. Unknowns with the index ``non_negative`` are bounded by zero where the solver treats complementarity itself.
+
+    One with a method ``right_side(R)`` makes Newton's steps with another system where the solver lets it: the tangent
+    gives the step that belongs to the residual ``R`` with that right-hand side. It says whether its tangent has a
+    ``symmetric`` form; the solver sets ``condensed`` to get that one, and ``stepped`` where it asks for the right side.
     """
 
     size: int
@@ -116,21 +120,6 @@ class Problem(Protocol):
 
     def shorten(self, x: FloatArray, step: FloatArray) -> float:
         """Factor in (0, 1] by which the step ``x - factor * step`` must be shortened."""
-
-
-class SteppedProblem(Problem, Protocol):
-    """A problem that makes Newton's steps with another system than residual and tangent where the solver lets it.
-
-    It says whether its tangent has a symmetric form; the solver sets ``condensed`` to get that one, and ``stepped``
-    where it asks for the right side.
-    """
-
-    symmetric: bool
-    condensed: bool
-    stepped: bool
-
-    def right_side(self, R: FloatArray) -> FloatArray:
-        """Right-hand side ``(size,)`` with which the tangent gives the step that belongs to ``R``."""
 
 
 @dataclass
@@ -181,7 +170,7 @@ class NonlinearSolver:
         self.seconds, self.thrifty, self.patient, self.iterations_left = Seconds(), True, True, math.inf
         pattern = self.problem.pattern
         self._stored = pattern.start
-        self._stepped: SteppedProblem | None = None
+        self._stepped: Any = None  # the problem, where it changes the system of a step
         self._condensed = False
         self._norms: list[float] = []  # of the residual, at every step of this solve
         self._end: FloatArray | None = None  # solution of the solve before
@@ -207,7 +196,7 @@ class NonlinearSolver:
         kind = (PETSc.Options().getAll() | self.options).get(f"{PREFIX}snes_type", "newtonls")
         # others use residual and tangent for more than a step, so these have to belong together
         if kind == "newtonls" and hasattr(self.problem, "right_side"):
-            self._stepped = cast(SteppedProblem, self.problem)
+            self._stepped = self.problem
             self._stepped.stepped = True
             self._condensed = self._stepped.condensed = self._stepped.symmetric
         if self._condensed:
