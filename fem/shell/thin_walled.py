@@ -138,8 +138,10 @@ def wall_between(body: ThinWalled, frame: Grasp, pad_size: Sequence[float], size
     # a pad may reach beyond the wall, where the outline has no station
     low, high = (float(end) for end in np.clip([low, high], *body.surface.heights))
     shell, fixed = _supported(body, frame, size._replace(heights=(low, high), half_width=half))
-    meshed = shell.mesh
-    wall = Wall(_surface(meshed), meshed.theta, meshed.s, meshed.number, 0.5 * meshed.thickness)
+    meshed, flat = shell.mesh, body.surface.flat
+    # through the meshed part of the wall and the rims of its flat ends
+    surface = wall_surface(meshed.surface, max(meshed.s[0], flat[0]), min(meshed.s[-1], flat[1]))
+    wall = Wall(surface, meshed.theta, meshed.s, meshed.number, 0.5 * meshed.thickness)
     return (LinearWall if linear else NonlinearWall)(shell, fixed), [wall] * len(frame.poses)
 
 
@@ -159,12 +161,6 @@ def _supported(body: ThinWalled, frame: Grasp, size: MeshSize) -> tuple[Shell[Bo
         open_top=body.open_top, open_bottom=body.open_bottom, base_thickness=body.base_thickness,
     )  # fmt: skip
     return supported(mesh, body.material, body.support)
-
-
-def _surface(mesh: BodyMesh):
-    """Splines through the meshed part of the wall and the rims of its flat ends."""
-    low, high = mesh.surface.flat
-    return wall_surface(mesh.surface, max(mesh.s[0], low), min(mesh.s[-1], high))
 
 
 def _footprint(frame: Grasp, pad_size: Sequence[float]) -> tuple[float, float, float]:
