@@ -45,8 +45,6 @@ def boxes(hand: Hand, pad: FloatArray, opening: float, depth: float) -> FloatArr
     ``pad (3,)`` are the pad's extents along the approach and across both axes, and its thickness [m], ``opening`` is
     the distance of the faces of the foam, and ``depth`` the pads' distance from the frame.
     """
-    closing = "xy".index(hand.closing)
-    across = 1 - closing
     width, thickness = (pad[1], FINGER_THICKNESS) if hand.finger_mm is None else np.array(hand.finger_mm) / 1e3
     tip, root = depth + pad[0] / 2, depth - pad[0] / 2
     bare = opening / 2 + pad[2]
@@ -54,11 +52,8 @@ def boxes(hand: Hand, pad: FloatArray, opening: float, depth: float) -> FloatArr
     finger = bare, bare + thickness, max(width, pad[1]), min(0.0, root)
     made = []
     for (low, high, wide, start), sign in product((foam, finger), (-1.0, 1.0)):
-        box = np.zeros((2, 3))
-        box[:, closing] = sorted((sign * low, sign * high))
-        box[:, across] = -wide / 2, wide / 2
-        box[:, 2] = start - WAY, tip
-        made.append(box)
+        box = np.sort([[sign * low, -wide / 2, start - WAY], [sign * high, wide / 2, tip]], axis=0)
+        made.append(box if hand.closing == "x" else box[:, [1, 0, 2]])
     if hand.palm_mm is not None:
         made.append(np.sort(hand.palm_mm, axis=0) / 1e3 - [[0.0, 0.0, WAY], [0.0, 0.0, 0.0]])
     return np.stack(made)
