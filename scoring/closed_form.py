@@ -66,21 +66,18 @@ def epsilon_linf(contact1: Axes, contact2: Axes, arm1: float, arm2: float) -> fl
     True
     """
     t1, t2 = contact1[2], contact2[2]
-    about = (t1 + t2) / math.sqrt(1 + max(t1, t2) ** 2)
-    alone = [n / math.sqrt(1 + other**2 + n**2) for n, other in _borne_alone(contact1, contact2, arm1, arm2)]
-    # a force along the line is met by one normal force: support 1
-    return min(1.0, about, *alone)
+    return _epsilon((t1 + t2) / math.sqrt(1 + max(t1, t2) ** 2), 1, contact1, contact2, arm1, arm2)
 
 
 def epsilon_l1(contact1: Axes, contact2: Axes, arm1: float, arm2: float) -> float:
     """Radius of the largest ball around 0 in the L1 grasp wrench space [-]; parameters as in `epsilon_linf`."""
     t1, t2 = contact1[2], contact2[2]
-    about = (t1 + t2) / math.sqrt(4 + (t1 - t2) ** 2)
-    alone = [n / math.sqrt(4 * (1 + other**2) + n**2) for n, other in _borne_alone(contact1, contact2, arm1, arm2)]
-    return min(1.0, about, *alone)
+    return _epsilon((t1 + t2) / math.sqrt(4 + (t1 - t2) ** 2), 4, contact1, contact2, arm1, arm2)
 
 
-def _borne_alone(contact1: Axes, contact2: Axes, arm1: float, arm2: float) -> list[tuple[float, float]]:
-    """For each contact and direction: moment of its friction about the other contact, and the other's arm."""
+def _epsilon(about: float, share: int, contact1: Axes, contact2: Axes, arm1: float, arm2: float) -> float:
+    """The least support: ``about`` the line; by one contact alone about the other, squares there ``share`` times."""
     D = abs(arm2 - arm1)
-    return [(contact1[k] * D, arm2) for k in (0, 1)] + [(contact2[k] * D, arm1) for k in (0, 1)]
+    alone = [(contact[k] * D, other) for contact, other in ((contact1, arm2), (contact2, arm1)) for k in (0, 1)]
+    # a force along the line is met by one normal force: support 1
+    return min(1.0, about, *(n / math.sqrt(share * (1 + other**2) + n**2) for n, other in alone))
