@@ -11,6 +11,7 @@ import numpy as np
 from scipy.interpolate import RegularGridInterpolator
 from scipy.spatial import cKDTree
 from trimesh.intersections import slice_faces_plane
+from trimesh.triangles import area
 
 from softjaw.fem.objects.gap import Pose
 from softjaw.friction.patch import NEGLIGIBLE
@@ -43,7 +44,7 @@ def surface_of(scene: Any, axes: Any, feet: Feet = ()) -> Surface:
     points, triangles = surface_triangles(scene.object)
     corners = np.asarray(points, float)[triangles]
     # Triangles without area show nothing and would only be cut further.
-    corners = corners[areas(corners) > 0]
+    corners = corners[area(corners) > 0]
     cell = np.full(len(corners), NOBODY)
     # Explicit poses have no unit on the station axis.
     if not axes[-3].units:
@@ -188,12 +189,7 @@ def cut(corners: np.ndarray, normal: np.ndarray, offset: float) -> np.ndarray:
     points, faces = corners[through].reshape(-1, 3), np.arange(3 * through.sum()).reshape(-1, 3)
     halves = (slice_faces_plane(points, faces, side * normal, offset * normal) for side in (1.0, -1.0))
     pieces = np.concatenate([half[0][half[1]] for half in halves])
-    return np.concatenate([corners[~through], pieces[areas(pieces) > 0]])
-
-
-def areas(corners: np.ndarray) -> np.ndarray:
-    """Areas ``(m,)`` of triangles."""
-    return 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    return np.concatenate([corners[~through], pieces[area(pieces) > 0]])
 
 
 def moved(places: np.ndarray, u: np.ndarray, angle: float) -> np.ndarray:

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import pyvista as pv
 import trimesh
+from trimesh.triangles import area as areas
 
 from softjaw.fem.objects.gap import Pose
 from softjaw.fem.objects.shapes import EllipticCylinder
@@ -23,7 +24,7 @@ from softjaw.study.result.layout import REPORT_BYTES
 from softjaw.study.result.read import open, scene_of
 from softjaw.study.scene import SceneError
 from softjaw.study.show.grasps import order
-from softjaw.study.show.object_surface import NOBODY, Cells, areas, between, coloured, cut, moved, pressed
+from softjaw.study.show.object_surface import NOBODY, Cells, between, coloured, cut, moved, pressed
 from softjaw.study.show.report import contact
 from softjaw.study.show.report.verdict import plain_report
 from softjaw.study.show.view.model import View, quantity_of, view_of
