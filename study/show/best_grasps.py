@@ -143,8 +143,7 @@ def case_table(
     columns += [Column("flags", display=False), Column("notes", wrap=NOTES_WIDTH)]
     rows: list[Row] = []
     for place_, index in enumerate(cases, start=1):
-        row: Row = {axis.name: float(axis.values[i]) for axis, i in zip(axes, index, strict=True)}
-        row |= {axis.name: axis.options[i] for axis, i in zip(axes, index, strict=True) if axis.options}
+        row: Row = {a.name: a.options[i] if a.options else float(a.values[i]) for a, i in zip(axes, index, strict=True)}
         row |= {"rank": place_, "name": short_name(ds, candidate_of(ds, index))}
         row |= {"state": STATES[int(ds.status.values[index])]}
         row |= {"label": str(ds.label.values[index[-3:-1]]), "flags": int(ds["flags"].values[index]) & OF_FILE}

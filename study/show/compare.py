@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from softjaw.friction.patch import FloatArray
 from softjaw.study.case.result import TIE
-from softjaw.study.messages import OTHER_FILE, USAGE, StudyError
+from softjaw.study.messages import OTHER_FILE, USAGE, StudyError, fault_of
 from softjaw.study.quantities import NUMERIC_MAPS, map_row
 from softjaw.study.ranking import falling
 from softjaw.study.result.layout import DONE
@@ -35,10 +35,8 @@ def compare(first: xr.Dataset, second: xr.Dataset, quantity: str = "e_n", model:
     or an unknown quantity.
     """
     axes, pair = _matched(first, second)
-    try:
+    with fault_of(f"{first.file}, {second.file}: a stored scene cannot be read", ValueError, code=OTHER_FILE):
         changed = changes(first.scene, second.scene)
-    except ValueError as error:
-        raise StudyError(OTHER_FILE, f"{first.file}, {second.file}: a stored scene cannot be read ({error})") from error
     in_a, in_b = (ds.status.values == DONE for ds in pair)
     states = {"solved in both": in_a & in_b, "only in a": in_a & ~in_b, "only in b": ~in_a & in_b,
               "in neither": ~in_a & ~in_b}  # fmt: skip
