@@ -30,7 +30,8 @@ class Lock:
     def take_first(self) -> None:
         """On rank 0: raise `StudyError` if a rank of another run is alive."""
         for attempt in range(6):  # 'status' takes the lock for an instant to see whether a run is alive
-            self._fd = self._opened()
+            with self._writing():
+                self._fd = os.open(self.path, os.O_RDWR | os.O_CREAT, 0o666)
             # A run that ends unlinks the file: a lock on a file without a name would keep nobody out.
             if self._flock(fcntl.LOCK_EX | fcntl.LOCK_NB):
                 with contextlib.suppress(FileNotFoundError):
@@ -47,10 +48,6 @@ class Lock:
             os.ftruncate(self._fd, 0)
             os.pwrite(self._fd, self.owner.encode(), 0)
         self._flock(fcntl.LOCK_SH)
-
-    def _opened(self) -> int:
-        with self._writing():
-            return os.open(self.path, os.O_RDWR | os.O_CREAT, 0o666)
 
     @contextlib.contextmanager
     def _writing(self) -> Iterator[None]:

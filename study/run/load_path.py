@@ -166,9 +166,8 @@ class PathSolver:
 
 def _pending(share: Share, codes: np.ndarray) -> Pending:
     """Missing rows of a share: for each force, rising, the candidates and their rows."""
-    rows_at = {k: [(c, rows[k]) for c, rows in enumerate(share.unit.rows)] for k in share.forces}
-    missing = {k: [(c, row) for c, row in served if codes[row] == MISSING] for k, served in rows_at.items()}
-    return {k: served for k, served in missing.items() if served}
+    at = {k: [(c, r[k]) for c, r in enumerate(share.unit.rows) if codes[r[k]] == MISSING] for k in share.forces}
+    return {k: served for k, served in at.items() if served}
 
 
 def sentence(error: BaseException, limit: float) -> str:

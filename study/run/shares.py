@@ -32,13 +32,9 @@ class Share(NamedTuple):
         return [self._replace(forces=self.forces[i::parts]) for i in range(min(parts, len(self.forces)))]
 
 
-def by_cost(costs: Sequence[float]) -> list[int]:
-    """Positions with the most expensive first; equal costs keep their order.
-
-    >>> by_cost([1.0, 5.0, 5.0, 2.0])
-    [1, 2, 3, 0]
-    """
-    return sorted(range(len(costs)), key=lambda i: (-costs[i], i))
+def costliest_first(listed: Iterable[Share]) -> list[Share]:
+    """Equal costs keep their order; no rank then ends long after the others."""
+    return sorted(listed, key=lambda share: -share.cost)
 
 
 def makespan(costs: Sequence[float], ranks: int) -> float:
@@ -48,8 +44,8 @@ def makespan(costs: Sequence[float], ranks: int) -> float:
     7.0
     """
     busy = np.zeros(max(ranks, 1))
-    for i in by_cost(costs):
-        busy[busy.argmin()] += costs[i]
+    for cost in sorted(costs, reverse=True):
+        busy[busy.argmin()] += cost
     return float(busy.max())
 
 
@@ -58,14 +54,14 @@ def shares(units: Iterable[Any], codes: np.ndarray, ranks: int) -> list[Share]:
 
     ``codes`` (rows,) array: state of every case.
     """
-    waiting = _in_order([Share(unit, forces) for unit in units if (forces := _missing(unit, codes))])
+    waiting = costliest_first(Share(unit, forces) for unit in units if (forces := _missing(unit, codes)))
     remaining, divided = sum(share.cost for share in waiting), list[Share]()
     for share in waiting:
         remaining -= share.cost
         # what follows keeps the others busy meanwhile
         undivided = not share.unit.apart or remaining >= ranks * share.cost
         divided += [share] if undivided or ranks == 1 else share.divided(ranks)
-    return _in_order(divided)
+    return costliest_first(divided)
 
 
 def divided(objects: Sequence[Sequence[Any]], codes: np.ndarray, ranks: int) -> tuple[list[Share], list[int]]:
@@ -77,18 +73,13 @@ def divided(objects: Sequence[Sequence[Any]], codes: np.ndarray, ranks: int) -> 
     undivided = [shares(units, codes, 1) for units in objects]
     costs = [sum(share.cost for share in some) for some in undivided]
     remaining, todo, sizes = sum(costs), list[Share](), list[int]()
-    for k in by_cost(costs):
+    for k in sorted(range(len(costs)), key=lambda k: -costs[k]):
         remaining -= costs[k]
         busy = remaining >= ranks * max((share.cost for share in undivided[k]), default=0.0)
         some = undivided[k] if busy else shares(objects[k], codes, ranks)
         todo += some
         sizes += [len(some)] if len(objects) > 1 else [1] * len(some)
     return todo, sizes
-
-
-def _in_order(listed: Sequence[Share]) -> list[Share]:
-    """The costliest first, so that no rank ends long after the others."""
-    return [listed[i] for i in by_cost([share.cost for share in listed])]
 
 
 def _missing(unit: Any, codes: np.ndarray) -> tuple[int, ...]:

@@ -17,7 +17,7 @@ from softjaw.study.run.estimate import FIRST_FORCE_FACTOR, timed
 from softjaw.study.run.load_path import settle
 from softjaw.study.run.plan import make_plan, plan_rows
 from softjaw.study.run.progress import Progress
-from softjaw.study.run.shares import by_cost, makespan, shares
+from softjaw.study.run.shares import Share, costliest_first, makespan, shares
 from tests.study.launching import ROOT, launch
 from tests.study.scenes import OVAL, scene_of
 
@@ -74,7 +74,8 @@ def test_expensive_first_is_as_good_as_the_bound_of_list_scheduling():
         assert best <= makespan(costs, n) <= (4 / 3 - 1 / (3 * n)) * best
     assert makespan([1.0, 2.0, 4.0], 1) == pytest.approx(7.0)
     assert makespan([1.0, 2.0, 4.0], 5) == pytest.approx(4.0)
-    assert by_cost([2.0, 3.0, 2.0]) == [1, 0, 2]
+    listed = costliest_first(Share(unit, (0, 1)) for unit in units_of([2.0, 3.0, 2.0]))
+    assert [share.unit.index for share in listed] == [1, 0, 2]
 
 
 def units_of(costs, forces=6, apart=True):
