@@ -9,8 +9,9 @@ goes with the root of the closing displacement.
 """
 
 import math
-from collections.abc import Sequence
-from typing import Any, NamedTuple
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import RectBivariateSpline
@@ -26,23 +27,6 @@ from softjaw.friction.patch import FloatArray
 NOISE_MARGIN = 2.0  # standard errors of the face that a contact has to stand
 LIFT, RAMP = 3.0, 2.0  # standard errors by which the face is lifted where nothing surely bears; elements of the ramp
 LIFT_SAMPLES = 60  # of the lift along a side of the pad
-
-
-class LiftedFace(NamedTuple):
-    """A measured face that is lifted off the pad by a smooth function of the place."""
-
-    face: MeasuredFace
-    lift: RectBivariateSpline
-
-    def gap(self, X: FloatArray) -> Gap:
-        """As of `MeasuredFace`, with the lift added: where the pad bears there is none."""
-        g, normal, hessian = self.face.gap(X)
-        x, y = X[:, 0], X[:, 1]
-        d = {(i, j): self.lift.ev(x, y, dx=i, dy=j) for i in range(3) for j in range(3 - i)}
-        normal[:, 0] += d[1, 0]
-        normal[:, 1] += d[0, 1]
-        hessian[:, :2, :2] += np.stack([np.stack([d[2, 0], d[1, 1]], -1), np.stack([d[1, 1], d[0, 2]], -1)], -2)
-        return g + d[0, 0], normal, hessian
 
 
 def press_measured(
@@ -74,8 +58,8 @@ def press_measured(
         raise NoContactError("the face lies nowhere below the undeformed one, so it touches nothing")
     touching, margin = face.lifted(depth), NOISE_MARGIN * face.doubt
 
-    def pressed(surface: MeasuredFace | LiftedFace, closing: float) -> Pressed:
-        press = Press(pad, surface.gap, options, fallbacks)
+    def pressed(gap: Callable[[FloatArray], Gap], closing: float) -> Pressed:
+        press = Press(pad, gap, options, fallbacks)
         try:
             return press.at_closing(closing)
         finally:
@@ -83,8 +67,8 @@ def press_measured(
 
     # share of the closing displacement: with a larger margin nothing tells contact from noise
     if margin >= 0.5 * depth:
-        return pressed(touching, depth), False
-    sure = pressed(touching, depth - margin)
+        return pressed(touching.gap, depth), False
+    sure = pressed(touching.gap, depth - margin)
     return pressed(_released(pad, touching, sure, depth), depth), True
 
 
@@ -96,11 +80,11 @@ def _depth(face: MeasuredFace, pad: Pad) -> float:
     return float(-face.height(X.ravel(), Y.ravel())[0].min())
 
 
-def _released(pad: Pad, face: MeasuredFace, sure: Pressed, depth: float) -> LiftedFace | MeasuredFace:
-    """The face, lifted where the pad bears nothing on the way to it, nor may on the rest of the way."""
+def _released(pad: Pad, face: MeasuredFace, sure: Pressed, depth: float) -> Callable[[FloatArray], Gap]:
+    """Gap of the face, lifted where the pad bears nothing on the way to it, nor may on the rest of the way."""
     bearing = sure.contact_face[sure.pressure > 0][:, :2]
     if not len(bearing):
-        return face
+        return face.gap
     widths = [side / n for side, n in zip(pad.shape.size[:2], pad.shape.elements, strict=False)]
     growth = math.sqrt(depth / sure.closing) - 1.0
     reach = 0.5 * float(np.ptp(bearing, axis=0).max()) * growth + max(widths)
@@ -108,4 +92,15 @@ def _released(pad: Pad, face: MeasuredFace, sure: Pressed, depth: float) -> Lift
     places = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
     t = np.clip((cKDTree(bearing).query(places)[0] - reach) / (RAMP * max(widths)), 0.0, 1.0)
     lift = LIFT * face.doubt * t**3 * (10.0 - 15.0 * t + 6.0 * t**2)
-    return LiftedFace(face, RectBivariateSpline(x, y, lift))
+    return partial(lifted_gap, face, RectBivariateSpline(x, y, lift))
+
+
+def lifted_gap(face: MeasuredFace, lift: RectBivariateSpline, X: FloatArray) -> Gap:
+    """Gap of a face that is lifted off the pad by a smooth function of the place; where the pad bears there is none."""
+    g, normal, hessian = face.gap(X)
+    x, y = X[:, 0], X[:, 1]
+    d = {(i, j): lift.ev(x, y, dx=i, dy=j) for i in range(3) for j in range(3 - i)}
+    normal[:, 0] += d[1, 0]
+    normal[:, 1] += d[0, 1]
+    hessian[:, :2, :2] += np.stack([np.stack([d[2, 0], d[1, 1]], -1), np.stack([d[1, 1], d[0, 2]], -1)], -2)
+    return g + d[0, 0], normal, hessian
