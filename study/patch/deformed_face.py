@@ -17,7 +17,7 @@ from softjaw.fem.objects.gap import NoContactError
 from softjaw.fem.objects.measured_face import cell_of, measured_face
 from softjaw.friction.patch import NEGLIGIBLE, FloatArray
 from softjaw.study.case.model import pads_of
-from softjaw.study.messages import SOME_FAILED, USAGE, Problem, StudyError, fault_of
+from softjaw.study.messages import SOME_FAILED, Problem, fault_of
 from softjaw.study.patch.faces import ReadPatch, refuse
 from softjaw.study.patch.patch_reader import Reading, checked_file, refused, si_columns, split_header, table_rows
 from softjaw.study.scene import Scene
@@ -36,13 +36,10 @@ def solve_deformed(file: str, unit: str | None, scene: Scene) -> ReadPatch:
     with fault_of(file, ValueError, ending="; measure more of the face"):
         face = measured_face(points, cell_of(scene.gripper.pad_size, scene.gripper.elements))
     wanted, *others = pads_of(scene, (False, False), coarser=False)
-    try:
+    no_state = fault_of(f"{file}: the pad has no state with this face", ConvergenceError, CheckError, code=SOME_FAILED)
+    sign = "; z points along the approach, so that pressed foam has z < 0: change its sign if it is the other way"
+    with no_state, fault_of(file, NoContactError, ending=sign):
         state, judged = press_measured(face, wanted, others, dict(scene.petsc))
-    except NoContactError as error:
-        remedy = "z points along the approach, so that pressed foam has z < 0: change its sign if it is the other way"
-        raise StudyError(USAGE, f"{file}: {error}; {remedy}") from error
-    except (ConvergenceError, CheckError) as error:
-        raise StudyError(SOME_FAILED, f"{file}: the pad has no state with this face: {error}") from error
     patch = extract(state.pad, state)
     loaded = patch.pressure > NEGLIGIBLE * patch.pressure.max(initial=0.0)
     faces = np.flatnonzero(loaded).tolist()

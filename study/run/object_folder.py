@@ -13,7 +13,7 @@ from pathlib import Path, PurePath
 from typing import Any, NamedTuple
 
 from softjaw.fem.objects.mesh_file import ENDINGS
-from softjaw.study.messages import USAGE, StudyError, shortened, shown
+from softjaw.study.messages import USAGE, StudyError, fault_of, shortened, shown
 from softjaw.study.result.index import INDEX
 from softjaw.study.scene.model import Scene, file_digest, load_scene, put_overrides
 from softjaw.study.scene.objects import Mesh
@@ -118,12 +118,10 @@ def _of_pattern(root: Path, pattern: str) -> Lines:
 
 
 def _of_table(path: Path) -> Lines:
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            reader = csv.DictReader(file, skipinitialspace=True)
-            lines: list[tuple[str, dict[Any, Any]]] = [(f"{path}:{reader.line_num}", line) for line in reader]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise StudyError(USAGE, f"{path}: cannot be read ({error}); {EXPECTED}") from error
+    unread = fault_of(f"{path}: cannot be read", OSError, UnicodeDecodeError, csv.Error, ending=f"; {EXPECTED}")
+    with unread, path.open(newline="", encoding="utf-8-sig") as file:
+        reader = csv.DictReader(file, skipinitialspace=True)
+        lines: list[tuple[str, dict[Any, Any]]] = [(f"{path}:{reader.line_num}", line) for line in reader]
     columns = [name for name in reader.fieldnames or () if name]
     if "mesh" not in columns or len(set(columns)) < len(columns):
         text = f"{path}:1: found {shown(', '.join(columns))}, expected columns with commas between them"
