@@ -5,6 +5,7 @@ displacement control closes the fingers in short steps, and the first state with
 gripper that closes with a growing force meets first.
 """
 
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -236,12 +237,10 @@ class Grip(LoadPath[WallProblem]):
             return self._stepping.solve(x, Control(force=force), work, self._stepping.most), False
         friction = self.problem.friction
         before = None if friction is None else friction.anchors
-        try:
+        with suppress(ConvergenceError):
             ahead = self._stepping.step_to(x, reached, force, work, by_displacement=False)
             if self.problem.closing(ahead) - self.problem.closing(x) <= expected:
                 return ahead, False
-        except ConvergenceError:
-            pass
         # a jump over a limit converges too, so the length of the step decides, not Newton's method alone
         forces: list[float] = []
         if friction is not None and before is not None:
