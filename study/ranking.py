@@ -223,7 +223,7 @@ def ranked(ds: xr.Dataset, k: int, by: str | None = None) -> IntArray:
     marks, surely = flags[order], _places(score if errors is None else score - errors.half_width)[order]
     hopeless = marks & LOST > 0
     if all(name in ds for name in FORCE_RANGE):
-        safe = (ds["force_low"] <= ds["force_high"]).values.ravel()[order]
+        safe = (np.maximum(ds["force_low"].values, least_force(ds)) <= ds["force_high"].values).ravel()[order]
         hopeless &= ~(safe & (marks & LOST & ~(Flag.TOO_WEAK | Flag.TOO_STRONG | Flag.YIELDS) == 0))
     return order[np.lexsort((surely, marks != 0, marks & Flag.NOT_ANTIPODAL, group, hopeless))]
 
@@ -387,6 +387,12 @@ def hand_of(ds: xr.Dataset) -> Hand | None:
     with suppress(StudyError):
         return gripper_file(name)[1] if name else None
     return None
+
+
+def least_force(ds: xr.Dataset) -> float:
+    """Normal force per finger below which the hand of the scene does not press [N]; 0 without one."""
+    hand = hand_of(ds)
+    return hand.force_n[0] if hand else 0.0
 
 
 def approach_of(ds: xr.Dataset, candidate: int, k: int, hand: Hand) -> tuple[float, ...] | None:

@@ -21,5 +21,5 @@ def nothing_solved(monkeypatch):
 @pytest.fixture
 def plans_in_no_time(monkeypatch):
     """Of plans what they solve to time it is no matter, and few places tell whether there is a sampled grasp."""
-    monkeypatch.setattr(pipeline, "solve_unit", lambda unit, *_: iter(unit.rows[0]))
+    monkeypatch.setattr(pipeline, "solve_unit", lambda unit, *_: enumerate(unit.rows[0]))
     monkeypatch.setattr(sampler, "antipodal_grasps", partial(sampler.antipodal_grasps, samples=6))

@@ -180,12 +180,14 @@ class Press(LoadPath[RigidProblem]):
             # as much as a pad with a fallback has, or a force without a state would take for ever
             self.solver.iterations_left = max(self.solver.iterations_left, self.MOST_ITERATIONS // 2)
         # a limit that was seen is the reason; else what stopped the first that knows of one
-        if not (known := [error for error in errors if isinstance(error, ConvergenceError)]):
+        pairs = [*zip((failed, *errors), tried, strict=True)]
+        if not (known := [pair for pair in pairs[1:] if isinstance(pair[0], ConvergenceError)]):
             raise errors[0]
-        limits = [error for error in (failed, *known) if isinstance(error, NotReachedError)]
-        text = f"{(limits or known)[0]} (tried with {', '.join(dict.fromkeys(tried))} gaps)"
+        limits = [pair for pair in pairs if isinstance(pair[0], NotReachedError)]
+        reason, rule = (limits or known)[0]
+        text = f"{reason} (with {rule} gaps; tried with {', '.join(dict.fromkeys(tried))})"
         text += "; more elements may lead further, or a place farther from an edge"
-        raise (NotReachedError if limits else ConvergenceError)(text) from known[0]
+        raise (NotReachedError if limits else ConvergenceError)(text) from known[0][0]
 
     def _through(self, below: OnPath | None, force: float, work: Work) -> FloatArray:
         """State at ``force`` [N] from first contact on, through the force of the state ``below``."""

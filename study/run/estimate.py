@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from softjaw.friction.patch import FloatArray
+from softjaw.study.case.result import CaseFailure
 from softjaw.study.quantities import LISTED
 from softjaw.study.run.limits import require_room
 from softjaw.study.scene.sections import FINEST
@@ -25,12 +26,16 @@ MOST_PROMISING = 3  # sampled grasps that are solved as well as listed ones
 ROUNDS = 1.6  # of the grasps that a list shows: with those that fall out of it
 
 
-def timed(units: Sequence[Any], budget: float = TIMED_S, inputs: int = 1) -> tuple[list[float], float]:
+def timed(
+    units: Sequence[Any], budget: float = TIMED_S, inputs: int = 1, failed: list[str] | None = None
+) -> tuple[list[float], float]:
     """Expected time of each unit of work [s], by a few that are solved here, and what the first one has loaded [s].
 
     The results are thrown away. After ``budget`` [s] a path is left in the middle. Loops that had to be compiled are
-    kept for the run: then all is timed once more. ``inputs``: as `Layout.inputs`, as often grasps are solved.
+    kept for the run: then all is timed once more. ``inputs``: as `Layout.inputs`, as often grasps are solved. Reasons
+    of cases that have no result are added to ``failed``.
     """
+    failed = [] if failed is None else failed
     if not units:
         return [], 0.0
     require_room()
@@ -39,14 +44,17 @@ def timed(units: Sequence[Any], budget: float = TIMED_S, inputs: int = 1) -> tup
     from softjaw.study.pipeline import SOLVERS, solve_unit
 
     with install_listener("numba:compile", compiling := TimingListener()):
-        times = _timed(units, budget, inputs, solve_unit)
+        times = _timed(units, budget, inputs, solve_unit, failed)
     if not compiling.done:
         return times
     SOLVERS.clear()  # what is solved already would take no time
-    return _timed(units, budget, inputs, solve_unit)
+    failed.clear()
+    return _timed(units, budget, inputs, solve_unit, failed)
 
 
-def _timed(units: Sequence[Any], budget: float, inputs: int, solve_unit: Callable) -> tuple[list[float], float]:
+def _timed(
+    units: Sequence[Any], budget: float, inputs: int, solve_unit: Callable, failed: list[str]
+) -> tuple[list[float], float]:
     """See `timed`; what the first case loads counts for no unit."""
     seconds, first_case, spent = np.full(len(units), np.nan), np.nan, 0.0
     n = len(units)  # the middle first; the first few lie far apart: multiples of the golden section
@@ -54,7 +62,7 @@ def _timed(units: Sequence[Any], budget: float, inputs: int, solve_unit: Callabl
     first = order[0]
     for i in order:
         times: list[float] = []
-        for took in _times(solve_unit(units[i]), len(units[i].rows[0])):
+        for took in _times(solve_unit(units[i]), len(units[i].rows[0]), failed):
             times.append(took)
             if np.isnan(first_case):
                 first_case = took
@@ -86,12 +94,13 @@ def _path(times: Sequence[float], forces: int, *, left: bool, loads: bool) -> fl
     return first + sum(times[1:]) + further * (forces - len(times))
 
 
-def _times(cases: Iterator[Any], count: int) -> Iterator[float]:
+def _times(cases: Iterator[Any], count: int, failed: list[str]) -> Iterator[float]:
     """Time of each case of a load path [s], up to one that fails."""
     before = time.process_time()
     for _ in range(count):
         try:
-            next(cases)
+            _, result = next(cases)
+            failed += [result.message] if isinstance(result, CaseFailure) else []
         except Exception:  # whatever a case dies of, the run says it
             yield time.process_time() - before
             return

@@ -160,7 +160,10 @@ def plan_rows(plan: Plan, scene: Any, path: Path, ranks: Sequence[int]) -> Itera
     for name, text in rows.items():
         if text:
             yield f"  {name:<10}  {text}"
-    yield f"  {'time':<10}  {_time(plan, scene, ranks)}"  # what is known at once need not wait for it
+    failed: list[str] = []
+    yield f"  {'time':<10}  {_time(plan, scene, ranks, failed)}"  # what is known at once need not wait for it
+    if failed:
+        yield f"  {'failed':<10}  {len(failed)} of the cases that were solved for it: {failed[0]}"
 
 
 def _no_grasps(plan: Plan) -> str:
@@ -186,12 +189,12 @@ def _rounds(plan: Plan, scene: Any) -> str:
     return f"up to {asked // each} more {what}, {each} cases each; the time counts them, no other row does"
 
 
-def _time(plan: Plan, scene: Any, ranks: Sequence[int]) -> str:
-    """Time on each of these numbers of ranks."""
+def _time(plan: Plan, scene: Any, ranks: Sequence[int], failed: list[str]) -> str:
+    """Time on each of these numbers of ranks; reasons of cases that fail are added to ``failed``."""
     if not plan.tried:
         return "no grasp is solved"
     before = time.process_time()  # what a run does before it solves, a plan did as well
-    each, loads = timed(plan.tried, inputs=plan.layout.inputs)
+    each, loads = timed(plan.tried, inputs=plan.layout.inputs, failed=failed)
     start = before + loads + END_S
     added = 1.0 + (scene.candidates.refine or 0) / (len(each) * plan.layout.shape[-1])
     counts = [plan.layout.shape[-1] if unit.apart else 1 for unit in plan.tried]  # forces that ranks may divide

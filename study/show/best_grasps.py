@@ -14,10 +14,10 @@ from softjaw.study.flags import BORNE, LOST, OF_FILE, Flag, flag_words, flags_in
 from softjaw.study.quantities import BY_KEY, FORCE_RANGE, LEAST_FORCE, LISTED, MAIN, MISSING, MODELS, STATES, map_row
 from softjaw.study.ranking import (
     distinct,
-    hand_of,
     index_of,
     judge,
     keys_at,
+    least_force,
     passed_over,
     rank_values,
     score_of,
@@ -173,6 +173,7 @@ def safe_range(ds: xr.Dataset, index: Index) -> str:
     low, high = (at(ds, name, index) for name in FORCE_RANGE)
     if np.isnan([low, high]).all():
         return "-"
+    low = max(low, least_force(ds))
     if all(name in ds for name in FORCE_RANGE) and (low > high or np.isnan(low)):
         return "none"
     more = "+" * bool(high >= largest_force(ds) * (1 - NEGLIGIBLE) and not at(ds, "force_high_error", index) > 0)
@@ -279,16 +280,17 @@ def _force(ds: xr.Dataset, index: Index) -> tuple[str, str]:
         known = np.isfinite(error)
         covers = "±: mesh, interpolation, not mu" if known else "error not known"
         least = with_error(low, error) if known else number(low, 3)
-        if at(ds, "force_high", index) < low:
-            return "none is safe", f"{wanted} need {least} N per finger ({covers}), the wall bears {_borne(ds, index)}"
+        of_hand, name = least_force(ds), Path(task_keys(ds, "gripper").get("preset") or "").stem
+        if at(ds, "force_high", index) < max(low, of_hand) * (1 - NEGLIGIBLE):
+            press = f"; {name} presses with {of_hand:g} N at least" * (of_hand > low)
+            need = f"{wanted} need {least} N per finger ({covers}), the wall bears {_borne(ds, index)}"
+            return "none is safe", need + press
         usable = (ds.status.values[index[:-1]] == DONE) & (ds["flags"].values[index[:-1]] & LOST == 0)
         reached = not int(ds["flags"].values[index]) & Flag.OUT_OF_REACH  # another force would not help
         harm = not usable.any() and reached and "between" not in ds.attrs
         alone = "; no solved force does without harm: solve one" * harm
-        hand = hand_of(ds)
-        if hand and low < hand.force_n[0]:
-            press, name = f"{hand.force_n[0]:g} N per finger", Path(task_keys(ds, "gripper")["preset"]).stem
-            return press, f"the least of {name}; {least} N hold {wanted} ({covers}){alone}"
+        if low < of_hand:
+            return f"{of_hand:g} N per finger", f"the least of {name}; {least} N hold {wanted} ({covers}){alone}"
         return f"{least} N per finger", f"the least that holds {wanted} ({covers}){alone}"
     weak = not at(ds, "safety_factor", index) >= safety * (1 - TIE)
     return pressed, f"no solved force holds {wanted}" if weak else f"the smallest solved force that holds {wanted}"

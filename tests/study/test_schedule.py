@@ -11,6 +11,7 @@ import pytest
 from numba import njit
 
 from softjaw.study import pipeline
+from softjaw.study.case.result import CaseFailure
 from softjaw.study.quantities import DONE, MISSING, SLIPS, WIDE
 from softjaw.study.run import estimate
 from softjaw.study.run.estimate import FIRST_FORCE_FACTOR, timed
@@ -236,8 +237,15 @@ def test_a_path_is_left_when_the_time_is_up_and_one_that_fails_counts_what_it_to
     assert timed([], 10.0) == ([], 0.0)
     [left], _ = timed(units_that_take([7.0, 4.0, 6.0, 4.0, 4.0]), budget=15.0)
     assert left == pytest.approx((FIRST_FORCE_FACTOR + 4) * 5.0)
-    [_, failed], _ = timed(units_that_take([2.0, None, 5.0], [2.0, 1.0, 1.0])[::-1])
-    assert failed == pytest.approx(2.0)
+    [_, took], _ = timed(units_that_take([2.0, None, 5.0], [2.0, 1.0, 1.0])[::-1])
+    assert took == pytest.approx(2.0)
+
+
+def test_a_plan_says_which_of_the_cases_that_it_solves_fail(monkeypatch, tmp_path):
+    monkeypatch.setattr(pipeline, "solve_unit", lambda unit, *_: iter([(0, CaseFailure("no contact"))]))
+    scene = scene_of(OVAL)
+    *_, failed = plan_rows(make_plan(scene), scene, tmp_path / "a.hdf", [1])
+    assert failed.split()[-2:] == ["no", "contact"]
 
 
 @pytest.mark.long

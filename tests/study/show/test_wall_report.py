@@ -9,13 +9,13 @@ from softjaw.study.case.effects import EffectChoice
 from softjaw.study.case.solver import FINE, CandidateSolver
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import DONE, FAILED
-from softjaw.study.ranking import judge, judged, ranking, shown_level
+from softjaw.study.ranking import judge, judged, least_force, ranking, shown_level
 from softjaw.study.result import derived
 from softjaw.study.result.read import open, read_field
 from softjaw.study.result.write import ResultWriter
 from softjaw.study.run.plan import make_plan, memory, wall_unknowns
 from softjaw.study.scene import parse_scene
-from softjaw.study.show.best_grasps import best, safe_range
+from softjaw.study.show.best_grasps import answer, best, safe_range
 from softjaw.study.show.grasps import at, field
 from softjaw.study.show.object_surface import undeformed
 from softjaw.study.show.report import curves, maps, tables, writing
@@ -107,6 +107,18 @@ def test_grasps_that_slide_out_or_yield_come_last(can, flag):
     table = best(ds, force=1.0)
     assert table.rows[0]["station"] != first
     assert any(flag.word in row["notes"] for row in table.rows)
+
+
+@pytest.mark.parametrize("share", [0.9, 1.1])
+def test_no_force_is_safe_where_the_hand_presses_harder_than_the_wall_bears(can, tmp_path, share):
+    ds, hand = open(can), tmp_path / "hand.toml"
+    low, high = ds.force_low.values[0, 0], ds.force_high.values[0, 0]
+    assert low < 0.9 * high
+    hand.write_text(f"[hand]\nforce_n = [{share * high}, 100]\n")
+    ds.attrs["scene"] = ds.attrs["scene"].replace("[gripper]", f'[gripper]\npreset = "{hand}"')
+    assert least_force(ds) == share * high
+    assert safe_range(ds, (0, 0, 0)) == (f"{share * high:.3g}..{high:.3g}" if share < 1 else "none")
+    assert (answer(judge(ds), (0, 0, 0))["force"][0] == "none is safe") == (share > 1)
 
 
 def test_cases_outside_their_window_are_judged_by_the_force():
