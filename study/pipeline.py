@@ -79,6 +79,7 @@ class UnitSolver:
         """Cases at these forces, upward."""
         start, before = time.perf_counter(), self.solver.seconds
         self.solver.finest = tuple(self.unit.finest) or (FINEST,) * len(self.solver.forces)
+        self.solver.together = self.unit.together
         choice = self._choice = self._choice or EffectChoice(self.solver)
         for k, outcome in _outcomes(choice, wanted):
             if isinstance(outcome, CaseFailure):
@@ -125,7 +126,7 @@ def _result(choice: EffectChoice, k: int, solved: Solved, unit: Any, begun: floa
     if coarse:
         values |= solved.errors(values, _state_values(coarse), settings, choice.skipped_share(k), choice.closes_less())
         # only where every case has a target: without one the sums at the end say how many cases miss the usual one
-        if (target := scene.accuracy.target) is not None and not unit.finest:
+        if (target := scene.accuracy.target) is not None and not scene.candidates.sampled:
             error = values[f"maps/{scene.accuracy.target_of}_error"]
             values["maps/flags"] |= Flag.COARSE * bool(misses(error, target))
     effects = choice.effects_at(k, contacts) | settled(choice.solver.scene, fine, fits)

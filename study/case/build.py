@@ -270,6 +270,15 @@ def forces_apart(scene: Scene) -> bool:
     return scene.accuracy.meshes > 1
 
 
+def samples_together(scene: Scene) -> bool:
+    """Whether rounds name the finer meshes of ``accuracy.target``, for all samples of uncertain inputs alike.
+
+    Their differences would else be those of meshes.
+    """
+    asked = bool(scene.uncertainty.spread) and scene.accuracy.target is not None
+    return asked and forces_apart(scene) and not has_wall(scene.object)
+
+
 def rounds_edges(scene: Scene) -> bool:
     """Whether the object's edges are rounded over a part of a pad's element, and a coarser pad tells what that does."""
     mesh = scene.object.shape == "mesh" and not has_wall(scene.object) and scene.object.grid_step is None

@@ -174,7 +174,7 @@ class Unit:
     ``rows`` for each its rows, one per force, rising. ``cost``: work, in element solves; only ratios mean something.
     ``state, reason``: one of `study.quantities.NO_GRASP` and why, for a candidate that is not solved; else `MISSING`,
     not computed. ``finest``: finest mesh of each force, as `study.case.solver` numbers them; empty where the scene
-    alone says it.
+    alone says it. ``together``: that one is solved whatever the error on the one before, as of other samples.
     """
 
     index: int
@@ -187,6 +187,7 @@ class Unit:
     state: int = MISSING
     reason: str = ""
     finest: tuple[int, ...] = ()
+    together: bool = False
 
     @property
     def apart(self) -> bool:

@@ -125,7 +125,7 @@ class CandidateSolver:
 
     ``scene``: its levels of effects do not count: they are asked for. ``poses``: of the pads before they touch.
     ``rounder``: solver of the candidate where edges of a mesh are rounded twice as far. ``finest``: finest mesh of each
-    force that ``accuracy.target`` may ask for.
+    force that ``accuracy.target`` may ask for, or which is solved whatever the error, ``together`` with other samples.
     """
 
     def __init__(self, scene: Scene, poses: Sequence[Pose], rounder: CandidateSolver | None = None) -> None:
@@ -135,6 +135,7 @@ class CandidateSolver:
             refuse_along_axis(fingers)
         self.forces = tuple(scene.load.normal_force)  # the load path; forces are asked for by their number in it
         self.finest: tuple[int, ...] = (FINEST,) * len(self.forces)
+        self.together = False
         self._pressing: dict[tuple[int, Levels], OnRigid | OnWall] = {}
         self._paths: dict[tuple[int, Levels, int], Iterator[Any]] = {}
         self._states: dict[tuple[int, int, Levels, int], Any] = {}  # or failures, of every part
@@ -231,7 +232,7 @@ class CandidateSolver:
         for mesh in range(FINE + 1, self.finest[k] + 1):
             # undecided, and unknown, is refined, which is right in both cases
             too_large = math.prod(pad_elements(self.scene, mesh)) > MOST_ELEMENTS
-            if surely_below(self.error(solved) + left_out, target) or too_large:
+            if too_large or (not self.together and surely_below(self.error(solved) + left_out, target)):
                 break
             try:
                 solved = solved._replace(meshes=[self.solve(k, mesh, levels), *solved.meshes])

@@ -346,13 +346,14 @@ def with_intervals(ds: xr.Dataset) -> xr.Dataset:
     """The cases with the scene's own inputs; samples of the uncertain ones become an interval of each main map.
 
     ``NAME_interval`` is its half-width (CCM) about the value, ``NAME_samples`` has the values, whose last dimension is
-    `REALISATION`.
+    `REALISATION`; NaN of a sample on another mesh, while a round is solved or where that failed.
     """
     given, samples = ds.isel({REALISATION: 0}, drop=True), ds.isel({REALISATION: slice(1, None)})
+    alike = samples["pad_elements"] == given["pad_elements"] if "pad_elements" in ds else True
     names = [name for name in UNCERTAIN_MAPS if name in ds]
     for name in names:
         values = samples[name].sel(model=MODELS[0], drop=True) if "model" in samples[name].dims else samples[name]
-        values = values.transpose(*given.status.dims, REALISATION)
+        values = values.where(alike).transpose(*given.status.dims, REALISATION)
         about = {"units": ds[name].attrs["units"], "long_name": f"half-width of the 95 % interval of {name}"}
         text = f"By how much {name} (CCM) of 95 % of the samples of uncertain inputs differs from its value."
         changes = values.values - values_of(given, name)[..., None]

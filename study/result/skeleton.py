@@ -123,7 +123,7 @@ def _reserve(path: Path, part: Path, need: int) -> None:
     except OSError as error:
         free = shutil.disk_usage(path.parent).free
         text = f"{path}: cannot be written ({error.strerror}): needs {need / 1e6:.1f} MB, {free / 1e6:.1f} MB are free"
-        raise StudyError(CANNOT_WRITE, f"{text}; choose another place with -o") from error
+        raise StudyError(CANNOT_WRITE, f"{text}; make room, or choose another place with -o") from error
     finally:
         remove(part)
 

@@ -83,22 +83,30 @@ class ResultWriter:
 
         One that has the values of a coarser mesh keeps them, with the message.
         """
+        mesh = math.nan if self._wanted is None else self._wanted[row]
         if self._wanted is not None and self._code[self._index(row)] == DONE:
-            self.write(row, self._kept(row, message))
+            self.write(row, self._tried_on(row, mesh, NOT_FINER + message))
         else:
-            mesh = math.nan if self._wanted is None else self._wanted[row]
             self.write(row, blank(self.layout, message, seconds, mesh), state)
 
-    def _kept(self, row: int, message: str) -> list[np.ndarray]:
-        """The stored values of a row, tried on the mesh that is wanted, with one more message."""
+    def not_finer(self) -> list[int]:
+        """Rows that keep the values of a coarser mesh, because `fail` was said of the one that is wanted."""
+        messages = self.read("status/message").ravel() if self._wanted is not None else ()
+        return [row for row, message in enumerate(messages) if NOT_FINER.encode() in message]
+
+    def try_again(self, row: int) -> None:
+        """Make such a row one that was never tried on the mesh that is wanted."""
         assert self._wanted is not None
+        values = self._tried_on(row, self._wanted[row] - 1, "")
+        self._code[self._index(row)] = MISSING
+        self.write(row, values)
+
+    def _tried_on(self, row: int, mesh: float, failure: str) -> list[np.ndarray]:
+        """The stored values of a row as tried on a ``mesh``, where there was this ``failure``."""
         values = [np.asarray(h5py.Dataset(column.dataset)[self._index(row)]) for column in self._columns]
-        values[[c.key for c in self.layout.columns].index(MESH)] = self._wanted[row]
-        known = text_of(bytes(values[-1].item()))
-        # a retry tries what has no values
-        parts = (part for part in message.split("; ") if "--retry-failed" not in part)
-        reason = NOT_FINER + "; ".join(parts)
-        values[-1] = np.array(text_bytes("; ".join(filter(None, (known, reason))), MESSAGE_BYTES))
+        values[[c.key for c in self.layout.columns].index(MESH)] = np.asarray(mesh)
+        known = text_of(bytes(values[-1].item())).partition(NOT_FINER)[0].removesuffix("; ")
+        values[-1] = np.array(text_bytes("; ".join(filter(None, (known, failure))), MESSAGE_BYTES))
         return values
 
     def write(self, row: int, values: Sequence[np.ndarray], state: int = DONE) -> None:
@@ -276,7 +284,7 @@ def verify(path: Path, layout: Layout, header: Header) -> bool:
     with open_result(path) as result:
         result.refuse_other(header)
         if result.layout.shape != layout.shape or result.layout.text() != layout.text():
-            text = f"{path}: made by a version that stored other values; it can be read, but not resumed"
+            text = f"{path}: stores other values, by run.patches or its version; it can be read, but not resumed"
             raise StudyError(OTHER_FILE, f"{text}: choose another file with -o")
         datasets = [result.file.checked(d.path, d.shape, d.dtype) for d in result.layout.datasets]
         packed = any(dataset.chunks is not None for dataset in datasets)

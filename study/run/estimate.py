@@ -79,7 +79,7 @@ def _timed(
         seconds[first] = np.nan
     each = _by_cost(units, seconds)
     loads = max(first_case - FIRST_FORCE_FACTOR * each[first] / (forces - 1 + FIRST_FORCE_FACTOR), 0.0)
-    if units[first].finest:
+    if units[first].finest:  # of sampled grasps
         listed = min(LISTED * inputs, len(units)) / len(units)
         each += ROUNDS * _listed(units[:MOST_PROMISING], budget, solve_unit) * listed
     return each.tolist(), float(loads)

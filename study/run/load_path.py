@@ -43,6 +43,9 @@ def settle(writer: Any, units: Iterable[Any], torn: Iterable[int], retry_failed:
     for row in rows_again(units, codes, torn, retry_failed):
         writer.forget(row)
         codes[row], attempts[row] = MISSING, 0
+    for row in writer.not_finer() if retry_failed else ():
+        writer.try_again(row)
+        codes[row], attempts[row] = MISSING, 0
     # Begun and not ended: a kill may have come between the checksum and the state.
     for row in np.flatnonzero((codes == MISSING) & (attempts > 0)):
         writer.tidy(int(row))

@@ -22,6 +22,7 @@ from softjaw.study.case.build import (
     own_frame,
     pad_elements,
     pad_shape,
+    samples_together,
 )
 from softjaw.study.case.candidates import decided
 from softjaw.study.quantities import ALONG, AROUND, NO_GRASP, STATES
@@ -31,7 +32,7 @@ from softjaw.study.run.estimate import END_S, TIMED, timed
 from softjaw.study.run.progress import duration
 from softjaw.study.run.refine import Rounds, added_cases, refined
 from softjaw.study.run.shares import makespan
-from softjaw.study.scene.sections import COARSE, FINEST
+from softjaw.study.scene.sections import COARSE, FINE, FINEST
 
 # Measured on ten scenes at the end of a run: bytes of a rank with the libraries and compiled loops that it needs, and
 # numbers over dofs^(4/3), the growth of nested dissection in 3-D, of factors, matrices and the solutions that are kept.
@@ -49,8 +50,9 @@ class Plan(NamedTuple):
 
     @property
     def tried(self) -> list[Any]:
-        """Units that are to be solved."""
-        return [unit for unit in self.units if not unit.state]
+        """Units that are to be solved, on finer meshes at once where rounds will name them for most."""
+        tried = [unit for unit in self.units if not unit.state]
+        return [unit if COARSE in unit.finest else replace(unit, finest=(), together=False) for unit in tried]
 
     @property
     def wanted(self) -> np.ndarray | None:
@@ -78,9 +80,9 @@ def make_plan(scene: Any, scene_file: str = "", overrides: Sequence[str] = (), r
     faces = math.prod(pad_shape(scene.gripper).patch_faces) if scene.run.patches != "none" else 0
     layout = Layout(tuple(grasps.axes(scene)), faces, tuple(derived(scene)), has(scene), rounds)
     units: Sequence[Any] = decided(grasps.units(scene))
-    if scene.candidates.sampled and forces_apart(scene):
-        named = layout.finer
-        units = [_with_meshes(unit, layout, named) for unit in units]
+    if (together := samples_together(scene)) or (scene.candidates.sampled and forces_apart(scene)):
+        named, least = layout.finer, COARSE if scene.candidates.sampled else FINE
+        units = [replace(_with_meshes(unit, layout, named, least), together=together) for unit in units]
     title = getattr(scene.object, "name", None) or Path(scene_file).stem
     petsc_options = " ".join(f"-{key} {value}" for key, value in scene.petsc.items())
     labels = tuple(candidate.label for candidate in grasps.candidates(scene))
@@ -104,13 +106,13 @@ def _about(scene: Any) -> dict[str, Any]:
     return about
 
 
-def _with_meshes(unit: Any, layout: Layout, named: Counter[Any]) -> Any:
-    """A unit whose forces are solved on the coarse mesh, and on finer ones as often as a case of it was ``named``."""
-    *_, count, _, forces = layout.shape  # explicit poses have one angle
-    places = [divmod(rows[0] // forces, count) for rows in unit.rows]
+def _with_meshes(unit: Any, layout: Layout, named: Counter[Any], least: int) -> Any:
+    """A unit of forces on the ``least`` mesh at first, and on finer ones as often as a case of it was ``named``."""
+    *_, stations, angles, forces = layout.shape
+    places = [divmod(rows[0] // forces, stations * angles) for rows in unit.rows]
     # a case is solved on the same meshes with all samples of uncertain inputs: their differences are no mesh's
     times = [max(named[point // layout.inputs, number, k] for point, number in places) for k in range(forces)]
-    finest = tuple(min(COARSE + n, FINEST) for n in times)
+    finest = tuple(min(max(COARSE + n, least), FINEST) for n in times)
     share = sum(1.0 if mesh else SCREENED_COST for mesh in finest) / forces
     return replace(unit, finest=finest, cost=unit.cost * share)
 

@@ -176,7 +176,7 @@ def about(result: Any) -> str:
 def round_text(added: Sequence[Any]) -> str:
     """What a round adds, in words."""
     if is_case(added[0]):
-        return f"{_counted(len(added), 'case')} on a finer mesh, those that may be among the best"
+        return f"{_counted(len(set(added)), 'case')} on a finer mesh"
     if isinstance(added[0], tuple):
         return f"{len(added)} more pose{'s' * (len(added) > 1)} around the best, by {added[0][0]:g} of the first step"
     return f"{_counted(len(added), 'more station')}, at {', '.join(f'{s:g}' for s in added)} mm"

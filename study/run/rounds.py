@@ -7,6 +7,8 @@ beside an edge it may tilt the contact normal. Those that may be the best, and w
 ``accuracy.target``, are solved on a finer mesh, and on one more where that may do; at last the best at other forces.
 Each case is named at most three times, so the rounds end.
 
+Of grasps that a scene lists, with uncertain inputs, finer meshes for all cases whose error misses the target.
+
 Of poses that are refined neighbours of the best grasp at each force: shifted along the pads' sides, turned about the
 approach or tilted, by a share of a first step. A round solves those of them that a bed of springs ranks highest; the
 share is halved once no neighbour is better. A peak that no grasp of the scene comes near stays unseen. Of stations see
@@ -14,7 +16,7 @@ share is halved once no neighbour is better. A peak that no grasp of the scene c
 """
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import product
 from typing import Any
 
@@ -23,14 +25,14 @@ import numpy as np
 from softjaw.friction.patch import FloatArray
 from softjaw.study import ranking
 from softjaw.study.case.bed import JawsOnSurface, grips, spring_payload
-from softjaw.study.case.build import build_object, own_frame, shapes_of, surface_triangles
+from softjaw.study.case.build import build_object, own_frame, samples_together, shapes_of, surface_triangles
 from softjaw.study.case.fit import jaws_of
 from softjaw.study.case.poses import STANDOFF, explicit_poses, in_file
 from softjaw.study.case.result import UNDECIDED, surely_below
 from softjaw.study.case.sampler import lids_of
 from softjaw.study.case.task import task_of
 from softjaw.study.flags import LOST, Flag
-from softjaw.study.quantities import FAILED, LISTED, NO_GRASP
+from softjaw.study.quantities import DONE, FAILED, LISTED, NO_GRASP
 from softjaw.study.ranking import distinct, judge, largest, rank_values, ranked, sure
 from softjaw.study.result.read import dataset, other_levels
 from softjaw.study.run.refine import Place, gained, next_stations, scores_of_poses, with_places
@@ -55,7 +57,8 @@ def next_round(result: Any, scene: Scene, each: int) -> tuple[Any, ...]:
     """
     if scene.candidates.poses:
         return next_poses(result, scores_of_poses(result), scene, each) or next_cases(result, scene)
-    return next_stations(result, scene, each)
+    # a station between others changes the numbers by which cases are named
+    return (not result.layout.finer and next_stations(result, scene, each)) or next_cases(result, scene)
 
 
 def next_poses(result: Any, values: FloatArray, scene: Scene, each: int) -> tuple[Place, ...]:
@@ -137,6 +140,8 @@ def apart(first: Frame, other: Frame, pad: Sequence[float]) -> float:
 
 def next_cases(result: Any, scene: Scene) -> tuple[Case, ...]:
     """Cases of the next round; none where the best are known as well as the scene asks for."""
+    if not scene.candidates.sampled and samples_together(scene):
+        return off_target(dataset(result), scene, result.layout.finer)
     if not scene.candidates.sampled or "work/mesh" not in {q.key for q in result.layout.quantities}:
         return ()
     ds = judge(dataset(result))
@@ -168,6 +173,17 @@ def next_cases(result: Any, scene: Scene) -> tuple[Case, ...]:
         chosen = [places[0].best]
         levels = tuple(i for i in other_levels(shape[-1], k) if not named[case_of(chosen[0], i, shape)])
     return tuple(sorted({case_of(i, level, shape) for i in chosen for level in levels}))
+
+
+def off_target(ds: Any, scene: Scene, named: Mapping[Case, int]) -> tuple[Case, ...]:
+    """Cases whose error is not surely below the target, as far as there is a finer mesh.
+
+    All start on the scene's mesh, so the first time a case is named twice.
+    """
+    shape, target = ds.status.shape, scene.accuracy.target or math.inf
+    error = np.where(ds.status == DONE, ds[f"{scene.accuracy.target_of}_error"], 0.0).reshape(-1, shape[-1])
+    cases = (case_of(i, k, shape) for (i, k), e in np.ndenumerate(error) if not surely_below(e, target))
+    return tuple(case for case in cases for _ in range(2 - min(named[case], 1)) if named[case] < FINEST)
 
 
 def rivals(

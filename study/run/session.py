@@ -27,7 +27,7 @@ from softjaw.study.result.index import INDEX
 from softjaw.study.result.lock import Lock, OpenedFile, holder, in_use
 from softjaw.study.result.skeleton import create, rewrite
 from softjaw.study.result.store import Result, open_result, torn_rows
-from softjaw.study.result.write import MESH, Files, ResultWriter, codes_on, verify
+from softjaw.study.result.write import MESH, NOT_FINER, Files, ResultWriter, codes_on, verify
 from softjaw.study.run.limits import Stopper, early, limited_memory
 from softjaw.study.run.load_path import PathSolver, rows_again, settle
 from softjaw.study.run.plan import Plan
@@ -87,6 +87,7 @@ def run_study(plan: Plan, work: Work, path: Path, comm: Any, *, retry_failed: bo
 
     Raises `StudyError` on every rank: the file is in use, belongs to another scene or cannot be written.
     """
+    path = path.resolve() if path.is_symlink() else path  # one lock for all names of a file, and a link stays one
     with locked(path, comm):
         if work.grown and (rounds := on_rank0(comm, rounds_in, path, plan)):
             plan, work = work.grown(rounds)
@@ -140,6 +141,8 @@ def _finished(path: Path, plan: Plan, retry_failed: bool, ranks: int) -> int | N
     if not path.exists() or not verify(path, plan.layout, plan.header):
         return None
     with open_result(path, unchecked=True) as result:
+        if retry_failed and any(NOT_FINER in message for message in result.messages.ravel()):
+            return None
         codes, wanted = result.codes.ravel(), plan.wanted
         codes = codes if wanted is None else codes_on(wanted, codes, result.read(MESH))
     if np.any(codes == MISSING) or rows_again(plan.units, codes, torn_rows(path, plan.layout), retry_failed):

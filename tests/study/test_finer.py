@@ -10,6 +10,7 @@ from softjaw.study.ranking import Place
 from softjaw.study.result.skeleton import create
 from softjaw.study.result.store import open_result, torn_rows
 from softjaw.study.result.write import ResultWriter, record
+from softjaw.study.run.load_path import settle
 from softjaw.study.run.plan import make_plan
 from softjaw.study.run.rounds import next_cases, rivals
 from softjaw.study.show.status import unfinished, waits
@@ -70,9 +71,15 @@ def test_a_case_keeps_its_coarse_values_until_finer_ones_replace_them(tmp_path):
     assert writer.read("payload/ccm").ravel()[number] == 1.0
     message = writer.read("status/message").ravel()[number]
     assert b"it did not converge" in message
-    assert b"retry" not in message  # there is nothing to try again: the case is done
     with pytest.raises(ValueError, match="done already"):
         writer.write(number, filled(first.layout, 2.0, 1))
+    settle(writer, later.units, [], retry_failed=False)
+    assert (writer.codes() == DONE).all()
+    codes = settle(writer, later.units, [], retry_failed=True)
+    assert np.flatnonzero(codes == MISSING).tolist() == [number] == np.flatnonzero(writer.codes() == MISSING).tolist()
+    assert writer.attempts()[number] == 0
+    assert writer.read("payload/ccm").ravel()[number] == 1.0
+    assert not writer.read("status/message").ravel()[number]
     writer.close()
     assert torn_rows(path, first.layout) == []
 

@@ -11,6 +11,7 @@ import pytest
 
 from softjaw.study import messages
 from softjaw.study.quantities import DONE, FAILED, MISSING, WIDE
+from softjaw.study.result.lock import Lock, holder
 from softjaw.study.result.store import open_result, torn_rows
 from tests.study import fake_run
 from tests.study.launching import contents, differing, done, ended, here, softjaw, start, states, study, wait_for
@@ -60,6 +61,20 @@ def test_a_killed_rank_loses_nothing_others_go_on_and_what_is_no_grasp_is_never_
         assert not torn_rows(path, result.layout)
         assert result.sessions[-1]["failed"] == 0
         assert result.sessions[-1]["done"] == result.status.size - 6
+
+
+def test_a_link_to_a_file_stays_one_and_both_names_have_one_lock(tmp_path, uninterrupted):
+    link, path = tmp_path / "link.hdf", tmp_path / "a.hdf"
+    link.symlink_to(path)
+    ended(0, link)
+    assert link.is_symlink()
+    assert differing(path, uninterrupted) == []
+    lock = Lock(path, "me")
+    lock.take_first()
+    assert holder(link) == "me"
+    code, _, _ = study(0, link, "--retry-failed")
+    assert code == messages.IN_USE
+    lock.release()
 
 
 @pytest.mark.long

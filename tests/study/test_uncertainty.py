@@ -7,13 +7,17 @@ from scipy.stats import norm
 import softjaw
 from softjaw.study.case.candidates import axes, candidates
 from softjaw.study.case.poses import axis_poses, moved
+from softjaw.study.case.result import CaseResult
 from softjaw.study.ranking import Sure, judge, sure
 from softjaw.study.result.read import half_width
+from softjaw.study.result.store import open_result
 from softjaw.study.run.plan import make_plan
 from softjaw.study.scene import SceneError, parse_scene
 from softjaw.study.scene.sections import Uncertainty
 from softjaw.study.show.best_grasps import best
-from tests.study.scenes import BALL, QUICK, pose_of, scene_of
+from softjaw.study.show.status import unfinished
+from tests.study.formula_results import written
+from tests.study.scenes import BALL, NO_COUPLING, OVAL, QUICK, pose_of, scene_of
 
 RIGID = "effects.sheet='rigid'"
 SPREAD = ("uncertainty.samples=8", 'uncertainty.spread={ "friction.mu" = 0.08, gripper.shear_modulus_kpa = 4 }')
@@ -141,3 +145,28 @@ def test_maps_have_what_the_samples_say_and_grasps_that_inputs_move_alike_are_to
     assert Sure(value, error, np.array([x, np.full(40, np.nan)])).apart(0, 1) is None
     half, _ = Sure(value, np.array([3.0, 0.0]), np.array([8 * x, x])).half_width
     assert half == pytest.approx(np.hypot(3.0, 4.0 * 0.95 * 40 / 39), rel=1e-2)
+
+
+def test_a_target_takes_all_samples_of_a_case_to_the_same_mesh(tmp_path):
+    """At this angle of an oval the first mesh's error depends on mu: the target lies between those of the samples."""
+    coarse = scene_of(OVAL, NO_COUPLING, angles="[30]", elements="[6, 4, 2]")
+    case = softjaw.press(coarse, station=0.0, angle=np.radians(30.0), force=2.0)
+    alone = coarse.with_values({"accuracy.target": 0.999 * case.errors["payload"] / case.payload})
+    together = alone.with_values({"uncertainty": {"samples": 8, "spread": {"friction.mu": 0.08}}})
+    assert softjaw.run(together, tmp_path / "a.hdf") == softjaw.run(alone, tmp_path / "b.hdf") == 0
+    ds, given = softjaw.open(tmp_path / "a.hdf"), softjaw.open(tmp_path / "b.hdf")
+    assert ds.payload.values.tobytes() == given.payload.values.tobytes()
+    assert ds.pad_elements.values.item() == given.pad_elements.values.item() > 6 * 4 * 2
+    assert 0.04 < ds.payload_interval.values.item() / case.payload < 0.1
+    assert ds.e_n_interval.values.item() / case.e_n < 1e-5  # which does not depend on mu
+    with open_result(tmp_path / "a.hdf") as result:
+        assert not unfinished(result)
+
+    def sample(index):
+        """As while a round is solved: one sample is on the mesh before."""
+        values = {"maps/payload": [1.0 + 0.01 * index[0]] * 3, "maps/payload_error": 0.01, "maps/flags": 0.0}
+        return CaseResult(values | {"maps/pad_elements": 48.0 if index[0] == 3 else 144.0})
+
+    ds = softjaw.open(written(tmp_path / "c.hdf", make_plan(together).layout, sample, scene=together.effective_toml()))
+    assert np.isnan(ds.payload_interval.values.item())
+    assert np.isnan(ds.payload_samples.values.ravel()).tolist() == [i == 3 for i in range(1, 9)]
