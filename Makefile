@@ -67,9 +67,36 @@ effects: setup
 	$(BIN)/python jobs/effects.py results/effects.csv
 	@$(BIN)/python jobs/effects.py results/effects.csv -o results/effects.png
 
-# STAGES names some of the stages that the last lines list: make test-long STAGES="slurm kernel-Zen"
+# The stages of the tests, each with the time that it may take; the last lines of both targets list how they ended. STAGES
+# names some of them: make test-long STAGES="slurm kernel-Zen"
+PYTEST     = $(BIN)/python -m pytest -q
+TESTS      = $(PYTEST) -n auto --maxprocesses 2 --dist loadfile
+serial     = 20m $(TESTS) -m "not long and not ranks"
+ranks      = 10m $(TESTS) -m "ranks and not long" $(shell grep -rl --include='test_*.py' mark.ranks tests)
+long       = 180m $(TESTS) -m "long and not ranks" --durations 20
+long-ranks = 60m $(PYTEST) -m "long and ranks" --durations 10
+decisions  = 60m env TURNS=200 $(TESTS) -m "not ranks" $(wildcard tests/*/test_decisions.py)
+kernel     = 20m env OPENBLAS_CORETYPE=$(1:kernel-%=%) $(TESTS) -m "not long and not ranks" $(NUMERICAL)
+slurm      = 60m tests/slurm/cluster.sh results/slurm/cluster $(BIN)/python -m tests.slurm.time_limit
+NUMERICAL  = tests/friction tests/lsfit tests/scoring tests/fem tests/test_stages.py
+USABLE     = $(addprefix kernel-,$(shell $(BIN)/python -m tests.blas))
+RUN_STAGE  = $(or $($(firstword $(subst kernel-,kernel ,$(1)))),$(error there is no stage '$(1)'))
+# Exit code 77 is that of a program that lacks something, as in automake.
+define STAGE
+echo; echo '== $(1): $(RUN_STAGE)'; begun=$$(date +%s); code=0; \
+timeout --foreground -k 30 $(RUN_STAGE) || code=$$?; \
+case $$code in 0) end=passed ;; 77) end='LEFT OUT' ;; 124 | 137) end='TOO LONG' ;; *) end=FAILED ;; esac; \
+ends="$$ends$$(printf '%-9s %-16s %6d s' "$$end" $(1) $$(($$(date +%s) - begun)))\n"; all=$$((all | code)); \
+
+endef
+
+test:      STAGES = serial ranks
+test-long: STAGES = long long-ranks decisions $(USABLE) slurm
+test:      OTHERS = long tests, kernels of the BLAS, Slurm: run "make test-long"
+test-long: OTHERS = the fast tests, and kernels of the BLAS that this CPU cannot run
 test test-long: setup
-	@$(BIN)/python -m tests.stages $@ $(STAGES)
+	@all=0; $(foreach name,$(STAGES),$(call STAGE,$(name)))printf '\n%b' "$$ends"; \
+	echo 'left out: $(OTHERS)'; exit $$all
 
 # mkdocs lies outside of .venv: it brings colorama, which numba then uses to write to the output of every run.
 docs: setup

@@ -36,3 +36,7 @@ def loaded() -> dict[str, str]:
             corename.restype = ctypes.c_char_p
             kernels[file] = corename().decode()
     return kernels
+
+
+if __name__ == "__main__":  # for the Makefile
+    print(*usable())

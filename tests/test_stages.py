@@ -2,35 +2,26 @@
 
 import os
 import re
-import sys
+import subprocess
 
 import pytest
 
 from tests.benchmark import kernels
 from tests.blas import STANDS_IN, loaded
-from tests.stages import CANNOT_RUN, Stage, fast, report, run, thorough
+from tests.study.launching import ROOT
 
 ASKED = os.environ.get("OPENBLAS_CORETYPE", "")
 
 
-def ends(code, **keys):
-    return Stage("it", (sys.executable, "-c", f"raise SystemExit({code})"), 1, **keys)
-
-
-@pytest.mark.parametrize(("stage", "passed", "code"), [
-    (ends(0), True, 0), (ends(1), False, 1), (ends(CANNOT_RUN), None, 2),
-    (ends(0, needs=("no-such-program",)), None, 2), (Stage("it", ("sleep", "60"), 0.001), False, 1),
+@pytest.mark.parametrize(("command", "word"), [
+    ("9 true", "passed"), ('9 sh -c "exit 1"', "FAILED"), ('9 sh -c "exit 77"', "LEFT OUT"), ("9 no-such", "FAILED"),
+    ("0.1 sleep 60", "TOO LONG"),
 ])  # fmt: skip
-def test_only_what_ran_to_its_end_has_passed(stage, passed, code):
-    outcome = run(stage)
-    assert outcome.passed is passed
-    assert report("test", [run(ends(0)), outcome]) == code
-
-
-def test_a_test_has_one_stage():
-    names = [stage.name for stage in (*fast(), *thorough())]
-    assert len(set(names)) == len(names)
-    assert {"serial", "ranks", "long", "long-ranks", "slurm"} <= set(names)
+def test_only_what_ran_to_its_end_has_passed_and_no_other_stage_waits_for_it(command, word):
+    words = ["make", "--silent", "--old-file=setup", "test", "STAGES=ranks serial", f"ranks={command}", "serial=9 true"]
+    done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, timeout=60)
+    assert re.findall(r"^(\w+(?: \w+)?) +(ranks|serial) ", done.stdout, re.M) == [(word, "ranks"), ("passed", "serial")]
+    assert (done.returncode == 0) == (word == "passed")
 
 
 @pytest.mark.skipif(not ASKED, reason="no kernel is asked for")
