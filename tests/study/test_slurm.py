@@ -67,22 +67,14 @@ def test_a_signal_stops_the_run_and_puts_the_job_back_into_the_queue(script, tmp
     assert calls(tmp_path) == [run, "scontrol requeue 4711", run]
 
 
-def test_a_job_that_never_ends_is_not_put_back_for_ever(tmp_path, slurm):
-    words = (SCRIPTS[-1], tmp_path, slurm, "a.toml")
-    code, _ = finished(*words, SLURM_RESTART_COUNT="5", MOST_RESTARTS="5", FAKE_CODE="75")
-    assert code == 75
-    assert not any("scontrol" in line for line in calls(tmp_path))
-
-
-def test_a_signal_that_comes_before_the_run_has_begun_puts_the_job_back_too(tmp_path, slurm):
-    assert finished(SCRIPTS[-1], tmp_path, slurm, "a.toml", FAKE_CODE="138")[0] == 75
-    assert calls(tmp_path)[1:] == ["scontrol requeue 4711"]
-
-
-@pytest.mark.parametrize("code", [0, 2, 6, 70, 137])
-def test_other_ends_are_final_and_keep_their_code(tmp_path, slurm, code):
-    assert finished(SCRIPTS[-1], tmp_path, slurm, "a.toml", FAKE_CODE=str(code))[0] == code
-    assert not any("scontrol" in line for line in calls(tmp_path))
+@pytest.mark.parametrize(("job", "code", "back"), [
+    ({"FAKE_CODE": "138"}, 75, True),  # a signal that comes before the run has begun
+    ({"FAKE_CODE": "75", "SLURM_RESTART_COUNT": "5", "MOST_RESTARTS": "5"}, 75, False),  # one that never ends
+    *(({"FAKE_CODE": str(code)}, code, False) for code in (0, 2, 6, 70, 137)),
+])  # fmt: skip
+def test_only_a_run_that_was_stopped_is_put_back_and_not_for_ever(tmp_path, slurm, job, code, back):
+    assert finished(SCRIPTS[-1], tmp_path, slurm, "a.toml", **job)[0] == code
+    assert calls(tmp_path)[1:] == ["scontrol requeue 4711"] * back
 
 
 def test_all_scripts_are_sound_and_share_what_they_do(tmp_path, slurm, monkeypatch, capsys):
