@@ -126,11 +126,6 @@ def test_ranks_are_busy_to_the_end(ranks):
     assert makespan(costs, ranks) >= even
 
 
-def test_more_ranks_than_load_paths_gain_nothing():
-    """64 load paths of four seconds."""
-    assert [makespan([4.0] * 64, ranks) for ranks in (1, 60, 64, 128)] == [256.0, 8.0, 4.0, 4.0]
-
-
 def test_a_plan_gives_the_time_on_every_number_of_ranks(tmp_path):
     scene = scene_of(OVAL)
     *_, text = plan_rows(make_plan(scene), scene, tmp_path / "a.hdf", (1, 4))
