@@ -11,7 +11,7 @@ from softjaw.fem.contact.press import Press
 from softjaw.fem.contact.problem import Control
 from softjaw.fem.errors import ConvergenceError
 from softjaw.fem.shell.grip import Grip
-from softjaw.fem.shell.wall_material import WallMaterial, wall_material
+from softjaw.fem.shell.wall_material import WallMaterial
 from softjaw.fem.shell.wall_mesh import MeshSize, body_mesh, interpolated
 from tests.fem.grips import check_tangent, e_n, gap_at, grip, pose, stirred, thin
 
@@ -70,16 +70,6 @@ def test_fingers_object_and_support_are_in_balance(support):
         np.testing.assert_allclose(state.wall.load.sum(axis=0), [0.0, 0.0, along_axis], atol=1e-7)
 
 
-def test_a_very_stiff_wall_is_a_rigid_object():
-    soft = list(grip(thin(1.4e-3, WallMaterial(4e11, 0.38), "clamped")).load_path(FORCES))
-    press = Press(soft[0].fingers[0].pad, gap_at(pose(0.0, 0.075)))
-    for a, b in zip(soft, press.load_path(FORCES), strict=True):
-        assert a.fingers[0].closing == pytest.approx(b.closing, rel=1e-4)
-        assert e_n(a.fingers[0]) == pytest.approx(e_n(b), rel=1e-4)
-        np.testing.assert_allclose(a.fingers[0].pressure, b.pressure, atol=1e-3 * b.pressure.max())
-    press.destroy()
-
-
 @pytest.mark.parametrize(("allowed", "level", "control"), [
     ((True, True), "nonlinear", FORCE), ((True, False), "linear", FORCE),
     pytest.param((False, False), "nonlinear", Control(closing=1.5e-3), marks=pytest.mark.long),
@@ -136,18 +126,15 @@ def test_coulombs_law_and_balance_hold(level):
         np.testing.assert_allclose(rubbed, state.wall.load.sum(axis=0), atol=1e-9 * state.force)
 
 
-@pytest.mark.long
-def test_a_wall_that_hardly_gives_way_is_a_rigid_object():
-    press = Press(grip(thin(), mu=MU).problem.fingers[0].pad, gap_at(pose(0.0, 0.075)), mu=MU)
-    rigid = list(press.load_path(FORCES))
-    stiff = thin(1e-3, wall_material("pet")._replace(young_modulus=3e10))
-    for one, other, smooth in zip(
-        grip(stiff, mu=MU).load_path(FORCES), rigid, grip(stiff).load_path(FORCES), strict=True
-    ):
-        assert one.fingers[0].closing == pytest.approx(other.closing, rel=5e-3)
-        # friction changes e_n by much more than the wall still does
-        assert abs(e_n(other) / e_n(smooth.fingers[0]) - 1.0) > 0.02
-        assert e_n(one.fingers[0]) == pytest.approx(e_n(other), rel=5e-4)
+@pytest.mark.parametrize("mu", [None, pytest.param(MU, marks=pytest.mark.long)])
+def test_a_very_stiff_wall_is_a_rigid_object(mu):
+    soft = list(grip(thin(1.4e-3, WallMaterial(4e11, 0.38), "clamped"), mu=mu).load_path(FORCES))
+    press = Press(soft[0].fingers[0].pad, gap_at(pose(0.0, 0.075)), mu=mu)
+    for a, b in zip(soft, press.load_path(FORCES), strict=True):
+        assert a.fingers[0].closing == pytest.approx(b.closing, rel=1e-4)
+        assert e_n(a.fingers[0]) == pytest.approx(e_n(b), rel=1e-4)
+        np.testing.assert_allclose(a.fingers[0].pressure, b.pressure, atol=1e-3 * b.pressure.max())
+    press.destroy()
 
 
 @pytest.mark.long
