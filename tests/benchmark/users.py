@@ -13,21 +13,8 @@ from trimesh.creation import annulus, box, capsule, cylinder, icosphere
 
 from softjaw.study.result.store import open_result
 from tests.benchmark.table import line, title
-from tests.objects.bad_meshes import joined, moved
-from tests.objects.bodies import hollow_bottle, mug, revolved, scan
-
-
-def bracket() -> trimesh.Trimesh:
-    return joined(box((0.06, 0.03, 0.012)), moved(box((0.012, 0.03, 0.07)), -0.024, 0.0, 0.03))
-
-
-def hammer() -> trimesh.Trimesh:
-    return joined(cylinder(0.014, 0.22, sections=24), moved(box((0.09, 0.028, 0.028)), 0.0, 0.0, 0.11))
-
-
-def screwdriver() -> trimesh.Trimesh:
-    handle = [(0.013 + 0.003 * np.sin(4 * np.pi * h / 0.1), h) for h in np.linspace(0.0, 0.1, 15)]
-    return revolved([(0.0, 0.0), *handle, (0.003, 0.104), (0.003, 0.2), (0.0, 0.2)], 32)
+from tests.objects.bad_meshes import SHAPES, hammer, low_poly
+from tests.objects.bodies import hollow_bottle, mug, scan
 
 
 def rock() -> trimesh.Trimesh:
@@ -40,9 +27,9 @@ def rock() -> trimesh.Trimesh:
 MESHES: dict[str, Callable[[], trimesh.Trimesh]] = {
     "brick": lambda: box((0.05, 0.04, 0.09)), "hexagonal bar": lambda: cylinder(0.022, 0.1, sections=6),
     "capsule": lambda: capsule(0.09, 0.02, count=(16, 16)), "low-poly ball": lambda: icosphere(2, 0.03),
-    "tube": lambda: annulus(0.018, 0.026, 0.08, sections=40), "bracket": bracket, "hammer": hammer,
-    "screwdriver": screwdriver, "mug": mug, "bottle": lambda: hollow_bottle(0.18, 0.032, 0.013, 0.003), "rock": rock,
-    "mustard bottle": lambda: scan("mustard"),
+    "tube": lambda: annulus(0.018, 0.026, 0.08, sections=40), "bracket": SHAPES["L"], "hammer": hammer,
+    "screwdriver": low_poly()["screwdriver"], "mug": mug, "bottle": lambda: hollow_bottle(0.18, 0.032, 0.013, 0.003),
+    "rock": rock, "mustard bottle": lambda: scan("mustard"),
 }  # fmt: skip
 
 
