@@ -124,6 +124,7 @@ def test_quick_answers_load_neither_mpi_nor_petsc(command, scene, finished):
     assert code == 0
     heavy = ("mpi4py", "petsc4py", "h5py", "pyvista") if command.startswith("patch") else HEAVY
     assert modules.isdisjoint(heavy)
+    assert command != "status FILE" or modules.isdisjoint(("xarray", "pandas"))
     assert ("numpy" in modules) == (not command.endswith("--help"))
 
 

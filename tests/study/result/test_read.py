@@ -17,7 +17,6 @@ from softjaw.study.result.store import open_result
 from softjaw.study.scene import parse_scene
 from tests.study.fake_run import fake_plan, fake_result
 from tests.study.formula_results import ANGLES, FORCES, STATIONS, linear, make, written
-from tests.study.launching import launch
 from tests.study.scenes import BALL, text_of
 
 
@@ -98,7 +97,7 @@ def test_every_dataset_has_its_numbers_and_cases_without_a_result_a_state_and_a_
     assert (ds.flags.values.ravel()[10:] == 0).all()
 
 
-def test_flags_are_bits_that_attributes_name_patches_are_read_on_demand_and_status_needs_no_xarray(tmp_path, half):
+def test_flags_are_bits_that_attributes_name_patches_are_read_on_demand(tmp_path, half):
     ds = softjaw.open(make(tmp_path / "a.hdf", flags__flags=float(Flag.SLIPS | Flag.COARSE)))
     ds.to_netcdf(tmp_path / "a.nc")
     with xr.open_dataset(tmp_path / "a.nc") as stored:
@@ -119,11 +118,6 @@ def test_flags_are_bits_that_attributes_name_patches_are_read_on_demand_and_stat
     assert some.pressure.units == "Pa"
     with pytest.raises(KeyError):
         read_field(half, "wall/place")
-    code = (
-        "import sys, softjaw; from softjaw.study.cli import main; main(['status', sys.argv[1]]);"
-        "sys.exit(bool({'xarray', 'pandas', 'mpi4py', 'petsc4py'} & set(sys.modules)))"
-    )
-    assert launch(0, "-c", code, half)[0] == 0
 
 
 @pytest.mark.parametrize(("values", "limit", "force"), [

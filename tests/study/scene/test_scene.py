@@ -93,6 +93,10 @@ def test_a_wrong_line_is_named_with_its_key_value_and_remedy(row):
     assert str(p).startswith(f"ball.toml:{line}: {key}: found {found}, expected {p.expected}")
 
 
+def posed(approach, more):
+    return "stations_mm = [0]", f"[[candidates.poses]]\npoint_mm = [0, 0, 0]\napproach = {approach}\n{more}"
+
+
 # What is put in place of what; the line and key that are named, and the value found.
 WRONG_VALUES = [
     ("radius_mm = 30", "", 1, "object.radius_mm", "nothing"),
@@ -109,6 +113,9 @@ WRONG_VALUES = [
     ("stations_mm = [0]", "sampled = 3\nangles_deg = [0]", 7, "candidates.angles_deg", "[0.0]"),
     ("= 30", "= 30\nmass_g = 5\ndensity = 1000", 5, "object.density", "1000.0"),
     ("[0]", "[0]\nangles_deg = [0, 400]", 7, "candidates.angles_deg[1]", "400"),
+    (*posed("[0, 0, 0]", "long_side = [0, 0, 1]"), 8, "candidates.poses[0].approach", "[0, 0, 0]"),
+    (*posed("[1, 0, 0]", "long_side = [-2, 0.1, 0]"), 9, "candidates.poses[0].long_side", "[-2.0, 0.1, 0.0]"),
+    (*posed("[1, 0, 0]", ""), 6, "candidates.poses[0].long_side", "nothing"),
     ("[1]", "[1, -2]", 9, "load.normal_force_n[1]", "-2"), ("[1]", "['5 N']", 9, "load.normal_force_n[0]", '"5 N"'),
 ]  # fmt: skip
 
@@ -147,17 +154,6 @@ NO_TOML = [
 def test_what_is_no_toml_or_makes_no_body_is_named_by_its_line_and_key(text, line, key):
     p = problem(text)
     assert (p.key, p.line) == (key, line)
-
-
-@pytest.mark.parametrize(("pose", "key", "found"), [
-    ("point_mm = [0, 0, 0]\napproach = [0, 0, 0]\nlong_side = [0, 0, 1]", "approach", "[0, 0, 0]"),
-    ("point_mm = [0, 0, 0]\napproach = [1, 0, 0]\nlong_side = [-2, 0.1, 0]", "long_side", "[-2.0, 0.1, 0.0]"),
-    ("point_mm = [0, 0, 0]\napproach = [1, 0, 0]", "long_side", "nothing"),
-])  # fmt: skip
-def test_an_explicit_pose_must_fix_a_frame(pose, key, found):
-    p = problem(BALL.replace("stations_mm = [0]", f"[[candidates.poses]]\n{pose}"))
-    assert (p.key, p.value) == (f"candidates.poses[0].{key}", found)
-    assert p.line in (6, 7, 8, 9)
 
 
 def test_every_problem_is_found_at_once_and_in_the_order_of_the_file():
