@@ -50,23 +50,6 @@ def test_every_unknown_has_its_place(element, symmetry):
         assert (pad.dofs[mirror, axis] == -1).all()
 
 
-@pytest.mark.parametrize("symmetry", SYMMETRIES)
-@pytest.mark.parametrize("elements", [(4, 6, 2), (20, 10, 1)])
-def test_front_nodes_run_along_the_width_first(element, elements, symmetry):
-    pad = Pad(PadShape(SIZE, elements, (1.5, 2.0, 1.0), element), FOAM, symmetry)
-    grid = pad.nodes[pad.contact_nodes].reshape(*pad.contact_grid, 3)
-    assert (grid[..., 2] == 0).all()
-    assert (np.diff(grid[..., 0], axis=0) > 0).all()
-    assert (np.diff(grid[..., 1], axis=1) > 0).all()
-    assert max(np.ptp(grid[..., 0], axis=1).max(), np.ptp(grid[..., 1], axis=0).max()) < 1e-15
-    assert (pad.contact_nodes[pad.pressure_index[pad.contact_nodes]] == pad.contact_nodes).all()
-    # a face's nodes span it in the same order as its shape functions
-    middle = np.einsum("qa,fai->fqi", pad.face_N, pad.nodes[pad.face_nodes])
-    middle = middle.reshape(len(middle), pad.shape.per_side, -1, 3)
-    assert (np.diff(middle[..., 0], axis=1) > 0).all()
-    assert (np.diff(middle[..., 1], axis=2) > 0).all()
-
-
 def test_grading():
     shape = PadShape(SIZE, (8, 6, 5), (4.0, 1.0, 3.0))
     x, y, z = (np.diff(shape.lines(axis, False)) for axis in range(3))
