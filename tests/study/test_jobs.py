@@ -33,18 +33,6 @@ def test_every_shipped_scene_passes_check(name, capsys):
     assert told.err == ""
 
 
-@pytest.mark.long  # tests/test_docs.py runs it on two ranks in the fast stage
-def test_the_smoke_scene_runs_as_it_is(tmp_path):
-    path = tmp_path / "smoke.hdf"
-    assert "4 of 4 cases complete, 0 failed, 0 not computed" in solve(0, JOBS["smoke"], path)
-    with open_result(path) as result:
-        assert (result.status == DONE).all()
-        e_n = {model: result.read(f"e_n/{model}") for model in ("ccm", "pcm")}
-        # forces along the axis of angles: the cylinder's blunt and sharp side lose differently much
-        assert (e_n["ccm"] < e_n["pcm"]).all()
-        assert result.read("F_N/F_N") == pytest.approx(np.broadcast_to([1.0, 2.0], (1, 2, 2)), rel=0.02)
-
-
 @pytest.mark.long  # tests/study/test_walls.py presses thin walls in the fast stage
 @pytest.mark.parametrize("name", ONE)
 def test_a_coarse_variant_of_every_scene_is_solved(tmp_path, name):
