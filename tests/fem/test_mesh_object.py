@@ -10,8 +10,6 @@ from softjaw.fem.errors import MeshError
 from softjaw.fem.objects.gap import NoContactError, Pose, first_touch
 from softjaw.fem.objects.mesh_file import read_triangles, stated_unit
 from softjaw.fem.objects.mesh_object import MeshObject
-from softjaw.fem.objects.shapes import Sphere
-from softjaw.fem.objects.splines import evaluate_grid, grid_coefficients
 from softjaw.fem.objects.triangles import cleaned
 from tests.fem.reference import slopes
 from tests.fuzz.readers import model_3mf, packed
@@ -36,21 +34,6 @@ def ball(level, radii=(RADIUS, RADIUS, RADIUS), centre=(0, 0, 0)):
 
 def box_points(lower, upper, n=400):
     return np.random.default_rng(3).uniform(lower, upper, (n, 3))
-
-
-def test_spline_alone_is_of_fourth_order():
-    """Samples of a sphere's distance, without triangles: orders 4, 3, 2 for the value and its derivatives."""
-    x, errors = np.random.default_rng(0).uniform(-0.5, 0.5, (200, 3)), []
-    for n in (41, 81):
-        s = np.linspace(-1, 1, n)
-        grid = np.stack(np.meshgrid(s, s, s + 3, indexing="ij"), axis=-1)
-        c = grid_coefficients(np.linalg.norm(grid, axis=-1))
-        y = x + np.array([0, 0, 3])
-        g, gradient, H = evaluate_grid(c, np.array([-1.0, -1.0, 2.0]), s[1] - s[0], y)
-        r, e, exact = Sphere(1.0).gap(y)
-        errors.append([np.abs(g - r - 1).max(), np.abs(gradient - e).max(), np.abs(H - exact).max()])
-    orders = np.log2(np.array(errors[:-1]) / np.array(errors[1:]))[-1]
-    assert orders == pytest.approx([4, 3, 2], abs=0.3)
 
 
 @pytest.fixture(scope="module")

@@ -19,16 +19,6 @@ from tests.scoring.grasps import unit
 RANDOM = np.random.default_rng(3)
 
 
-@pytest.mark.parametrize(
-    ("d", "degree", "count"), [(1, 4, 1), (2, 4, 5), (3, 2, 6), (3, 4, 15), (6, 2, 21), (6, 4, 126)]
-)
-def test_there_are_as_many_monomials_as_ways_to_share_the_degree(d, degree, count):
-    E = exponents(d, degree)
-    assert E.shape == (count, d)
-    assert (E.sum(axis=1) == degree).all()
-    assert len(np.unique(E, axis=0)) == count
-
-
 @pytest.mark.parametrize("d", [1, 2, 3, 6])
 def test_monomials_are_products_of_powers_with_substitution_and_derivatives(d):
     E, w = exponents(d, 4), RANDOM.normal(size=(7, d))
