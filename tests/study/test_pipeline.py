@@ -18,7 +18,7 @@ from softjaw.study.case.solver import followed
 from softjaw.study.doctor import launch_environment
 from softjaw.study.flags import Flag
 from softjaw.study.quantities import MODELS
-from softjaw.study.scene import parse_scene
+from softjaw.study.scene import load_scene
 from tests.study.launching import ROOT, launch
 from tests.study.scenes import BALL, CONE, OVAL, QUICK, results_of, scene_of, units_of
 
@@ -265,14 +265,10 @@ def test_a_solver_that_is_cut_short_takes_more_steps_to_the_same_answer():
     assert sum(sum(values["work/step_halvings"]) for values in cut) > 0
 
 
-def bottle(*changes):
-    path = ROOT / "jobs" / "bottle-rigid.toml"
-    return results_of(parse_scene(path.read_text(), path, ["candidates.angles_deg=[0]", *changes]))
-
-
 def test_over_a_hole_the_frame_stands_on_the_pad():
     """At 1 N in the middle of the waist the pad's middle hangs 0.3 mm over the bottle of 58 mm diameter."""
-    [result] = bottle("candidates.stations_mm=[67.5]", "load.normal_force_n=[1]")
+    place = "candidates.angles_deg=[0]", "candidates.stations_mm=[67.5]", "load.normal_force_n=[1]"
+    [result] = results_of(load_scene(ROOT / "jobs" / "bottle-rigid.toml", place))
     origin, axes = (result.values[f"fingers/frame_{name}"][0] for name in ("origin", "axes"))
     assert result.values["fingers/frame_flag"][0] == 0
     np.testing.assert_allclose(axes, np.eye(3), atol=1e-6)
