@@ -94,21 +94,6 @@ def test_little_friction_on_a_ball_makes_a_thin_set_whose_bounds_meet_too(mu):
     assert 1.9 * mu * F <= found.force <= found.upper <= found.force * (1 + 1.01 * BOUND_GAP)
 
 
-@pytest.mark.parametrize("arm", [0.003, 0.02])
-def test_a_load_beside_the_contacts_tips_them(arm):
-    """Along y at an arm along z the torque about x is borne as torsion, which takes its share of friction."""
-    assert held(pair(), [0, 0, arm], [0, 1, 0]).force == pytest.approx(2 * MU * F / (1 + arm / E), rel=1e-6)
-    assert held(pair(), [0, 0, arm]).force <= 2 * MU * F / (1 + arm / E)
-
-
-@pytest.mark.parametrize("share", [0.3, 0.7])
-def test_a_couple_of_the_squeeze_uses_up_friction(share):
-    """Forces that pass each other by h make a couple F h; friction along z, at the arms D / 2, takes it."""
-    found = held(pair(share * MU * D), direction=[0, 1, 0])
-    assert found.force == pytest.approx(2 * MU * F * (1 - share), rel=1e-6)
-    assert found.borne
-
-
 def test_points_in_the_planes_of_facets_end_in_bounds_that_meet():
     """Boxes, whose hulls Qhull once refused to widen."""
     force, mu, e, distance = 2.830322673600437, 0.33575343309687694, 0.00012007769368455101, 0.027299709516401895
