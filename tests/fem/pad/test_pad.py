@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from softjaw.fem.materials import material
-from softjaw.fem.pad.mesh import Pad, along_side
+from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.pad.shape import PadShape
 
 FOAM = material("blatz_ko", 0.020e6)
@@ -73,13 +73,6 @@ def test_halved_has_half_as_many_elements_everywhere(elements):
     for fine, n, across in zip(elements, coarse.elements, (True, True, False), strict=True):
         # even sides stay even, for the planes of symmetry
         assert n - -(-fine // 2) == (1 if across and fine % 4 == 2 else 0)
-
-
-@pytest.mark.parametrize("n", [2, 3])
-def test_shape_functions_of_a_side(n):
-    assert along_side(n, np.linspace(0, 1, n)) == pytest.approx(np.eye(n), abs=1e-15)
-    for power in range(n):
-        assert along_side(n, np.array([0.3]))[0] @ np.linspace(0, 1, n) ** power == pytest.approx(0.3**power)
 
 
 def test_pressures_at_nodes_are_those_of_a_smooth_pressure():
