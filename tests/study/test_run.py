@@ -157,19 +157,15 @@ def test_a_second_run_at_the_same_time_is_refused_and_status_can_be_asked(tmp_pa
     assert (told[0], code, process.returncode) == (0, 4, 75)
 
 
-@pytest.mark.parametrize(("place", "ranks"), [
-    ("/proc/softjaw.hdf", 2), pytest.param("a_file/x.hdf", 0, marks=pytest.mark.long),
-    pytest.param("", 0, marks=pytest.mark.long),
+@pytest.mark.parametrize(("place", "ranks", "words"), [
+    ("/proc/softjaw.hdf", 2, ()), ("x.hdf", 0, ("--file-limit", 300_000)),  # space is asked for before all cases
+    pytest.param("a_file/x.hdf", 0, (), marks=pytest.mark.long), pytest.param("", 0, (), marks=pytest.mark.long),
 ])  # fmt: skip
-def test_a_place_that_cannot_be_written_is_told_once_on_all_ranks(tmp_path, place, ranks):
+def test_a_place_that_cannot_be_written_or_is_too_small_is_told_once_on_all_ranks(tmp_path, place, ranks, words):
     (tmp_path / "a_file").write_text("")
-    errors = ended(ranks, tmp_path / place, code=5)
+    errors = ended(ranks, tmp_path / place, *words, code=5)
     assert errors.count("error: ") == 1
-
-
-def test_too_little_space_is_noticed_before_anything_is_solved(tmp_path):
-    ended(0, tmp_path / "x.hdf", "--file-limit", 300_000, code=5)
-    assert not (tmp_path / "x.hdf.part").exists()
+    assert not list(tmp_path.glob("*.part"))
 
 
 @pytest.mark.parametrize("ranks", [0, pytest.param(2, marks=pytest.mark.long)])
