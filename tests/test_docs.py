@@ -207,11 +207,11 @@ def picture(folder, name):
 
 
 @pytest.fixture
-def here(tmp_path, monkeypatch):
+def here(folder):
     plt = pytest.importorskip("matplotlib.pyplot")
     plt.switch_backend("Agg")
-    monkeypatch.chdir(tmp_path)
-    yield tmp_path
+    (folder / "jobs").symlink_to(ROOT / "jobs")
+    yield folder
     plt.close("all")
 
 
@@ -254,7 +254,6 @@ def python_blocks(page):
 
 @pytest.mark.long
 def test_the_page_on_python_runs_as_it_stands(here, capsys):
-    (here / "jobs").symlink_to(ROOT / "jobs")
     found = {}
     exec(compile(python_blocks("docs/python.md"), "docs/python.md", "exec"), found)
     assert found["code"] == 0
@@ -267,6 +266,5 @@ def test_the_page_on_python_runs_as_it_stands(here, capsys):
 
 @pytest.mark.long
 def test_the_block_of_the_readme_runs(here, capsys):
-    (here / "jobs").symlink_to(ROOT / "jobs")
     exec(compile(python_blocks("README.md"), "README.md", "exec"), {})
     assert float(capsys.readouterr().out.split()[0]) > 0
