@@ -9,7 +9,7 @@ import pytest
 
 from softjaw.fem.shell.wall_model import LinearShell
 from tests.fem.shell import shell_problems
-from tests.fem.shell.shell_problems import follow, load_steps
+from tests.fem.shell.shell_problems import load_steps
 
 TABLES = json.loads((Path(__file__).parents[2] / "data" / "shell_tables.json").read_text(encoding="utf-8"))
 NONLINEAR = {
@@ -28,11 +28,9 @@ LINEAR = {
 def test_nonlinear_table(name):
     table, case = TABLES[name], NONLINEAR[name]()
     rows = np.array(table["table"])
-    states = list(load_steps(case.loaded, rows[:, 0]))
-    found = np.array([case.read(state.q) for state in states])
+    found = np.array([case.read(state.q) for state in load_steps(case.loaded, rows[:, 0])])
     # printed with three digits: half a unit of the last one is theirs
     assert (np.abs(found - rows[:, 1:]) <= table["tol_rel"] * rows[:, 1:] + 0.0005).all()
-    assert sum(state.halvings for state in states) == 0
 
 
 @pytest.mark.parametrize("name", NONLINEAR)
@@ -40,7 +38,7 @@ def test_full_load_in_one_step(name):
     """Guard on the tangent of mixed integration points: the plain one takes hundreds of iterations, or fails."""
     table, case = TABLES[name], NONLINEAR[name]()
     (state,) = load_steps(case.loaded, [1.0])
-    assert (state.iterations, state.halvings) <= (20, 0)
+    assert state.iterations <= 20
     assert case.read(state.q) == pytest.approx(table["table"][-1][1:], rel=table["tol_rel"])
 
 
@@ -51,21 +49,19 @@ def test_the_plain_tangent_finds_the_same_state():
     assert plain.iterations > mixed.iterations
 
 
-def path_of(case, largest_factor):
-    """Displacements and load factors along the path up to this factor."""
-    path = [(0.0, 0.0)]
-    for state in follow(case.loaded, 0.05, longest=10.0):
-        path.append((case.read(state.q)[0], state.factor))
-        if state.factor > largest_factor:
-            return np.array(path).T
-
-
 @pytest.mark.long
 def test_hinged_roof_past_both_limit_points():
-    table = TABLES["hinged_roof_12.7"]
-    w, P = path_of(shell_problems.hinged_roof(12.7), 1.0)
-    rows = np.array(table["table"])
-    assert np.abs(np.interp(rows[:, 1], w, P) - rows[:, 0]).max() < table["tol_abs_P"]
+    """The force under the middle where its displacement is given: there the load has a maximum, and a minimum later."""
+    table, case = TABLES["hinged_roof_12.7"], shell_problems.hinged_roof(12.7)
+    [(node, component, sign)] = case.probes
+    case.fixed[node, component] = True
+    q = np.zeros(case.shell.size)
+    for P, w in table["table"]:
+        q = q.copy()
+        q[6 * node + component] = sign * w
+        q = case.loaded.newton(q, 0.0).q
+        force = case.shell.residual(q)[6 * node + component] / case.load[node, component]
+        assert force == pytest.approx(P, abs=table["tol_abs_P"])
 
 
 @pytest.mark.parametrize("name", LINEAR)
@@ -74,14 +70,3 @@ def test_linear_course(name, n):
     case, table = LINEAR[name](n), TABLES["linear"][name]
     q = LinearShell(*case.loaded[:2]).solve(case.loaded.load)
     assert case.read(q)[0] / table["ref"] == pytest.approx(table["measured_Q4"][str(n)][1], abs=2e-4)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(("problem", "levels", "expected"), [
-    (shell_problems.pulled_cylinder, [1.0], [2.768, 4.551, 3.269]),
-    (shell_problems.pinched_half_cylinder, np.linspace(0.05, 1, 20), [171.505]),
-])  # fmt: skip
-def test_other_problems_at_full_load(problem, levels, expected):
-    case = problem()
-    *_, last = load_steps(case.loaded, levels)
-    assert case.read(last.q) == pytest.approx(expected, rel=0.01)
