@@ -1,4 +1,4 @@
-"""Shells under given loads, by load steps, and problems with published answers.
+"""Shells under given loads or displacements, by steps, and problems with published answers.
 
 A problem has a mesh, supports, loads and the displacements that are read. Nonlinear: Sze, Liu and Lo, Finite Elements
 in Analysis and Design 40, 2004; linear: MacNeal and Harder, Finite Elements in Analysis and Design 1, 1985. Lengths,
@@ -64,6 +64,18 @@ def load_steps(loaded: Loaded, factors: Iterable[float]) -> Iterator[Equilibrium
     for factor in factors:
         here = loaded.newton(here.q, factor)
         yield here
+
+
+def moved_steps(case, displacements):
+    """Load factor and state with the loaded node, the first that is read, moved so far: past a maximum of it too."""
+    (node, component, sign), *_ = case.probes
+    fixed, q = case.fixed.copy(), np.zeros(case.shell.size)
+    fixed[node, component] = True
+    for displacement in displacements:
+        q = q.copy()
+        q[6 * node + component] = sign * displacement
+        q = case.loaded._replace(fixed=fixed.ravel()).newton(q, 0.0).q
+        yield case.shell.residual(q)[6 * node + component] / case.load[node, component], q
 
 
 @dataclass
@@ -175,4 +187,23 @@ def pinched_cylinder(n):
     c.fixed[np.ix_(k[:, -1], [0, 2, 3, 5])] = True
     c.load[k[0, 0]] = -0.25 * UZ
     c.probes = [(k[0, 0], 2, -1)]
+    return c
+
+
+def pulled_cylinder(around=24, along=36):
+    """Eighth of a cylinder with free ends, pulled outwards by two opposing forces."""
+    c, k = cylinder(4.953, 5.175, 0.094, np.pi / 2, 10.5e6, 0.3125, around, along)
+    symmetric(c.fixed, k[-1], 2)
+    c.load[k[0, 0]] = 40e3 / 4 * UZ
+    c.probes = [(k[0, 0], 2, 1), (k[-1, 0], 0, -1), (k[-1, -1], 0, -1)]
+    return c
+
+
+def pinched_half_cylinder(n=40):
+    """Half of a half cylinder, clamped at one end, pressed down at the other's crown; the straight side slides."""
+    c, k = cylinder(101.6, 304.8, 3.0, np.pi / 2, 2068.5, 0.3, n, n)
+    symmetric(c.fixed, k[-1], 2)
+    c.fixed[k[:, 0]] = True
+    c.load[k[0, -1]] = -2000 / 2 * UZ
+    c.probes = [(k[0, -1], 2, -1)]
     return c

@@ -9,7 +9,7 @@ import pytest
 
 from softjaw.fem.shell.wall_model import LinearShell
 from tests.fem.shell import shell_problems
-from tests.fem.shell.shell_problems import load_steps
+from tests.fem.shell.shell_problems import load_steps, moved_steps
 
 TABLES = json.loads((Path(__file__).parents[2] / "data" / "shell_tables.json").read_text(encoding="utf-8"))
 NONLINEAR = {
@@ -51,17 +51,10 @@ def test_the_plain_tangent_finds_the_same_state():
 
 @pytest.mark.long
 def test_hinged_roof_past_both_limit_points():
-    """The force under the middle where its displacement is given: there the load has a maximum, and a minimum later."""
-    table, case = TABLES["hinged_roof_12.7"], shell_problems.hinged_roof(12.7)
-    [(node, component, sign)] = case.probes
-    case.fixed[node, component] = True
-    q = np.zeros(case.shell.size)
-    for P, w in table["table"]:
-        q = q.copy()
-        q[6 * node + component] = sign * w
-        q = case.loaded.newton(q, 0.0).q
-        force = case.shell.residual(q)[6 * node + component] / case.load[node, component]
-        assert force == pytest.approx(P, abs=table["tol_abs_P"])
+    table = TABLES["hinged_roof_12.7"]
+    P, w = np.transpose(table["table"])
+    factors = [factor for factor, _ in moved_steps(shell_problems.hinged_roof(12.7), w)]
+    assert factors == pytest.approx(P, abs=table["tol_abs_P"])
 
 
 @pytest.mark.parametrize("name", LINEAR)
@@ -70,3 +63,13 @@ def test_linear_course(name, n):
     case, table = LINEAR[name](n), TABLES["linear"][name]
     q = LinearShell(*case.loaded[:2]).solve(case.loaded.load)
     assert case.read(q)[0] / table["ref"] == pytest.approx(table["measured_Q4"][str(n)][1], abs=2e-4)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("problem", "expected"), [
+    (shell_problems.pulled_cylinder, [2.768, 4.551, 3.269]), (shell_problems.pinched_half_cylinder, [171.505]),
+])  # fmt: skip
+def test_other_problems_at_full_load(problem, expected):
+    case = problem()
+    *_, (_, near) = moved_steps(case, np.linspace(0.0, expected[0], 41)[1:])
+    assert case.read(case.loaded.newton(near, 1.0).q) == pytest.approx(expected, rel=0.01)
