@@ -77,7 +77,9 @@ def read_triangles(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
             f"{path}: is truncated or damaged: {faces} faces declared, {len(mesh.faces)} triangles read; export again"
         )
     # polygons are cut into fans, which fold over where a polygon is not convex
-    if kind not in SCENES and len(mesh.faces) > faces and (mesh.face_adjacency_angles > FOLDED).any():
+    with np.errstate(invalid="ignore"):  # of points that are refused later
+        folded = kind not in SCENES and len(mesh.faces) > faces and (mesh.face_adjacency_angles > FOLDED).any()
+    if folded:
         text = f"{path}: has polygons that are not convex, expected triangles; triangulate the mesh when you export it"
         raise MeshError(text)
     return np.array(mesh.vertices, dtype=float), np.array(mesh.faces, dtype=np.int64)

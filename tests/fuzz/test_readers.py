@@ -15,7 +15,7 @@ from softjaw.fem.errors import MeshError
 from softjaw.fem.objects.mesh_file import read_triangles
 from softjaw.study.messages import UNPRINTABLE
 from softjaw.study.scene import SceneError, load_scene
-from tests.fuzz.edits import edited, edits
+from tests.fuzz.edits import edited, edits, renumber, repeat_line
 from tests.fuzz.hostile_meshes import hostile
 from tests.fuzz.readers import QUICK, Reader
 from tests.study.launching import ROOT
@@ -70,6 +70,13 @@ def test_a_spoilt_file_is_read_or_refused(tmp_path, reader, data):
     path.write_bytes(edited(reader.content, data.draw(edits(reader.kinds))))
     wrong = complaint(reader, path)
     assert not wrong, wrong
+
+
+def test_a_corner_at_infinity_of_a_polygon_ends_without_a_warning(tmp_path):
+    reader, path = QUICK["ASCII STL"], tmp_path / "mesh.stl"
+    path.write_bytes(edited(reader.content, [(renumber, 1.0, 1), (repeat_line, 0.6875, 1)]))
+    assert b"-inf" in path.read_bytes()
+    assert not complaint(reader, path)
 
 
 @EVERY
