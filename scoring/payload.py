@@ -135,8 +135,8 @@ def _along(grasp: _Grasp, d: FloatArray) -> Payload:
     other, _, also = _programme(*grasp, d, rows, basis)  # a load of more than -other is needed: none where that is < 0
     if max(missing, also) >= ROUNDING_FORCE or min(most, other) < -ROUNDING_FORCE:
         return Payload(0.0, 0.0, d, False)
-    held, upper = (load if load > ROUNDING_FORCE else 0.0 for load in (float(-d @ point[:3]), most))
-    return Payload(held, upper, d, True)
+    lower, upper = (load if load > ROUNDING_FORCE else 0.0 for load in (float(-d @ point[:3]), most))
+    return Payload(lower, upper, d, True)
 
 
 def _worst(grasp: _Grasp, gap: float, least: float) -> Payload:

@@ -31,7 +31,7 @@ from softjaw.fem.pad.mesh import Pad
 from softjaw.fem.shell.facing import FAR
 from softjaw.friction.patch import NEGLIGIBLE, FloatArray
 
-PARTS = 4  # of the piece that a point stands for, along a side, of which some may lie beyond a rim
+PARTS = 4  # along a side of the area of one point, of which some may lie beyond a rim
 
 Gap = Callable[[FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
 

@@ -105,8 +105,8 @@ def stated_unit(path: Path) -> str:
         return ""
     with suppress(Exception), zipfile.ZipFile(path) as archive:  # reading it tells what is wrong with it
         heads = [archive.open(name).read(4096) for name in archive.namelist() if name.endswith(".model")]
-        found = re.search(rb'<model[^>]*\sunit="(\w+)"', b"".join(heads))
-        word = found[1].decode() if found else "millimeter"
+        attribute = re.search(rb'<model[^>]*\sunit="(\w+)"', b"".join(heads))
+        word = attribute[1].decode() if attribute else "millimeter"
         return {"millimeter": "mm", "centimeter": "cm", "meter": "m"}.get(word, word)
     return ""
 

@@ -191,8 +191,8 @@ def rounding(p: FloatArray, t: FloatArray, u: FloatArray, radius: float) -> tupl
     # at half a turn the sign hangs on rounding
     angle = -np.pi if angle > np.pi - 1e-6 else angle
     phi = np.linspace(0.0, angle, 1 + max(2, int(np.ceil(abs(angle) / ARC_STEP))))
-    left = np.sign(angle) * np.array([-t[1], t[0]])
-    arc = p + radius * (np.sin(np.abs(phi))[:, None] * t + (1 - np.cos(phi))[:, None] * left)
+    inward = np.sign(angle) * np.array([-t[1], t[0]])
+    arc = p + radius * (np.sin(np.abs(phi))[:, None] * t + (1 - np.cos(phi))[:, None] * inward)
     return arc, radius * np.abs(phi)
 
 
@@ -226,8 +226,8 @@ def _without_rims(curve: Curve, rim: float) -> tuple[Curve, list[float | None]]:
         (z, r), d = (curve.derivative(np.array([cuts[k]]), order)[0] for order in range(2))
         rise, widens = d / np.linalg.norm(d) * [1.0, outwards]
         if r > 1e-9 and rise > 0.3:
-            taken = min(rim, 0.25 * r) * min((1.0 + widens) / rise, 1.0)  # where it flares, a smaller rim
-            cuts[k] -= outwards * min(taken / np.linalg.norm(d), 0.25 * float(curve.breaks[-1]))
+            length = min(rim, 0.25 * r) * min((1.0 + widens) / rise, 1.0)  # where it flares, a smaller rim
+            cuts[k] -= outwards * min(length / np.linalg.norm(d), 0.25 * float(curve.breaks[-1]))
             heights[k] = float(z)
     return curve.between(*cuts), heights
 

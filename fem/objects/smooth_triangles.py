@@ -191,7 +191,7 @@ def _at_ends(
     bends[joint], lines[joint] = bend[edges], along[edges]
     following = _next_joints(facets, bulge)
     round_ = _in_a_row(following, bends, lines)
-    alone = (following < 0).all(axis=1)  # neither facet goes on smoothly elsewhere: a handle of six sides and its tip
+    alone = (following < 0).all(axis=1)  # neither facet has another smooth joint: a handle of six sides and its tip
     real = np.zeros(len(smooth), dtype=bool)
     while True:  # of a cone between two straight walls the next end shows
         elsewhere = np.append(bulge, 0.0)[following].min(axis=1)

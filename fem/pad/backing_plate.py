@@ -121,5 +121,5 @@ def _plate(x: tuple[float, ...], y: tuple[float, ...], symmetry: tuple[bool, boo
     for axis in range(2):
         if symmetry[axis]:
             fixed[np.abs(X[..., axis]) < NEGLIGIBLE, axis] = fixed[np.abs(X[..., axis]) < NEGLIGIBLE, 3 + axis] = True
-    at = np.ix_(*(np.searchsorted(line, own) for line, own in zip(lines, given, strict=True)))
+    at = np.ix_(*(np.searchsorted(line, of_pad) for line, of_pad in zip(lines, given, strict=True)))
     return shell, fixed.ravel(), ~fixed[..., :3][at], np.arange(clamped.size).reshape(clamped.shape)[at]

@@ -108,12 +108,12 @@ def wall_flags(scene: Scene, state: Pressed, values: dict[str, Any]) -> Flag:
 
 
 def foot_note(scene: Scene, state: Pressed, shell: Shell) -> str:
-    """What to know where a table would have to pull a standing foot down by more than the weight that is on it."""
+    """A note where a table would have to pull the foot down by more than the weight that is on it."""
     if scene.object.support != "standing":
         return ""
     mesh, wall = shell.mesh, state.wall
-    held = shell.residual(wall.q).reshape(-1, 6)[mesh.foot, 2] - wall.load[mesh.foot, 2]
-    pulled = -float(np.minimum(held, 0.0).sum()) / mesh.share
+    support = shell.residual(wall.q).reshape(-1, 6)[mesh.foot, 2] - wall.load[mesh.foot, 2]
+    pulled = -float(np.minimum(support, 0.0).sum()) / mesh.share
     weight = GRAVITY * (scene.object.mass or 0.0)
     if pulled <= max(weight, SLIGHT_PULL * state.force):
         return ""

@@ -131,12 +131,12 @@ def gripper_file(name: str) -> tuple[dict[str, Any], Hand]:
 
 
 def filled_in(
-    tables: dict[str, Any], folder: Path, kept: Collection[str] | None = None
+    tables: dict[str, Any], folder: Path, given: Collection[str] | None = None
 ) -> tuple[str, Any, str] | None:
     """Put the keys of ``gripper.preset`` into a scene's tables, where it has none of its own; what is wrong with it.
 
     The largest opening is what the foam leaves of the stroke. An error is a key, what it has, and what was expected; a
-    gripper's own file is looked for from ``folder``, and has its whole path then. Keys but ``kept`` are filled in
+    gripper's own file is looked for from ``folder``, and has its whole path then. Keys but ``given`` are filled in
     anew; by default all that are there are the scene's own.
     """
     gripper = tables.get("gripper")
@@ -149,7 +149,7 @@ def filled_in(
     except StudyError as error:
         more = "" if isinstance(error.__cause__, OSError) else f": {error}"  # of no such file all is said
         return "gripper.preset", name, f"one of {', '.join(PRESETS)}, or a file of the same form{more}"
-    for key in () if kept is None else {*keys, "max_opening_mm"} - {*kept}:
+    for key in () if given is None else {*keys, "max_opening_mm"} - {*given}:
         gripper.pop(key, None)
     for key, value in keys.items():
         gripper.setdefault(key, value)

@@ -71,7 +71,7 @@ def _timed(
             spent += took if spent else took + min(first_case, FIRST_FORCE_FACTOR * took)
             if spent > budget:
                 break
-        seconds[i] = _path(times, len(units[i].rows[0]), left=spent > budget, loads=i == first)
+        seconds[i] = _path(times, len(units[i].rows[0]), stopped=spent > budget, loads=i == first)
         if spent > budget:
             break
     forces = len(units[first].rows[0])
@@ -85,9 +85,9 @@ def _timed(
     return each.tolist(), float(loads)
 
 
-def _path(times: Sequence[float], forces: int, *, left: bool, loads: bool) -> float:
-    """Time of a load path of which the first forces took ``times`` [s]; it ended by itself if it was not ``left``."""
-    if len(times) < forces and not left:
+def _path(times: Sequence[float], forces: int, *, stopped: bool, loads: bool) -> float:
+    """Time of a load path of which the first forces took ``times`` [s]; it ended by itself unless ``stopped``."""
+    if len(times) < forces and not stopped:
         return sum(times)  # it failed
     further = sum(times[1:]) / (len(times) - 1) if len(times) > 1 else times[0] / FIRST_FORCE_FACTOR
     first = FIRST_FORCE_FACTOR * further if loads else times[0]

@@ -294,8 +294,8 @@ def _rows_of(folder: ObjectFolder, out: Path, retry_failed: bool) -> tuple[list[
         if before["key"] == key and (before["done"] < 1 or (out / row["file"]).exists()):
             row = before | {"mesh": row["mesh"]} | ({"state": index.MISSING} if before["state"] in again else {})
         rows.append(row | {"key": key} | ({} if mass is None else {"mass": in_si("mass_g", mass)}))
-    told = "object", "mesh", "state", "reason"
-    stored, now = ([[row[name] for name in told] for row in these] for these in (known.values(), rows))
+    columns = "object", "mesh", "state", "reason"
+    stored, now = ([[row[name] for name in columns] for row in these] for these in (known.values(), rows))
     return rows, stored != now
 
 

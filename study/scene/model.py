@@ -372,12 +372,12 @@ def _preset_again(before: Mapping[str, Any], tables: dict[str, Any], values: Map
     """
     if OF_PRESET.isdisjoint(values):
         return
-    kept = {key.removeprefix("gripper.") for key in values}
-    if "preset" not in kept:
+    given = {key.removeprefix("gripper.") for key in values}
+    if "preset" not in given:
         without = {"gripper": {key: value for key, value in before.items() if key != "max_opening_mm"}}
         follows = not filled_in(without, Path()) and without["gripper"].items() >= before.items()
-        kept |= before.keys() - ({"max_opening_mm"} if follows else set())
-    if trouble := filled_in(tables, Path(), kept):
+        given |= before.keys() - ({"max_opening_mm"} if follows else set())
+    if trouble := filled_in(tables, Path(), given):
         key, actual, expected = trouble
         raise SceneError([Problem("scene", None, key, shown(actual), expected, "")])
 

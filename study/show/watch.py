@@ -75,8 +75,8 @@ def file_look(path: Path) -> Look:
             rounds = len(result.layout.added)
             counts = f"{progress.line(codes)}{f', round {rounds} of further grasps' * bool(rounds)}"
             if not runner:
-                left = unfinished(result)
-                return [counts, *_end(result, left)], STOPPED if left else code_of(codes)
+                incomplete = unfinished(result)
+                return [counts, *_end(result, incomplete)], STOPPED if incomplete else code_of(codes)
             title = f" ({result.title})" * bool(result.title)
             since = lasted(result.sessions[-1]["start"]) if result.sessions else ""
             about = f"{result.path}{title}: {runner}{f', for {since}' * bool(since)}"
@@ -86,9 +86,9 @@ def file_look(path: Path) -> Look:
     return look
 
 
-def _end(result: Any, left: bool) -> list[str]:
-    """Last words of a run that has ended, and whether something is ``left`` to do."""
-    if left:
+def _end(result: Any, incomplete: bool) -> list[str]:
+    """Last words of a run that has ended, complete or not."""
+    if incomplete:
         return [f"not complete: {RESUME}"]
     return ["complete", *reasons(result, terminal_width()), f"'softjaw show {result.path}' lists the best grasps"]
 
