@@ -12,8 +12,7 @@ IntArray = NDArray[np.int32]
 class Pattern:
     """Entries of a square matrix in compressed rows (``start, column, values``); the diagonal is always stored.
 
-    ``rows, columns (k,)`` are places in any order and with repeats; negative ones are left out. `grow` makes new
-    arrays.
+    ``rows, columns (k,)`` are places in any order and with repeats; negative ones are left out.
     """
 
     def __init__(self, size: int, rows: IntArray, columns: IntArray) -> None:

@@ -348,11 +348,7 @@ LAWS = {"blatz_ko": 0, "hyperfoam": 1, "neo_hookean": 2, "linear": 3}
 
 
 class Material(NamedTuple):
-    """A law with its parameters and its small-strain constants.
-
-    ``law``: a key of ``LAWS``; ``parameters (k,)``: as the law's function documents them [Pa, -]; ``shear_modulus,
-    poisson_ratio``: of the undeformed state [Pa], [-].
-    """
+    """A law of ``LAWS``, its parameters ``(k,)`` as its function documents them, and constants for small strain."""
 
     law: str
     parameters: FloatArray

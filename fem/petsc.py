@@ -147,18 +147,9 @@ class NonlinearSolver:
     residual, so they cost steps but no accuracy. They do end just below the tolerance, where a Newton step would go far
     beyond; so a caller whose tolerance is loose sets ``thrifty`` to False, which rules out the latter kind.
 
-    Parameters
-    ----------
-    problem : Problem
-    options : dict
-        PETSc options with the prefix, as ``{"contact_snes_max_it": 50}``; they override the defaults.
-
-    Attributes
-    ----------
-    iterations_left : float
-        Newton iterations that further solves may take in all, failed ones too; a caller sets it.
-    patient : bool
-        Whether a solve continues where its residual stalls; a caller sets it.
+    ``options``: PETSc options with the prefix, as ``{"contact_snes_max_it": 50}``; they override the defaults. A caller
+    sets ``iterations_left``, Newton iterations that further solves may take in all, failed ones too, and ``patient``,
+    whether a solve continues where its residual stalls.
     """
 
     problem: Problem
@@ -281,13 +272,7 @@ class NonlinearSolver:
         return self._end.copy(), done
 
     def approach(self, x: FloatArray, tolerance: float, iterations: int) -> tuple[FloatArray, float, float]:
-        """As `solve`, but what the iterations have come to is returned whether it converged or not.
-
-        Returns
-        -------
-        x, norm, fall
-            The iterate, the norm of the residual there, and what part it is of that one iteration before.
-        """
+        """As `solve`, converged or not: iterate, norm of its residual, and that over the norm one iteration before."""
         try:
             x, _ = self.solve(x, tolerance, iterations)
         except ConvergenceError:

@@ -76,10 +76,7 @@ def _across(N: FloatArray) -> FloatArray:
 class ContactFace(NamedTuple):
     """One surface of bilinear faces, loaded or not, whose normal is bilinear between the corners.
 
-    Parameters
-    ----------
-    corners, normal : (n, 4, 3) arrays
-        Corners around each face [m] and the normals there, unit vectors; faces that share a corner share both.
+    ``corners, normal (n, 4, 3)``: around each face, and unit normals there; faces that share a corner share both [m].
     """
 
     corners: FloatArray

@@ -21,29 +21,16 @@ from softjaw.lsfit.surface import FitError, FitFlag, FloatArray
 def convex_quartic(W: ArrayLike, T: ArrayLike, gamma: float = 0.01) -> tuple[Quartic, str]:
     """Convex quartic with the least ``mean ((P - 1)^2 + gamma |(I - t t') grad P|^2)``, and what proves it convex.
 
-    The quartic of the linear equations is taken if a positive definite Gram matrix proves it convex. Only otherwise
-    the semidefinite programme is solved, which asks for eigenvalues of at least `MIN_EIGENVALUE`, so that rounding
-    cannot undo the proof. A body that would reach more than `MAX_REACH_RATIO` times as far as the ellipsoid of the
-    samples is bounded there by a larger margin, and flagged.
+    The quartic of the linear equations is taken if a positive definite Gram matrix proves it convex (the proof is then
+    ``least squares``). Only otherwise the semidefinite programme is solved (``semidefinite programme``), which asks for
+    eigenvalues of at least `MIN_EIGENVALUE`, so that rounding cannot undo the proof. A body that would reach more than
+    `MAX_REACH_RATIO` times as far as the ellipsoid of the samples is bounded there by a larger margin, and flagged.
+
+    ``W, T (m, d)``: normalised wrenches and unit motions [-]; the surface is in the coordinates of the wrenches, flat
+    and flagged if they are. ``gamma``: weight of the motions. A little bends the surface the right way between samples;
+    with 1 the directions are bought with radii that are off by some per cent.
 
     Raises `FitError`: if the programme is not solved, or its result fails the certificate.
-
-    Parameters
-    ----------
-    W : (m, d) array
-        Normalised wrenches [-].
-    T : (m, d) array
-        Unit motions [-].
-    gamma : float
-        Weight of the motions. A little bends the surface the right way between samples; with 1 the directions are
-        bought with radii that are off by some per cent.
-
-    Returns
-    -------
-    surface : Quartic
-        In the coordinates of the wrenches; flat, and flagged, if the samples are.
-    certificate : str
-        ``least squares`` if the best quartic is convex by itself, else ``semidefinite programme``.
     """
     samples = round_samples(W, T)
     r = samples.B.shape[1]

@@ -13,25 +13,12 @@ FLAT_RATIO = 1e-9  # of principal lengths: below it samples are flat
 
 
 def normalised_samples(wrench: ArrayLike, twist: ArrayLike, force: float, rho: float) -> tuple[FloatArray, FloatArray]:
-    """Wrenches ``(f, tau / rho) / force`` and unit motions ``(v, rho omega) / |.|``.
+    """Wrenches ``(f, tau / rho) / force`` and unit motions ``(v, rho omega) / |.|``, ``(m, d)`` each [-].
 
-    With ``rho`` in proportion to the patch, equal patches of any size and unit give equal samples.
-
-    Parameters
-    ----------
-    wrench : (m, 6) or (m, d) array
-        ``[f, tau]`` about the origin, or the components of it that the motions have [N, N m].
-    twist : (m, d) array
-        ``[v_x, v_y, omega_z]``, or ``[v, omega]`` of the origin [m/s, rad/s].
-    force : float
-        ``mu S`` [N].
-    rho : float
-        Length of the contact [m].
-
-    Returns
-    -------
-    W, T : (m, d) array
-        Wrenches and unit motions [-].
+    With ``rho`` in proportion to the patch, equal patches of any size and unit give equal samples. ``wrench``:
+    ``[f, tau]`` about the origin ``(m, 6)``, or the components of it that the motions have ``(m, d)`` [N, N m];
+    ``twist (m, d)``: ``[v_x, v_y, omega_z]``, or ``[v, omega]`` of the origin [m/s, rad/s]; ``force``: ``mu S`` [N];
+    ``rho``: length of the contact [m].
     """
     w, t = np.atleast_2d(np.asarray(wrench, float)), np.atleast_2d(np.asarray(twist, float))
     planar = t.shape[1] == 3

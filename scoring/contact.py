@@ -75,10 +75,7 @@ class PolytopeBody:
 
 
 class DiscBody(NamedTuple):
-    """Sum of discs, such as the limit surface of faces with friction.
-
-    ``discs (n, 6)``: two half-axes of each, in ``(f_x, f_y, tau_z)``.
-    """
+    """Sum of ``discs (n, 6)``, two half-axes of each in ``(f_x, f_y, tau_z)``, such as the limit surface of faces."""
 
     discs: FloatArray
 

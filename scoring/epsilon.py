@@ -74,20 +74,9 @@ def epsilon(
     The bounds hold up to rounding. A body that is no ellipsoid is replaced by an ellipsoid inside it for the lower
     bound, which leaves a gap as large as its fit error; the upper bound uses its own support.
 
-    Parameters
-    ----------
-    contacts : sequence of SoftContact
-        One or more, in any pose.
-    object_length : float or (3,) array
-        As in `scoring.contact.SoftContact.wrench_map` [m].
-    contact_length : float
-        Lengths by which the torques of forces and those about the normals are divided [m]; epsilon depends on both.
-    centre_of_mass : (3,) array
-        Point about which torques are taken [m]; epsilon depends on it.
-    kind : str
-        "linf": every normal force is at most one; "l1": their sum is.
-    tolerance : float
-        Relative gap of the bounds to work for; an absolute one of 1e-6 is enough too.
+    ``contacts``: one or more, in any pose. Lengths and centre [m] are as in `scoring.contact.SoftContact.wrench_map`,
+    and epsilon depends on each. ``kind``: with "linf" every normal force is at most one, with "l1" their sum is.
+    ``tolerance``: relative gap of the bounds to work for; an absolute one of 1e-6 is enough too.
     """
     C = np.array([contact.wrench_map(object_length, contact_length, centre_of_mass) for contact in contacts])
     c, bodies = C[:, :, 0], [contact.body for contact in contacts]
@@ -298,10 +287,7 @@ def _proof(c: FloatArray, D: FloatArray, kind: str, planes: FloatArray) -> Proof
 
 
 def _products(c: FloatArray, D: FloatArray, kind: str, planes: FloatArray) -> tuple[FloatArray, list[FloatArray]]:
-    """``(sum s)^2`` and forms ``(m, d, d)`` that are not negative there: by numbers, Lorentz vectors, matrices.
-
-    The first is ``|u|^2``.
-    """
+    """``(sum s)^2``; forms ``(m, d, d)`` not negative there, first ``|u|^2``, by numbers, Lorentz vectors, matrices."""
     n, k = len(c), 1 if kind == "l1" else len(c)
     d = 6 + k
     s = np.eye(k, d, 6)

@@ -34,10 +34,7 @@ HULL_THICKNESS = 1e-6  # the same of flat hulls, whose normals are differences o
 
 @dataclass(frozen=True, eq=False)
 class Span:
-    """A contact's span of 4 dimensions, split along T: its wrench map ``C (6, 4)``, and orthonormal bases.
-
-    ``T (6, 2)`` is the basis of the plane T, ``U (6, 2)`` that of the rest of the span, across T.
-    """
+    """A contact's span: wrench map ``C (6, 4)``, orthonormal bases ``T (6, 2)`` of T and ``U (6, 2)`` across T."""
 
     C: FloatArray
     T: FloatArray

@@ -73,24 +73,12 @@ def payload(
 ) -> Payload:
     """Largest force at the centre of mass that two contacts hold, along ``direction`` or the worst of all.
 
-    Parameters
-    ----------
-    contacts : two SoftContact
-        With sums of discs or polytopes as limit surfaces, at the solved forces [N, N, N m].
-    pressure : (2, 6) array
-        Wrench of each finger's pressure on the object, torques about the origin [N, N m].
-    centre_of_mass : (3,) array
-        Where the load acts [m].
-    direction : (3,) array, optional
-        In which it pulls, of any length.
-    kind : str
-        What happens to the normal forces: one of `KINDS`.
-    drive : (2, 3) array, optional
-        Force with which the gripper presses each finger [N]; by default that of its pressure.
-    gap : float
-        Of the bounds, relative, at which the search ends.
-    least : float
-        Force below which the search ends, however far apart the bounds are [N].
+    ``contacts``: two, with sums of discs or polytopes as limit surfaces, at the solved forces [N, N, N m];
+    ``pressure (2, 6)``: wrench of each finger's pressure on the object, torques about the origin [N, N m];
+    ``centre_of_mass (3,)``: where the load acts [m]; ``direction (3,)``: in which it pulls, of any length; ``kind``:
+    what happens to the normal forces, of `KINDS`; ``drive (2, 3)``: force with which the gripper presses each
+    finger [N], by default that of its pressure. The search ends at a relative ``gap`` of the bounds, or below the force
+    ``least`` [N], however far apart they are.
     """
     centre, P = np.asarray(centre_of_mass, float), np.asarray(pressure, float)
     length = max(float(np.linalg.norm(c.position - centre)) for c in contacts) or 1.0

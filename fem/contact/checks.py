@@ -47,23 +47,13 @@ def check(
     foam: Foam, x: FloatArray, state: tuple[FloatArray, FloatArray, ContactPoints], imbalance: float, force: float,
     residual: float, slack: float = 0.0,
 ) -> Checks:  # fmt: skip
-    """Measures of a pad's state ``x`` at a normal force [N] on the whole pad.
+    """Measures of a pad's state ``x (size,)`` at a normal force [N] on the whole pad.
+
+    ``state``: nodal pressures, mean gaps and points of the contact face, as ``contact_state`` gives them;
+    ``imbalance``: largest force out of balance at a node, of the whole pad [N]; ``residual``: part of the force that
+    this may be; ``slack``: what every law of the contact may be off by at least, `ALTERNATING` or nothing.
 
     Raises `CheckError`: with the law that is broken, the figure and its bound.
-
-    Parameters
-    ----------
-    foam : Foam
-    x : (size,) array
-        Unknowns of the pad.
-    state : tuple
-        Nodal pressures, mean gaps and points of the contact face, as ``contact_state`` gives them.
-    imbalance : float
-        Largest force out of balance at a node, of the whole pad [N].
-    force, residual : float
-        The normal force [N], and the part of it that a node may be out of balance.
-    slack : float
-        What every law of the contact may be off by at least, `ALTERNATING` or nothing.
     """
     pad = foam.pad
     pressure, gap, points = state
@@ -120,12 +110,7 @@ def explained(error: ConvergenceError, foam: Foam, x: FloatArray, force: float) 
 
 
 def refuse_fall(low: tuple[float, float], high: tuple[float, float]) -> None:
-    """Refuse a state that a pad on a rigid object cannot have come to: more force means more closing displacement.
-
-    ``low, high``: force [N] and closing displacement [m] of a state and of the next one.
-
-    Raises `CheckError`: if the force grew and the closing displacement fell.
-    """
+    """`CheckError` where, on a rigid object, the force [N] grows and the closing [m] falls from ``low`` to ``high``."""
     # a fallback pad may follow one with other gaps, and their closings differ a little without any fault
     # share of the closing displacement from one force to the next: weighted and nodal gaps differ by less
     if high[0] > low[0] and high[1] < (1.0 - 0.05) * low[1]:

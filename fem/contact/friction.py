@@ -51,27 +51,12 @@ def stick_or_slip(
     normal: FloatArray, d: FloatArray, mu: float, pressure: FloatArray, derivatives: bool,
     before: FloatArray | None = None, share: float = 1.0,
 ) -> tuple[FloatArray, ...]:  # fmt: skip
-    """Traction of points and, if wanted, its derivatives; see the module's formulas.
+    """Traction ``t (..., 3)`` of points [Pa] and, if wanted, its derivatives; see the module's formulas.
 
-    Parameters
-    ----------
-    normal, d : (..., 3) arrays
-        Unit normals, and tractions that would stick [Pa].
-    mu : float
-    pressure : (...) array
-        Nominal pressures, none negative [Pa].
-    before : (..., 3) array, optional
-        Tractions of the iterate before [Pa]; slip is judged, and directed, by these and a ``share`` of the change to
-        ``d``.
-
-    Returns
-    -------
-    t : (..., 3) array
-        Traction [Pa].
-    by_d, by_normal : (..., 3, 3) arrays
-        Its derivatives [-], [Pa].
-    by_pressure : (..., 3) array
-        [-]
+    ``normal, d (..., 3)``: unit normals, and tractions that would stick [Pa]; ``pressure (...)``: nominal pressures,
+    none negative [Pa]; ``before (..., 3)``: tractions of the iterate before [Pa], by which slip is judged and directed
+    with a ``share`` of the change to ``d``. Derivatives are by ``d`` [-] and by the normal [Pa] ``(..., 3, 3)``, and by
+    the pressure ``(..., 3)`` [-].
     """
     most = mu * pressure
     judged = d if before is None else before + share * (d - before)
@@ -106,14 +91,9 @@ def stick_or_slip(
 class Anchor(NamedTuple):
     """Last accepted state of one finger's points, in the frame of what it touches.
 
-    Attributes
-    ----------
-    at, traction : (n, 3) arrays
-        Places of the points, on a wall less its displacement where they faced it [m], and tractions [Pa].
-    closed : (n,) array of bool
-        Whether the point pressed.
-    nodes, N : (n, 4) arrays
-        Nodes of the wall's elements that they faced and shape functions there; a rigid object has none.
+    ``at, traction (n, 3)``: places of the points, on a wall less its displacement where they faced it [m], and
+    tractions [Pa]; ``closed (n,)``: whether the point pressed; ``nodes, N (n, 4)``: nodes of the wall's elements that
+    they faced and shape functions there; a rigid object has none.
     """
 
     at: FloatArray
@@ -129,16 +109,9 @@ class Friction:
     A point that slips to and fro beyond its place would make Newton's method alternate for ever, with the same nodes in
     contact and the same points slipping. So steps that take most of the last one back are shortened.
 
-    Attributes
-    ----------
-    mu, stick : float
-        Friction coefficient; stiffness of stick in units of E / thickness.
-    anchors : tuple of Anchor
-        Last accepted state of each finger. It is replaced, never changed, so that whoever keeps it can put it back.
-    moved : index
-        The unknowns that are displacements.
-    before : (n, 3) array
-        Tractions with which the last step was made [Pa].
+    ``mu``: friction coefficient; ``stick``: stiffness of stick in units of E / thickness; ``anchors``: last accepted
+    state of each finger, replaced and never changed, so that whoever keeps it can put it back; ``moved``: index of the
+    unknowns that are displacements; ``before (n, 3)``: tractions with which the last step was made [Pa].
     """
 
     anchors: tuple[Anchor, ...]

@@ -68,10 +68,7 @@ class Work:
 
 
 class _Place(NamedTuple):
-    """A state on the path: unknowns, force [N], largest strain, stability, and the tangent.
-
-    That is the change of the unknowns per force [m/N], None where it is not known.
-    """
+    """A state on the path: unknowns, force [N], largest strain, stability, and the tangent [m/N], None if unknown."""
 
     x: FloatArray
     force: float
@@ -84,20 +81,11 @@ class _Place(NamedTuple):
 class Stepping:
     """Steps of one problem.
 
-    Parameters
-    ----------
-    problem : ContactProblem
-    solver : NonlinearSolver
-    most : int, optional
-        Newton iterations of one step after which a shorter one is tried; else the solver's own limit.
-    watch : callable
-        Called with every new state and its force [N]; what it raises ends the load path.
-    near : callable
-        Whether the iterate that a failed solve ended at keeps the laws of contact to ``slack`` and may pass.
-    deepest : float
-        Closing displacement at which the backing plate would be in a rigid object [m].
-    followed : RigidProblem, optional
-        The problem once more where its path of equilibria is followed.
+    ``most``: Newton iterations of one step after which a shorter one is tried; else the solver's own limit. ``watch``:
+    called with every new state and its force [N]; what it raises ends the load path. ``near``: whether the iterate that
+    a failed solve ended at keeps the laws of contact to ``slack`` and may pass. ``deepest``: closing displacement at
+    which the backing plate would be in a rigid object [m]. ``followed``: the problem once more where its path of
+    equilibria is followed.
     """
 
     problem: ContactProblem

@@ -34,24 +34,12 @@ def press_measured(
 ) -> tuple[Pressed, bool]:
     """State of a pad pressed into the shape of its measured face, and whether contact is distinguished from noise.
 
+    The state is in the frame at first touch, from which the backing plate has moved on by the closing displacement.
+    ``face``: measured from where the undeformed face would be; ``pad``: whole, on a rigid backing plate;
+    ``fallbacks, options``: as in `fem.contact.press.Press`.
+
     Raises `NoContactError`: if the face is not pressed in anywhere; `ConvergenceError`, `CheckError`: if there is no
     acceptable state.
-
-    Parameters
-    ----------
-    face : MeasuredFace
-        Measured from where the undeformed face would be.
-    pad : Pad
-        Whole, on a rigid backing plate.
-    fallbacks : sequence of Pad
-        With other gaps, as in `fem.contact.press.Press`.
-    options : dict
-        PETSc options with the prefix ``contact_``.
-
-    Returns
-    -------
-    state, judged
-        In the frame at first touch, from which the backing plate has moved on by the closing displacement.
     """
     depth = _depth(face, pad)
     if not depth > 1e-6 * pad.shape.size[2]:

@@ -112,15 +112,9 @@ class _PathState(NamedTuple, Generic[ProblemT]):
 class LoadPath(ABC, Generic[ProblemT]):
     """Pads on one object along a load path.
 
-    Parameters
-    ----------
-    problems : sequence of callables
-        They make the problem, and the same one with other gaps, the best first, for forces at which it has no solution.
-        All number their unknowns alike.
-    options : dict
-        PETSc options with the prefix ``contact_``.
-    stride : int
-        With friction the path leads through every ``stride``-th of its forces; 2 tells what its steps leave.
+    ``problems``: make the problem, and the same one with other gaps, the best first, for forces at which it has no
+    solution; all number their unknowns alike. ``options``: PETSc options with the prefix ``contact_``. ``stride``: with
+    friction the path leads through every ``stride``-th of its forces; 2 tells what its steps leave.
     """
 
     MOST_ITERATIONS: int  # of Newton's method for one force

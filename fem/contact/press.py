@@ -27,21 +27,12 @@ LONGEST_CLOSING, SHORTEST_CLOSING = 0.05, 1 / 64  # step to a given closing, of 
 
 
 class Press(LoadPath[RigidProblem]):
-    """One pad against one object; ``gap`` takes points of the pad's frame, the pad at first touch.
+    """One pad against one object.
 
-    Parameters
-    ----------
-    pad : Pad
-    gap : callable
-        ``(n, 3)`` points to signed distance, gradient and Hessian.
-    options : dict
-        PETSc options with the prefix ``contact_``.
-    fallbacks : sequence of Pad
-        The same pad with other gaps, the best first, for forces at which ``pad`` has no solution.
-    mu : float, optional
-        Friction coefficient; without it no friction acts back on the pressures.
-    stride : int
-        As in `fem.contact.path.LoadPath`.
+    ``gap``: points ``(n, 3)`` of the pad's frame at first touch to signed distance, gradient and Hessian.
+    ``fallbacks``: the same pad with other gaps, the best first, for forces at which ``pad`` has no solution. ``mu``:
+    friction coefficient; without it no friction acts back on the pressures. ``options, stride``: as in
+    `fem.contact.path.LoadPath`.
     """
 
     # half of them where other gaps can take over, all for the next; usual: 4 to 15

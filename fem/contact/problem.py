@@ -61,17 +61,10 @@ class Control:
 class ContactPoints(NamedTuple):
     """Quadrature points of the meshed contact face in the pad's frame.
 
-    Parameters
-    ----------
-    position, normal : (faces, points, 3) arrays
-        Deformed points [m] and the object's outward unit normals there.
-    depth : float
-        How far the deepest Gauss point of the contact face is inside the object [m]; the solve keeps nodes outside,
-        each by itself or with the weighted mean round it, not every point.
-    load : (faces, points) array
-        Normal force [N].
-    friction : (faces, points, 3) array, optional
-        Tangential force on the pad [N]; None without friction.
+    ``position, normal (faces, points, 3)``: deformed points [m] and the object's outward unit normals there; ``depth``:
+    how far the deepest Gauss point is inside the object [m]; the solve keeps nodes outside, each by itself or with the
+    weighted mean round it, not every point; ``load (faces, points)``: normal force [N];
+    ``friction (faces, points, 3)``: tangential force on the pad [N], None without friction.
     """
 
     position: FloatArray

@@ -138,10 +138,7 @@ class RigidProblem(ContactProblem):
         return (NN @ weighted).reshape(m, k, k, *values.shape[1:])
 
     def _slip(self, x: FloatArray, c: Evaluated) -> tuple[FloatArray, FloatArray]:
-        """Derivatives of friction's traction by the point's place and by its pressure.
-
-        It grows with the pressure, and no pressure with it, so the tangent is not symmetric.
-        """
+        """Derivatives of friction's traction by place and pressure of the point; the tangent is not symmetric."""
         assert self.friction is not None
         assert c.traction is not None
         before, share = self.friction.judging(x) if self.stepped else (None, 1.0)

@@ -93,10 +93,7 @@ def _seen(which, normals, sides, directions, spacing, rotation, origin, lower, u
 
 
 class FacingSheet(NamedTuple):
-    """What a finger sees of a mesh: small triangles of the surface that is seen, and the whole ``mesh``.
-
-    ``directions (k, 3)`` are lines of sight, away from the finger.
-    """
+    """What a finger sees of a ``mesh`` along ``directions (k, 3)``, away from it: small triangles of its surface."""
 
     sheet: TriangleTree
     mesh: TriangleTree

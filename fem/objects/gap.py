@@ -1,7 +1,4 @@
-"""Objects as gap functions: where a pad stands, what every object offers it, and where a pad meets one first.
-
-Also the small pieces that the analytic objects share.
-"""
+"""Objects as gap functions: where a pad stands, what every object offers it, and where a pad meets one first."""
 
 from collections.abc import Callable
 from functools import partial
@@ -84,10 +81,7 @@ class Analytic(GapFunction):
 
 
 def radial(d: FloatArray) -> Gap:
-    """Length of the rows of ``d (n, k)``, its gradient and Hessian; a fixed direction at the centre itself.
-
-    The Hessian grows as 1/length; below 1e-9 m it is held, so that nothing becomes infinite.
-    """
+    """Length of the rows of ``d (n, k)``, its gradient and its Hessian, which is held within 1e-9 m of the centre."""
     r = np.linalg.norm(d, axis=1)
     e = d / np.where(r > 0, r, 1.0)[:, None]
     e[r == 0, 0] = 1.0
@@ -130,19 +124,11 @@ def first_touch(obj: GapFunction, pose: Pose, points: FloatArray, reach: float) 
     Sphere tracing: a point may move by its signed distance without crossing the surface. All points are traced at once
     and those that are already further than the first hit are given up; each hit is then located by bisection.
 
+    ``obj``: its gap must be a signed distance; ``pose``: the pad's frame before the approach; ``points (n, 3)``: of the
+    contact face in that frame [m]; ``reach``: distance to give up at [m].
+
     Raises `NoContactError`: if no point meets the object within ``reach``, or only grazes it, or the pad starts inside
     the object.
-
-    Parameters
-    ----------
-    obj : GapFunction
-        Object; its gap must be a signed distance.
-    pose : Pose
-        The pad's frame before the approach.
-    points : (n, 3) array
-        Points of the pad's contact face in the pad's frame [m].
-    reach : float
-        Distance to give up at [m].
     """
     reach += GRAZE  # what is met just at the end of the reach is met
     start, approach = pose.to_object(points), pose.rotation[:, 2]

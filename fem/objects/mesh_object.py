@@ -122,8 +122,7 @@ class MeshObject:
     def near(self, pose: Pose, lower: FloatArray, upper: FloatArray, element: float | None = None) -> MeshRegion:
         """Smooth signed distance inside the box from ``lower (3,)`` to ``upper (3,)`` of the pad's frame [m].
 
-        ``element`` is the size of the pad's elements [m]. Depends on the arguments alone, so every rank gets the same
-        region.
+        ``element`` is the size of the pad's elements [m]. Every rank gets the same region.
         """
         box = np.array([lower, upper], dtype=float)
         size = box[1] - box[0]
@@ -162,10 +161,7 @@ class MeshObject:
         return decimated(self.points, self.triangles, 10_000)
 
     def sharp_facets(self, width: float) -> str:
-        """What there is to say of wide facets that stay sharp though they may be meant as round; mostly nothing.
-
-        ``width`` is that of a facet that a pad feels [m].
-        """
+        """A note on facets wider than ``width`` [m] that stay sharp though they may be meant as round; mostly empty."""
         smooth = self._smooth
         edges, off = smooth.doubtful(width)
         if len(edges) < 4:  # a round surface has more edges of one kind than a scan has by chance

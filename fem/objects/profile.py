@@ -216,10 +216,7 @@ def with_lids(given: Curve, rim: float, heights: Sequence[float | None] = ()) ->
 
 
 def _without_rims(curve: Curve, rim: float) -> tuple[Curve, list[float | None]]:
-    """An outline without what the rims at its ends take, and the heights of its ends.
-
-    None for an end on the axis, and for one that runs outwards, as a flange does: its rim goes round it.
-    """
+    """An outline without its rims, and the heights of its ends: None on the axis, and for one that runs outwards."""
     cuts = [0.0, float(curve.breaks[-1])]
     heights: list[float | None] = [None, None]
     for k, outwards in enumerate((-1.0, 1.0)):
@@ -265,10 +262,7 @@ def _end(points: FloatArray, at: int, side: int, runs: list[tuple[int, int, bool
 def _corner(
     points: FloatArray, before: tuple[int, int, bool], after: tuple[int, int, bool], rim: float
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray] | None:
-    """Rounding of the corner between two straight runs: points, arc length, direction before and after.
-
-    None where the runs have one direction up to rounding, as the two parts of a long line of rounded points may.
-    """
+    """Rounding between two straight runs: points, arc length, directions before and after; None if they are one."""
     p, q, r = points[before[0]], points[before[1]], points[after[1]]
     a, b = np.linalg.norm(q - p), np.linalg.norm(r - q)
     t, u = (q - p) / a, (r - q) / b

@@ -24,19 +24,13 @@ def closest() -> Any:
 class Revolution(Analytic):
     """Body that a profile sweeps round the z axis.
 
-    Raises `ValueError`: for points that make no body, with the number of the point.
+    ``profile (k, 2)``: heights z and radii r [m] in order along the outside; r > 0, r = 0 allowed at the two ends.
+    Three or more points on a line give exactly this line, the others a smooth curve (see ``fem.objects.profile``).
+    ``rim``: radius of the rounding at corners between straight runs and where an open end meets its flat cap [m];
+    smaller where the body is thin. ``beyond``: whether the rim of an open end's cap lies beyond the last point, as that
+    of a wall does, which reaches up to there; else the cap lies at its height.
 
-    Parameters
-    ----------
-    profile : (k, 2) array
-        Heights z and radii r [m] in order along the outside; r > 0, r = 0 allowed at the two ends. Three or more points
-        on a line give exactly this line, the others a smooth curve (see ``fem.objects.profile``).
-    rim : float
-        Radius of the rounding at corners between straight runs and where an open end meets its flat cap [m]; smaller
-        where the body is thin.
-    beyond : bool
-        Whether the rim of an open end's flat cap lies beyond the last point, as that of a wall does, which reaches up
-        to there. Else the cap lies at its height.
+    Raises `ValueError`: for points that make no body, with the number of the point.
     """
 
     profile: FloatArray

@@ -160,10 +160,7 @@ def smooth_triangles(points: FloatArray, triangles: IntArray, crease_angle: floa
 def _measures(
     points: FloatArray, area: FloatArray, edges: IntArray, edge_of: IntArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Lengths of edges, and what the narrower triangle at each measures across it, ``(e,)`` each [m].
-
-    ``area (m, 3)``: `area_vectors` of the triangles [m^2].
-    """
+    """Length of each edge ``(e,)`` and what the narrower triangle measures across it [m]; ``area``: `area_vectors`."""
     twice = np.linalg.norm(area, axis=1)
     length = np.linalg.norm(np.diff(points[edges], axis=1)[:, 0], axis=1)
     narrower = np.full(len(edges), np.inf)

@@ -65,8 +65,7 @@ class Foam:
     def strains(self, x: FloatArray, directions: FloatArray) -> tuple[float, float, float]:
         """Smallest ``det F``, largest ``|principal stretch - 1|`` and smallest eigenvalue of the acoustic tensor.
 
-        The acoustic tensor, see ``fem.materials.strains``, is formed for unit ``directions (k, 3)`` and divided by the
-        shear modulus.
+        As `fem.materials.strains` for unit ``directions (k, 3)``; the eigenvalue is divided by the shear modulus.
         """
         law = self.pad.material
         det, strain, lowest = strains(law.number, law.parameters, self._displacements(x), self.pad.dN, directions)

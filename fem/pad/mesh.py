@@ -1,10 +1,9 @@
 """The pad: a foam block bonded to a rigid backing plate, meshed with hexahedra through scikit-fem.
 
-The mesh covers the whole pad, or the half or quarter that symmetry leaves.  Unknowns are numbered
+The mesh covers the whole pad, or the half or quarter that symmetry leaves. Unknowns are numbered
 ``[free displacements | closing of the backing plate | nodal pressures]``: the nodes of the bonded back share one
 unknown, the closing, so that the force on the plate is the residual of that unknown. On an elastic plate only the nodes
-that the
-finger holds do; the others are free, and the backing plate connects them to the closing displacement.
+that the finger holds do; the others are free, and the backing plate connects them to the closing displacement.
 """
 
 import math

@@ -53,16 +53,10 @@ class PadShape(NamedTuple):
 
 
 class BackingPlate(NamedTuple):
-    """Plate behind a pad.
+    """Plate behind a pad; lengths in m, the modulus in Pa.
 
-    Parameters
-    ----------
-    thickness, young_modulus : float
-        [m], [Pa].
-    poisson_ratio : float
-    support : (float, float)
-        Length and width of the patch in the middle that the finger holds [m]; 0 for a line. What reaches beyond the
-        plate holds nothing: a plate that is no larger than the patch is rigid.
+    ``support``: length and width of the patch in the middle that the finger holds; 0 for a line. What reaches beyond
+    the plate holds nothing: a plate that is no larger than the patch is rigid.
     """
 
     thickness: float

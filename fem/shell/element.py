@@ -182,24 +182,10 @@ def _side_mixing() -> FloatArray:
 class Shell(Generic[MeshT]):
     """Thin-walled object.
 
-    Parameters
-    ----------
-    mesh : ShellMesh
-    young_modulus, poisson_ratio : float
-        [Pa], [-].
-    springs : tuple, optional
-        Nodes ``(m,)`` and the stiffness to ground of their displacements ``(3 m, 3 m)`` [N/m].
-
-    Attributes
-    ----------
-    loops : tuple
-        Leading arguments of the compiled loops, see `elements`.
-    size : int
-        ``6 k``.
-    start, column : (6 k + 1,), (nnz,) arrays
-        Compressed-row pattern of the tangent, columns ascending.
-    node_area : (k,) array
-        Reference area that belongs to each node [m^2].
+    ``springs``: nodes ``(m,)`` and the stiffness to ground of their displacements ``(3 m, 3 m)`` [N/m]. ``loops``:
+    leading arguments of the compiled loops, see `elements`; ``size``: ``6 k``; ``start (6 k + 1,), column (nnz,)``:
+    compressed rows of the tangent, columns ascending; ``node_area (k,)``: reference area that belongs to each
+    node [m^2].
     """
 
     def __init__(
@@ -248,14 +234,10 @@ class Shell(Generic[MeshT]):
     def tangent(self, q: FloatArray, before: FloatArray | None = None) -> FloatArray:
         """Values ``(nnz,)`` of the tangent [N/m] in ``q (6 k,)``, at ``start`` and ``column``.
 
-        Parameters
-        ----------
-        q : (6 k,) array
-        before : (6 k,) array, optional
-            State at the previous tangent of the same Newton solve. With it the tangent is that of mixed integration
-            points (Magisano, Leonetti, Garcea, Int. J. Num. Meth. Eng. 109, 2017): its geometric part uses the stresses
-            that the last linear step predicted. The residual, and so the solution, is untouched; thin shells get
-            there in far fewer iterations. Leave it out in the first iteration, also after every cut step.
+        ``before (6 k,)``: state at the previous tangent of the same Newton solve. With it the tangent is that of mixed
+        integration points (Magisano, Leonetti, Garcea, Int. J. Num. Meth. Eng. 109, 2017): its geometric part uses the
+        stresses that the last linear step predicted. The residual, and so the solution, is untouched; thin shells get
+        there in far fewer iterations. Leave it out in the first iteration, also after every cut step.
         """
         values = np.zeros(self.start[-1])
         # assigned, not added: the kernel adds the elements to it

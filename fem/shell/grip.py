@@ -61,10 +61,7 @@ class WallState(NamedTuple):
 
 
 class Grip(LoadPath[WallProblem]):
-    """Pads on a thin-walled object.
-
-    ``problems`` make it with weighted gaps, and with nodal ones, for forces at which the former have no solution.
-    """
+    """Pads on a thin-walled object: ``problems`` with weighted gaps, and with nodal ones if those have no solution."""
 
     MOST_ITERATIONS = 200  # with weighted and with nodal gaps each; usual ones take 6
 

@@ -58,10 +58,7 @@ class Opening:
         return x[self._near] - (-x[self._near] if self._across is None else x[self._across])
 
     def watch(self, q: FloatArray, force: float) -> None:
-        """Note the state at a force [N] of the fingers.
-
-        Raises `CheckError`: if the walls have met at a lower force.
-        """
+        """Note the state at a force [N] of the fingers; `CheckError` if the walls have met at a lower force."""
         opening = self(q)
         if opening > 0.0:
             self.last = opening, force
@@ -77,10 +74,8 @@ def creep(
 ) -> Iterator[tuple[FloatArray, float]]:
     """States that the wall creeps through from ``x`` at the normal force [N], and the largest velocity of a node.
 
-    There is no end: the caller stops.
-
-    Raises `ConvergenceError`: when a step of `SHORTEST_STEP` does not serve; `SpentError`: when the solver has no
-    iterations left.
+    There is no end: the caller stops. Raises `ConvergenceError`: when a step of `SHORTEST_STEP` does not serve;
+    `SpentError`: when the solver has no iterations left.
     """
     wall, time = slice(problem.model.size), FIRST_STEP
     resistance = _resistance(problem)

@@ -105,10 +105,7 @@ class Grasp(NamedTuple):
 
 
 def grasp(body: ThinWalled, poses: tuple[Pose, Pose], allowed: tuple[bool, bool] = (True, True)) -> Grasp:
-    """Grasp frame of two poses at first touch and the planes of symmetry that object and poses share.
-
-    ``allowed`` leaves out planes that the meshes cannot use.
-    """
+    """Grasp frame of two poses at first touch, and the ``allowed`` planes of symmetry that object and poses share."""
     approach = poses[0].rotation[:, 2]
     # an approach along the axis has no angle about it, and any will do
     angle = float(np.arctan2(-approach[1], -approach[0])) if np.hypot(*approach[:2]) > 1e-6 else 0.0

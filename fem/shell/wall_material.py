@@ -10,11 +10,7 @@ from typing import NamedTuple
 
 
 class WallMaterial(NamedTuple):
-    """Isotropic elastic wall.
-
-    ``young_modulus, poisson_ratio`` [Pa], [-]; ``yield_strength``: stress at which the wall would keep an indentation
-    [Pa]; None where it is not known.
-    """
+    """Isotropic elastic wall; above the ``yield_strength`` [Pa] an indentation stays, None where it is not known."""
 
     young_modulus: float
     poisson_ratio: float

@@ -26,16 +26,8 @@ MOST_BENT = 0.8  # thickness over the radius of curvature at the edge of a lid
 class MeshSize(NamedTuple):
     """How fine a wall's mesh is; the gripped regions lie at the angles 0 and pi about the axis.
 
-    Parameters
-    ----------
-    around, along : float
-        Element sizes in the gripped regions [m].
-    coarse : float
-        Largest element size elsewhere [m].
-    heights : (float, float)
-        Range of z that pads touch [m].
-    half_width : float
-        Half the width of a gripped region round the body [m].
+    ``around, along``: element sizes in the gripped regions [m]; ``coarse``: largest element size elsewhere [m];
+    ``heights``: range of z that pads touch [m]; ``half_width``: half the width of a gripped region round the body [m].
     """
 
     around: float = 0.0015

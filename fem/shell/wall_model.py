@@ -48,10 +48,7 @@ class LinearShell:
         return q
 
     def compliance(self, nodes: IntArray) -> FloatArray:
-        """Displacement of the outer face's nodes ``(n,)`` by forces on them: symmetric, ``(3 n, 3 n)`` [m/N].
-
-        Rows and columns are node by node.
-        """
+        """Compliance ``(3 n, 3 n)`` of the outer face's nodes ``(n,)`` to forces on them, node by node [m/N]."""
         u = (6 * np.asarray(nodes, dtype=np.int64)[:, None] + np.arange(3)).ravel()
         C = np.empty((len(u), len(u)))
         # the whole load matrix of a fine wall would not fit into memory

@@ -35,11 +35,7 @@ BEYOND = 2e-3  # by which the wall is continued for points that slide across a r
 
 
 class WallProblem(ContactProblem):
-    """One or two pads on a deformable wall, whose unknowns come first.
-
-    One pad where a plane of symmetry lies between the fingers, else two, as of `fem.contact.problem.Finger`; without
-    ``mu`` no friction acts back on the pressures.
-    """
+    """One pad (where a plane of symmetry lies between the fingers) or two on a wall, whose unknowns come first."""
 
     longest_closing = 1e-3
 
