@@ -33,30 +33,13 @@ def solve_scene(
     retry_failed: bool = False,
     last: Callable[[Any], str] = summary,
 ) -> int:
-    """Solve a scene into its file, or what is missing there; collective over ``comm``.
+    """Solve a scene into its result file ``path``, or what is missing there; collective over ``comm``.
 
-    Parameters
-    ----------
-    scene : Scene
-    path : Path
-        Result file.
-    comm : mpi4py communicator
-    scene_file, overrides : str, sequence of str
-        Where the scene comes from, and what was changed by ``--set``; kept in the file.
-    retry_failed : bool
-        Whether cases that failed before are tried again.
-    last : callable
-        ``last(result)`` gives the text that is printed at the end.
+    ``scene_file, overrides``: where the scene comes from, and what ``--set`` changed; kept in the file.
+    ``retry_failed``: whether cases that failed before are tried again. ``last(result)`` gives the text that is printed
+    at the end. Returns the exit code, of `study.messages.MEANING`, the same on every rank.
 
-    Returns
-    -------
-    int
-        Exit code, the same on every rank; `study.messages.MEANING` says what it means.
-
-    Raises
-    ------
-    StudyError
-        On every rank: nothing was started, or the file is in use or cannot be written.
+    Raises `StudyError` on every rank: nothing was started, or the file is in use or cannot be written.
     """
     scene = on_rank0(comm, with_sampled_grasps, scene)
     plan = on_rank0(comm, prepare, scene, scene_file, overrides)

@@ -118,10 +118,7 @@ def complain(error: StudyError, speaks: bool | None = None) -> int:
 
 
 def with_ending(option: str, file: str | Path, *endings: str) -> Path:
-    """The path of a file that an option names.
-
-    Raises `StudyError`: it ends otherwise.
-    """
+    """The path of a file that an option names; `StudyError` if it has another ending."""
     if Path(file).suffix.lower() not in endings:
         raise StudyError(USAGE, f"{option}: found '{file}', expected a file ending in {' or '.join(endings)}")
     return Path(file)
@@ -140,9 +137,7 @@ def fault_of(place: str, *kinds: type[Exception], code: int = USAGE, ending: str
 def beside(path: Path, folders: bool = False, part: Path | None = None) -> Iterator[Path]:
     """A place to write to, renamed to ``path`` when it is on disk; with ``folders`` those that are missing are made.
 
-    ``part`` names it. Devices and pipes are written to as they are.
-
-    Raises `StudyError` if the file cannot be written, with exit code 5.
+    ``part`` names it. Devices and pipes are written to as they are. `StudyError` if the file cannot be written.
     """
     special = path.exists() and not path.is_file() and not path.is_dir()
     part = path if special else part or path.with_name(f"{path.stem}.{os.getpid()}.part{path.suffix}")

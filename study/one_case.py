@@ -67,10 +67,7 @@ class Case(GraspNumbers):
     def value(self, name: str, model: str = "ccm") -> float:
         """A quantity of the grasp in SI units, of one friction model where it has several.
 
-        Raises
-        ------
-        KeyError
-            For a name that the case does not have.
+        Raises `KeyError`: for a name that the case does not have.
         """
         values = np.asarray(self._read(f"maps/{name}"))
         return float(values[MODELS.index(checked_model(model))] if values.ndim else values)
@@ -266,12 +263,7 @@ def _with_candidates(scene: Scene, table: dict[str, Any]) -> Scene:
 def grasp_pose(pose: Any) -> Mapping[str, Any]:
     """A pose as a scene's ``[[candidates.poses]]`` has it: from a matrix ``(4, 4)``, or both pads' poses.
 
-    Raises
-    ------
-    ValueError
-        The matrix is none of a motion.
-    TypeError
-        It is neither.
+    Raises `ValueError`: the matrix is none of a motion; `TypeError`: it is neither.
     """
     if isinstance(pose, tuple) and [np.shape(part) for part in pose] == [(2, 3, 3), (2, 3)]:
         # as `GraspPoint.pose` gives them: finger 1's is enough, for the other one comes from the opposite side

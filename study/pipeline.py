@@ -164,10 +164,7 @@ def _outcomes(choice: EffectChoice, wanted: Collection[int]) -> Iterator[tuple[i
 
 
 def image(result: CaseResult, unit: Any, c: int) -> CaseResult:
-    """The result of the ``c``-th candidate that a unit serves, in the frame of the object's own file.
-
-    It is the same grasp, turned about the object's axis.
-    """
+    """The result of a unit's ``c``-th candidate: the same grasp turned about the object's axis, in the file's frame."""
     placed = own_frame(unit.scene.object)
     rotation = placed.rotation @ about_z(unit.turns[c])
     values = dict(result.values)

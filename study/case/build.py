@@ -30,10 +30,7 @@ def geometry() -> Any:
 
 @lru_cache(maxsize=8)
 def build_object(shape: Any) -> GapObject:
-    """Object of a scene's section ``[object]``.
-
-    Raises `ValueError` for geometry that cannot be, a mesh that is open or crosses itself among others.
-    """
+    """Object of a scene's section ``[object]``; `ValueError` for geometry that cannot be, as a mesh that is open."""
     match shape.shape:
         case "mesh":
             return geometry().mesh_object(shape)
@@ -84,10 +81,7 @@ def centroid_and_bounds(shape: Any) -> dict[str, NDArray[np.float64]]:
 
 
 def volume(shape: Any) -> float:
-    """Volume of the body that an object's surface encloses [m^3]: a sphere's exactly, others' within 1 %.
-
-    Raises `ValueError`: the surface does not enclose one.
-    """
+    """Volume that an object's surface encloses [m^3]: a sphere's exactly, others' within 1 %; `ValueError` if none."""
     if shape.shape == "sphere":
         return 4.0 / 3.0 * math.pi * float(shape.radius) ** 3
     if shape.shape == "plane":
@@ -122,10 +116,7 @@ def centre_of_mass(scene: Scene) -> NDArray[np.float64]:
 
 @lru_cache(maxsize=8)
 def outer_surface(shape: Any) -> OuterSurface:
-    """Outer surface of an object that can have a wall.
-
-    Raises `ValueError` for geometry that cannot be.
-    """
+    """Outer surface of an object that can have a wall; `ValueError` for geometry that cannot be."""
     if shape.shape == "revolution":
         body = build_object(shape)
         assert isinstance(body, objects.Revolution)
@@ -148,12 +139,10 @@ def shapes_of(scene: Scene) -> list[Any]:
 
 
 def check_object(scene: Scene) -> None:
-    """Refuse geometry that cannot be, and stations beside a mesh, before any work starts.
+    """Refuse geometry that cannot be, and stations beside a mesh, before any work starts; `StudyError` names the key.
 
     Outlines and meshes are built to be judged, at the price of importing numpy, scipy and numba; of the other shapes
     the scene itself has checked every number, and whatever passes there can be built.
-
-    Raises `StudyError` with the key and what is wrong with it.
     """
     for inputs in scene.realisations[1:]:
         scene.at(inputs)  # samples that are no scene together
@@ -172,10 +161,7 @@ def check_object(scene: Scene) -> None:
 
 
 def middle_of(scene: Scene) -> Any:
-    """The `CentreLine` that the scene's stations follow; None where they follow the axis z.
-
-    Raises `StudyError` for a mesh without sections across its axis.
-    """
+    """The `CentreLine` that stations follow, None for the axis z; `StudyError` for a mesh without sections across."""
     shape = scene.object
     if shape.shape != "mesh" or not scene.candidates.station_values_mm:
         return None

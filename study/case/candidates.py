@@ -112,8 +112,7 @@ def check_candidates(scene: Scene) -> None:
 def turn_between(first: Candidate, second: Candidate, axis_symmetry: int) -> float | None:
     """Angle about z that turns both pads of one candidate into those of another, if the object looks the same then.
 
-    ``axis_symmetry``: order of the object's rotational symmetry about z; 0 is every angle. Returns angle in [0, 2 pi)
-    [rad].
+    In [0, 2 pi) [rad]. ``axis_symmetry``: order of the object's rotational symmetry about z; 0 is every angle.
     """
     angle, other = (turn_of_pose(*pair, axis_symmetry) for pair in zip(first.poses, second.poses, strict=True))
     if angle is None or other is None or abs(math.remainder(angle - other, 2 * math.pi)) > NEGLIGIBLE:

@@ -32,23 +32,14 @@ ANTIPODAL = np.radians(5.0)  # beyond this misalignment a flag says so
 class Contact:
     """A contact patch and what friction can carry there: contact frame, friction limits and ellipsoid per model.
 
-    Raises `NoContactError`, `ValueError`: for a patch without load or direction, and an ``x_hint`` along its normal.
-
-    Parameters
-    ----------
-    patch : ContactPatch
-        Faces in any frame.
-    mu : float
-        Coulomb friction coefficient [-].
-    pose : Pose, optional
-        Of the patch's frame in the object's; by default they are the same.
-    x_hint : (3,) array
-        Direction that becomes x of the contact frame.
-    whole_face : bool
-        As in `friction.frame.contact_frame`.
+    ``patch``: faces in any frame; ``mu``: Coulomb friction coefficient [-]; ``pose``: of the patch's frame in the
+    object's, by default they are the same; ``x_hint (3,)``: direction that becomes x of the contact frame;
+    ``whole_face``: as in `friction.frame.contact_frame`.
 
     ``local`` is the patch in the contact frame and ``rho`` its length [m]; ``unit_limits`` are the friction limits for
     mu = 1, ``ellipsoids`` go through the three motions of ``limits``.
+
+    Raises `NoContactError`, `ValueError`: for a patch without load or direction, and an ``x_hint`` along its normal.
     """
 
     def __init__(
@@ -111,10 +102,7 @@ class Contact:
         return np.concatenate([force.sum(axis=0), cross(arm, force).sum(axis=0)])
 
     def drive(self, pressure: FloatArray) -> FloatArray:
-        """Force with which the gripper presses, along the approach, in the object's frame ``(3,)`` [N].
-
-        ``pressure (6,)`` is the contact's `pressure_wrench`.
-        """
+        """Force ``(3,)`` of the gripper, along the approach in the object's frame, by the `pressure_wrench` [N]."""
         approach = self.pose.rotation[:, 2]
         return (pressure[:3] @ approach) * approach
 

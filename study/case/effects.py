@@ -224,8 +224,7 @@ class EffectChoice:
     def changes(self, name: str, step: Step, k: int) -> tuple[float, float, float]:
         """Relative changes of e_n, payload and quality by one step at the ``k``-th force on the coarse mesh.
 
-        NaN where they are not known. Of effects that all forces share they are those at the force where they are
-        largest.
+        NaN where they are not known. Of effects that all forces share: at the force where they are largest.
         """
         forces = [k] if name == COUPLING else range(self.count)
         # what is not known at some force may be the largest
@@ -282,10 +281,7 @@ class EffectChoice:
     # --- cases at the levels that were chosen -------------------------------------------------------------------------
 
     def case(self, k: int) -> Solved:
-        """A case, with friction that acts back where it was chosen and can be solved.
-
-        Raises `ConvergenceError, CheckError` if there is no acceptable state.
-        """
+        """A case, with friction that acts back where it was chosen and can be solved; raises as `CandidateSolver`."""
         level, note = self.level(COUPLING, k), ""
         solved: Solved | None = None
         if level.reason != FORCED and level.level == level_named(COUPLING, "tangential"):

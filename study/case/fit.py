@@ -34,8 +34,7 @@ class Jaws(NamedTuple):
 def extremes(points: FloatArray, triangles: IntArray, sides: tuple[float, float]) -> tuple[float, float]:
     """Lowest and highest z of triangles over a rectangle about the origin; infinite where there are none.
 
-    ``points, triangles`` (k, 3) array, (m, 3) int array: [m]. ``sides``: length and width of the rectangle, along x and
-    y [m].
+    ``points (k, 3)`` [m], ``triangles (m, 3)``; ``sides``: length and width of the rectangle, along x and y [m].
     """
     from softjaw.fem.objects.triangles import lowest_and_highest  # compiled: most scenes are checked without
 
@@ -48,10 +47,8 @@ def extremes(points: FloatArray, triangles: IntArray, sides: tuple[float, float]
 def fit_of(points: FloatArray, triangles: IntArray, jaws: Jaws, doubt: float = 0.0) -> tuple[int, str]:
     """Whether a gripper fits round triangles in its own frame: z along finger 1's approach, x along the long side.
 
-    `WIDE` or `COLLIDES` and why; `MISSING`, not computed, where it fits or that is open.
-
-    ``points, triangles`` (arrays): as for `extremes`. ``doubt``: what is nearer to a limit is undecided [m], and counts
-    as a fit.
+    `WIDE` or `COLLIDES` and why; `MISSING`, not computed, where it fits or is nearer to a limit than ``doubt`` [m].
+    ``points, triangles``: as for `extremes`.
     """
     low, high = extremes(points, triangles, jaws.pad[:2])
     opening = high - low

@@ -82,10 +82,7 @@ def material_of(shape: Walled) -> WallMaterial:
 
 
 def check_wall(shape: Any, surface: OuterSurface) -> None:
-    """Refuse a wall that is too thick for the curvature of outline or sections, and a base where nothing is flat.
-
-    Raises `StudyError` with the key and what is wrong with it.
-    """
+    """`StudyError` for a wall too thick for the curvature of outline or sections, or a base where nothing is flat."""
     # at its middle, as a wall that begins on the axis has no lines round it there
     size = MeshSize(heights=(0.5 * sum(surface.heights),) * 2, around=0.01, along=0.005, coarse=0.02)
     if shape.base_wall is not None and surface.flat[0] == 0.0:

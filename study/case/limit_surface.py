@@ -79,9 +79,8 @@ def fit_surfaces(
 ) -> dict[str, SurfaceFit]:
     """Fit limit surfaces to the wrenches of a contact in one friction model.
 
-    ``model``: friction model. ``kinds``: as a scene names them in ``limit_surface.model``. ``objective``:
-    ``least_squares`` or ``zhou``. ``samples``: motions that are fitted to; others, as many as `INDEPENDENT`, judge the
-    fits.
+    ``kinds``: as a scene names them in ``limit_surface.model``. ``objective``: ``least_squares`` or ``zhou``.
+    ``samples``: motions that are fitted to; `INDEPENDENT` others judge the fits.
     """
     rho, limits = contact.rho, contact.unit_limits[model]
     twist = fit_motions(samples) / [1.0, 1.0, rho]

@@ -300,12 +300,7 @@ def same_grasp(grasp: SampledGrasp, other: SampledGrasp, length: float) -> bool:
 
 @lru_cache(maxsize=8)
 def with_sampled_grasps(scene: Scene) -> Scene:
-    """The scene with the grasps that its sampler finds as explicit poses.
-
-    Poses are rounded to 1 um and 1e-6, so that they are the same on every machine.
-
-    Raises `NoGraspError` where no grasp fits between the pads.
-    """
+    """The scene with the grasps that its sampler finds as explicit poses; `NoGraspError` where none fits the pads."""
     given, obj = scene.candidates, build_object(scene.object)
     task, surface = task_of(scene), surface_triangles(scene.object)
     grasps = antipodal_grasps(

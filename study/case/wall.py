@@ -44,10 +44,8 @@ def estimated_indentation(
 ) -> tuple[float, float]:
     """Indentation of the linear wall at a force [N], where undeformed pads would overlap it [m], and ratio.
 
-    ``closing`` is that of the pads on the rigid object [m].
-
-    The second is the largest ratio of an inward displacement to the wall's thickness there. One right-hand side with
-    factors that all candidates share.
+    The second is the largest ratio of an inward displacement to the wall's thickness there. ``closing`` is that of the
+    pads on the rigid object [m]. One right-hand side with factors that all candidates share.
     """
     length, width, _ = scene.gripper.pad_size
     # A round object is the same at every angle, so all candidates share its factors.

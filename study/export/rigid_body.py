@@ -44,20 +44,14 @@ class RigidBody:
 
 
 def scene_of(ds: xr.Dataset, case: dict[str, Any]) -> Scene:
-    """The scene of a case (`study.export.cases`), with its values of what is swept.
-
-    Raises `StudyError`: the file's scene is none of this version.
-    """
+    """The scene of a case (`study.export.cases`) with its swept values; `StudyError` if this version cannot read it."""
     index = [int(np.flatnonzero(axis.values == case["place"][axis.name])[0]) for axis in axes_of(ds)[:-3]]
     with fault_of(ds.attrs["file"], SceneError, code=OTHER_FILE):
         return scene_at(ds, index)
 
 
 def body_of(ds: xr.Dataset, case: dict[str, Any]) -> RigidBody:
-    """The object of a case (`study.export.cases`).
-
-    Raises `StudyError`: the object cannot be built, as when its mesh is not there any more.
-    """
+    """The object of a case (`study.export.cases`); `StudyError` if it cannot be built, as when its mesh is gone."""
     scene = scene_of(ds, case)
     shape = scene.object
     with fault_of(f"{ds.attrs['file']}: its object cannot be built", ValueError, OSError, code=OTHER_FILE):

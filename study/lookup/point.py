@@ -89,8 +89,7 @@ class GraspPoint(GraspNumbers):
     def error(self, name: str, model: str = "ccm") -> Any:
         """Stated error of `value`, of the cases around and of the interpolation, in the quantity's unit.
 
-        NaN where there is no value, and for what no file states an error of.
-        See `study.lookup.GraspMap`.
+        NaN where there is no value, and for what no file states an error of. See `study.lookup.GraspMap`.
         """
         errors, values = (of(name, model, self.corners) for of in (self.map.errors, self.map.interpolated))
         # what meshes leave in a contact they leave in the quality of surfaces that are fitted to it, too

@@ -125,10 +125,7 @@ def read_patch(file: str | Path, **at: int | slice) -> xr.Dataset:
 
 
 def read_field(file: str | Path, path: str, **at: int | slice) -> xr.DataArray:
-    """One of the large datasets that `open` leaves out (``wall/place``), at positions.
-
-    ``at`` is as in `read_patch`; `KeyError` if the file has no such dataset.
-    """
+    """One of the large datasets that `open` leaves out (``wall/place``), as `read_patch`; `KeyError` if it has none."""
     import xarray as xr
 
     with open_result(file) as result:
@@ -180,10 +177,7 @@ def _fill_ranges(variables: dict[str, Any], status: NDArray[np.integer], scene: 
 
 
 def scene_of(ds: xr.Dataset, index: Sequence[int] = ()) -> Scene:
-    """The scene kept in a result file, with the values of a point of its sweep.
-
-    Raises `SceneError`: this version cannot read it, or its mesh has changed since.
-    """
+    """The scene in a result file at a point of its sweep; `SceneError` if unreadable, or if its mesh has changed."""
     text = ds.attrs["scene"]
     scene = _scene_at(text, sweep_point(ds, index))
     with suppress(OSError):  # a mesh that is not there now

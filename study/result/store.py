@@ -243,10 +243,7 @@ def value_text(axis: Any, i: int) -> str:
 
 @contextmanager
 def open_result(path: str | Path, unchecked: bool = False) -> Iterator[Result]:
-    """A result file for reading, also while a run is writing it; raise `StudyError` if it is none.
-
-    ``unchecked`` reads what is there, whether it matches its checksums or not.
-    """
+    """A result file for reading, also while written; ``unchecked`` skips checksums. `StudyError` if it is none."""
     path = Path(path)
     # whatever numbers it holds, no warning of numpy is worth printing
     with opened(path, "result file", lambda file: Result(path, file, unchecked)) as result, np.errstate(all="ignore"):

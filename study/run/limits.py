@@ -142,10 +142,8 @@ def limited_memory(setting: float | str, ranks: int) -> Iterator[None]:
     """Bound the address space of this process by what it has now plus its share of what is free.
 
     ``setting``: memory of a rank in GB, or its share of what is free now, or no bound; ``ranks``: processes that share
-    the memory of this machine.
-
-    ``RLIMIT_AS`` bounds addresses, of which libraries reserve more than they use; so what stands there before the
-    first case does not count.
+    the memory of this machine. ``RLIMIT_AS`` bounds addresses, of which libraries reserve more than they use; so what
+    stands there before the first case does not count.
     """
     soft, hard = resource.getrlimit(resource.RLIMIT_AS)
     if setting != "none":
@@ -162,10 +160,7 @@ def limited_memory(setting: float | str, ranks: int) -> Iterator[None]:
 
 
 def require_room() -> None:
-    """Refuse a limit of addresses that leaves no room for the program itself.
-
-    Raises `StudyError` with the limit, what is needed, and what to do.
-    """
+    """`StudyError` where the limit of addresses leaves no room for the program itself."""
     limit = resource.getrlimit(resource.RLIMIT_AS)[0]
     # With less than this some libraries hang instead of failing, so the run is refused before.
     if limit != resource.RLIM_INFINITY and limit < PROGRAM_BYTES:

@@ -35,9 +35,7 @@ def rows_again(units: Iterable[Any], codes: np.ndarray, torn: Iterable[int], ret
 def settle(writer: Any, units: Iterable[Any], torn: Iterable[int], retry_failed: bool) -> np.ndarray:
     """Decide by one process what is missing: torn rows again, failed ones on demand, no grasps and deadly ones never.
 
-    A case that an earlier run left out and this one tries is missing again.
-
-    Returns (rows,) array: state of every case as the run begins.
+    A case that an earlier run left out and this one tries is missing again. Returns states ``(rows,)`` of the cases.
     """
     units, codes, attempts = list(units), writer.codes(), writer.attempts()
     for row in rows_again(units, codes, torn, retry_failed):

@@ -100,10 +100,7 @@ class _ObjectsRun:
             self.rows[n]["state"] = index.MISSING
 
     def _torn(self) -> list[int]:
-        """Numbers of objects in whose files rows are torn, for which ranks look together.
-
-        Raises `StudyError` on every rank: files cannot be read.
-        """
+        """Numbers of objects in whose files rows are torn, by all ranks; `StudyError` if a file is unreadable."""
         torn, refused = list[int](), list[StudyError]()
         for n, row in [*enumerate(self.rows)][self._comm.rank :: self._comm.size]:
             path = self._out / row["file"]

@@ -1,7 +1,4 @@
-"""A run: prepare or resume the file, let all ranks solve what is missing, and write how it ended.
-
-The same on any number of ranks.
-"""
+"""A run, on any number of ranks: prepare or resume the file, solve what is missing, and write how it ended."""
 
 from __future__ import annotations
 
@@ -109,10 +106,7 @@ def run_study(plan: Plan, work: Work, path: Path, comm: Any, *, retry_failed: bo
 
 @contextlib.contextmanager
 def locked(path: Path, comm: Any) -> Iterator[None]:
-    """Have a file for the ranks of ``comm`` alone; collective.
-
-    Raises `StudyError` on every rank: the file is in use, or its folder cannot be written.
-    """
+    """Have a file for the ranks of ``comm`` alone, collective; `StudyError` on every rank if in use or not writable."""
     # Host and process: two runs on one file system must not have the same name.
     owner = f"host {os.uname().nodename}, process {os.getpid()}, {comm.size} rank{'s' * (comm.size > 1)}"
     lock, index = Lock(path, owner), path.with_name(f"{INDEX}.hdf")
@@ -234,8 +228,7 @@ class Session:
     def solve(self) -> int:
         """Solve, wait for all ranks, close the file; the exit code.
 
-        Raises `StudyError`: the file cannot be written any more; with several ranks all of them are ended at once
-        instead.
+        Raises `StudyError`: the file cannot be written any more; several ranks are all ended at once instead.
         """
         claims = Claims(self._comm, self._groups)
         try:

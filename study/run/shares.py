@@ -50,10 +50,7 @@ def makespan(costs: Sequence[float], ranks: int) -> float:
 
 
 def shares(units: Iterable[Any], codes: np.ndarray, ranks: int) -> list[Share]:
-    """What is missing of some units, in the order of work, cut so that so many ranks are busy to the end.
-
-    ``codes`` (rows,) array: state of every case.
-    """
+    """What is missing of some units by ``codes (rows,)``, in order of work, cut so that all ``ranks`` stay busy."""
     waiting = costliest_first(Share(unit, forces) for unit in units if (forces := _missing(unit, codes)))
     remaining, divided = sum(share.cost for share in waiting), list[Share]()
     for share in waiting:

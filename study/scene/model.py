@@ -396,10 +396,7 @@ def _matching_foam(gripper: Mapping[str, Any], values: Mapping[str, Any]) -> Map
 
 
 def plain_tables(tables: Mapping[str, Any]) -> dict[str, Any]:
-    """A copy of tables, or of values by dotted key, with lists and numbers instead of numpy's.
-
-    Raises `TypeError` for what is no mapping by text.
-    """
+    """A copy of tables with lists and numbers instead of numpy's; `TypeError` for what is no mapping by text."""
     if not isinstance(tables, Mapping) or not all(isinstance(key, str) for key in tables):
         raise TypeError(f"tables of a scene: found {shown(tables)}, expected a mapping of sections, {{'object': ...}}")
     return json.loads(json.dumps(dict(tables), default=lambda v: getattr(v, "tolist", v.__str__)()))
@@ -425,10 +422,7 @@ def load_scene(path: Path | str, overrides: Sequence[str] = (), check_files: boo
 def parse_scene(
     text: str, path: Path | str = "scene.toml", overrides: Sequence[str] = (), check_files: bool = True
 ) -> Scene:
-    """The scene of a text that stands in the file ``path``.
-
-    ``check_files = False`` leaves out whether a mesh exists, for a text kept in a result file.
-    """
+    """The scene of a text from the file ``path``; ``check_files = False`` for a stored one, whose mesh may be gone."""
     path = Path(path)
     return _scene(parse_toml(text, str(path)), text, path, overrides, check_files)
 

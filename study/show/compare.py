@@ -28,11 +28,8 @@ def compare(first: xr.Dataset, second: xr.Dataset, quantity: str = "e_n", model:
     """Every common case of one map of two result files (``a`` and ``b``), and counts for all maps as facts.
 
     A difference exceeds the errors if it is larger than the sum of both: half-widths of intervals, or else errors of
-    the mesh.
-
-    ``first, second`` (xarray.Dataset): as `study.result.read.open` gives them. ``quantity``: map to be listed case by
-    case. ``model``: friction model of all quantities. Raises `StudyError`: different kinds of axes, nothing in common,
-    or an unknown quantity.
+    the mesh. ``quantity``: map to be listed case by case. Raises `StudyError`: different kinds of axes, nothing in
+    common, or an unknown quantity.
     """
     axes, pair = _matched(first, second)
     with fault_of(f"{first.file}, {second.file}: a stored scene cannot be read", ValueError, code=OTHER_FILE):

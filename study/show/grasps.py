@@ -33,10 +33,7 @@ ABOVE = ("min_det_f", "ellipticity")
 
 
 def field(ds: xr.Dataset, name: str, model: str = "ccm") -> Any:
-    """Array of a variable over all cases, a map of several friction models in one; None where it has no value.
-
-    What is known of a candidate only has the same value at every force.
-    """
+    """Array of a variable over all cases, a map of several friction models in one; None where it has no value."""
     if name not in ds.variables:
         return None
     of_finger = "finger" in ds.variables[name].dims

@@ -17,10 +17,7 @@ from softjaw.study.units import shown_unit
 
 
 def write_objects_page(index: Path, out: Path) -> Path:
-    """Write one page on all objects of a folder; the path that was written.
-
-    Raises `StudyError`: the index cannot be read, or the page cannot be written.
-    """
+    """Write one page on all objects of a folder; its path. `StudyError` if that or reading the index fails."""
     rows, about = read_index(index)
     table = index_table(index)
     columns = [c for c in table.columns if c.display]

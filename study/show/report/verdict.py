@@ -86,10 +86,7 @@ def warnings(ds: xr.Dataset) -> list[str]:
 
 
 def plain_report(ds: xr.Dataset) -> str:
-    """The report in the file itself, for whoever has only the file and a tool that prints HDF5.
-
-    What it is, the best grasps, failures with their reasons, and how to read the numbers.
-    """
+    """The report in the file itself, for whoever has only the file and a tool that prints HDF5."""
     named, ds = ds.attrs["title"], judge(ds)
     size = subtitle(ds).partition(": ")[2]
     grasps = best_text(ds, WIDTH, top=TOP) if ds.attrs["best"] else ""

@@ -241,10 +241,7 @@ def maps_of(ds: xr.Dataset) -> list[str]:
 
 
 def quantity_of(ds: xr.Dataset, name: str | None) -> str:
-    """A map of the study by its name; by default the one that grasps are ranked by.
-
-    Raises `StudyError` if there is no such map with a value.
-    """
+    """A map of the study by its name, by default what ranks grasps; `StudyError` if there is none with a value."""
     names = maps_of(ds)
     if name is None or name in names:
         return name or str(ds.attrs["score"])

@@ -27,10 +27,7 @@ MOST = 24_000_000  # bytes of pads, walls and limit surfaces; beyond it, those o
 def object_block(
     view: View, index: Index, quantity: str, motion: str, cases: Sequence[Index], limit_surface: bool = False
 ) -> Block:
-    """The figure as a part of a page, with the geometry of some cases; why there is none where nothing can be drawn.
-
-    ``limit_surface`` adds the limit surface of the weaker finger.
-    """
+    """The figure as a part of a page, with the geometry of some cases; why there is none where nothing can be drawn."""
     if not len(view.surface.points):
         return text(f"{view.note[:1].upper()}{view.note[1:]}.", "warn")
     content, left_out = payload(view, index, quantity, cases, motion, limit_surface)
