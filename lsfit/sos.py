@@ -24,10 +24,8 @@ from scipy.special import factorial
 from softjaw.lsfit.form import exponents, tensor_places
 from softjaw.lsfit.surface import FitError, FloatArray
 
-MIN_EIGENVALUE = 1e-7
-"""Smallest eigenvalue asked of a Gram matrix, in coordinates where that of a ball has eigenvalues of 4 and more."""
-ENOUGH = 1e-6
-"""Relative gap and residuals from which a solution is taken where Clarabel ends short of its own tolerance, 1e-8."""
+MIN_EIGENVALUE = 1e-7  # of a Gram matrix, in coordinates where that of a ball has eigenvalues of 4 and more
+ENOUGH = 1e-6  # relative gap and residuals of a solution that is taken though Clarabel ends short of its own 1e-8
 
 
 @lru_cache

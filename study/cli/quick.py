@@ -21,6 +21,7 @@ from softjaw.study.run.progress import duration
 from softjaw.study.run.shares import makespan
 from softjaw.study.scene import Scene, SceneError, load_scene, start
 from softjaw.study.scene.objects import Mesh
+from softjaw.study.scene.sections import OTHERS
 from softjaw.study.scene.text import quoted
 from softjaw.study.show.overview import aligned, listed, scene_text
 from softjaw.study.table import hanging, terminal_width
@@ -180,8 +181,8 @@ def petsc_overrides(words: Sequence[str]) -> list[str]:
             options.append([word[1:], "true"])
         # A number with a sign is a value; any other word with a dash is an option of somebody else.
         elif (word.startswith("-") and not word[1:2].isdigit()) or not options or options[-1][1] != "true":
-            text = f"PETSc option '{word}' after '--': softjaw takes only options of the contact solver, -contact_..."
-            raise StudyError(USAGE, f"{text}; others go into the environment variable PETSC_OPTIONS")
+            text = f"found '{word}' after '--', expected an option of the contact solver, as -contact_...; {OTHERS}"
+            raise StudyError(USAGE, text)
         else:
             options[-1][1] = word
     return [f"petsc.{name}={value}" for name, value in options]

@@ -22,6 +22,7 @@ from softjaw.study.units import in_si
 
 FOLDER = Path(__file__).parent
 PRESETS = tuple(sorted(path.stem for path in FOLDER.glob("*.toml")))
+EXPECTED = f"one of {', '.join(PRESETS)}, or a file of the same form"
 APPROACHES = {"x": (0, 1.0), "minus-x": (0, -1.0), "y": (1, 1.0), "minus-y": (1, -1.0)}  # axis of finger 1's pad, sign
 Approach = Annotated[str, Field(pattern="^(minus-)?[xy]$")]
 Pair = Annotated[tuple[float, float], Field(strict=False)]
@@ -119,8 +120,7 @@ def gripper_file(name: str) -> tuple[dict[str, Any], Hand]:
         if not 0 <= hand.force_n[0] <= hand.force_n[1]:
             raise ValueError(f"hand.force_n: found {list(hand.force_n)}, expected the least and the largest force")
     except OSError as error:
-        text = f"gripper: found '{name}', expected one of {', '.join(PRESETS)}, or a file of the same form"
-        raise StudyError(USAGE, text) from error
+        raise StudyError(USAGE, f"gripper: found '{name}', expected {EXPECTED}") from error
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"]))
@@ -148,7 +148,7 @@ def filled_in(
         keys, hand = gripper_file(gripper["preset"])
     except StudyError as error:
         more = "" if isinstance(error.__cause__, OSError) else f": {error}"  # of no such file all is said
-        return "gripper.preset", name, f"one of {', '.join(PRESETS)}, or a file of the same form{more}"
+        return "gripper.preset", name, f"{EXPECTED}{more}"
     for key in () if given is None else {*keys, "max_opening_mm"} - {*given}:
         gripper.pop(key, None)
     for key, value in keys.items():

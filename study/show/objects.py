@@ -16,6 +16,7 @@ from softjaw.study.result.store import open_result
 from softjaw.study.run.progress import duration
 from softjaw.study.table import Column, Row, Table, as_text, wrapped
 
+RESUME = "run the same command again to resume"
 LOOKS: dict[str, dict[str, Any]] = {  # of the displayed columns
     "payload": {"error": "payload_error"}, "opening": {"drop": 1}, "force": {}, "e_n": {"drop": 2},
     "grasps": {"drop": 3}, "seconds": {"drop": 4}, "state": {"wrap": 12}, "reason": {"wrap": 34, "drop": 5},
@@ -59,7 +60,7 @@ def status_text(path: Path, width: int) -> str:
     cases = sum(max(row["done"], 0) for row in ended) + sum(done for done, *_ in now)
     seconds = duration(sum(np.nan_to_num(row["seconds"]) for row in ended) + sum(seconds for *_, seconds in now))
     lines = [f"{path}: {counts_text(rows)}", f"  {cases} cases solved; what is done took {seconds} on all ranks"]
-    resume = "run the same command again to resume" * (index.code_of(rows) == STOPPED)
+    resume = RESUME * (index.code_of(rows) == STOPPED)
     lines += filter(None, [f"running now: {runner}" if runner else resume])
     named = [f"{row['object']}: {row['state']}: {row['reason']}" for row in rows if row["reason"]]
     return "\n".join([*lines, *(wrapped(line, width, "  ", "    ") for line in named)])

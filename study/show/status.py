@@ -21,6 +21,7 @@ from softjaw.study.run.refine import about
 from softjaw.study.scene.sections import COARSE, FINEST
 from softjaw.study.scene.text import scene_table
 from softjaw.study.show import objects
+from softjaw.study.show.objects import RESUME
 from softjaw.study.table import (
     MOST_NOTES,
     PAPER,
@@ -34,7 +35,6 @@ from softjaw.study.table import (
 
 MOST_PLACES = 2
 NO_ERRORS = "no errors known; accuracy.meshes = 2 gives them"
-RESUME = "run the same command again to resume"
 Index = tuple[int, ...]
 
 

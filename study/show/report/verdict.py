@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from softjaw.study.flags import BORNE, flags_in
-from softjaw.study.quantities import MISSING, MODEL_NAMES, MODELS
+from softjaw.study.quantities import DEFINITIONS, MISSING, MODEL_NAMES, MODELS
 from softjaw.study.ranking import judge
 from softjaw.study.result.read import axes_of
 from softjaw.study.result.store import value_text
@@ -26,11 +26,10 @@ CAVEAT = (
     " the scene below. Only trends can be compared: models differ more with curvature, torque and e_n grow with force."
 )
 TOP, MOST_REASONS, WIDTH = 5, 10, 120  # of the plain text in the file: grasps, messages, characters
-READING = """How to read the file
-All values are SI. Every dataset has its unit, its label and its definition as attributes. ccm lets every face resist in
-its own plane (curved contact model); pcm and pcm_projected are planar models with the pressure sum S and with the
-normal force F_N. NaN: no value; /study/status/code (0 missing, 1 done, 2 failed) and /study/status/message say why.
-Candidates are counted over stations and angles, the angle running fastest. /study/scene has all settings.
+READING = f"""How to read the file
+{DEFINITIONS} status/code: 0 missing, 1 done, 2 failed.
+Every dataset has its unit, its label and its definition as attributes. Candidates are counted over stations and angles,
+the angle running fastest. /study/scene has all settings.
 h5web, silx and NeXpy plot the maps; 'softjaw export --format vtk' writes files for ParaView."""
 ASCII = str.maketrans({"\N{MULTIPLICATION SIGN}": "x", "±": "+-"})
 
