@@ -48,8 +48,7 @@ def take_buffers(*others: Callable[[], object]) -> None:
         try:
             mmap.mmap(-1, ROOM, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS, prot=mmap.PROT_READ).close()
         except OSError as error:
-            room = f"{ROOM / 1e6:.0f} MB of address space at once"
-            text = f"the linear algebra library needs {room}, which is not available"
+            text = f"the linear algebra library lacks {ROOM / 1e6:.0f} MB of address space at once"
             raise MemoryError(text) from error
         operation()
 

@@ -177,8 +177,8 @@ class Stepping:
                     ended = ConvergenceError(f"stuck at {low[1]:.4g} N of {force:.4g} N: {error}")
                     break
         else:
-            reached = f"reached {low[1]:.4g} N after {MOST_STEPS} steps"
-            ended = NotReachedError(f"the force stays below {force:.4g} N: {reached}")
+            text = f"the force stays below {force:.4g} N: reached {low[1]:.4g} N after {MOST_STEPS} steps"
+            ended = NotReachedError(text)
         if falls([peak[0], low[1]]):
             ended = NotReachedError(
                 f"the force stays below {force:.4g} N: it has a maximum of {peak[0]:.4g} N at {1e3 * peak[1]:.4g} mm, "

@@ -276,8 +276,8 @@ class LoadPath(ABC, Generic[ProblemT]):
 
     def _given_up(self, reached: float, force: float) -> ConvergenceError:
         """The error where no iterations are left, at ``reached`` [N]."""
-        spent = f"given up after {self.MOST_ITERATIONS} Newton iterations"
-        return ConvergenceError(f"stuck at {reached:.4g} N of {force:.4g} N: {spent}")
+        text = f"stuck at {reached:.4g} N of {force:.4g} N: given up after {self.MOST_ITERATIONS} Newton iterations"
+        return ConvergenceError(text)
 
     def _pressed(self, state: OnPath, work: Work) -> Pressed:
         """The state, checked."""

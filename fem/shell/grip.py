@@ -144,15 +144,11 @@ class Grip(LoadPath[WallProblem]):
         opening, force = self.opening.last
         # the opening tells a wall that has collapsed from a solve that failed for another reason
         if opening < limit:
-            closer = f"its opposite sides have come {1 - opening:.0%} of their distance closer"
+            text = f"no equilibrium found beyond {force:.3g} N, where opposite sides are {1 - opening:.0%} closer"
             if opening < FOLDED:
-                text = f"the wall collapsed: beyond {force:.3g} N, where {closer}, no equilibrium was found"
-            else:
-                text = (
-                    f"no equilibrium was found beyond {force:.3g} N, where {closer}: either the wall gives way there, "
-                    "or Newton's method did not find which nodes touch; try a finer mesh or shorter pads"
-                )
-            raise CheckError(f"{text} ({error})") from error
+                raise CheckError(f"the wall collapsed: {text} ({error})") from error
+            causes = "the wall gives way there, or Newton's method did not find which nodes touch"
+            raise CheckError(f"{text}: {causes}; try a finer mesh or shorter pads ({error})") from error
 
     def _level(self, state: OnPath | None, force: float, work: Work) -> OnPath:
         """State at ``force`` from the one before, or from first contact."""

@@ -135,8 +135,8 @@ def press_of(scene: Scene, finger: Finger, coarser: bool, stride: int = 1) -> Pr
 def check_petsc(wanted: dict[str, Any]) -> None:
     """Refuse PETSc options that no solver asks for, that PETSc itself refuses, or that the scene does not know of."""
     if hidden := [f"-{name}" for name in options_elsewhere()]:
-        text = f"petsc: found {', '.join(hidden)} in PETSC_OPTIONS, which no result tells"
-        raise StudyError(USAGE, f"{text}; give them after '--', or as keys of [petsc]")
+        text = f"petsc: found {', '.join(hidden)} in PETSC_OPTIONS, which no result tells; write keys of [petsc]"
+        raise StudyError(USAGE, text)
     if not wanted:
         return
     try:

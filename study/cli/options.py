@@ -151,8 +151,7 @@ OPTIONS = {
     "written": _option("-o", metavar="FILE", dest="output", help="file to write (default: standard output)"),
     "approach": _option("--approach", choices=("x", "minus-x", "y", "minus-y"), action="append", dest="approaches",
                         help="palm to fingertips, by the long (x) or short (y) side of pad 1 (default: the clearest)"),
-    "gripper": _option("--gripper", metavar="NAME", help="franka_hand, robotiq_2f85, schunk_egp50, wsg50, or a file of"
-                       " the same form: frame, joints, stroke, forces, palm and fingers"),
+    "gripper": _option("--gripper", metavar="NAME", help="franka_hand, robotiq_2f85, schunk_egp50, wsg50, or a file"),
     "wider": _option("--wider", type=number("a number, 0 or above", 0.0), default=20.0, metavar="MM",
                      help="how far the gripper opens beyond first touch (default 20)"),
     "frame": _option("--frame", default="object", metavar="NAME",

@@ -75,8 +75,8 @@ def contact_of(
 ) -> Contact:  # fmt: skip
     """A patch in its contact frame, with its friction; errors as for `friction_limits`, which ``count`` faces."""
     if not isinstance(patch, ContactPatch):
-        expected = "a ContactPatch of centroid, area, normal and pressure"
-        raise TypeError(f"patch is a {type(patch).__name__}: expected {expected}")
+        text = f"patch is a {type(patch).__name__}: expected a ContactPatch of centroid, area, normal and pressure"
+        raise TypeError(text)
     mu, x_hint = checked_mu(mu), principal_direction(patch) if x_axis is None else np.asarray(x_axis, float)
     if x_hint.shape != (3,) or not np.isfinite(x_hint).all():
         raise ValueError(f"x_axis is {x_hint.tolist()}: expected three finite numbers")
@@ -104,8 +104,8 @@ def check_facing(contacts: Sequence[Contact], names: Sequence[str]) -> None:
     line = contacts[1].origin - contacts[0].origin
     distance = float(np.linalg.norm(line))
     if distance <= 1e-9 * max(c.rho for c in contacts):
-        text = f"{names[1]} has its contact at the same place as {names[0]}"
-        raise ValueError(f"{text}; both have to use the coordinates of one object")
+        text = f"{names[0]} and {names[1]} touch at the same place; give both in the coordinates of one object"
+        raise ValueError(text)
     pairs = zip(contacts, names, (line, -line), strict=True)
     # difference of cosines that decides nothing
     away = [name for c, name, to in pairs if c.normal @ to < -1e-6 * distance]

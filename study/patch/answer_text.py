@@ -62,8 +62,8 @@ def patch(options: Namespace) -> str:
         mu, long_side = options.mu or scene.friction.mu, ALONG_PAD if long_side is None else long_side
         read = [solve_deformed(options.file, options.unit, scene)]
     elif options.scene:
-        text = f"found '{options.scene}' behind the file, expected it with --deformed only"
-        raise StudyError(USAGE, f"SCENE: {text}; add --deformed if the file holds a deformed face")
+        text = f"SCENE: found '{options.scene}', expected none; add --deformed if the file holds a deformed face"
+        raise StudyError(USAGE, text)
     else:
         read = [read_patch(file, reading) for file in (options.file, options.other) if file]
     patches = [EvaluatedPatch(patch, mu, long_side) for patch in read]
@@ -81,12 +81,12 @@ def patch(options: Namespace) -> str:
 def _scene_of(options: Namespace) -> Scene:
     """The scene whose pad has a deformed face; options that say something else are refused."""
     if not options.scene:
-        text = "found no scene, expected one behind the file, whose [gripper] is the pad"
-        raise StudyError(USAGE, f"--deformed: {text}; write softjaw patch --deformed {options.file} SCENE.toml")
+        text = f"found no scene with the pad; write softjaw patch --deformed {options.file} SCENE.toml"
+        raise StudyError(USAGE, f"--deformed: {text}")
     for name in ("other", "pressure_unit", "pressure_name", "flip_normals"):
         if getattr(options, name):
-            text = f"--{name.replace('_', '-')}: found with --deformed, which solves one pad for its pressure"
-            raise StudyError(USAGE, f"{text}; remove one of them")
+            option = f"--{name.replace('_', '-')}"
+            raise StudyError(USAGE, f"{option}: found with --deformed, which solves for the pressure; remove one")
     return load_scene(Path(options.scene))
 
 

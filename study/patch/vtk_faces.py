@@ -34,8 +34,8 @@ def read_vtk(path: Path, reading: Reading) -> ReadPatch:
         raise refused(path, None, name, "no unit", "a unit of pressure",
                        f"add --pressure-unit kpa, or name the array {name}_kpa: units are not guessed")  # fmt: skip
     if len(values) != (grid.n_points if at_points else len(ids)):
-        text = f"'{name}' has {len(values)} values for {len(ids)} cells"
-        raise StudyError(OTHER_FILE, f"{path}: damaged ({text}); write it again")
+        text = f"{path}: damaged ('{name}' has {len(values)} values for {len(ids)} cells); write it again"
+        raise StudyError(OTHER_FILE, text)
     with np.errstate(all="ignore"):  # what is not finite is reported with its place
         corners = FACTORS["length"][reading.unit] * np.asarray(grid.points).astype(float)[ids]
         pressure = FACTORS["pressure"][unit] * values.astype(float)

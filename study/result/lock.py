@@ -135,8 +135,8 @@ class OpenedFile:
             raise self._lost(why(error)) from error
         if identity != self._identity:
             what = "was moved or removed" if identity is None else "was replaced by another file"
-            remedy = "put it back, or begin again with the same command"
-            raise StudyError(CANNOT_WRITE, f"{self.path}: {what} while the run was writing it; {remedy}")
+            text = f"{self.path}: {what} during the run; put it back, or begin again with the same command"
+            raise StudyError(CANNOT_WRITE, text)
 
     @contextlib.contextmanager
     def writing(self) -> Iterator[None]:

@@ -124,8 +124,8 @@ def _of_table(path: Path) -> Lines:
         lines: list[tuple[str, dict[Any, Any]]] = [(f"{path}:{reader.line_num}", line) for line in reader]
     columns = [name for name in reader.fieldnames or () if name]
     if "mesh" not in columns or len(set(columns)) < len(columns):
-        text = f"{path}:1: found {shown(', '.join(columns))}, expected columns with commas between them"
-        raise StudyError(USAGE, f"{text}, each once and one of them `mesh`")
+        text = f"{path}:1: found {shown(', '.join(columns))}, expected distinct columns, `mesh` among them, and commas"
+        raise StudyError(USAGE, text)
     if of_run := [name for name in columns if name.startswith("run.")]:
         raise StudyError(USAGE, f"{path}:1: found the column {of_run[0]}, expected it in the scene, for all objects")
     for place, line in lines:

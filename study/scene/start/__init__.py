@@ -64,8 +64,8 @@ def init(options: Namespace, measure: Callable[[Namespace], Measured]) -> str:
         if getattr(options, name):
             raise StudyError(USAGE, f"--{name}: found beside '{options.kind}'; write 'softjaw init mesh --mesh ...'")
     if options.mesh and (Path(options.mesh).is_dir() or "*" in options.mesh):
-        fault = f"--mesh: found '{options.mesh}', expected one mesh, of which a scene is made for all"
-        raise StudyError(USAGE, f"{fault}; then: softjaw run SCENE --objects {shlex.quote(options.mesh)}")
+        many = shlex.quote(options.mesh)
+        raise StudyError(USAGE, f"--mesh: found {many}, expected one of them; then: softjaw run SCENE --objects {many}")
     base = _base(options)
     scene, batch = (base.with_name(base.name + ending) for ending in (".toml", ".sbatch"))
     existing = [str(path) for path in (scene, batch) if path.exists()]

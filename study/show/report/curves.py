@@ -165,8 +165,7 @@ def wall_curves(ds: xr.Dataset, index: Index, allowed: float | None) -> Block | 
         made.add_vline(1e3 * allowed, line={"color": "#c05a00", "dash": "dash"}, row=1, col=2)
     made.update_yaxes(title_text="normal force [N]", col=1)
     rule = f" Dashed: the allowed indentation, {1e3 * allowed:g} mm." if allowed is not None else ""
-    diamonds = "Open diamonds: the wall snapped in at a smaller force."
-    caption = f"Dark: {place(ds, index)}; grey: other candidates. {diamonds}{rule}"
+    caption = f"Dark: {place(ds, index)}; grey: others. Open diamonds: the wall snapped in at a smaller force.{rule}"
     summary = f"{number(1e3 * indentation[index])} mm at {place(ds, index, force=True)}"
     return plot(made, caption, f"Force over closing and indentation; {summary}.", 340)
 
