@@ -155,7 +155,6 @@ class NonlinearSolver:
     options: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Create matrix, vectors and solver."""
         comm, n = PETSc.COMM_SELF, self.problem.size
         self.seconds, self.thrifty, self.patient, self.iterations_left = Seconds(), True, True, math.inf
         pattern = self.problem.pattern

@@ -59,7 +59,6 @@ class ContactPatch:
     corners: FloatArray | None = None
 
     def __post_init__(self) -> None:
-        """Check every field, then freeze the arrays."""
         n = len(np.atleast_1d(np.asarray(self.pressure, float)))
         checked = {
             "centroid": _finite("centroid", self.centroid, (n, 3)),

@@ -129,7 +129,6 @@ class Case(GraspNumbers):
         return finger_surface(self.fingers, finger, checked_model(model), fitted)
 
     def __str__(self) -> str:
-        """Main quantities in a few lines, with their errors where they are known."""
         lines, errors = [f"{self.label}, {self.force:g} N"], self.errors
         for name in (n for n in MAIN if f"maps/{n}" in self.result.values):
             units = BY_KEY[f"maps/{name}"].unit
@@ -238,7 +237,6 @@ def _at_station(scene: Scene, station: float, angle: float | None) -> tuple[Scen
 
 
 def _number(name: str, value: Any, unit: str) -> float:
-    """A finite number."""
     if isinstance(value, str | bool) or np.ndim(value) or not np.isreal(value):
         raise TypeError(f"{name} is {value!r}: expected one number [{unit}]")
     if not math.isfinite(value):
@@ -256,7 +254,6 @@ def _joined(values: Sequence[float], value: float) -> tuple[list[float], int]:
 
 
 def _with_candidates(scene: Scene, table: dict[str, Any]) -> Scene:
-    """The scene with these candidates."""
     return Scene.of_tables(scene.effective() | {"candidates": table})
 
 

@@ -257,7 +257,6 @@ class LoadPath(ABC, Generic[ProblemT]):
         return OnPath(x, start.force, self._stepping.jumped)
 
     def _interpolated(self, start: Pressed) -> FloatArray:
-        """Unknowns of a coarser mesh's state."""
         x, pads = np.zeros(self.problem.size), start.fingers
         for number, f in enumerate(self.problem.fingers):
             # where the coarser mesh has one finger, the other one is its image in x = 0

@@ -180,6 +180,5 @@ def _bisected(gap: Callable[[FloatArray], FloatArray], low: FloatArray, high: Fl
 
 
 def _vector(v: FloatArray) -> str:
-    """Three numbers for a message."""
     # adding zero turns -0 into 0
     return ", ".join(f"{x:.4g}" for x in v + 0.0)

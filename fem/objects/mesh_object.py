@@ -176,12 +176,10 @@ class MeshObject:
 
     @cached_property
     def _tree(self) -> TriangleTree:
-        """The flat triangles."""
         return TriangleTree(self.points, self.triangles)
 
     @cached_property
     def _smooth(self) -> SmoothTriangles:
-        """The triangles made smooth."""
         return smooth_triangles(self.points, self.triangles, self.crease_angle)
 
 

@@ -91,7 +91,6 @@ def cleaned(points: FloatArray, triangles: IntArray, unit: str = "m") -> Triangl
 
 
 def _finite(points: FloatArray, triangles: IntArray) -> tuple[IntArray, list[str]]:
-    """Triangles whose corners are finite."""
     # what lies beyond is no coordinate in any unit, and its square overflows
     good = (np.abs(points) < HUGE_COORDINATE).all(axis=1)[triangles].all(axis=1)
     if not good.any():

@@ -151,7 +151,6 @@ class GraspPoint(GraspNumbers):
         return finger_surface(self.fingers, finger, model, fitted)
 
     def __str__(self) -> str:
-        """Main quantities at one point, in a few lines."""
         if self.shape:
             return f"{len(self.states)} points, {int((self.states == INSIDE).sum())} of them with values"
         axes, (station, angle, force) = self.map.axes, self.place[0].tolist()

@@ -87,7 +87,6 @@ def file_look(path: Path) -> Look:
 
 
 def _end(result: Any, incomplete: bool) -> list[str]:
-    """Last words of a run that has ended, complete or not."""
     if incomplete:
         return [f"not complete: {RESUME}"]
     return ["complete", *reasons(result, terminal_width()), f"'softjaw show {result.path}' lists the best grasps"]

@@ -113,7 +113,6 @@ def _packed(values: np.ndarray, kind: str) -> str:
 
 
 def _choice(view: View, name: str) -> dict[str, Any]:
-    """A map that can be chosen."""
     values, limits = view.coloured(name)
     rows = [[float(f"{v:.6g}") if np.isfinite(v) else None for v in view.over_candidates(values, k)]
             for k in range(values.shape[-1])]  # fmt: skip
