@@ -68,13 +68,6 @@ def slopes(f, x, h):
     return np.stack([(f(x + e) - f(x - e)) / (2 * h) for e in h * np.eye(3)], axis=-1)
 
 
-def uniaxial_hyperfoam(stretch, nu, mu, alpha):
-    """Lateral stretch ``l^-nu`` and Cauchy stress [Pa] of a one-term hyperfoam pulled or pressed to ``stretch``."""
-    lateral = stretch**-nu
-    nominal = 2 * mu / (alpha * stretch) * (stretch**alpha - stretch ** (-alpha * nu))
-    return lateral, nominal / lateral**2
-
-
 @dataclass(frozen=True)
 class Hertz:
     """Contact radius or half width [m], peak pressure [Pa] and, for a sphere, approach of a half space [m]."""
