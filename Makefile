@@ -70,7 +70,7 @@ effects: setup
 # The stages of the tests, each with the time that it may take; the last lines of both targets list how they ended. STAGES
 # names some of them: make test-long STAGES="slurm kernel-Zen"
 PYTEST     = $(BIN)/python -m pytest -q
-TESTS      = $(PYTEST) -n auto --maxprocesses 2 --dist loadfile
+TESTS      = $(PYTEST) -n logical --maxprocesses 2 --dist loadfile
 serial     = 20m $(TESTS) -m "not long and not ranks"
 ranks      = 10m $(TESTS) -m "ranks and not long" $(shell grep -rl --include='test_*.py' mark.ranks tests)
 long       = 180m $(TESTS) -m "long and not ranks" --durations 20
