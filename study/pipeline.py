@@ -126,7 +126,7 @@ def _result(choice: EffectChoice, k: int, solved: Solved, unit: Any, begun: floa
     if coarse:
         values |= solved.errors(values, _state_values(coarse), settings, choice.skipped_share(k), choice.closes_less())
         # only where every case has a target: without one the sums at the end say how many cases miss the usual one
-        if (target := scene.accuracy.target) is not None and not scene.candidates.sampled:
+        if (target := scene.accuracy.target) is not None and not unit.finest:
             error = values[f"maps/{scene.accuracy.target_of}_error"]
             values["maps/flags"] |= Flag.COARSE * bool(misses(error, target))
     effects = choice.effects_at(k, contacts) | settled(choice.solver.scene, fine, fits)
