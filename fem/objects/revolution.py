@@ -96,8 +96,8 @@ class Revolution(Analytic):
 def _check_line(line: FloatArray) -> None:
     """Refuse a curve that touches the axis on the way, or itself; ``line (m + 1, 2)`` is its polyline."""
     if line[1:-1, 1].min() <= NEGLIGIBLE:
-        z = line[1 + line[1:-1, 1].argmin(), 0]
-        raise ValueError(f"the profile's curve swings to the axis near z = {z:g} m; add points there to hold it off")
+        z = 1e3 * line[1 + line[1:-1, 1].argmin(), 0]
+        raise ValueError(f"the profile's curve swings to the axis near z = {z:.4g} mm; add points there to hold it off")
     a, d = line[:-1], np.diff(line, axis=0)
 
     def cross(u: FloatArray, v: FloatArray) -> FloatArray:
@@ -112,7 +112,8 @@ def _check_line(line: FloatArray) -> None:
     # neighbours share an end and always touch
     i, _ = np.nonzero(np.triu(split & split.T & near, k=2))
     if len(i):
+        z, r = 1e3 * a[i[0]]
         raise ValueError(
-            f"the profile crosses or touches itself near z = {a[i[0], 0]:g} m, r = {a[i[0], 1]:g} m; give "
+            f"the profile crosses or touches itself near z = {z:.4g} mm, r = {r:.4g} mm; give "
             "the points in order along the outside, and more of them where it bends sharply"
         )

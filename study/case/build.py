@@ -104,7 +104,7 @@ def with_mass(scene: Scene) -> Scene:
     with fault_of("object.density", ValueError, ending="; write object.mass_g instead"):
         if any(key.startswith("object.") for key in (*scene.sweep, *scene.uncertainty.spread)):
             raise ValueError("the object changes along the sweep, or is uncertain")
-        mass = max(round(converted(density * volume(scene.object), "kg", "g"), 2), 0.01)
+        mass = float(f"{converted(density * volume(scene.object), 'kg', 'g'):.4g}")
     return scene.model_copy(update={"object": scene.object.model_copy(update={"density": None, "mass_g": mass})})
 
 

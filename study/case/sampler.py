@@ -78,8 +78,8 @@ def straightened(
         approach = grip.axes @ tilt
         point = grip.point + grip.axes @ np.array([*shift, grip.depth])
         axes = axes_of(approach / np.linalg.norm(approach), grip.axes[:, 0])
-        # shift between two rounds that ends them [m]
-        done = tilt[2] > math.cos(STRAIGHT) and np.abs(shift).max() < 5e-4
+        # shift between two rounds that ends them, of the pad's side
+        done = tilt[2] > math.cos(STRAIGHT) and np.abs(shift).max() < 0.01 * jaws.pad[0]
         grip = JawsOnSurface(surface, point, axes, jaws)
         if done:
             break

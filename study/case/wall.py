@@ -26,7 +26,7 @@ from softjaw.study.units import GRAVITY
 
 DENTED_SHARE = 0.2  # of the object's half width between the fingers, beyond which an indentation is flagged
 SLIGHT_PULL = 0.05  # of the normal force: a pull at the foot that says nothing
-ESTIMATE = MeshSize(0.004, 0.006, 0.012)  # mesh of the estimate that the level is chosen by
+ESTIMATE = (0.004, 0.006, 0.012)  # elements of the estimate that the level is chosen by, as of a `MeshSize` [m]
 
 
 @lru_cache(maxsize=8)
@@ -49,7 +49,8 @@ def estimated_indentation(
     """
     length, width, _ = scene.gripper.pad_size
     # A round object is the same at every angle, so all candidates share its factors.
-    linear = object_factors(body, 0.0 if body.surface.round else grasp.angle, grasp.mirrors, ESTIMATE, 0.6 * width)
+    angle = 0.0 if body.surface.round else grasp.angle
+    linear = object_factors(body, angle, grasp.mirrors, _estimate_size(body, length, width), 0.6 * width)
     mesh, area = linear.shell.mesh, linear.shell.node_area
     load = np.zeros((linear.shell.nodes, 6))
     pressed = np.zeros(linear.shell.nodes, dtype=bool)
@@ -70,6 +71,15 @@ def estimated_indentation(
     indentations = _indentations(linear.shell, linear.solve(load.ravel()).reshape(-1, 6))
     ratios = indentations / mesh.thickness
     return float(indentations[pressed].max(initial=0.0)), float(ratios[pressed].max(initial=0.0))
+
+
+def _estimate_size(body: ThinWalled, length: float, width: float) -> MeshSize:
+    """Elements of `ESTIMATE`, and smaller ones of a body or under pads that these would hardly divide."""
+    middle = body.surface.station(0.5 * sum(body.surface.heights))
+    across = body.surface.jets(np.linspace(0.0, np.pi, 9), middle)[:, 0, :2]
+    radius = float(np.linalg.norm(across, axis=1).min())
+    share = min(1.0, radius / 0.02, length / 0.02, width / 0.012)
+    return MeshSize(*(share * size for size in ESTIMATE))
 
 
 def _indentations(shell: Shell, q: FloatArray) -> FloatArray:

@@ -184,7 +184,8 @@ class RevolutionShape(Walled):
     SIZE_KEYS = ("profile_mm",)
     shape: Literal["revolution"]
     profile_mm: tuple[Point, ...] = Field(
-        min_length=4, max_length=2000, description="outline as points [z, radius] with rising z",
+        min_length=4, max_length=2000,
+        description="outline as points [z, radius] with rising z; corners are rounded by 2 mm",
         examples=[[[0, 30], [30, 30], [60, 30], [90, 20]]],
     )  # fmt: skip
 

@@ -9,8 +9,9 @@ import pytest
 from softjaw.fem.shell.wall_problem import WallProblem
 from softjaw.study import pipeline
 from softjaw.study.case import wall
-from softjaw.study.case.effects import ABOVE, BELOW, SMALL_INDENTATION
+from softjaw.study.case.effects import ABOVE, BELOW, SMALL_INDENTATION, EffectChoice
 from softjaw.study.case.result import CaseFailure
+from softjaw.study.case.solver import CandidateSolver
 from softjaw.study.flags import Flag
 from tests.study.scenes import QUICK, pose_of, scene_of, units_of
 from tests.study.test_pipeline import differing
@@ -63,6 +64,17 @@ def test_the_level_follows_the_indentation_and_compression_is_a_strain_too(monke
     assert indicators == tuple(sorted(indicators))
     assert indicators[1] <= SMALL_INDENTATION < indicators[2]
     assert reasons == (BELOW, BELOW, ABOVE)
+    # a twentieth as large in all: the estimate has smaller elements as well
+    small = "pad_length_mm=2.5", "pad_width_mm=1.1", "pad_thickness_mm=0.75"
+    profile = [[z / 20, r / 20] for z, r in ((0, 24), (4, 28), (30, 30), (60, 32), (80, 34))]
+    [unit] = walled(
+        CUP, f"object.profile_mm={profile}", "object.wall_mm=0.01", "object.young_modulus_gpa=200",
+        "candidates.stations_mm=[2]", "accuracy.wall_element_mm=0.2", *(f"gripper.{key}" for key in small),
+        forces="[0.01]",
+    )  # fmt: skip
+    level = EffectChoice(CandidateSolver(unit.scene, unit.candidate.poses)).level("object", 0)
+    assert (level.level, level.reason) == (names[2], ABOVE)
+    assert level.indicator == pytest.approx(indicators[2], rel=0.3)
     face = SimpleNamespace(von_mises=np.ones(1), principal_strain=np.array([[-3e-3, 1e-3]]))
     for name, value in (("faces", [face, face]), ("_indentations", np.zeros(1)), ("_places", None)):
         monkeypatch.setattr(wall, name, lambda *_, value=value: value)

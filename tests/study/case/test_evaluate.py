@@ -202,6 +202,8 @@ def test_a_mass_is_density_times_volume_and_what_has_no_volume_or_several_is_ref
     ball = with_sampled_grasps(scene_of(BALL, "object.density=1000"))
     assert ball.object.mass == pytest.approx(1000 * 4 / 3 * math.pi * 0.03**3, rel=1e-4)
     assert ball.object.density is None
+    bead = with_sampled_grasps(scene_of(BALL, "object.density=200", "object.radius_mm=1.5"))
+    assert bead.object.mass == pytest.approx(200 * 4 / 3 * math.pi * 0.0015**3, rel=1e-3)
     tube = with_sampled_grasps(scene_of(OVAL, "object.density=500"))
     assert tube.object.mass == pytest.approx(500 * math.pi * 0.025 * 0.02 * 0.12, rel=5e-3)
     uncertain = 'uncertainty.spread={"object.radius_mm"=1}'
