@@ -26,7 +26,6 @@ from softjaw.study.units import GRAVITY
 
 DENTED_SHARE = 0.2  # of the object's half width between the fingers, beyond which an indentation is flagged
 SLIGHT_PULL = 0.05  # of the normal force: a pull at the foot that says nothing
-ESTIMATE = (0.004, 0.006, 0.012)  # elements of the estimate that the level is chosen by, as of a `MeshSize` [m]
 
 
 @lru_cache(maxsize=8)
@@ -74,12 +73,12 @@ def estimated_indentation(
 
 
 def _estimate_size(body: ThinWalled, length: float, width: float) -> MeshSize:
-    """Elements of `ESTIMATE`, and smaller ones of a body or under pads that these would hardly divide."""
+    """Mesh of the estimate: 4 mm round the body and 6 mm along it, less on a body or under pads that are small."""
     middle = body.surface.station(0.5 * sum(body.surface.heights))
     across = body.surface.jets(np.linspace(0.0, np.pi, 9), middle)[:, 0, :2]
     radius = float(np.linalg.norm(across, axis=1).min())
     share = min(1.0, radius / 0.02, length / 0.02, width / 0.012)
-    return MeshSize(*(share * size for size in ESTIMATE))
+    return MeshSize(share * 0.004, share * 0.006, share * 0.012)
 
 
 def _indentations(shell: Shell, q: FloatArray) -> FloatArray:
