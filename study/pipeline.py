@@ -15,7 +15,7 @@ from softjaw.fem.errors import CheckError, ConvergenceError
 from softjaw.fem.objects.gap import about_z
 from softjaw.fem.pad.halving import halved
 from softjaw.fem.petsc import Seconds
-from softjaw.study.case.build import forces_apart, own_frame, pad_shape, rounds_edges
+from softjaw.study.case.build import forces_apart, own_frame, pad_elements, pad_shape, rounds_edges
 from softjaw.study.case.contact import of_fingers, on_faces
 from softjaw.study.case.effects import COUPLING, SCREENED, EffectChoice, settled
 from softjaw.study.case.errors import coarse_errors
@@ -27,7 +27,7 @@ from softjaw.study.case.wall import foot_note, wall_flags
 from softjaw.study.flags import Flag, flag_sentences
 from softjaw.study.quantities import misses
 from softjaw.study.scene import Scene
-from softjaw.study.scene.sections import COARSE, FINEST
+from softjaw.study.scene.sections import COARSE, FINE, FINEST
 
 MOST_SOLVERS = 24  # whose solutions are kept: some MB each, on a wall 40
 
@@ -137,7 +137,9 @@ def _result(choice: EffectChoice, k: int, solved: Solved, unit: Any, begun: floa
         values["maps/flags"] &= ~Flag.COARSE  # its errors say so
     values |= _work(choice.solver, solved, start, begun, before)
     if scene.accuracy.target is not None:
-        values |= {"maps/pad_elements": math.prod(shape.elements), "work/mesh": finest}
+        # what has no finer state, or too many elements there, needs no further round
+        beyond = unit.together and finest > FINE and shape.elements != pad_elements(scene, finest)
+        values |= {"maps/pad_elements": math.prod(shape.elements), "work/mesh": FINEST if beyond else finest}
     patches = [on_faces(c, pad_shape(scene.gripper)) for c in contacts]
     patch = {name: np.stack([faces[name] for faces in patches]) for name in patches[0]}
     notes = dict.fromkeys(note for c in contacts for note in c.state.notes)

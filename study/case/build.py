@@ -259,10 +259,10 @@ def forces_apart(scene: Scene) -> bool:
 def samples_together(scene: Scene) -> bool:
     """Whether rounds name the finer meshes of ``accuracy.target``, for all samples of uncertain inputs alike.
 
-    Their differences would else be those of meshes.
+    Samples on other meshes would differ by these too. Walls that are simulated have two meshes in any case.
     """
-    asked = bool(scene.uncertainty.spread) and scene.accuracy.target is not None
-    return asked and forces_apart(scene) and not has_wall(scene.object)
+    rigid = scene.effects.object == "rigid" or not has_wall(scene.object)
+    return bool(scene.uncertainty.spread) and scene.accuracy.target is not None and forces_apart(scene) and rigid
 
 
 def rounds_edges(scene: Scene) -> bool:

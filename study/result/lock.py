@@ -100,7 +100,7 @@ def in_use(result: Path, holder: str) -> StudyError:
 
 def holder(result: Path) -> str:
     """Who is running on ``result`` now, or an empty text."""
-    result = result.resolve()  # of a link
+    result = Path(os.path.realpath(result))  # of a link
     try:
         fd = os.open(result.with_name(result.name + ".lock"), os.O_RDONLY)
     except OSError:

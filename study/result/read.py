@@ -33,6 +33,7 @@ from softjaw.study.quantities import (
 from softjaw.study.result.derived import SOURCES, force_ranges
 from softjaw.study.result.index import index_path, open_index
 from softjaw.study.result.layout import DONE, VERSION
+from softjaw.study.result.skeleton import UNFINISHED
 from softjaw.study.result.store import Result, open_result
 from softjaw.study.scene import Scene, SceneError, parse_scene
 from softjaw.study.scene.model import file_digest
@@ -161,7 +162,8 @@ def dataset(result: Result) -> xr.Dataset:
     marks = {"flag_masks": tuple(map(int, known)), "flag_meanings": _joined(flag.word for flag in known)}
     variables["flags"] = xr.Variable(layout.names, flags, variables["flags"].attrs | marks)
     variables["status"] = xr.Variable(layout.names, status.astype(np.int8), _about(BY_KEY["status/code"]))
-    if set(FORCE_RANGE) & variables.keys() and (status == MISSING).any():  # what is solved has its range at once
+    # until the end of a run what is solved has its range at once
+    if set(FORCE_RANGE) & variables.keys() and ((status == MISSING).any() or result.report == UNFINISHED):
         _fill_ranges(variables, status, _parsed(result.scene))
     ds = xr.Dataset(variables, _coordinates(result, variables), _attributes(result))
     return with_intervals(ds) if REALISATION in ds.dims else ds

@@ -20,6 +20,7 @@ from softjaw.study.result.hdf5 import StoredFile, text_of
 from softjaw.study.result.layout import DONE, ROOT, SESSION, Header, Layout
 from softjaw.study.result.skeleton import HDF5_VERSIONS, report_bytes, text_bytes
 from softjaw.study.result.store import Result, open_result
+from softjaw.study.scene.sections import COARSE, FINEST
 
 MESH = "work/mesh"
 NOT_FINER = "on a finer mesh it was not solved: "
@@ -83,7 +84,8 @@ class ResultWriter:
 
         One that has the values of a coarser mesh keeps them, with the message.
         """
-        mesh = math.nan if self._wanted is None else self._wanted[row]
+        # those that are finer start from the one that has no state
+        mesh = math.nan if self._wanted is None else COARSE if self._wanted[row] == COARSE else FINEST
         if self._wanted is not None and self._code[self._index(row)] == DONE:
             self.write(row, self._tried_on(row, mesh, NOT_FINER + message))
         else:

@@ -13,7 +13,7 @@ import numpy as np
 from softjaw.study.case.result import CaseFailure, TimeLimitError
 from softjaw.study.quantities import FAILED, MISSING, NO_GRASP
 from softjaw.study.result.lock import OpenedFile
-from softjaw.study.result.write import Files, record
+from softjaw.study.result.write import MESH, Files, record
 from softjaw.study.run.limits import AbandonedError, Stopper, is_out_of_memory
 from softjaw.study.run.shares import Share
 
@@ -128,7 +128,7 @@ class PathSolver:
                 continue
             mine = self._image(result, unit, c) if self._image else result
             # A candidate that is served by symmetry cost nothing: its timings stay empty, so that sums are right.
-            entries = {k: v for k, v in mine.values.items() if not (c and k.startswith("work/"))}
+            entries = {k: v for k, v in mine.values.items() if not c or k == MESH or not k.startswith("work/")}
             entries = entries if c else {"work/seconds_total": seconds, **entries}
             values = record(writer.layout, replace(mine, values=entries))
             with self._state.writing():

@@ -50,7 +50,7 @@ class Plan(NamedTuple):
 
     @property
     def tried(self) -> list[Any]:
-        """Units that are to be solved, on finer meshes at once where rounds will name them for most."""
+        """Units that are to be solved; on finer meshes at once if not sampled, for rounds may take all there."""
         tried = [unit for unit in self.units if not unit.state]
         return [unit if COARSE in unit.finest else replace(unit, finest=(), together=False) for unit in tried]
 

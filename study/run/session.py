@@ -84,7 +84,8 @@ def run_study(plan: Plan, work: Work, path: Path, comm: Any, *, retry_failed: bo
 
     Raises `StudyError` on every rank: the file is in use, belongs to another scene or cannot be written.
     """
-    path = path.resolve() if path.is_symlink() else path  # one lock for all names of a file, and a link stays one
+    if path.is_symlink():  # one lock for all names of a file, and a link stays one
+        path = Path(os.path.realpath(path))
     with locked(path, comm):
         if work.grown and (rounds := on_rank0(comm, rounds_in, path, plan)):
             plan, work = work.grown(rounds)
@@ -134,15 +135,21 @@ def _finished(path: Path, plan: Plan, retry_failed: bool, ranks: int) -> int | N
     """Exit code of a file that is packed and lacks nothing, which is left as it is; None of any other."""
     if not path.exists() or not verify(path, plan.layout, plan.header):
         return None
+    if retry_failed and keeps_coarser(path):
+        return None
     with open_result(path, unchecked=True) as result:
-        if retry_failed and any(NOT_FINER in message for message in result.messages.ravel()):
-            return None
         codes, wanted = result.codes.ravel(), plan.wanted
         codes = codes if wanted is None else codes_on(wanted, codes, result.read(MESH))
     if np.any(codes == MISSING) or rows_again(plan.units, codes, torn_rows(path, plan.layout), retry_failed):
         return None
     print(_begins(path, codes, 0, ranks, created=False), flush=True)
     return code_of(codes)
+
+
+def keeps_coarser(path: Path) -> bool:
+    """Whether a case of a file has the values of a coarser mesh, because it was not solved on a finer one."""
+    with open_result(path, unchecked=True) as result:
+        return any(NOT_FINER in message for message in result.messages.ravel())
 
 
 def _solve(plan: Plan, work: Work, path: Path, comm: Any, retry_failed: bool) -> int:

@@ -173,8 +173,10 @@ def safe_range(ds: xr.Dataset, index: Index) -> str:
     low, high = (at(ds, name, index) for name in FORCE_RANGE)
     if np.isnan([low, high]).all():
         return "-"
-    low = max(low, least_force(ds))
-    if all(name in ds for name in FORCE_RANGE) and (low > high or np.isnan(low)):
+    if "force_low" in ds and np.isnan(low):
+        return "none"
+    low = np.fmax(low, least_force(ds) or np.nan)
+    if low > high:
         return "none"
     more = "+" * bool(high >= largest_force(ds) * (1 - NEGLIGIBLE) and not at(ds, "force_high_error", index) > 0)
     return "..".join("" if np.isnan(bound) else f"{bound:.3g}" for bound in (low, high)) + more
@@ -281,7 +283,7 @@ def _force(ds: xr.Dataset, index: Index) -> tuple[str, str]:
         covers = "±: mesh, interpolation, not mu" if known else "error not known"
         least = with_error(low, error) if known else number(low, 3)
         of_hand, name = least_force(ds), Path(task_keys(ds, "gripper").get("preset") or "").stem
-        if at(ds, "force_high", index) < max(low, of_hand) * (1 - NEGLIGIBLE):
+        if at(ds, "force_high", index) < max(low, of_hand):
             press = f"; {name} presses with {of_hand:g} N at least" * (of_hand > low)
             need = f"{wanted} need {least} N per finger ({covers}), the wall bears {_borne(ds, index)}"
             return "none is safe", need + press

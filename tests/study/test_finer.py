@@ -91,9 +91,11 @@ def test_a_case_that_rounds_name_three_times_counts_as_begun_once(tmp_path):
     for mesh in range(4):
         plan = make_plan(made, rounds=((row, (0, 2, 1)),) * mesh)
         writer = ResultWriter(path, first.layout, None, plan.wanted)
-        assert (writer.codes()[5], writer.attempts()[5]) == (MISSING, 0)
-        writer.count_attempt(5)
-        writer.fail(5, "no state")
+        # those that are finer than the scene's start from it: what has no state there is not tried again
+        assert (writer.codes()[5], writer.attempts()[5]) == (MISSING if mesh < 2 else FAILED, 0)
+        if mesh < 2:
+            writer.count_attempt(5)
+            writer.fail(5, "no state")
         assert writer.codes()[5] == FAILED
         assert writer.attempts()[7] == 0
         writer.count_attempt(7)

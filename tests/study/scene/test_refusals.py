@@ -55,8 +55,11 @@ def test_every_object_of_a_sweep_is_judged():
 def test_walls_that_their_bodies_cannot_have_are_refused(body, key, expected):
     with pytest.raises(StudyError, match=rf"^object.{key}: .*{expected}"):
         check_object(at([60], *body))
-    if body[0] != FLASK:
-        check_object(at([60], body[0], "object.wall_mm=0.5"))
+
+
+@pytest.mark.parametrize(("body", "wall"), [(DOMED, 0.5), (NECKED, 2), (SQUARE, 2)])
+def test_walls_that_their_bodies_can_have_are_not(body, wall):
+    check_object(at([60], body, f"object.wall_mm={wall}"))
 
 
 @pytest.mark.parametrize("body", [BALL, CYLINDER, BOX])
