@@ -84,7 +84,7 @@ RUN_STAGE  = $(or $($(firstword $(subst kernel-,kernel ,$(1)))),$(error there is
 # Exit code 77 is that of a program that lacks something, as in automake.
 define STAGE
 echo; echo '== $(1): $(RUN_STAGE)'; begun=$$(date +%s); code=0; \
-timeout --foreground -k 30 $(RUN_STAGE) || code=$$?; \
+timeout -k 30 $(RUN_STAGE) & stage=$$!; trap "kill -- -$$stage; exit 130" INT TERM; wait $$stage || code=$$?; trap - INT TERM; \
 case $$code in 0) end=passed ;; 77) end='LEFT OUT' ;; 124 | 137) end='TOO LONG' ;; *) end=FAILED ;; esac; \
 ends="$$ends$$(printf '%-9s %-16s %6d s' "$$end" $(1) $$(($$(date +%s) - begun)))\n"; all=$$((all | code)); \
 
