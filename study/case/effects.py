@@ -152,7 +152,7 @@ def settled(scene: Scene, solution: Solution, fits: Sequence[Mapping[str, Surfac
 STEPS: dict[str, tuple[Step, ...]] = {
     "sheet": (Step("rigid", "elastic", _plate, STIFF_PLATE, SOFT_PLATE),),
     "object": (
-        Step("rigid", "linear_shell", lambda c, _: c.indentation[0], STIFF_WALL, 0.0),
+        Step("rigid", "linear_shell", lambda c, _: max(c.indentation[0], c.indentation[2]), STIFF_WALL, 0.0),
         Step("linear_shell", "nonlinear_shell", lambda c, _: c.indentation[1], SMALL_INDENTATION, 0.0),
     ),
     COUPLING: (Step("none", "tangential", _traction, SMALL_TRACTION, inf),),
@@ -214,7 +214,9 @@ class EffectChoice:
         """Level of one effect at the ``k``-th force: each step is skipped, taken, or measured."""
         for step in STEPS[name]:
             measured = partial(self.changes, name, step, k)
-            level = decided(name, step, step.indicator(self, k), measured, self.target)
+            # a wall's dents and stresses are no part of the target
+            target = min(self.target, E_N_TARGET) if name == "object" else self.target
+            level = decided(name, step, step.indicator(self, k), measured, target)
             if level.level == level_named(name, step.low):
                 break
             if name != COUPLING:
@@ -267,16 +269,25 @@ class EffectChoice:
             return None
 
     @cached_property
-    def indentation(self) -> tuple[float, float]:
-        """Indentation of a linear wall at the highest force over the closing displacement, and over its thickness."""
+    def indentation(self) -> tuple[float, float, float]:
+        """Indentation of a linear wall at the highest force over the closing displacement and over its thickness.
+
+        The third reaches `STIFF_WALL` at half the allowed dent or strength: what is solved may be twice the estimate.
+        """
         if not self.solver.walled:
-            return nan, nan
+            return nan, nan, nan
         scene, fingers, force = self.solver.at_levels(self.levels), self.solver.fingers, self.solver.forces[-1]
         grasp = grasp_of(scene, fingers)
         pad = pad_of(scene, grasp.pad_symmetry, contact_rules(scene, walled=True)[0], coarser=False)
         closing = SpringBed(pad, fingers[0].gap).closing(force)
-        indentation, ratio = estimated_indentation(thin_body(scene.object), grasp, scene, closing, force)
-        return indentation / closing, ratio
+        # foam gets stiffer: a small pad closes a third as far as a bed of springs
+        plain = self.levels._replace(object="rigid", friction_pressure_coupling="none")
+        if self._wanted["object"] == "auto" and (contacts := self.coarse(self.count - 1, plain)):
+            closing = min(closing, *(contact.state.closing for contact in contacts))
+        body, dent = thin_body(scene.object), getattr(scene.object, "allowed_dent", None)
+        indentation, ratio, stress = estimated_indentation(body, grasp, scene, closing, force)
+        borne = max(indentation / (dent or inf), stress / (body.material.yield_strength or inf))
+        return indentation / closing, ratio, 2.0 * STIFF_WALL * borne
 
     # --- cases at the levels that were chosen -------------------------------------------------------------------------
 
@@ -323,7 +334,7 @@ class EffectChoice:
         return E_N_TARGET / SMALL_TRACTION * level.indicator if level.reason == BELOW else 0.0
 
     def closes_less(self) -> float:
-        """By what share of it fingers close less on a wall that is taken as rigid, because its indicator said so."""
+        """By what share fingers close less on a wall that is taken as rigid, because its indicator said so."""
         level = self.level("object", self.count - 1)
         stiff = level.level == level_named("object", "rigid") and level.reason == BELOW
         return RIGID_CLOSES * self.indentation[0] if stiff else 0.0

@@ -97,7 +97,7 @@ def check_wall(shape: Any, surface: OuterSurface) -> None:
             if max(shape.thicknesses_mm) > most:
                 raise ValueError(
                     f"found {max(shape.thicknesses_mm):g}, expected at most {most:.3g} mm, a tenth of the mesh's"
-                    " smallest extent; a thicker wall is as good as rigid: leave it out"
+                    " smallest extent; a thicker wall is no shell: leave it out for a rigid object"
                 )
         refuse_thick_sections(surface, shape.wall)
         body_mesh(

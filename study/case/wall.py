@@ -40,8 +40,8 @@ def thin_body(shape: Walled) -> ThinWalled:
 
 def estimated_indentation(
     body: ThinWalled, grasp: Grasp, scene: Scene, closing: float, force: float
-) -> tuple[float, float]:
-    """Indentation of the linear wall at a force [N], where undeformed pads would overlap it [m], and ratio.
+) -> tuple[float, float, float]:
+    """Indentation of the linear wall at a force [N], where undeformed pads would overlap it [m], ratio and stress [Pa].
 
     The second is the largest ratio of an inward displacement to the wall's thickness there. ``closing`` is that of the
     pads on the rigid object [m]. One right-hand side with factors that all candidates share.
@@ -67,9 +67,10 @@ def estimated_indentation(
         load[:, :3] += (part * depth / depth.sum())[:, None] * pose.rotation[:, 2]
         pressed |= depth > 0
     load[:, 3:] = load[:, :3]
-    indentations = _indentations(linear.shell, linear.solve(load.ravel()).reshape(-1, 6))
-    ratios = indentations / mesh.thickness
-    return float(indentations[pressed].max(initial=0.0)), float(ratios[pressed].max(initial=0.0))
+    q = linear.solve(load.ravel())
+    indentations = _indentations(linear.shell, q.reshape(-1, 6))
+    dent, ratio = (float(v[pressed].max(initial=0.0)) for v in (indentations, indentations / mesh.thickness))
+    return dent, ratio, max(float(face.von_mises.max()) for face in faces(linear.shell, q))
 
 
 def _estimate_size(body: ThinWalled, length: float, width: float) -> MeshSize:

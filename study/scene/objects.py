@@ -113,7 +113,7 @@ class Walled(Shape):
             if not 0.01 <= value <= most:
                 expected = f"a thickness from 0.01 to {most:g} mm, a tenth of the object's smallest extent"
                 if key == "wall_mm" and value > most:
-                    expected += "; a thicker wall is as good as rigid: leave it out"
+                    expected += "; a thicker wall is no shell: leave it out for a rigid object"
                 yield wrong(value, expected, key)
                 break
         missing = [k for k in ("young_modulus_gpa", "wall_poisson_ratio") if getattr(self, k) is None]

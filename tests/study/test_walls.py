@@ -75,6 +75,11 @@ def test_the_level_follows_the_indentation_and_compression_is_a_strain_too(monke
     level = EffectChoice(CandidateSolver(unit.scene, unit.candidate.poses)).level("object", 0)
     assert (level.level, level.reason) == (names[2], ABOVE)
     assert level.indicator == pytest.approx(indicators[2], rel=0.3)
+    # a wall as stiff as the first one, of which a dent is asked for that it may have
+    stiff = "object.wall_mm=1", "object.young_modulus_gpa=200", "object.allowed_dent_mm=1e-4"
+    [unit] = walled(CUP, *stiff, "accuracy.meshes=2", "accuracy.target=0.4", forces="[0.2]")
+    level = EffectChoice(CandidateSolver(unit.scene, unit.candidate.poses)).level("object", 0)
+    assert (level.level, level.reason) == (names[1], BELOW)
     face = SimpleNamespace(von_mises=np.ones(1), principal_strain=np.array([[-3e-3, 1e-3]]))
     for name, value in (("faces", [face, face]), ("_indentations", np.zeros(1)), ("_places", None)):
         monkeypatch.setattr(wall, name, lambda *_, value=value: value)
