@@ -163,8 +163,15 @@ def body_mesh(
     t, p = theta[first[0]], s[first[1]]
     D = 0.5 * _wall(surface, thickness, base_thickness, p)[:, None] * surface.normals(t, p)
     X = surface.jets(t, p)[:, 0] - D
-    planes = _planes(symmetry, theta, number, len(X))
-    return BodyMesh(X, D, grid_elements(number), surface, theta, s, number, symmetry, planes)
+    elements, planes = grid_elements(number), _planes(symmetry, theta, number, len(X))
+    x = X[elements]
+    facing = np.einsum("ek,ek->e", np.cross(x[:, 2] - x[:, 0], x[:, 3] - x[:, 1]), D[elements].mean(axis=1))
+    if facing.min() <= 0.0:
+        raise ValueError(
+            f"the wall folds near z = {1e3 * x[facing.argmin(), 0, 2]:.4g} mm, where an edge is too sharp for its "
+            'thickness; make it thinner, give the edge its own points, or open_ends = "both"'
+        )
+    return BodyMesh(X, D, elements, surface, theta, s, number, symmetry, planes)
 
 
 def _steps(surface: OuterSurface, thickness: Thickness) -> list[float]:

@@ -36,6 +36,7 @@ NECKED = 'shape = "revolution"\nprofile_mm = [[0, 30], [40, 28], [80, 18], [120,
 SQUARE = 'shape = "sections"' + "".join(
     f"\n[[object.sections]]\nz_mm = {z}\na_mm = 35\nexponent = 20" for z in (0, 40, 80, 120)
 )
+OVAL = SQUARE.replace("a_mm = 35\nexponent = 20", "a_mm = 40\nb_mm = 12.5\nexponent = 3")
 
 
 def test_every_object_of_a_sweep_is_judged():
@@ -50,6 +51,7 @@ def test_every_object_of_a_sweep_is_judged():
     ((DOMED, "object.wall_mm=0.5", "object.base_wall_mm=1"), "base_wall_mm", "a flat bottom"),
     ((NECKED, "object.wall_mm=5"), "wall_mm", "section's radius of curvature is only 4 mm"),
     ((SQUARE, "object.wall_mm=4"), "wall_mm", "section's radius of curvature is only 2.5"),
+    ((OVAL, "object.wall_mm=0.7"), "wall_mm", "the wall folds near z = -"),
     ((FLASK, "object.wall_mm=30"), "wall_mm", "a tenth of the mesh's smallest extent"),
 ])  # fmt: skip
 def test_walls_that_their_bodies_cannot_have_are_refused(body, key, expected):
