@@ -31,26 +31,11 @@ Row = dict[str, Any]
 class Column(NamedTuple):
     """A quantity as it is shown.
 
-    Parameters
-    ----------
-    name : str
-        Key of the rows, and name in CSV and JSON.
-    unit : str
-        SI unit of the rows.
-    label : str
-        Displayed head; the name where it is empty.
-    error : str
-        Key that holds the error of this quantity.
-    relative : bool
-        Whether that is a share of the value; else it is in the unit.
-    digits : int
-        Significant digits where no error says how many there are.
-    display, programs : bool
-        Whether text and page show it, and whether CSV and JSON hold it.
-    drop : int
-        Above 0, what a narrow text leaves out, the largest number first.
-    wrap : int
-        Characters in a line of its cells, which begin at the left; 0 for numbers.
+    ``name``: key of the rows, and name in CSV and JSON; ``unit``: SI unit of the rows; ``label``: displayed head, the
+    name where it is empty. ``error``: key of the error, a share of the value where it is ``relative``, else in the
+    unit; ``digits``: significant ones where no error says how many there are. ``display, programs``: whether text and
+    page show it, and CSV and JSON hold it. ``drop``: above 0, what a narrow text leaves out, the largest number first.
+    ``wrap``: characters in a line of its cells, which begin at the left; 0 for numbers.
     """
 
     name: str
