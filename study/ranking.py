@@ -205,27 +205,35 @@ def rank_values(ds: xr.Dataset, name: str, k: int) -> np.ndarray:
 def ranked(ds: xr.Dataset, k: int, by: str | None = None) -> IntArray:
     """The candidates solved at a force level, flat, the best first; see `score_of` and `ranking`.
 
-    Of grasps that their errors cannot tell from the best of them the simpler ones come first, antipodal and without a
-    flag, and then those that surely reach more. Of the `LOST` ones those come first that are safe at another force.
+    Of grasps that their errors cannot tell from the best of them the simpler ones come first, antipodal, without a flag
+    and known to a fifth, and then those that surely reach more. Of the `LOST` ones those come first that are safe at
+    another force.
     """
     done = np.flatnonzero(ds["status"].values[..., k].ravel() == DONE)
     name = score_of(ds, by)
     score, flags = rank_values(ds, name, k), judged(ds)[..., k].ravel()
     order, errors = done[ranking(score[done], flags[done])], sure(ds, name, k)
-    places, group, head = _places(score), np.zeros(len(order), np.int64), 0
+    places, group, head, surest = _places(score), np.zeros(len(order), np.int64), 0, 0
     for n, i in enumerate(order):
         first, lost = order[head], flags[[order[head], i]] & LOST > 0
         alike = places[i] == places[first]
         if errors is not None and not alike:  # an error of its own that is larger makes no grasp better
             alike = errors.apart(first, i) is False and score[i] > score[first] - errors.half_width[first]
-        head = head if alike and lost[0] == lost[1] else n
+            # nor may one whose own value is hardly known hide that another of its group is surely better
+            alike = alike and errors.apart(order[surest], i) is not True
+        if not (alike and lost[0] == lost[1]):
+            head = surest = n
+        elif errors is not None and score[i] - errors.half_width[i] > (score - errors.half_width)[order[surest]]:
+            surest = n
         group[n] = head
     marks, surely = flags[order], _places(score if errors is None else score - errors.half_width)[order]
+    vague = np.zeros(len(order), bool) if errors is None else (errors.half_width > 0.2 * score)[order]
     hopeless = marks & LOST > 0
     if all(name in ds for name in FORCE_RANGE):
         safe = (np.maximum(ds["force_low"].values, least_force(ds)) <= ds["force_high"].values).ravel()[order]
         hopeless &= ~(safe & (marks & LOST & ~(Flag.TOO_WEAK | Flag.TOO_STRONG | Flag.YIELDS) == 0))
-    return order[np.lexsort((surely, marks != 0, marks & Flag.NOT_ANTIPODAL, group, hopeless))]
+    turned = (marks & Flag.NOT_ANTIPODAL > 0) | vague
+    return order[np.lexsort((surely, (marks != 0) | vague, turned, group, hopeless))]
 
 
 # --- distinct places, and the force that is shown ---------------------------------------------------------------------

@@ -29,7 +29,7 @@ from softjaw.study.quantities import COLLIDES, MISSING, SLIPS, STATES, WIDE
 from softjaw.study.scene import Scene
 from softjaw.study.units import shown_text
 
-SAMPLES = 300  # points of the surface from which grasps are looked for
+SAMPLES = 300  # points of the surface from which grasps are looked for, four times as many where few are found
 TURNS = 4  # rounds of setting a grasp straight; most end after two
 STRAIGHT = math.radians(0.5)  # tilt between two rounds that ends them
 APART, NEAR = 0.5, 0.25  # of the pad's length: grasps that are nearer are at one place; and one, if directions agree
@@ -162,7 +162,14 @@ def offers(
     # places that only a pad in their middle meets squarely, such as the bottom of a bowl, are seldom hit at random
     through_centre = [(np.asarray(task.centre_of_mass, float), direction) for direction in axes]
     starts: list[tuple[JawsOnSurface, bool]] = []  # and whether they meet the object squarely
-    for place, normal in [*through_centre, *sampled(corners, normals, samples, seed)]:
+    good = 0
+
+    def aims() -> Iterator[tuple[FloatArray, FloatArray]]:
+        yield from [*through_centre, *sampled(corners, normals, samples, seed)]
+        if good < samples / 4:  # little of the surface can be gripped: it is looked for with more points
+            yield from sampled(corners, normals, 3 * samples, seed + 1)
+
+    for place, normal in aims():
         try:
             aimed = JawsOnSurface(surface, place, axes_of(-normal, axis), jaws)
             if state := state_of(aimed):
@@ -175,7 +182,9 @@ def offers(
             starts.append((start, square))
             for along in long_sides(start, axis):
                 grip = straightened(surface, start.point, axes_of(start.axes[:, 2], along), jaws)
-                yield judged(grip, task), lids is not None and grip.over(lids)
+                grasp = judged(grip, task)
+                good += not grasp.state
+                yield grasp, lids is not None and grip.over(lids)
         except NoContactError:
             continue
 

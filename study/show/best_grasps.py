@@ -197,8 +197,12 @@ def certainty(ds: xr.Dataset, places: Sequence[int], score: str, k: int) -> str:
         return ""
     if apart[0] is None:
         return "places 1 and 2 cannot be compared: one has no error yet"
-    alike = max((n for n, better in enumerate(apart, start=2) if better is False), default=0)
-    return f"places 1 to {alike} are equal within errors" if alike else "place 1 is best beyond errors"
+    alike = [n for n, better in enumerate(apart, start=2) if better is False]
+    if not alike:
+        return "place 1 is best beyond errors"
+    if alike[-1] == len(alike) + 1:  # without a gap
+        return f"places 1 to {alike[-1]} are equal within errors"
+    return f"places {', '.join(map(str, [1, *alike[:-1]]))} and {alike[-1]} are equal within errors"
 
 
 def common(marks: np.ndarray) -> int:

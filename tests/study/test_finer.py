@@ -5,6 +5,7 @@ import pytest
 import trimesh
 
 from softjaw.study.case.result import CaseResult
+from softjaw.study.flags import Flag
 from softjaw.study.quantities import DONE, FAILED, LISTED, MISSING
 from softjaw.study.ranking import Place
 from softjaw.study.result.skeleton import create
@@ -125,6 +126,19 @@ def test_with_a_mass_finer_meshes_go_to_the_force_below_too(tmp_path, changes, l
         named = next_cases(result, made)
     assert {level for *_, level in named} == levels
     assert (0, 3, last) in named  # the scene's mesh may have a state where the coarse one has none
+
+
+def test_what_one_mesh_says_of_a_grasp_that_may_be_the_best_is_asked_of_the_next(tmp_path):
+    made = sampled("load.normal_force_n=[5]")
+    plan = make_plan(made, rounds=(tuple((0, n, 0) for n in range(4)),))  # all on the scene's mesh
+
+    def case(index):
+        held, flags = ((1.0, 0.0), (0.5, 0.0), (1.5, float(Flag.COLLISION)), (0.4, 0.0))[index[0]]
+        values = {"maps/payload": [held] * 3, "maps/payload_error": 0.004, "maps/flags": flags}
+        return CaseResult(values | {"work/mesh": 1})
+
+    with open_result(written(tmp_path / "a.hdf", plan.layout, case, plan.header)) as result:
+        assert next_cases(result, made) == ((0, 2, 0),)
 
 
 def test_a_case_gets_its_finer_meshes_with_every_sample_of_uncertain_inputs_at_its_point_of_a_sweep(tmp_path):

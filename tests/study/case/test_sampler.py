@@ -11,6 +11,7 @@ from softjaw.study.case.sampler import (
     SampledGrasp,
     antipodal_grasps,
     axes_of,
+    offers,
     principal_axes,
     reached_by_hand,
     same_grasp,
@@ -192,6 +193,14 @@ def test_grasps_that_the_hand_does_not_reach_are_left_out_and_it_reaches_a_slab_
     assert list(map(reached_by_hand(parse_scene(slab, "slab")), at)) == [True, True]
     hand = reached_by_hand(parse_scene(slab, "slab", ['gripper.preset="franka_hand"']))
     assert list(map(hand, at)) == [False, True]
+
+
+def test_where_little_can_be_gripped_it_is_looked_for_with_more_points():
+    rod = trimesh.creation.cylinder(0.01, 0.12, sections=24).apply_translation((0.2, 0, 0))
+    body = surface(trimesh.util.concatenate([trimesh.creation.icosphere(3, 0.08), rod]))
+    offered = [over for _, over in offers(body, NARROW, TASK, 0, 40, None)]
+    assert offered.count(None) > 2 * 40  # most are on the ball, which is too wide
+    assert offered.count(False) >= 6
 
 
 def test_a_start_that_is_still_turning_keeps_none_away_that_meets_its_faces_squarely():

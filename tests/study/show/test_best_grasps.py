@@ -1,6 +1,7 @@
 """The best grasps: which force, which order, which errors; the same numbers in text, CSV and JSON."""
 
 import json
+import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -182,6 +183,17 @@ def test_grasps_are_ranked_by_payload_or_what_is_named_and_of_those_alike_the_si
     ds = study([[1.0], [0.5]], flags=[float(Flag.NOT_ANTIPODAL), 0.0])
     ds["payload_error"] = (ds.status.dims, np.repeat([0.02, 1.2], 2).reshape(ds.status.shape), {"units": ""})
     assert stations(best(ds)) == [0.0, 1.0]
+    # 1.0 to within 1.0 is alike to all; of these 0.96 surely holds more than 0.47, which has no flag
+    ds = study([[1.0], [0.96], [0.8], [0.47]], flags=[float(Flag.COARSE)] * 2 + [0.0] * 2)
+    errors = np.repeat([1.0, 0.1, 0.45, 0.03], 2).reshape(ds.status.shape)
+    ds["payload_error"] = (ds.status.dims, errors, {"units": ""})
+    table = best(ds)
+    assert stations(table) == [1.0, 2.0, 0.0, 3.0]
+    assert re.findall(r"places (.*) are equal", " ".join(table.notes)) == ["1 to 3"]
+    ds = study([[0.96], [0.9], [0.85]])
+    errors = np.repeat([0.02, 0.01, 0.35], 2).reshape(ds.status.shape)
+    ds["payload_error"] = (ds.status.dims, errors, {"units": ""})
+    assert re.findall(r"places (.*) are equal", " ".join(best(ds).notes)) == ["1 and 3"]
 
 
 def test_the_force_is_the_largest_that_most_share_or_the_lowest_that_holds_a_mass_and_payload_in_grams():
