@@ -94,28 +94,13 @@ MEASURED = {  # parts of an effect that the coarse mesh decides
 class Quantity:
     """One number, or one small array, of a case: a row of the table.
 
-    Parameters
-    ----------
-    name : str
-        Name of the dataset in its group.
-    dims : tuple of str
-        Dimensions after those of the cases; ``model`` for one value per friction model.
-    unit, label, definition : str
-        SI unit ("" for a pure number), label of a colour bar, and one sentence that readers see beside the data.
-    group : str
-        Group of the file; those of ``maps`` are groups of their own, which viewers draw.
-    symbol : str
-        Head of a column; the name where it is empty.
-    needs : tuple of str
-        Of `NEEDS`; without all of them the quantity is not in the file.
-    rank : int
-        Place among the main maps, 1 for the first; 0 for all others.
-    meanings : tuple of str
-        What the integers 0, 1, ... of a code mean; -1 is none.
-    error : str
-        Where two meshes tell the error of a map, what it is: "relative", or "absolute" in the unit; else nothing.
-    of : str
-        The map whose error it is, in whose group it stands.
+    ``name``: of the dataset in its ``group``; those of ``maps`` are groups of their own, which viewers draw. ``dims``:
+    after those of the cases, ``model`` for one value per friction model. ``unit, label, definition``: SI unit ("" for a
+    pure number), label of a colour bar, and one sentence that readers see beside the data. ``symbol``: head of a
+    column, the name where it is empty. ``needs``: of `NEEDS`, without all of which the quantity is not in the file.
+    ``rank``: place among the main maps, 1 for the first; 0 for all others. ``meanings``: what the integers 0, 1, ... of
+    a code mean; -1 is none. ``error``: where two meshes tell the error of a map, what it is, "relative", or "absolute"
+    in the unit; else nothing. ``of``: the map whose error it is, in whose group it stands.
     """
 
     name: str

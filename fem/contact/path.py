@@ -33,34 +33,15 @@ ProblemT = TypeVar("ProblemT", bound=ContactProblem)
 class Pressed(NamedTuple):
     """A pad in equilibrium on the object at one normal force, with the wall and the other pad that it shares it with.
 
-    Parameters
-    ----------
-    force, closing : float
-        Normal force [N] and closing displacement of the backing plate from first touch [m].
-    unknowns : (n,) array
-        State of the solver.
-    pad : Pad
-        The pad it was solved with: the fallback where the pad itself had no solution.
-    pose : Pose
-        Its frame at first touch; a rigid object is seen from there.
-    pressure : (contact nodes,) array
-        Nominal contact pressure, in the order of ``Pad.contact_nodes`` [Pa].
-    contact_face : (contact nodes, 3) array
-        Deformed nodes of the contact face, in the pad's frame at first touch [m].
-    points : ContactPoints
-        Position, normal and load of the quadrature points of the meshed contact face.
-    work : Work
-        Effort; that of two pads that are solved at once is counted with the first.
-    path_dependent : bool
-        Whether the pad, or the wall, has jumped before: another load path may lead to another state.
-    instead : bool
-        Whether a fallback was taken.
-    notes : tuple of str
-        Which means beside Newton's method on steps of the force it took.
-    wall : WallState, optional
-        The wall that gives way.
-    other : Pressed, optional
-        The second pad on this wall.
+    ``force, closing``: normal force [N] and closing displacement of the backing plate from first touch [m].
+    ``unknowns (n,)``: state of the solver. ``pad``: that it was solved with, the fallback where the pad itself had no
+    solution; ``pose``: its frame at first touch, from which a rigid object is seen. ``pressure (contact nodes,)``:
+    nominal contact pressure, in the order of ``Pad.contact_nodes`` [Pa]; ``contact_face (contact nodes, 3)``: deformed
+    nodes of the contact face, in the pad's frame at first touch [m]; ``points``: position, normal and load of its
+    quadrature points. ``work``: effort; that of two pads that are solved at once is counted with the first.
+    ``path_dependent``: whether pad or wall has jumped before, so that another load path may lead to another state.
+    ``instead``: whether a fallback was taken. ``notes``: which means beside Newton's method on steps of the force it
+    took. ``wall``: the wall that gives way; ``other``: the second pad on it.
     """
 
     force: float
