@@ -26,8 +26,8 @@ scene = sj.Scene.from_file(Path(__file__).parents[1] / "bottle-rigid.toml").with
 sj.run(scene, FILE)
 grasps = sj.GraspMap(FILE)
 
-# %% The robot stands at -y, a table lies at z = 0, and the hand is 90 mm high and opens to 70 mm
-TOWARDS, HAND, OPENING = np.array([0.0, 1.0, 0.0]), 0.09, 0.07
+# %% The robot stands at -x, a table lies at z = 0, and the hand is 90 mm high and opens to 70 mm
+TOWARDS, HAND, OPENING = np.array([1.0, 0.0, 0.0]), 0.09, 0.07
 
 
 def reachable(point):
