@@ -213,27 +213,27 @@ def ranked(ds: xr.Dataset, k: int, by: str | None = None) -> IntArray:
     name = score_of(ds, by)
     score, flags = rank_values(ds, name, k), judged(ds)[..., k].ravel()
     order, errors = done[ranking(score[done], flags[done])], sure(ds, name, k)
-    places, group, head, surest = _places(score), np.zeros(len(order), np.int64), 0, 0
+    half = np.zeros(len(score)) if errors is None else errors.half_width
+    surely, places, group, head, surest = score - half, _places(score), np.zeros(len(order), np.int64), 0, 0
     for n, i in enumerate(order):
         first, lost = order[head], flags[[order[head], i]] & LOST > 0
         alike = places[i] == places[first]
         if errors is not None and not alike:  # an error of its own that is larger makes no grasp better
-            alike = errors.apart(first, i) is False and score[i] > score[first] - errors.half_width[first]
+            alike = errors.apart(first, i) is False and score[i] > surely[first]
             # nor may one whose own value is hardly known hide that another of its group is surely better
             alike = alike and errors.apart(order[surest], i) is not True
         if not (alike and lost[0] == lost[1]):
             head = surest = n
-        elif errors is not None and score[i] - errors.half_width[i] > (score - errors.half_width)[order[surest]]:
+        elif surely[i] > surely[order[surest]]:
             surest = n
         group[n] = head
-    marks, surely = flags[order], _places(score if errors is None else score - errors.half_width)[order]
-    vague = np.zeros(len(order), bool) if errors is None else (errors.half_width > 0.2 * score)[order]
+    marks, vague = flags[order], (half > 0.2 * np.abs(score))[order]
     hopeless = marks & LOST > 0
     if all(name in ds for name in FORCE_RANGE):
         safe = (np.maximum(ds["force_low"].values, least_force(ds)) <= ds["force_high"].values).ravel()[order]
         hopeless &= ~(safe & (marks & LOST & ~(Flag.TOO_WEAK | Flag.TOO_STRONG | Flag.YIELDS) == 0))
     turned = (marks & Flag.NOT_ANTIPODAL > 0) | vague
-    return order[np.lexsort((surely, (marks != 0) | vague, turned, group, hopeless))]
+    return order[np.lexsort((_places(surely)[order], (marks != 0) | vague, turned, group, hopeless))]
 
 
 # --- distinct places, and the force that is shown ---------------------------------------------------------------------

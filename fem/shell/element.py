@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.sparse import bsr_matrix
 
 from softjaw.fem.assembly import IntArray, Pattern, pairs
@@ -73,6 +74,14 @@ def patch(X: FloatArray, normal: FloatArray, thickness: float) -> ShellMesh:
     return ShellMesh(X.reshape(-1, 3), np.ascontiguousarray(D.reshape(-1, 3)), grid_elements(number))
 
 
+def folded(X: FloatArray, D: FloatArray, nodes: IntArray) -> NDArray[np.bool_]:
+    """Which elements ``(n,)`` do not face the side of their directors; nearer to edge-on than 1e-9 counts as folded."""
+    x, d = X[nodes], D[nodes].mean(axis=1)
+    normal = np.cross(*(np.einsum("i,nik->nk", s, x) for s in (A_0, B_0)))
+    least = 1e-9 * np.linalg.norm(normal, axis=1) * np.linalg.norm(d, axis=1)
+    return np.asarray(~(np.einsum("nk,nk->n", normal, d) > least))
+
+
 def elements(
     X: FloatArray, D: FloatArray, nodes: IntArray, young_modulus: float, poisson_ratio: float
 ) -> tuple[tuple[IntArray, FloatArray, FloatArray, FloatArray], FloatArray]:
@@ -103,8 +112,7 @@ def elements(
     g_centre, _ = _metric(x, A_0, B_0, e1)
     points = [_metric(x, a, b, e1) for a, b in zip(A_G, B_G, strict=True)]
     g, area = np.stack([p[0] for p in points], 1), np.stack([p[1] for p in points], 1)
-    facing = np.einsum("nk,nk->n", np.cross(*(np.einsum("i,nik->nk", s, x) for s in (A_0, B_0))), d.mean(axis=1))
-    bad = np.flatnonzero(~((area > 0).all(axis=1) & (facing > 0)))
+    bad = np.flatnonzero(~(area > 0).all(axis=1) | folded(X, D, nodes))
     if len(bad):
         raise ValueError(
             f"shell element {bad[0]} with nodes {nodes[bad[0]].tolist()} has no area or its directors "

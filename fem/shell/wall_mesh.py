@@ -12,7 +12,7 @@ from scipy.interpolate import CubicSpline
 
 from softjaw.fem.assembly import IntArray
 from softjaw.fem.objects.outer_surface import OuterSurface
-from softjaw.fem.shell.element import ShellMesh, grid_elements
+from softjaw.fem.shell.element import ShellMesh, folded, grid_elements
 from softjaw.friction.patch import NEGLIGIBLE, FloatArray
 
 Thickness = float | Sequence[tuple[float, float]]  # of a wall [m], or pairs (z, thickness)
@@ -164,12 +164,10 @@ def body_mesh(
     D = 0.5 * _wall(surface, thickness, base_thickness, p)[:, None] * surface.normals(t, p)
     X = surface.jets(t, p)[:, 0] - D
     elements, planes = grid_elements(number), _planes(symmetry, theta, number, len(X))
-    x = X[elements]
-    facing = np.einsum("ek,ek->e", np.cross(x[:, 2] - x[:, 0], x[:, 3] - x[:, 1]), D[elements].mean(axis=1))
-    if facing.min() <= 0.0:
+    if (fold := folded(X, D, elements)).any():
         raise ValueError(
-            f"the wall folds near z = {1e3 * x[facing.argmin(), 0, 2]:.4g} mm, where an edge is too sharp for its "
-            'thickness; make it thinner, give the edge its own points, or open_ends = "both"'
+            f"the wall folds near z = {1e3 * X[elements[fold.argmax(), 0], 2]:.4g} mm, where an edge is too sharp for "
+            'its thickness; make it thinner, give the edge its own points, or open_ends = "both"'
         )
     return BodyMesh(X, D, elements, surface, theta, s, number, symmetry, planes)
 

@@ -93,7 +93,7 @@ def rewrite(path: Path, layout: Layout, header: Header, *, packed: bool = False)
                 values = old.file.values(dataset.path)
                 target = file[dataset.path]
                 target[...] = _spread(values, dataset, stations).astype(target.dtype)  # texts with their encoding
-            for name in (SESSION_ROWS, *([] if left_out else [REPORT])):
+            for name in (SESSION_ROWS, *[REPORT] * packed):
                 file[name][...] = old.file.values(name)
 
 

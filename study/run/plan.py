@@ -52,7 +52,7 @@ class Plan(NamedTuple):
     def tried(self) -> list[Any]:
         """Units that are to be solved; on finer meshes at once if not sampled, for rounds may take all there."""
         tried = [unit for unit in self.units if not unit.state]
-        return [unit if COARSE in unit.finest else replace(unit, finest=(), together=False) for unit in tried]
+        return [replace(u, finest=(), together=False) if u.finest and COARSE not in u.finest else u for u in tried]
 
     @property
     def wanted(self) -> np.ndarray | None:
@@ -193,13 +193,13 @@ def _rounds(plan: Plan, scene: Any) -> str:
 
 def _time(plan: Plan, scene: Any, ranks: Sequence[int], failed: list[str]) -> str:
     """Time on each of these numbers of ranks; reasons of cases that fail are added to ``failed``."""
-    if not plan.tried:
+    if not (tried := plan.tried):
         return "no grasp is solved"
     before = time.process_time()  # what a run does before it solves, a plan did as well
-    each, loads = timed(plan.tried, inputs=plan.layout.inputs, failed=failed)
+    each, loads = timed(tried, inputs=plan.layout.inputs, failed=failed)
     start = before + loads + END_S
     added = 1.0 + (scene.candidates.refine or 0) / (len(each) * plan.layout.shape[-1])
-    counts = [plan.layout.shape[-1] if unit.apart else 1 for unit in plan.tried]  # forces that ranks may divide
+    counts = [plan.layout.shape[-1] if unit.apart else 1 for unit in tried]  # forces that ranks may divide
     parts = [added * cost / n for cost, n in zip(each, counts, strict=True) for _ in range(n)]
     times = (f"{duration(start + makespan(parts, n))} on {n} rank{'s' * (n > 1)}" for n in ranks)
     return f"about {', '.join(times)} for all cases, {TIMED}"

@@ -140,9 +140,9 @@ def apart(first: Frame, other: Frame, pad: Sequence[float]) -> float:
 
 def next_cases(result: Any, scene: Scene) -> tuple[Case, ...]:
     """Cases of the next round; none where the best are known as well as the scene asks for."""
-    if not scene.candidates.sampled and samples_together(scene):
-        return off_target(dataset(result), scene, result.layout.finer)
-    if not scene.candidates.sampled or "work/mesh" not in {q.key for q in result.layout.quantities}:
+    if not scene.candidates.sampled:
+        return off_target(dataset(result), scene, result.layout.finer) if samples_together(scene) else ()
+    if "work/mesh" not in {q.key for q in result.layout.quantities}:
         return ()
     ds = judge(dataset(result))
     k = ds.attrs["level"]

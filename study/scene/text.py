@@ -4,6 +4,7 @@ import json
 import re
 import tomllib
 from collections.abc import Mapping
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -153,4 +154,10 @@ def value_text(value: Any) -> str:
 
 def scene_table(text: str, section: str) -> dict[str, Any]:
     """A section of a stored scene; empty where there is none."""
-    return dict(parse_toml(text, "scene").get(section, {}))
+    return dict(_stored_tables(text).get(section, {}))
+
+
+@lru_cache(maxsize=8)
+def _stored_tables(text: str) -> dict[str, Any]:
+    """Tables of a stored scene, which are asked for again for each line of a list."""
+    return parse_toml(text, "scene")
