@@ -31,12 +31,15 @@ class Pattern:
     def grow(self, rows: IntArray, columns: IntArray) -> IntArray:
         """Store these entries too; returns where each old entry has moved to."""
         wanted = np.unique(self._keys(rows, columns))
-        place = np.minimum(np.searchsorted(self.keys, wanted), len(self.keys) - 1)
-        # `searchsorted` may point behind the last key, hence the minimum above; such a key is new anyway
-        new = wanted[self.keys[place] != wanted]
-        old = self.keys
-        self._set(np.sort(np.concatenate([old, new]), kind="stable"))  # merges two sorted runs in linear time
-        return np.searchsorted(self.keys, old).astype(np.int32)
+        place = np.searchsorted(self.keys, wanted)
+        # `searchsorted` may point behind the last key, hence the minimum; such a key is new anyway
+        fresh = self.keys[np.minimum(place, len(self.keys) - 1)] != wanted
+        new, place = wanted[fresh], place[fresh]
+        # every old entry moves by the number of new ones before it
+        moved = np.arange(len(self.keys)) + np.cumsum(np.bincount(place, minlength=len(self.keys) + 1))[:-1]
+        if len(new):
+            self._set(np.insert(self.keys, place, new))
+        return moved.astype(np.int32)
 
     def _keys(self, rows: IntArray, columns: IntArray) -> NDArray[np.int64]:
         # one sortable number per place; 64 bits, because the square of the size passes 2^31 from 46,341 unknowns on
@@ -45,8 +48,9 @@ class Pattern:
 
     def _set(self, keys: NDArray[np.int64]) -> None:
         self.keys = keys
-        self.column = (keys % self.size).astype(np.int32)
         self.start = np.searchsorted(keys, np.arange(self.size + 1) * np.int64(self.size)).astype(np.int32)
+        first = np.arange(self.size) * np.int64(self.size)
+        self.column = (keys - np.repeat(first, np.diff(self.start))).astype(np.int32)
         self.values = np.zeros(len(keys))
 
 

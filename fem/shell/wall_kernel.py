@@ -51,8 +51,7 @@ def force_blocks(
 
 @njit(cache=True)
 def add_blocks(blocks, rows, columns, start, column, values):
-    """Add blocks ``(n, r, m)`` in rows and columns, -1 where fixed, to compressed rows; whether all had a place."""
-    complete = True
+    """Add blocks ``(n, r, m)`` in rows and columns, -1 where fixed, to compressed rows, which have a place for all."""
     for n in range(len(blocks)):
         for r in range(rows.shape[1]):
             if rows[n, r] < 0:
@@ -61,10 +60,5 @@ def add_blocks(blocks, rows, columns, start, column, values):
             for j in range(columns.shape[1]):
                 if columns[n, j] < 0:
                     continue
-                # columns ascend within a row, so bisection finds the slot; if none, the caller grows the pattern
-                place = low + np.searchsorted(column[low:high], columns[n, j])
-                if place == high or column[place] != columns[n, j]:
-                    complete = False
-                else:
-                    values[place] += blocks[n, r, j]
-    return complete
+                # columns ascend within a row, so bisection finds the slot
+                values[low + np.searchsorted(column[low:high], columns[n, j])] += blocks[n, r, j]

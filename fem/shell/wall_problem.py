@@ -61,7 +61,7 @@ class WallProblem(ContactProblem):
         # kept from call to call: where a point was is the best start for where it is now
         self.places = [places.copy() for places in self._first_places]
         pattern, self._wall_slots, self._foam_slots, self._balance_slots = self._bare
-        self.pattern = copy(pattern)
+        self.pattern, self._met_before = copy(pattern), [set[tuple[int, ...]]() for _ in self.fingers]
 
     @property
     def control(self) -> Control:
@@ -140,12 +140,10 @@ class WallProblem(ContactProblem):
         self._tangent_set = np.concatenate([c.active for c in contacts])
         for f, values in zip(self.fingers, self._values, strict=True):
             f.foam.stiffness(x[f.unknowns], values)
-        # adding the contact may find entries without a place; the pattern grows and all is filled once more
-        while True:
-            self._fill(wall, contacts)
-            if all([self._add_contact(k, x, c) for k, c in enumerate(contacts)]):
-                return
-            self._grow(contacts)
+        self._couple(contacts)
+        self._fill(wall, contacts)
+        for k, c in enumerate(contacts):
+            self._add_contact(k, x, c)
 
     def keep(self, x: FloatArray, first: bool) -> bool:
         """See `ContactProblem`."""
@@ -182,11 +180,11 @@ class WallProblem(ContactProblem):
         mean = self.pattern.slots(np.full_like(closings, first.closing_dof), closings)
         values[mean] = self.closing_stiffness / len(closings)
 
-    def _add_contact(self, k: int, x: FloatArray, c: Evaluated) -> bool:
-        """Add the contact of the ``k``-th finger to the tangent; whether the pattern has a place for all entries."""
+    def _add_contact(self, k: int, x: FloatArray, c: Evaluated) -> None:
+        """Add the contact of the ``k``-th finger to the tangent."""
         f, pick = self.fingers[k], self._engaged(self.fingers[k], c)
         if not len(pick):
-            return True
+            return
         facet, point = np.divmod(pick, f.pad.face_N.shape[0])
         facing = Facing(*(values[pick] for values in c.surface))
         N, area = f.pad.face_N[point], f.faced[facet, point]
@@ -213,18 +211,25 @@ class WallProblem(ContactProblem):
         gaps = (f.kappa * area[:, None] * N)[:, :, None] * (facing.e[:, None] @ D)
         rows = np.where(c.active[f.nodes[facet]], f.pressure_dofs[facet], -1)
         stored = self.pattern.start, self.pattern.column, self.pattern.values
-        return add_blocks(forces, moved, unknowns, *stored) & add_blocks(gaps, rows, moved, *stored)
+        add_blocks(forces, moved, unknowns, *stored)
+        add_blocks(gaps, rows, moved, *stored)
 
     def _engaged(self, f: Finger, c: Evaluated) -> IntArray:
         """Points that face the wall, of facets that already press or that the next iteration may close: few."""
         presses = (c.active[f.nodes] | (c.lam != 0.0)).any(axis=1)
         return np.flatnonzero(np.repeat(presses, f.pad.face_N.shape[0]) & c.faces)
 
-    def _grow(self, contacts: list[Evaluated]) -> None:
-        """Couple the faces that press with the wall's nodes that they face."""
-        each = [self._couplings(k, f, c) for k, (f, c) in enumerate(zip(self.fingers, contacts, strict=True))]
-        rows, columns = zip(*(part for couplings in each for part in couplings), strict=True)
-        moved = self.pattern.grow(np.concatenate(rows), np.concatenate(columns))
+    def _couple(self, contacts: list[Evaluated]) -> None:
+        """Give the facets that press a place in the pattern with the wall's nodes that they face."""
+        new = [self._meetings(k, c) - met for k, (c, met) in enumerate(zip(contacts, self._met_before, strict=True))]
+        if not any(new):
+            return
+        parts = list[tuple[IntArray, IntArray]]()
+        for f, met, meetings in zip(self.fingers, self._met_before, new, strict=True):
+            met |= meetings
+            parts += self._couplings(f, np.array(sorted(meetings), np.int32).reshape(-1, 9))
+        rows, columns = map(np.concatenate, zip(*parts, strict=True))
+        moved = self.pattern.grow(rows, columns)
 
         def move(slots: IntArray) -> IntArray:
             return np.where(slots >= 0, moved[slots], -1).astype(np.int32)
@@ -232,20 +237,29 @@ class WallProblem(ContactProblem):
         self._wall_slots, self._foam_slots = move(self._wall_slots), [move(slots) for slots in self._foam_slots]
         self._balance_slots = move(self._balance_slots)
 
-    def _couplings(self, k: int, f: Finger, c: Evaluated) -> list[tuple[IntArray, IntArray]]:
-        """Rows and columns of the entries that the contact of the ``k``-th finger may have."""
-        facets, pick = np.repeat(np.arange(len(f.nodes)), f.pad.face_N.shape[0]), self._engaged(f, c)
-        on_pad = np.concatenate([f.dofs.reshape(len(f.nodes), -1), f.pressure_dofs], axis=1)[facets[pick]]
-        on_wall = self.wall_dofs(c.surface.nodes[pick])
-        pair = pairs(on_pad[:, :, None], on_wall[:, None, :])
-        couplings = [pair, (pair[1], pair[0]), pairs(on_wall[:, :, None], on_wall[:, None, :])]
+    def _meetings(self, k: int, c: Evaluated) -> set[tuple[int, ...]]:
+        """Facets of the ``k``-th finger that press, each with the four nodes of the wall that a point of it faces.
+
+        Behind them the four that friction drags the point along, -1 where it does not.
+        """
+        f = self.fingers[k]
+        pick = self._engaged(f, c)
+        before = np.full((len(pick), 4), -1)
         if self.friction is not None:
-            # and the nodes of the wall that points are dragged along
-            dragged, nodes = self._dragged(k, f, c), self.friction.anchors[k].nodes
-            now, before = self.wall_dofs(c.surface.nodes[dragged]), self.wall_dofs(nodes[dragged])
-            rows = np.concatenate([f.dofs.reshape(len(f.nodes), -1)[facets[dragged]], now], axis=1)
-            couplings.append(pairs(rows[:, :, None], before[:, None, :]))
-        return couplings
+            dragged = self._dragged(k, f, c)[pick]
+            before[dragged] = self.friction.anchors[k].nodes[pick[dragged]]
+        meetings = np.column_stack([pick // f.pad.face_N.shape[0], c.surface.nodes[pick], before])
+        return set(map(tuple, meetings.tolist()))
+
+    def _couplings(self, f: Finger, meetings: IntArray) -> list[tuple[IntArray, IntArray]]:
+        """Rows and columns of the entries that contact and friction may have between facets and nodes ``(n, 9)``."""
+        facet, now, before = meetings[:, 0], meetings[:, 1:5], meetings[:, 5:]
+        moved, on_wall = f.dofs[facet].reshape(len(facet), -1), self.wall_dofs(now)
+        on_pad = np.concatenate([moved, f.pressure_dofs[facet]], axis=1)
+        along = np.where(before[:, :1] >= 0, self.wall_dofs(before), -1)
+        pair = pairs(on_pad[:, :, None], on_wall[:, None, :])
+        drag = pairs(np.concatenate([moved, on_wall], axis=1)[:, :, None], along[:, None, :])
+        return [pair, (pair[1], pair[0]), pairs(on_wall[:, :, None], on_wall[:, None, :]), drag]
 
     def wall_dofs(self, nodes: IntArray) -> IntArray:
         """Unknowns ``(n, 24)`` that move the outer face at nodes ``(n, 4)`` of the wall, -1 where fixed."""
