@@ -213,6 +213,9 @@ def ranked(ds: xr.Dataset, k: int, by: str | None = None) -> IntArray:
     name = score_of(ds, by)
     score, flags = rank_values(ds, name, k), judged(ds)[..., k].ravel()
     order, errors = done[ranking(score[done], flags[done])], sure(ds, name, k)
+    vaguely = 0.2 * np.abs(score)  # from this error on a value is hardly known, and one without an error, too
+    if errors is not None:
+        errors = errors._replace(error=np.where(np.isnan(errors.error), vaguely, errors.error))
     half = np.zeros(len(score)) if errors is None else errors.half_width
     surely, places, group, head, surest = score - half, _places(score), np.zeros(len(order), np.int64), 0, 0
     for n, i in enumerate(order):
@@ -227,7 +230,7 @@ def ranked(ds: xr.Dataset, k: int, by: str | None = None) -> IntArray:
         elif surely[i] > surely[order[surest]]:
             surest = n
         group[n] = head
-    marks, vague = flags[order], (half > 0.2 * np.abs(score))[order]
+    marks, vague = flags[order], (half >= vaguely)[order]
     hopeless = marks & LOST > 0
     if all(name in ds for name in FORCE_RANGE):
         safe = (np.maximum(ds["force_low"].values, least_force(ds)) <= ds["force_high"].values).ravel()[order]

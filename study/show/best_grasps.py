@@ -197,12 +197,13 @@ def certainty(ds: xr.Dataset, places: Sequence[int], score: str, k: int) -> str:
         return ""
     if apart[0] is None:
         return "places 1 and 2 cannot be compared: one has no error yet"
-    alike = [n for n, better in enumerate(apart, start=2) if better is False]
+    alike, unknown = ([n for n, better in enumerate(apart, start=2) if better is how] for how in (False, None))
+    more = f"; no error is known of {', '.join(map(str, unknown))}" * bool(unknown)
     if not alike:
-        return "place 1 is best beyond errors"
-    if alike[-1] == len(alike) + 1:  # without a gap
-        return f"places 1 to {alike[-1]} are equal within errors"
-    return f"places {', '.join(map(str, [1, *alike[:-1]]))} and {alike[-1]} are equal within errors"
+        return f"place 1 is best beyond errors{more}"
+    if alike[-1] == len(alike) + 1 > 2:  # without a gap
+        return f"places 1 to {alike[-1]} are equal within errors{more}"
+    return f"places {', '.join(map(str, [1, *alike[:-1]]))} and {alike[-1]} are equal within errors{more}"
 
 
 def common(marks: np.ndarray) -> int:

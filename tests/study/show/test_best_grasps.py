@@ -196,6 +196,17 @@ def test_grasps_are_ranked_by_payload_or_what_is_named_and_of_those_alike_the_si
     assert re.findall(r"places (.*) are equal", " ".join(best(ds).notes)) == ["1 and 3"]
 
 
+def test_a_grasp_without_an_error_neither_leads_its_equals_nor_parts_them():
+    ds = study([[1.0], [0.99], [0.98], [0.5]])
+    errors = np.repeat([0.3, np.nan, 0.01, 0.01], 2).reshape(ds.status.shape)
+    ds["payload_error"] = (ds.status.dims, errors, {"units": ""})
+    assert stations(best(ds)) == [2.0, 1.0, 0.0, 3.0]
+    errors[0] = 0.025
+    table = best(ds)
+    assert stations(table) == [0.0, 2.0, 1.0, 3.0]
+    assert "places 1 and 2 are equal within errors; no error is known of 3" in " ".join(table.notes)
+
+
 def test_the_force_is_the_largest_that_most_share_or_the_lowest_that_holds_a_mass_and_payload_in_grams():
     assert best(rising()).facts["force"] == 5.0
     some = rising()
