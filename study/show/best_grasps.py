@@ -197,8 +197,10 @@ def certainty(ds: xr.Dataset, places: Sequence[int], score: str, k: int) -> str:
         return ""
     if apart[0] is None:
         return "places 1 and 2 cannot be compared: one has no error yet"
-    alike, unknown = ([n for n, better in enumerate(apart, start=2) if better is how] for how in (False, None))
-    more = f"; no error is known of {', '.join(map(str, unknown))}" * bool(unknown)
+    known = errors.half_width <= 0.2 * np.abs(errors.value)  # as in `ranked`
+    close = [(n, known[i]) for n, (i, better) in enumerate(zip(others, apart, strict=True), start=2) if not better]
+    alike, hardly = ([n for n, sure_of in close if sure_of == how] for how in (True, False))
+    more = f", but too little is known of {', '.join(map(str, hardly))}" * bool(hardly)
     if not alike:
         return f"place 1 is best beyond errors{more}"
     if alike[-1] == len(alike) + 1 > 2:  # without a gap
