@@ -1,6 +1,5 @@
 """``softjaw cost``: what accuracy costs in time, by an ordinary sweep over meshes; its table and its picture."""
 
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -88,37 +87,33 @@ def settings_in(ds: xr.Dataset) -> list[Setting]:
     """Every point of the sweep of a file, in its order."""
     scene, swept = parse_scene(ds.attrs["scene"], check_files=False), axes_of(ds)[:-3]
     shape = ds.status.shape[: len(swept)]
-    seconds = _by_point(values_of(ds, BY_KEY["work/seconds_total"].variable), shape)
-    maps = {name: _by_point(values_of(ds, name), shape) for name in JUDGED if name in ds}
-    claims = {name: _by_point(values_of(ds, f"{name}_error"), shape) for name in maps if f"{name}_error" in ds}
+    seconds = _by_point(ds, BY_KEY["work/seconds_total"].variable)
+    maps = {name: _by_point(ds, name) for name in JUDGED if name in ds}
     best = tuple(0 if axis.long_name in SMALLEST else length - 1 for axis, length in zip(swept, shape, strict=True))
     last = int(np.ravel_multi_index(best, shape))
-    with np.errstate(divide="ignore", invalid="ignore"):  # where nothing is held
-        errors = {name: np.abs(values - values[last]) / np.abs(values[last]) for name, values in maps.items()}
-    tables = scene.with_values({}).effective()
+    worst = {n: _largest(np.abs(values - values[last]) / np.abs(values[last])) for n, values in maps.items()}
+    unknown = np.full(len(seconds), np.nan)
+    stated = {n: _largest(_by_point(ds, f"{n}_error")) if f"{n}_error" in ds else unknown for n in maps}
+    means, failed = seconds.mean(axis=1).filled(np.nan), np.ma.count_masked(seconds, axis=1)
     settings = []
     for i, index in enumerate(np.ndindex(shape)):
         values = {axis.long_name: scene.sweep[axis.long_name][j] for axis, j in zip(swept, index, strict=True)}
-        keys = {key: key.partition(".")[::2] for key in values}
-        given = all(np.array_equal(tables[s].get(name), values[key]) for key, (s, name) in keys.items())
         words = {a.long_name: a.options[j] if a.options else f"{values[a.long_name]:g}"
                  for a, j in zip(swept, index, strict=True)}  # fmt: skip
-        worst = {n: float(_known(e[i]).max()) for n, e in errors.items()}
-        stated = {n: float(_known(claims[n][i]).max()) if n in claims else np.nan for n in maps}
-        mean, failed = float(_known(seconds[i]).mean()), int(np.isnan(seconds[i]).sum())
-        settings.append(Setting(words, mean, worst, stated, failed, given, i == last))
+        errors, claims = ({n: float(each[i]) for n, each in by_name.items()} for by_name in (worst, stated))
+        given = scene.with_values(values) == scene.with_values({})
+        settings.append(Setting(words, float(means[i]), errors, claims, int(failed[i]), given, i == last))
     return settings
 
 
-def _known(values: FloatArray) -> FloatArray:
-    """The finite ones of some values; NaN where there is none."""
-    finite = values[np.isfinite(values)]
-    return finite if finite.size else np.array([np.nan])
+def _by_point(ds: xr.Dataset, name: str) -> Any:
+    """A map ``(points, cases)``, masked where it has no finite value."""
+    return np.ma.masked_invalid(values_of(ds, name).reshape(-1, int(np.prod(ds.status.shape[-3:]))))
 
 
-def _by_point(values: FloatArray, shape: Sequence[int]) -> FloatArray:
-    """Values over the cases ``(points, cases)``."""
-    return values.reshape(int(np.prod(shape)), -1)
+def _largest(values: Any) -> FloatArray:
+    """The largest value at each point, NaN where there is none."""
+    return np.ma.max(values, axis=1).filled(np.nan)
 
 
 def percent(error: float) -> str:
@@ -127,9 +122,8 @@ def percent(error: float) -> str:
     >>> percent(0.0213), percent(3e-8), percent(float("nan"))
     ('2.1 %', '< 0.0001 %', '-')
     """
-    if not np.isfinite(error):
-        return "-"
-    return f"{100 * error:.2g} %" if error >= 1e-6 else "< 0.0001 %"
+    shown = f"{100 * error:.2g} %" if error >= 1e-6 else "< 0.0001 %"
+    return shown if np.isfinite(error) else "-"
 
 
 def cost_text(ds: xr.Dataset) -> str:
