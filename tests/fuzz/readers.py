@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import trimesh
 
 from softjaw.fem.errors import MeshError
 from softjaw.fem.objects.mesh_object import MeshObject
@@ -46,6 +47,7 @@ TABLE = b"""x_mm,y_mm,z_mm,area_mm2,nx,ny,nz,pressure_kpa
 """
 POINTS = 30.0 * np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]])
 FACES = np.array([[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]])  # octahedron
+BODY = trimesh.Trimesh(POINTS, FACES, process=False)
 ROWS = "".join([*(f"{x:g} {y:g} {z:g}\n" for x, y, z in POINTS), *(f"3 {a} {b} {c}\n" for a, b, c in FACES)])
 BODY_3MF = "<mesh><vertices>{}</vertices><triangles>{}</triangles></mesh>".format(
     "".join(f'<vertex x="{x:g}" y="{y:g}" z="{z:g}"/>' for x, y, z in POINTS),
@@ -65,13 +67,7 @@ class Reader(NamedTuple):
 
 
 def stl(binary):
-    if binary:
-        record = np.zeros(len(FACES), np.dtype([("n", "<f4", 3), ("v", "<f4", (3, 3)), ("a", "<u2")]))
-        record["v"] = POINTS[FACES]
-        return b"\0" * 80 + len(FACES).to_bytes(4, "little") + record.tobytes()
-    facets = ("".join(f"vertex {x:g} {y:g} {z:g}\n" for x, y, z in corners) for corners in POINTS[FACES])
-    body = "".join(f"facet normal 0 0 0\nouter loop\n{facet}endloop\nendfacet\n" for facet in facets)
-    return f"solid s\n{body}endsolid s\n".encode()
+    return BODY.export(file_type="stl") if binary else BODY.export(file_type="stl_ascii").encode()
 
 
 def obj():
@@ -84,14 +80,9 @@ def off():
 
 
 def ply(binary):
-    head = f"ply\nformat {'binary_little_endian' if binary else 'ascii'} 1.0\nelement vertex 6\n"
-    head += "".join(f"property float {axis}\n" for axis in "xyz")
-    head += "element face 8\nproperty list uchar int vertex_indices\nend_header\n"
-    if binary:
-        faces = np.zeros(8, [("n", "u1"), ("v", "<i4", 3)])
-        faces["n"], faces["v"] = 3, FACES
-        return head.encode() + POINTS.astype("<f4").tobytes() + faces.tobytes()
-    return (head + ROWS).encode()
+    content = BODY.export(file_type="ply")
+    head, end, _ = content.partition(b"end_header\n")
+    return content if binary else head.replace(b"binary_little_endian", b"ascii") + end + ROWS.encode()
 
 
 def gltf_tree(**changes):

@@ -105,17 +105,11 @@ def data_blocks(path):
 
 
 def flip(path, byte, bit):
-    with path.open("r+b") as file:
-        file.seek(byte)
-        value = file.read(1)[0] ^ (1 << bit)
-        file.seek(byte)
-        file.write(bytes([value]))
+    np.memmap(path)[byte] ^= 1 << bit
 
 
 def zero(path, offset, length):
-    with path.open("r+b") as file:
-        file.seek(offset)
-        file.write(bytes(length))
+    np.memmap(path)[offset : offset + length] = 0
 
 
 def judge(found, expected, path):
