@@ -25,7 +25,7 @@ from softjaw.study.case.result import CaseFailure, CaseResult
 from softjaw.study.case.solver import CandidateSolver, Solution, Solved, join_notes
 from softjaw.study.case.wall import foot_note, wall_flags
 from softjaw.study.flags import Flag, flag_sentences
-from softjaw.study.quantities import misses
+from softjaw.study.quantities import MODELS, misses
 from softjaw.study.scene import Scene
 from softjaw.study.scene.sections import COARSE, FINE, FINEST
 
@@ -182,9 +182,10 @@ def _state_values(solution: Solution) -> dict[str, Any]:
     closing, checks = [c.state.closing for c in contacts], [c.state.checks._asdict() for c in contacts]
     values = {"maps/closing": np.mean(closing), "fingers/closing": closing}
     # of the force that the gripper commands, which the checks compare with the force along the approach
-    excess = [c.force_excess for c in contacts]
+    excess = [c.limits["ccm"].F_N / c.state.force - 1.0 for c in contacts]
     values |= {"maps/force_excess": max(excess, key=abs), "fingers/force_excess": excess}
-    values["maps/e_n_commanded"] = np.min([c.e_n_commanded for c in contacts], axis=0)
+    commanded = [[c.unit_limits[name].tau_z / c.state.force for name in MODELS] for c in contacts]
+    values["maps/e_n_commanded"] = np.min(commanded, axis=0)
     first, second = (c.pose for c in contacts)
     opening = float((second.origin - first.origin) @ first.rotation[:, 2])
     values |= {"maps/opening": opening, "maps/opening_loaded": opening - sum(closing)}

@@ -135,8 +135,7 @@ def _search(wall: Wall, points: FloatArray, places: FloatArray, v: FloatArray, w
     surface = wall.surface
     _face(
         np.ascontiguousarray(points), places, surface.theta, surface.s, surface.coefficients,
-        wall.closed, *wall.ends, beyond, wall.theta, wall.s, wall.nodes, wall.half, v, w, facing.gap, facing.normal,
-        facing.e, facing.nodes, facing.N, facing.H, facing.G, facing.S,
+        wall.closed, *wall.ends, beyond, wall.theta, wall.s, wall.nodes, wall.half, v, w, *facing,
     )  # fmt: skip
     return facing
 

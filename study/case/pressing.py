@@ -26,7 +26,6 @@ from softjaw.study.case.poses import turn_of_pose
 from softjaw.study.case.result import UNDECIDED
 from softjaw.study.case.wall import thin_body, wall_values
 from softjaw.study.flags import Flag
-from softjaw.study.quantities import MODELS
 from softjaw.study.scene import Scene
 
 OBLIQUE = 1.0 / 1.05  # cosine below which the force along the normal is 5 % from the commanded one
@@ -111,16 +110,6 @@ class PressedContact(Contact):
             self._views += [Contact(patch, self.mu, self.pose, whole_face=True) for patch in patches]
             _ = [view.ellipsoids for view in self._views]  # computed once for both fingers, as in `of`
         return [view.at(self.pose) for view in self._views]
-
-    @property
-    def force_excess(self) -> float:
-        """Force along the contact normal over the one commanded, which is along the approach, less 1."""
-        return self.limits["ccm"].F_N / self.state.force - 1.0
-
-    @property
-    def e_n_commanded(self) -> list[float]:
-        """``max tau_z / (mu F)`` in each of `MODELS`, with the force ``F`` that is commanded [m]."""
-        return [self.unit_limits[name].tau_z / self.state.force for name in MODELS]
 
     @property
     def on_few_elements(self) -> bool:
