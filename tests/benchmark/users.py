@@ -1,6 +1,5 @@
 """A dozen meshes of the kinds that users bring (``make bench PARTS=users``): CPU seconds per case on two meshes."""
 
-import resource
 import subprocess
 import sys
 import tempfile
@@ -15,6 +14,7 @@ from softjaw.study.result.store import open_result
 from tests.benchmark.table import line, title
 from tests.objects.bad_meshes import SHAPES, hammer, low_poly
 from tests.objects.bodies import hollow_bottle, mug, scan
+from tests.study.launching import children_seconds
 
 
 def rock() -> trimesh.Trimesh:
@@ -43,9 +43,9 @@ def every_mesh() -> None:
             make().export(mesh)
             scene, result = mesh.with_suffix(".toml"), mesh.with_suffix(".hdf")
             _softjaw("init", "mesh", "--mesh", mesh, "--unit", "m", "-o", scene)
-            before = _cpu_seconds()
+            before = children_seconds()
             _softjaw("run", scene, "-o", result)
-            spent = _cpu_seconds() - before
+            spent = children_seconds() - before
             with open_result(result) as file:
                 cases = file.codes.size
             figures.append(spent / cases)
@@ -58,8 +58,3 @@ def _softjaw(*words: object) -> None:
     command = [sys.executable, "-m", "softjaw", *map(str, words)]
     if (code := subprocess.run(command, stdout=subprocess.DEVNULL).returncode) not in (0, 6):
         raise RuntimeError(f"{' '.join(command)} ended with exit code {code}")
-
-
-def _cpu_seconds() -> float:
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return used.ru_utime + used.ru_stime

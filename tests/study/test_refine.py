@@ -20,7 +20,7 @@ from softjaw.study.run.refine import FINEST_SPACING_SHARE, chances, gained, next
 from softjaw.study.run.rounds import FINEST_STEP_SHARE, SAME_POSE_STEPS, apart, next_poses
 from softjaw.study.scene import load_scene, parse_scene
 from tests.study.formula_results import written
-from tests.study.launching import begin, contents, differing, launch, wait_for
+from tests.study.launching import begin, contents, differing, solve, wait_for
 from tests.study.scenes import mesh_of, pose_of, text_of
 
 GIVEN = np.linspace(25.0, 175.0, 35)
@@ -260,13 +260,6 @@ def test_a_grown_file_of_poses_keeps_rows_labels_and_places_and_samplers_can_be_
     assert load_scene("jobs/smoke.toml", ["candidates.refine=false"]).candidates.refine is None
 
 
-def refined(scene, name, ranks, *words):
-    path = scene.parent / name
-    code, output, errors = launch(ranks, "-m", "softjaw", "run", scene, "-o", path, *words)
-    assert code == 0, errors
-    return path, output
-
-
 def added(path):
     if not path.exists():
         return ()
@@ -288,19 +281,20 @@ def test_a_study_that_grows_has_the_same_bits_on_any_ranks_if_it_is_refined_late
     """``own`` cases come first; the best grasp is so many times better than that of these."""
     scene = tmp_path / "scene.toml"
     scene.write_text(text)
-    alone, _ = refined(scene, "alone.hdf", 0)
+    alone, late, killed = (tmp_path / f"{name}.hdf" for name in ("alone", "late", "killed"))
+    solve(0, scene, alone)
     assert len(added(alone)) >= 2
     expected = contents(alone)
     for ranks in (2, 3):
-        assert differing(refined(scene, f"{ranks}.hdf", ranks)[0], expected) == []
-    late, first = refined(scene, "late.hdf", 2, "--set", "candidates.refine=false")
-    assert "round" not in first
+        solve(ranks, scene, tmp_path / f"{ranks}.hdf")
+        assert differing(tmp_path / f"{ranks}.hdf", expected) == []
+    assert "round" not in solve(2, scene, late, "--set", "candidates.refine=false")
     assert best(alone) >= gain * best(late)
-    assert f"0 of {own} cases to solve" in refined(scene, "late.hdf", 2)[1]
+    assert f"0 of {own} cases to solve" in solve(2, scene, late)
     assert differing(late, expected) == []
-    killed = tmp_path / "killed.hdf"
     process = begin(0, "-m", "softjaw", "run", scene, "-o", killed)
     wait_for(lambda: len(added(killed)) == 1)
     process.kill()
     process.communicate(timeout=30)
-    assert differing(refined(scene, "killed.hdf", 2)[0], expected) == []
+    solve(2, scene, killed)
+    assert differing(killed, expected) == []

@@ -2,7 +2,6 @@
 
 import io
 import re
-import resource
 from itertools import chain
 from types import SimpleNamespace
 
@@ -19,7 +18,7 @@ from softjaw.study.run.load_path import settle
 from softjaw.study.run.plan import make_plan, plan_rows
 from softjaw.study.run.progress import Progress
 from softjaw.study.run.shares import Share, costliest_first, makespan, shares
-from tests.study.launching import ROOT, launch
+from tests.study.launching import ROOT, children_seconds, launch
 from tests.study.scenes import OVAL, scene_of
 
 CLAIMS = """
@@ -253,8 +252,3 @@ def test_a_plan_is_within_two_fifths_of_what_the_run_takes(job, tmp_path):
     before = children_seconds()
     assert launch(1, "-m", "softjaw", "run", scene, *out)[0] == 0
     assert 0.6 < (60 * int(minutes or 0) + float(seconds)) / (children_seconds() - before) < 1.4
-
-
-def children_seconds():
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return used.ru_utime + used.ru_stime
