@@ -161,21 +161,28 @@ def test_a_fold_of_the_foam_is_a_jump_an_unstable_start_is_noted_and_a_maximum_o
         steps.solve(np.array([0.5 * MM]), Control(closing=2.2 * MM), Work())
 
 
-@pytest.mark.parametrize(("scatter", "passes"), [(1e-7, True), (1e-2, False)])
-def test_a_state_whose_nodes_alternate_passes_where_it_is_near_enough(scatter, passes):
-    """An iterate beside the state, as a solve that does not end leaves it; the residual is told, and noted."""
-    press = press_of()
-    known = last(press_of(), [5])
+def stalling(end, **choices):
+    """A press whose solves under a force do not end; ``end`` gives iterate and residual from those that would."""
+    press = press_of(**choices)
     proper = press.solver.solve
 
     def stalls(x, tolerance, *limits):
-        if press.problem.control.force is None:
+        force = press.problem.control.force
+        if force is None:
             return proper(x, tolerance, *limits)
         error = ConvergenceError("alternates")
-        error.end = known.unknowns * (1 + scatter), 1e-5
+        error.end = end(lambda: proper(x, tolerance, *limits)[0], force * press.pad.share)
         raise error
 
-    press.solver.solve, press._others = stalls, ()
+    press.solver.solve, press._others, press._fallbacks = stalls, (), ()
+    return press
+
+
+@pytest.mark.parametrize(("scatter", "passes"), [(1e-7, True), (1e-2, False)])
+def test_a_state_whose_nodes_alternate_passes_where_it_is_near_enough(scatter, passes):
+    """An iterate beside the state, as a solve that does not end leaves it; the residual is told, and noted."""
+    known = last(press_of(), [5])
+    press = stalling(lambda *_: (known.unknowns * (1 + scatter), 1e-5))
     if passes:
         state = last(press, [5])
         assert state.closing == pytest.approx(known.closing, rel=1e-6)
@@ -188,18 +195,7 @@ def test_a_state_whose_nodes_alternate_passes_where_it_is_near_enough(scatter, p
 @pytest.mark.parametrize(("off", "passes"), [(5e-4, True), (2e-3, False)])
 def test_with_friction_a_state_on_the_way_may_be_off_by_more_than_the_last_one(off, passes):
     """At an edge a point may have no place between stick and slip: solves stall there and would beyond for ever."""
-    press = press_of(mu=0.6)
-    proper = press.solver.solve
-
-    def stalls(x, tolerance, *limits):
-        x, iterations = proper(x, tolerance, *limits)
-        if press.problem.control.force is None:
-            return x, iterations
-        error = ConvergenceError("alternates")
-        error.end = x, off * press.problem.control.force * press.pad.share
-        raise error
-
-    press.solver.solve, press._fallbacks = stalls, ()
+    press = stalling(lambda solved, force: (solved(), off * force), mu=0.6)
     with pytest.raises(ConvergenceError):
         last(press, [5])
     assert bool(press._path) == passes
