@@ -11,9 +11,11 @@ from pathlib import Path
 
 import h5py
 import numpy as np
+import pytest
 
 from softjaw.study.cli import main
 from softjaw.study.doctor import launch_environment
+from softjaw.study.messages import StudyError
 from softjaw.study.quantities import DONE
 from softjaw.study.result.store import open_result
 from tests.study import fake_run
@@ -75,6 +77,11 @@ def here(program, *words):
     with redirect_stdout(output), redirect_stderr(errors):
         code = program([str(word) for word in words])
     return code, output.getvalue(), errors.getvalue()
+
+
+def refusal(code, match=None):
+    """That a `StudyError` with this exit code is raised, as by ``pytest.raises``."""
+    return pytest.raises(StudyError, match=match, check=lambda error: error.code == code)
 
 
 def start(ranks, *words):

@@ -20,7 +20,7 @@ from softjaw.study.doctor import launch_environment
 from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, StudyError, beside, make_folders, write_file
 from softjaw.study.run import session
 from softjaw.study.show.report import writing as report
-from tests.study.launching import ROOT, answer, launch
+from tests.study.launching import ROOT, answer, launch, refusal
 from tests.study.launching import study as run_fake
 from tests.study.scenes import BALL, text_of
 from tests.study.view_files import make
@@ -230,9 +230,8 @@ def test_a_file_is_whole_or_not_there_a_device_is_written_to_and_a_file_in_the_w
     for folder in (tmp_path / "a", tmp_path / "a" / "b"):
         with pytest.raises(NotADirectoryError):
             make_folders(folder)
-    with pytest.raises(StudyError) as refused:
+    with refusal(CANNOT_WRITE):
         write_file(tmp_path / "a" / "b", "", folders=True)
-    assert refused.value.code == CANNOT_WRITE
 
 
 def test_a_file_that_is_complete_and_cannot_be_packed_is_left_as_it_is_unless_it_is_damaged(monkeypatch, capsys):

@@ -21,7 +21,7 @@ from softjaw.study.messages import CANNOT_WRITE, USAGE, StudyError
 from softjaw.study.result.lock import OpenedFile
 from softjaw.study.run import limits
 from softjaw.study.run.limits import GRACE, AbandonedError, Stopper, available, limited_memory, listen
-from tests.study.launching import launch
+from tests.study.launching import launch, refusal
 
 
 def wait():
@@ -168,9 +168,7 @@ def test_the_share_of_a_rank_follows_its_control_group_and_a_file_that_was_moved
     with pytest.raises(StudyError):
         standing.check()
     path.write_text("2")
-    with pytest.raises(StudyError) as refusal:
+    with refusal(CANNOT_WRITE):
         standing.check()
-    assert refusal.value.code == CANNOT_WRITE
-    with pytest.raises(StudyError, match="No space") as refusal, standing.writing():
+    with refusal(CANNOT_WRITE, match="No space"), standing.writing():
         raise OSError("No space left on device")
-    assert refusal.value.code == CANNOT_WRITE

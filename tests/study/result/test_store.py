@@ -21,6 +21,7 @@ from softjaw.study.result.skeleton import axes_of, create, groups, text_bytes, v
 from softjaw.study.result.store import open_result, torn_rows
 from softjaw.study.result.write import ResultWriter, blank, record, verify
 from tests.study.fake_run import fake_result
+from tests.study.launching import refusal
 
 HEADER = Header("abc", 'a = "µ"\n', "Flasche", labels=("left", "ötken"))
 
@@ -126,9 +127,8 @@ def test_a_file_that_has_not_the_quantities_of_this_version_opens(tmp_path, monk
     ds = softjaw.open(path)
     assert "epsilon" not in ds
     assert ds.quality.values[1, 1, 1].tolist() == [1.0, 2.0, 3.0]
-    with pytest.raises(StudyError) as refused:
+    with refusal(OTHER_FILE):
         verify(path, small(), HEADER)
-    assert refused.value.code == OTHER_FILE
     with h5py.File(path, "r+") as file:
         file["study/quality/pcm"][1, 1, 1] = 7.0
     with pytest.raises(StudyError, match=r"quality/pcm of case 10"):
@@ -227,14 +227,12 @@ def test_a_result_that_does_not_fit_is_a_bug_a_full_disk_told_and_only_an_own_fi
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(os, "posix_fallocate", full)
-    with pytest.raises(StudyError, match=r"No space left .* MB are free") as caught:
+    with refusal(CANNOT_WRITE, match=r"No space left .* MB are free"):
         create(tmp_path / "x.hdf", small(), HEADER)
-    assert caught.value.code == CANNOT_WRITE
     assert list(tmp_path.iterdir()) == [path]
     verify(path, small(), HEADER)
-    with pytest.raises(StudyError) as caught:
+    with refusal(OTHER_FILE):
         verify(path, small(), replace(HEADER, digest="xyz"))
-    assert caught.value.code == OTHER_FILE
     with pytest.raises(StudyError):
         verify(path, small(has=NEEDS[:1]), HEADER)
 
@@ -249,9 +247,8 @@ def test_a_result_that_does_not_fit_is_a_bug_a_full_disk_told_and_only_an_own_fi
 def test_a_file_of_another_kind_is_refused_when_it_is_opened(path, spoil):
     with h5py.File(path, "r+") as file:
         spoil(file)
-    with pytest.raises(StudyError) as caught, open_result(path):
+    with refusal(OTHER_FILE), open_result(path):
         pass
-    assert caught.value.code == OTHER_FILE
 
 
 @pytest.mark.parametrize("kind", ["missing", "empty", "text", "folder"])
@@ -259,9 +256,8 @@ def test_what_is_no_hdf5_file_is_refused(path, kind):
     path.unlink()
     if kind != "missing":
         path.write_text("" if kind == "empty" else "station,e_n\n1,2\n")
-    with pytest.raises(StudyError) as caught, open_result(path.parent if kind == "folder" else path):
+    with refusal(OTHER_FILE), open_result(path.parent if kind == "folder" else path):
         pass
-    assert caught.value.code == OTHER_FILE
 
 
 def virtual(file, name, secret):
@@ -285,9 +281,8 @@ def test_data_from_elsewhere_are_not_read(path, tmp_path, put):
         put(file, "study/e_n/ccm", secret)
     with open_result(path) as read:
         assert read.read("e_n/pcm").shape == (5, 2, 3)
-        with pytest.raises(StudyError) as caught:
+        with refusal(OTHER_FILE):
             read.read("e_n/ccm")
-    assert caught.value.code == OTHER_FILE
 
 
 def test_a_lock_keeps_a_second_run_away_goes_with_its_holder_and_withdraws_when_overtaken(tmp_path):

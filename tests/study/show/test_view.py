@@ -31,6 +31,7 @@ from softjaw.study.show.view.model import View, quantity_of, view_of
 from softjaw.study.show.view.object3d import object_block, payload
 from softjaw.study.show.view.pads import corners_of, pads_of
 from tests.study.formula_results import sealed
+from tests.study.launching import refusal
 from tests.study.scenes import mesh_of, text_of
 from tests.study.view_files import CLOSING, FAILED, GRID, PRESSURE, SIZE, make, quality
 
@@ -187,9 +188,8 @@ def test_no_pads_are_invented_and_a_case_is_chosen_by_number_place_or_score(file
     }
     for (candidate, station, angle, force), index in chosen.items():
         assert view_of(view.ds, candidate, (station, angle), force)[1] == index
-    with pytest.raises(StudyError, match="0 to 5") as refused:
+    with refusal(USAGE, match="0 to 5"):
         view_of(view.ds, 6, (None, None), None)
-    assert refused.value.code == USAGE
     for name in ("beauty", "flags"):  # whose bits no colour tells
         with pytest.raises(StudyError, match="quality, e_n"):
             quantity_of(view.ds, name)
