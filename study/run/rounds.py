@@ -21,6 +21,7 @@ from itertools import product
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from softjaw.friction.patch import FloatArray
 from softjaw.study import ranking
@@ -35,6 +36,7 @@ from softjaw.study.flags import LOST, Flag
 from softjaw.study.quantities import DONE, FAILED, LISTED, NO_GRASP
 from softjaw.study.ranking import distinct, judge, largest, rank_values, ranked, sure
 from softjaw.study.result.read import dataset, other_levels
+from softjaw.study.result.write import NOT_FINER
 from softjaw.study.run.refine import Place, gained, next_stations, scores_of_poses, with_places
 from softjaw.study.scene import Scene
 from softjaw.study.scene.grasps import GraspPose
@@ -149,9 +151,9 @@ def next_cases(result: Any, scene: Scene) -> tuple[Case, ...]:
     order, known = [int(i) for i in ranked(ds, k, "payload")], sure(ds, "payload", k)
     if known is None:
         return ()
-    named, shape = result.layout.finer, ds.status.shape
-    times = np.array([named[case_of(i, k, shape)] for i in range(len(known.value))])
-    flags = ds["flags"].values[..., k].ravel()
+    named, shape, target = result.layout.finer, ds.status.shape, scene.accuracy.target
+    often = _often(ds, named, k, target or 0.0)
+    times, flags = often[:, k], ds["flags"].values[..., k].ravel()
     lost = [i for i in order if flags[i] & LOST and not flags[i] & Flag.OUT_OF_REACH][:LISTED]
     order = [i for i in order if not flags[i] & LOST and np.isfinite(known.value[i])]
     places = distinct(ds, order, rank_values(ds, "payload", k), k)
@@ -162,7 +164,7 @@ def next_cases(result: Any, scene: Scene) -> tuple[Case, ...]:
     chosen = chosen or [i for i in rivals(places, known.value, error, lost) if not times[i]][:LISTED]
     if not chosen:
         relative = error / np.maximum(known.value, np.finfo(float).tiny)
-        target, most = scene.accuracy.target, max((known.value[i] - error[i] for i in order), default=-np.inf)
+        most = max((known.value[i] - error[i] for i in order), default=-np.inf)
         reach = relative < IN_REACH / np.maximum(times, 1) * (target or np.inf)
         near = {place.best for place in places[:LISTED] if reach[place.best]}
         near |= {i for i in order if known.value[i] + error[i] > most and (times[i] == 1 or reach[i])}
@@ -174,7 +176,21 @@ def next_cases(result: Any, scene: Scene) -> tuple[Case, ...]:
     if not chosen and places and "safety_factor" not in ds:  # the first lines say what the best holds at these forces
         chosen = [places[0].best]
         levels = tuple(i for i in other_levels(shape[-1], k) if not named[case_of(chosen[0], i, shape)])
-    return tuple(sorted({case_of(i, level, shape) for i in chosen for level in levels}))
+    return tuple(sorted({case_of(i, n, shape) for i in chosen for n in levels if n == k or often[i, n] < FINEST}))
+
+
+def _often(ds: Any, named: Mapping[Case, int], k: int = 0, target: float = 0.0) -> NDArray[np.int64]:
+    """How often each case was named, ``(candidates, forces)``; `FINEST` for those that are not named again.
+
+    These wait for ``--retry-failed``, or are known to the ``target`` at a force beside the ``k``-th: all samples of
+    uncertain inputs are solved on the mesh that a case is named for, whatever its error.
+    """
+    shape, forces = ds.status.shape, ds.status.shape[-1]
+    error = ds["payload_error"].values.reshape(-1, forces)
+    often = np.array([[named[case_of(i, n, shape)] for n in range(forces)] for i in range(len(error))])
+    known = (often > 0) & (error <= target * (1.0 - UNDECIDED)) & (np.arange(forces) != k)
+    left = np.char.find(ds["message"].values.astype(str), NOT_FINER) >= 0
+    return np.where(known | left.reshape(-1, forces), FINEST, often)
 
 
 def off_target(ds: Any, scene: Scene, named: Mapping[Case, int]) -> tuple[Case, ...]:
@@ -184,8 +200,9 @@ def off_target(ds: Any, scene: Scene, named: Mapping[Case, int]) -> tuple[Case, 
     """
     shape, target = ds.status.shape, scene.accuracy.target or math.inf
     error = np.where(ds.status == DONE, ds[f"{scene.accuracy.target_of}_error"], 0.0).reshape(-1, shape[-1])
-    cases = (case_of(i, k, shape) for (i, k), e in np.ndenumerate(error) if not surely_below(e, target))
-    return tuple(case for case in cases for _ in range(2 - min(named[case], 1)) if named[case] < FINEST)
+    often = _often(ds, named)
+    cases = ((case_of(i, k, shape), often[i, k]) for (i, k), e in np.ndenumerate(error) if not surely_below(e, target))
+    return tuple(case for case, times in cases for _ in range(2 - min(times, 1)) if times < FINEST)
 
 
 def rivals(

@@ -10,7 +10,7 @@ from softjaw.study.quantities import DONE, FAILED, LISTED, MISSING
 from softjaw.study.ranking import Place
 from softjaw.study.result.skeleton import create
 from softjaw.study.result.store import open_result, torn_rows
-from softjaw.study.result.write import ResultWriter, record
+from softjaw.study.result.write import NOT_FINER, ResultWriter, record
 from softjaw.study.run.load_path import settle
 from softjaw.study.run.plan import make_plan
 from softjaw.study.run.rounds import next_cases, rivals
@@ -178,3 +178,22 @@ def test_the_best_of_a_sampled_study_are_solved_well_with_the_same_bits_on_any_r
     unsolved = mesh[:, 1] == 0
     best = np.sort((payload - payload * error)[~unsolved, 1])[-LISTED]
     assert ((payload * (1 + error))[unsolved, 1] <= best + 1e-9).all()
+
+
+@pytest.mark.parametrize(
+    ("message", "share", "levels"), [("", 0.02, {0, 1}), ("", 0.004, {1}), (f"{NOT_FINER}late", 0.02, {1})]
+)
+def test_a_force_beside_the_shown_one_is_named_again_only_if_a_further_mesh_is_to_tell_more(
+    tmp_path, message, share, levels
+):
+    """What is named is solved on the next mesh with all samples of uncertain inputs, and so no more than without."""
+    made = sampled("object.mass_g=100")
+    plan = make_plan(made, rounds=(tuple((0, n, k) for n in range(4) for k in (0, 1)),))
+
+    def case(index):
+        held, error, text = (1.0, 0.02, "") if index[-1] else (0.01, share, message)
+        values = {"maps/payload": [held] * 3, "maps/payload_error": error, "maps/flags": 0.0, "work/mesh": 1}
+        return CaseResult(values | {"maps/safety_factor": [10 * held] * 3}, message=text)
+
+    with open_result(written(tmp_path / "a.hdf", plan.layout, case, plan.header)) as result:
+        assert {level for *_, level in next_cases(result, made)} == levels

@@ -1,5 +1,7 @@
 """Uncertain inputs: samples, the study that is solved with them, intervals, and whether grasps differ beyond them."""
 
+from collections import Counter
+
 import numpy as np
 import pytest
 from scipy.stats import norm
@@ -11,7 +13,9 @@ from softjaw.study.case.result import CaseResult
 from softjaw.study.ranking import Sure, judge, sure
 from softjaw.study.result.read import half_width
 from softjaw.study.result.store import open_result
+from softjaw.study.result.write import NOT_FINER
 from softjaw.study.run.plan import make_plan
+from softjaw.study.run.rounds import off_target
 from softjaw.study.scene import SceneError, parse_scene
 from softjaw.study.scene.sections import Uncertainty
 from softjaw.study.show.best_grasps import best
@@ -160,6 +164,12 @@ def test_a_target_takes_all_samples_of_a_case_to_the_same_mesh(tmp_path):
     assert ds.e_n_interval.values.item() / case.e_n < 1e-5  # which does not depend on mu
     with open_result(tmp_path / "a.hdf") as result:
         assert not unfinished(result)
+    above = softjaw.open(tmp_path / "a.hdf")
+    above = above.assign(payload_error=above.payload_error + 1.0)
+    named = Counter({(0, 0, 0): 2, (0, 1, 0): 2})
+    assert off_target(above, together, named) == ((0, 0, 0), (0, 1, 0))
+    above["message"] = above.message.copy(data=np.full(above.message.shape, f"{NOT_FINER}late"))
+    assert not off_target(above, together, named)  # which waits for --retry-failed
 
     def sample(index):
         """As while a round is solved: one sample is on the mesh before."""
