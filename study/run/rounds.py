@@ -152,7 +152,8 @@ def next_cases(result: Any, scene: Scene) -> tuple[Case, ...]:
     if known is None:
         return ()
     named, shape, target = result.layout.finer, ds.status.shape, scene.accuracy.target
-    often = _often(ds, named, k, target or 0.0)
+    relative = ds[f"{scene.accuracy.target_of}_error"].values.reshape(-1, shape[-1])
+    often = _often(ds, named, k, relative <= (target or 0.0) * (1.0 - UNDECIDED))
     times, flags = often[:, k], ds["flags"].values[..., k].ravel()
     lost = [i for i in order if flags[i] & LOST and not flags[i] & Flag.OUT_OF_REACH][:LISTED]
     order = [i for i in order if not flags[i] & LOST and np.isfinite(known.value[i])]
@@ -163,7 +164,7 @@ def next_cases(result: Any, scene: Scene) -> tuple[Case, ...]:
     chosen = failed + [place.best for place in places[:LISTED] if not times[place.best]]
     chosen = chosen or [i for i in rivals(places, known.value, error, lost) if not times[i]][:LISTED]
     if not chosen:
-        relative = error / np.maximum(known.value, np.finfo(float).tiny)
+        relative = np.nan_to_num(relative[:, k], nan=np.inf)
         most = max((known.value[i] - error[i] for i in order), default=-np.inf)
         reach = relative < IN_REACH / np.maximum(times, 1) * (target or np.inf)
         near = {place.best for place in places[:LISTED] if reach[place.best]}
@@ -179,18 +180,16 @@ def next_cases(result: Any, scene: Scene) -> tuple[Case, ...]:
     return tuple(sorted({case_of(i, n, shape) for i in chosen for n in levels if n == k or often[i, n] < FINEST}))
 
 
-def _often(ds: Any, named: Mapping[Case, int], k: int = 0, target: float = 0.0) -> NDArray[np.int64]:
+def _often(ds: Any, named: Mapping[Case, int], k: int = 0, known: Any = False) -> NDArray[np.int64]:
     """How often each case was named, ``(candidates, forces)``; `FINEST` for those that are not named again.
 
-    These wait for ``--retry-failed``, or are known to the ``target`` at a force beside the ``k``-th: all samples of
+    These wait for ``--retry-failed``, or are ``known`` to the target at a force beside the ``k``-th: all samples of
     uncertain inputs are solved on the mesh that a case is named for, whatever its error.
     """
     shape, forces = ds.status.shape, ds.status.shape[-1]
-    error = ds["payload_error"].values.reshape(-1, forces)
-    often = np.array([[named[case_of(i, n, shape)] for n in range(forces)] for i in range(len(error))])
-    known = (often > 0) & (error <= target * (1.0 - UNDECIDED)) & (np.arange(forces) != k)
-    left = np.char.find(ds["message"].values.astype(str), NOT_FINER) >= 0
-    return np.where(known | left.reshape(-1, forces), FINEST, often)
+    left = (np.char.find(ds["message"].values.astype(str), NOT_FINER) >= 0).reshape(-1, forces)
+    often = np.array([[named[case_of(i, n, shape)] for n in range(forces)] for i in range(len(left))])
+    return np.where(left | known & (often > 0) & (np.arange(forces) != k), FINEST, often)
 
 
 def off_target(ds: Any, scene: Scene, named: Mapping[Case, int]) -> tuple[Case, ...]:

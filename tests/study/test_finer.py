@@ -134,11 +134,13 @@ def test_what_one_mesh_says_of_a_grasp_that_may_be_the_best_is_asked_of_the_next
 
     def case(index):
         held, flags = ((1.0, 0.0), (0.5, 0.0), (1.5, float(Flag.COLLISION)), (0.4, 0.0))[index[0]]
-        values = {"maps/payload": [held] * 3, "maps/payload_error": 0.004, "maps/flags": flags}
+        values = {"maps/payload": [held] * 3, "maps/payload_error": 0.004, "maps/e_n_error": 0.02, "maps/flags": flags}
         return CaseResult(values | {"work/mesh": 1})
 
     with open_result(written(tmp_path / "a.hdf", plan.layout, case, plan.header)) as result:
         assert next_cases(result, made) == ((0, 2, 0),)
+        of_e_n = sampled("load.normal_force_n=[5]", 'accuracy.target_of="e_n"')
+        assert next_cases(result, of_e_n) == tuple((0, n, 0) for n in range(4))
 
 
 def test_a_case_gets_its_finer_meshes_with_every_sample_of_uncertain_inputs_at_its_point_of_a_sweep(tmp_path):
