@@ -114,8 +114,8 @@ def _plate(choice: EffectChoice, _: int) -> float:
 
 def _traction(choice: EffectChoice, k: int) -> float:
     """`neglected_traction` on the coarse mesh, of the finger where it is larger."""
-    contacts = choice.coarse(k, choice.levels)
-    return nan if contacts is None else max(neglected_traction(c.state, c.mu) for c in contacts)
+    solution = choice.coarse(k, choice.levels)
+    return max(neglected_traction(c.state, c.mu) for c in solution.contacts) if solution else nan
 
 
 def dropped_share(wrench: FloatArray, rho: float) -> float:
@@ -233,7 +233,7 @@ class EffectChoice:
         return max((self._compared(name, step, i) for i in forces), key=lambda c: np.nan_to_num(largest(c), nan=inf))
 
     def _compared(self, name: str, step: Step, k: int) -> tuple[float, float, float]:
-        pair = self._coarse_pair(name, step, k)
+        pair = [solution.contacts for solution in self._coarse_pair(name, step, k)]
         # on a few elements e_n follows from their size, and what other gaps change is no measure of the effect
         if not pair or any(
             a.on_few_elements or b.on_few_elements or a.nodal_instead != b.nodal_instead
@@ -244,13 +244,11 @@ class EffectChoice:
         e_n, payload, score = (b / a - 1.0 if a > 0 else nan for a, b in zip(low, high, strict=True))
         return e_n, payload, score
 
-    def _coarse_pair(
-        self, name: str, step: Step, k: int
-    ) -> tuple[Sequence[PressedContact], Sequence[PressedContact]] | None:
-        """Contacts on the coarse mesh without and with a step; None where one of them does not exist."""
+    def _coarse_pair(self, name: str, step: Step, k: int) -> tuple[Solution, Solution] | tuple[()]:
+        """Solutions on the coarse mesh without and with a step; empty where one of them does not exist."""
         low = self.coarse(k, self.levels._replace(**{name: step.low}))
         high = low and self.coarse(k, self.levels._replace(**{name: step.high}))
-        return (low, high) if low and high else None
+        return (low, high) if low and high else ()
 
     def _judged(self, contacts: Sequence[PressedContact]) -> tuple[float, float, float]:
         """e_n of the weaker finger [m], payload [kg] and quality, NaN where unknown."""
@@ -261,10 +259,10 @@ class EffectChoice:
             return e_n, nan, nan
         return e_n, *values["maps/payload"], *values["maps/quality"]
 
-    def coarse(self, k: int, levels: Levels) -> Sequence[PressedContact] | None:
-        """Contacts at the ``k``-th force on the coarse mesh; None where it has none."""
+    def coarse(self, k: int, levels: Levels) -> Solution | None:
+        """What the ``k``-th force has on the coarse mesh; None where it has nothing."""
         try:
-            return self.solver.solve(k, COARSE, levels).contacts
+            return self.solver.solve(k, COARSE, levels)
         except TOO_SMALL:
             return None
 
@@ -282,8 +280,8 @@ class EffectChoice:
         closing = SpringBed(pad, fingers[0].gap).closing(force)
         # foam gets stiffer: a small pad closes a third as far as a bed of springs
         plain = self.levels._replace(object="rigid", friction_pressure_coupling="none")
-        if self._wanted["object"] == "auto" and (contacts := self.coarse(self.count - 1, plain)):
-            closing = min(closing, *(contact.state.closing for contact in contacts))
+        if self._wanted["object"] == "auto" and (rigid := self.coarse(self.count - 1, plain)):
+            closing = min(closing, *(contact.state.closing for contact in rigid.contacts))
         body, dent = thin_body(scene.object), getattr(scene.object, "allowed_dent", None)
         indentation, ratio, stress = estimated_indentation(body, grasp, scene, closing, force)
         borne = max(indentation / (dent or inf), stress / (body.material.yield_strength or inf))

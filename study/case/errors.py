@@ -91,14 +91,14 @@ ALL_SEEN = Unseen()
 def mesh_errors(
     fine: Sequence[Contact], coarse: Sequence[Contact], values: Mapping[str, Any], other: Mapping[str, Any],
     settings: EvaluationSettings, views: Sequence[Sequence[Contact]] = (),
-    pairs: Sequence[tuple[Sequence[Any], Sequence[Any], float]] = (), unseen: Unseen = ALL_SEEN,
+    pairs: Sequence[tuple[Any, Any, float]] = (), unseen: Unseen = ALL_SEEN,
     left_out: float = 0.0, closes_less: float = 0.0,
 ) -> dict[str, float]:  # fmt: skip
     """Errors of all quantities that have one, from the contacts on the mesh and on a coarser one.
 
     ``values`` are those of the fine mesh, ``other`` what the coarser one says beside its contacts; keyed alike.
-    ``views`` are the coarse contacts with their pressures at Gauss points and at nodes, ``pairs`` are contacts on the
-    coarse mesh that differ too, and which share of that counts; ``left_out`` is a share of every value,
+    ``views`` are the coarse contacts with their pressures at Gauss points and at nodes, ``pairs`` are solutions on
+    the coarse mesh that differ too, and which share of that counts; ``left_out`` is a share of every value,
     ``closes_less`` one of the closing, of which others change by a part.
     """
     # of a wall that is taken as rigid: measured on bottles, cans and a marker, with half as much again
@@ -106,7 +106,7 @@ def mesh_errors(
     fine_mesh, coarse_mesh = _on_mesh(values, fine), _on_mesh(other, coarse) | grasp_values(tuple(coarse), settings)
     viewed = [_sums(view) | grasp_values(tuple(view), settings) for view in views]
     compared = [(_all(low, settings), _all(high, settings), share) for low, high, share in pairs]
-    acts = any(contact.state.points.friction is not None for _, high, _ in pairs for contact in high)
+    acts = any(contact.state.points.friction is not None for _, high, _ in pairs for contact in high.contacts)
     errors = {}
     for q in (q for q in TABLE if q.error and q.key in coarse_mesh and q.name != "opening_loaded"):
         view_values = [view[q.key] for view in viewed if q.key in view]
@@ -179,10 +179,11 @@ def distance(value: ArrayLike, other: ArrayLike, kind: str, of: ArrayLike | None
     return float(apart.max())
 
 
-def _all(contacts: Sequence[Any], settings: EvaluationSettings) -> dict[str, Any]:
-    """All values that contacts alone tell."""
-    closing = np.mean([c.state.closing for c in contacts])
-    return _on_mesh({"maps/closing": closing}, contacts) | grasp_values(tuple(contacts), settings)
+def _all(solution: Any, settings: EvaluationSettings) -> dict[str, Any]:
+    """All values that have an error, of a solution."""
+    contacts = solution.contacts
+    values = {"maps/closing": np.mean([c.state.closing for c in contacts])} | solution.fingers.wall_values(contacts)
+    return _on_mesh(values, contacts) | grasp_values(tuple(contacts), settings)
 
 
 def _on_mesh(values: Mapping[str, Any], contacts: Sequence[Contact]) -> dict[str, Any]:

@@ -67,14 +67,14 @@ class Solution:
 class Solved(NamedTuple):
     """Solutions of one case on all its meshes, the finest first, and a note on meshes that have none.
 
-    The ``pairs`` of contacts on the coarse mesh differ by the steps of the load path or by an effect, with the share of
-    it that is left; the ``edges`` by how far the object's are rounded: as on the scene's mesh, and twice as far.
+    The ``pairs`` of solutions on the coarse mesh differ by the steps of the load path or by an effect, with the share
+    of it that is left; the ``edges`` by how far the object's are rounded: as on the scene's mesh, and twice as far.
     """
 
     meshes: Sequence[Solution]
     note: str = ""
-    pairs: Sequence[tuple[Sequence[PressedContact], Sequence[PressedContact], float]] = ()
-    edges: tuple[Sequence[PressedContact], Sequence[PressedContact]] | None = None
+    pairs: Sequence[tuple[Solution, Solution, float]] = ()
+    edges: tuple[Solution, Solution] | None = None
 
     @property
     def fine(self) -> Solution:
@@ -199,12 +199,11 @@ class CandidateSolver:
             coarse = self.solve(k, COARSE, levels)
             solved = Solved([solved.fine, coarse])
             if levels.friction_pressure_coupling != "none":
-                longer = self.solve(k, LONG_STEPS, levels).contacts
-                solved = solved._replace(pairs=[(coarse.contacts, longer, OF_LONG_STEPS)])
+                solved = solved._replace(pairs=[(coarse, self.solve(k, LONG_STEPS, levels), OF_LONG_STEPS)])
             if self.rounder:
                 plain = levels._replace(friction_pressure_coupling="none")
-                contacts = self.solve(k, COARSE, plain).contacts, self.rounder.solve(k, FINE, plain).contacts
-                solved = solved._replace(edges=contacts)
+                edges = self.solve(k, COARSE, plain), self.rounder.solve(k, FINE, plain)
+                solved = solved._replace(edges=edges)
         except (ConvergenceError, CheckError) as failure:
             solved = solved._replace(note=(PART_OF_ERROR if solved.coarse else NO_ERROR).format(reason=failure))
         return self._refined(solved, k, levels, left_out) if isinstance(solved.fine.fingers, OnRigid) else solved

@@ -145,10 +145,15 @@ def test_every_quantity_with_an_error_gets_one():
     values, other = evaluate(fine, task)[0], {"maps/closing": 1.1e-3, "maps/opening_loaded": 0.049}
     values |= {"maps/closing": 1e-3, "maps/opening_loaded": 0.050}
     pad = SimpleNamespace(shape=SimpleNamespace(element="hex8"), material=SimpleNamespace(poisson_ratio=0.25))
-    fine[0].state = SimpleNamespace(pad=pad)
+    fine[0].state = fine[1].state = SimpleNamespace(pad=pad, closing=1e-3, points=SimpleNamespace(friction=None))
     # of a wall all of the distance is left
     dents = [mine | {"maps/indentation": dent} for mine, dent in ((values, 1e-3), (other, 1.1e-3))]
     assert mesh_errors(fine, coarse, *dents, task)["maps/indentation_error"] == pytest.approx(0.1, rel=1e-9)
+    # and what friction or load steps do to it, which contacts do not tell
+    walls = [SimpleNamespace(wall_values=lambda _, dent=dent: {"maps/indentation": dent}) for dent in (2e-3, 2.4e-3)]
+    steps = [(*(SimpleNamespace(contacts=fine, fingers=wall) for wall in walls), 0.5)]
+    error = mesh_errors(fine, coarse, *dents, task, pairs=steps)["maps/indentation_error"]
+    assert error == pytest.approx(0.1 + 0.5 * 0.4, rel=1e-9)
     errors = mesh_errors(fine, coarse, values, other, task)
     assert set(errors) == {q.of_error.key for q in TABLE if q.error and "wall" not in q.needs}
     assert np.isfinite([*errors.values()]).all()
