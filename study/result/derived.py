@@ -54,7 +54,8 @@ def derived(scene: Scene) -> list[Quantity]:
         listed += [
             Quantity(HIGH, over, "N", "largest force that the wall bears",
                      "Normal force per finger at which indentation passes object.allowed_dent_mm or stress the yield"
-                     " strength, as force_low; else the largest solved force. NaN: wall taken as rigid.", "derived"),
+                     " strength, as force_low; else the largest solved force. Forces without a result are bridged"
+                     " between solved ones. NaN: wall taken as rigid.", "derived"),
             Quantity(HIGH_ERROR, over, "N", "error of the largest force that the wall bears",
                      "What their stated errors and the interpolation may move it, to less.", "derived"),
         ]  # fmt: skip
@@ -100,14 +101,25 @@ def force_ranges(scene: Scene, values: Mapping[str, FloatArray], ended: ArrayLik
         known = np.isfinite(values["indentation"])
         solved = np.where(known.any(axis=-1) & ended, np.where(known, forces, 0.0).max(axis=-1), np.nan)
         shares = {name: values.get(f"{name}_error", np.nan) for name in limits}
-        bounds = [crossing(forces, values[name], most, shares[name]) for name, most in limits.items()]
-        larger = {name: values[name] * (1.0 + np.nan_to_num(share)) for name, share in shares.items()}
+        without_holes = {name: np.apply_along_axis(_without_holes, -1, values[name], forces) for name in limits}
+        bounds = [crossing(forces, without_holes[name], most, shares[name]) for name, most in limits.items()]
+        larger = {name: without_holes[name] * (1.0 + np.nan_to_num(share)) for name, share in shares.items()}
         # fmin, not minimum: a limit that is never passed is NaN and bounds nothing.
         high = ranges[HIGH] = np.fmin.reduce([solved, *(at for at, _ in bounds)])
         least = np.fmin.reduce([solved, *(crossing(forces, larger[name], most)[0] for name, most in limits.items())])
         off = np.maximum.reduce([high - least, *(np.where(at == high, error, 0.0) for at, error in bounds)])
         ranges[HIGH_ERROR] = off if any(f"{name}_error" in values for name in limits) else np.full(off.shape, np.nan)
     return ranges
+
+
+def _without_holes(values: FloatArray, forces: FloatArray) -> FloatArray:
+    """Values ``(k,)`` up to the last that is known: a wall that is harmed there may be so at a force without a result.
+
+    >>> _without_holes(np.array([np.nan, 2.0, np.nan, 4.0, np.nan]), np.arange(5.0)).tolist()
+    [2.0, 2.0, 3.0, 4.0, nan]
+    """
+    known = np.isfinite(values)
+    return np.interp(forces, forces[known], values[known], right=np.nan) if known.any() else values
 
 
 def crossing(

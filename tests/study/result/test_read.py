@@ -164,6 +164,11 @@ def test_bounds_of_the_force_are_those_of_their_point_of_a_sweep_and_errors_hold
     assert ranges["force_high"].ravel() == pytest.approx([0.5, 3.0, 4.0])
     assert (ranges["force_high_error"].ravel()[:2] > [0.03, 0.025]).all()
     assert ranges["force_high_error"].ravel()[2] == 0.0
+    for lost, bears in ((0, [0.5, 3.0, 4.0]), (1, [0.5, 3.0, 4.0]), (2, [0.5, 2.0, 2.0])):  # one case without a result
+        holes = {name: np.where(np.arange(3) == lost, np.nan, value) for name, value in known.items()}
+        high = force_ranges(scene, holes)["force_high"].ravel()
+        assert (high <= np.array(bears) * (1 + 1e-9)).all()
+        assert (high > 0).all()
     scene = parse_scene(text_of(tube, stations="[50]", forces="[4]"), "x.toml", limits[:1])
     ranges = force_ranges(scene, {name: values[0, ..., 2:] for name, values in known.items()})
     assert ranges["force_high"].ravel() == pytest.approx([1.0])
