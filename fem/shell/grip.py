@@ -27,6 +27,7 @@ LONGEST_SOLVE, WITH_FRICTION = 12, 24
 # opening below which a wall without a further state counts as collapsed at once, and after nodal gaps have failed too
 FOLDED, INDENTED = 0.75, 0.95
 GIVES_WAY = 0.5  # stiffness of the grasp over the mean one so far, below which the wall counts as snapped in
+CLOSED = 0.01  # part of the opening: a wall that has closed by less has not snapped in
 
 
 def jumps(low: tuple[float, float], high: tuple[float, float]) -> bool:
@@ -41,8 +42,7 @@ def jumps(low: tuple[float, float], high: tuple[float, float]) -> bool:
     (False, True, False)
     """
     (force, shut), (more, then) = low, high
-    # part of the opening: a wall that has closed by less has not jumped
-    return then > 0.01 and GIVES_WAY * (then - shut) / (more - force) > shut / force
+    return then > CLOSED and GIVES_WAY * (then - shut) / (more - force) > shut / force
 
 
 class WallState(NamedTuple):
@@ -215,7 +215,7 @@ class Grip(LoadPath[WallProblem]):
         # the first contact may have more force than the first level asks for: no slope yet
         if force > reached:
             slope = (self.problem.closing(ahead) - self.problem.closing(x)) / (force - reached)
-            gives_way |= GIVES_WAY * slope > self.problem.closing(x) / reached
+            gives_way |= GIVES_WAY * slope > self.problem.closing(x) / reached and self._shut(ahead) > CLOSED
             gives_way |= jumps((reached, self._shut(x)), (force, self._shut(ahead)))
         return OnPath(ahead, force, state.jumped or fell, slope, state.snapped or fell or gives_way)
 
@@ -250,10 +250,12 @@ class Grip(LoadPath[WallProblem]):
     def _gives_way(self, x: FloatArray, force: float, compliance: float) -> bool:
         """Whether the force grows much more slowly with the closing displacement here than it has done so far.
 
+        First touch is known to some micrometres: before the wall has closed that is much of the closing displacement.
+
         Pads on a rigid object get stiffer as they spread. Walls under soft pads have a plateau instead of a limit
         when they snap in, and no force falls there.
         """
-        return bool(compliance * force > self.problem.closing(x) / GIVES_WAY)
+        return bool(compliance * force > self.problem.closing(x) / GIVES_WAY) and self._shut(x) > CLOSED
 
     def _shut(self, x: FloatArray) -> float:
         """How much of the wall's opening is gone."""

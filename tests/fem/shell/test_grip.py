@@ -1,6 +1,7 @@
 """Two fingers on a thin wall, with and without friction that acts back: tangent, balance, limits, other figures."""
 
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -223,6 +224,12 @@ def test_a_start_that_does_not_serve_is_replaced_by_one_below_or_by_first_contac
     assert found.fingers[0].work.steps > 1
     assert apart(found, ladder()[1]) < 1e-8
     assert not found.path_dependent
+
+
+@pytest.mark.parametrize(("closing", "shut", "expected"), [(-2e-6, 1e-4, False), (1e-6, 1e-4, False), (1e-6, 0.1, 1)])
+def test_a_first_touch_that_is_off_by_micrometres_is_no_snap_in(closing, shut, expected):
+    grip_ = SimpleNamespace(problem=SimpleNamespace(closing=lambda x: closing), _shut=lambda x: shut)
+    assert Grip._gives_way(grip_, np.zeros(1), 3e-3, 1e-3) == expected
 
 
 @pytest.mark.long
