@@ -201,16 +201,24 @@ def warnings(scene: Scene) -> tuple[str, ...]:
 
 
 def _swing(shape: Any) -> str:
-    """What there is to say of a smooth outline that leaves the extent of its points; mostly nothing."""
+    """What there is to say of a smooth outline that lies far off straight lines between its points; mostly nothing."""
     if shape.shape not in ("revolution", "sections"):
         return ""
-    low, high = np.transpose([shape.spans_mm[axis] for axis in "xy"])
-    bounds = 1e3 * build_object(shape).bounds[:, :2]
-    off = float(np.max([low - bounds[0], bounds[1] - high]))
-    # share of the width: less is how a round outline with few points is meant
-    if off < 0.02 * float(np.max(high - low)):
+    outlines = [shape.profile_mm] if shape.shape == "revolution" else [
+        [(s.z_mm, s.a_mm + s.shift_mm[0]) for s in shape.sections],
+        [(s.z_mm, (s.b_mm or s.a_mm) + s.shift_mm[1]) for s in shape.sections],
+    ]  # fmt: skip
+    surface, off = outer_surface(shape), 0.0
+    places = np.linspace(*surface.wall, 500)
+    for axis, points in enumerate(map(np.array, outlines)):
+        curve = 1e3 * surface.jets(np.full(len(places), 0.5 * np.pi * axis), places)[:, 0, [2, axis]]
+        along, beside = np.diff(points, axis=0), curve[:, None] - points[:-1]
+        share = np.clip((beside * along).sum(axis=2) / (along**2).sum(axis=1), 0.0, 1.0)
+        off = max(off, float(np.linalg.norm(beside - share[..., None] * along, axis=2).min(axis=1).max()))
+    # share of the width: less is how a round outline with few points is meant; and what a rounded corner leaves [mm]
+    if off < max(0.03 * float(np.ptp([shape.spans_mm[axis] for axis in "xy"], axis=1).max()), 1.0):
         return ""
-    return f"object: the outline swings {off:.2g} mm beyond its points; three points on a line draw a straight wall"
+    return f"object: the outline lies up to {off:.2g} mm off lines between its points; three on a line make it straight"
 
 
 def notices(scene: Scene) -> list[str]:

@@ -185,7 +185,8 @@ class RevolutionShape(Walled):
     shape: Literal["revolution"]
     profile_mm: tuple[Point, ...] = Field(
         min_length=4, max_length=2000,
-        description="outline as points [z, radius] with rising z; corners are rounded by 2 mm",
+        description="outline as points [z, radius] with rising z, a smooth curve through them; straight along three or"
+        " more on a line, whose corners are rounded by 2 mm",
         examples=[[[0, 30], [30, 30], [60, 30], [90, 20]]],
     )  # fmt: skip
 

@@ -123,3 +123,5 @@ def test_a_swept_pad_that_leaves_the_object_and_stations_in_metres_get_a_warning
     assert len(warnings(at([0.1], BOTTLE))) == 1  # the pad leaves the bottle
     swings = at([100], BOTTLE.replace("[100, 29], [200, 20]", "[80, 20], [200, 20]"))
     assert len(warnings(swings)) == 1  # 2 points do not make a straight wall: its radius is 33 mm
+    points = "[[0, 24], [3, 27], [70, 33], [200, 60]]"  # 5 mm off where a cup has radius 29, but nowhere beyond its rim
+    assert len(warnings(at([100], f'shape = "revolution"\nprofile_mm = {points}'))) == 1
