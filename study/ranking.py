@@ -414,7 +414,7 @@ def approach_of(ds: xr.Dataset, candidate: int, k: int, hand: Hand) -> tuple[flo
         scene = scene_of(ds, index)
         wide, _, depth = opened(hand, scene.gripper, opening)
         middle = ds["finger_pose_origin"].values[index].mean(axis=0)
-        approach, room = clearest(scene, hand, pad, middle, wide, depth)
+        approach, room = clearest(scene, hand, pad, middle, wide, opening, depth)
     except (ValueError, OSError):  # the object is not there now
         return None
     free = room >= FREE and not refused(hand, scene.gripper, opening, ds["normal_force"].values[k])

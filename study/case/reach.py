@@ -69,18 +69,20 @@ def hand_axes(pad: FloatArray, approach: str, closing: str) -> FloatArray:
 
 def rooms(
     points: FloatArray, hand: Hand, pad: FloatArray, middle: FloatArray, size: Sequence[float], wide: float,
-    depth: float,
+    touch: float, depth: float,
 ) -> dict[str, float]:  # fmt: skip
     """By approach the clearance [m] of a hand that comes to pads ``wide`` apart round ``middle (3,)`` [m].
 
-    ``pad``: axes of finger 1's as columns ``(3, 3)``. ``size``: of a pad, along its axes. Others as for `boxes`.
+    At first ``touch`` [m] fingers and palm, without the foam, may come as near as the object but no nearer. ``pad``:
+    axes of finger 1's as columns ``(3, 3)``. ``size``: of a pad, along its axes. Others as for `boxes`.
     """
     clearances = {}
     for approach in hand.approaches:
         R = hand_axes(pad, approach, hand.closing)
         sides = size[:2] if approach.endswith("x") else size[1::-1]
-        parts = boxes(hand, np.array([*sides, size[2]]), wide, depth)
-        clearances[approach] = clearance((points - middle) @ R + [0.0, 0.0, depth], parts)
+        before, there = (boxes(hand, np.array([*sides, size[2]]), apart, depth) for apart in (wide, touch))
+        x = (points - middle) @ R + [0.0, 0.0, depth]
+        clearances[approach] = min(clearance(x, before), clearance(x, there[2:]) + FREE)  # the first two are foam
     return clearances
 
 
@@ -112,13 +114,13 @@ def clearance(points: FloatArray, corners: FloatArray) -> float:
 
 
 def clearest(
-    scene: Any, hand: Hand, pad: FloatArray, middle: FloatArray, wide: float, depth: float
+    scene: Any, hand: Hand, pad: FloatArray, middle: FloatArray, wide: float, touch: float, depth: float
 ) -> tuple[str, float]:
     """The approach of a hand, and its clearance [m]; parameters as for `rooms`.
 
     It is the one from above, if the hand is `FREE` there, else the clearest. `ValueError, OSError`: no object is there.
     """
-    room = rooms(surface_points(scene.object), hand, pad, middle, scene.gripper.pad_size, wide, depth)
+    room = rooms(surface_points(scene.object), hand, pad, middle, scene.gripper.pad_size, wide, touch, depth)
     weight = np.array(scene.task.direction or (0.0, 0.0, -1.0))
     down = {name: float(hand_axes(pad, name, "x")[:, 2] @ weight / np.linalg.norm(weight)) for name in room}
     approach = chosen_approach(room, down)

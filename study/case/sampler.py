@@ -335,7 +335,7 @@ def reached_by_hand(scene: Scene) -> Callable[[SampledGrasp], bool]:
     def reached(grasp: SampledGrasp) -> bool:
         axes = placed.rotation @ axes_of(grasp.approach, grasp.long_side)
         wide, most, depth = opened(hand, scene.gripper, grasp.opening)
-        room = rooms(points, hand, axes, placed.to_object(grasp.point), size, wide, depth)
+        room = rooms(points, hand, axes, placed.to_object(grasp.point), size, wide, grasp.opening, depth)
         return grasp.opening <= most and max(room.values()) > FREE
 
     return reached

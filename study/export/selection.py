@@ -202,7 +202,7 @@ def holds(ds: xr.Dataset, case: dict[str, Any], gripper: GripperFrame) -> dict[s
         return dict.fromkeys(gripper.approach, Hold(*joints, tuple(beyond)))
     unknown = "the object cannot be built, so that no approach can be chosen"
     with fault_of(unknown, ValueError, OSError, ending="; name one with --approach"):
-        approach, room = clearest(scene, hand, pad, _middle(case), wide, depth)
+        approach, room = clearest(scene, hand, pad, _middle(case), wide, opening, depth)
     beyond += ["the hand meets the object from every side"] * (room < FREE and not beyond)
     return {approach: Hold(*joints, tuple(beyond))}
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from softjaw.study.case.poses import axis_poses
-from softjaw.study.case.reach import WAY, boxes, clearance, surface_points
+from softjaw.study.case.reach import FREE, WAY, boxes, clearance, rooms, surface_points
 from softjaw.study.cli.exporting import gripper_of
 from softjaw.study.export.rigid_body import scene_of
 from softjaw.study.export.selection import GripperFrame, first, grasps, usable
@@ -80,6 +80,16 @@ def test_another_force_is_advised_only_where_one_that_was_solved_holds_the_objec
                   for g in taken(path, Hand())]  # fmt: skip
         kept, said = usable(grasps)
         assert (kept, "--force" in said) == ([], advised)
+
+
+@pytest.mark.parametrize(("rim", "free"), [(0.044, True), (0.046, False)])
+def test_fingers_that_close_below_a_rim_must_not_meet_it(rim, free):
+    """Open, all stay clear of a pot's rim; closed on its wall of radius 40 mm, foam of 5 mm keeps fingers at 45 mm."""
+    points = np.array([[sign * r, 0.0, z] for sign in (-1.0, 1.0) for r, z in ((0.04, 0.0), (rim, 0.045))])
+    upright = np.array([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])  # axes of the pad: closes along x
+    hand, size = Hand(depth_mm=140, closing="x"), (0.024, 0.02, 0.005)
+    room = rooms(points, hand, upright.T, np.zeros(3), size, wide=0.1, touch=0.08, depth=0.14)
+    assert (room["minus-x"] >= FREE) == free
 
 
 def test_boxes_clear_a_sphere_and_stand_beside_the_pads_and_the_gripper_of_the_scene_comes_unless_named(path):
