@@ -17,7 +17,7 @@ FINENESS = (0.5, 0.7, 1.0, 1.4)  # elements per direction over those of the scen
 WALL_SIZES = (2.0, 1.0, 0.7)  # of a wall's elements, over those of the scene
 REPRESENTATIVE = 3  # candidates, and forces, that stand for all
 SMALLEST = ("accuracy.wall_element_mm", "object.grid_step_mm")  # whose smallest value is the best; else the last
-JUDGED = ("payload", "quality", "e_n")
+JUDGED = ("payload", "quality", "e_n", "indentation", "wall_stress")
 LOOKS = (("#12436d", "o"), ("#c05a00", "s"), ("#2a8c82", "^"), ("#801650", "D"))
 
 

@@ -82,6 +82,8 @@ def test_errors_are_distances_from_the_last_or_smallest_point_and_failed_cases_c
     assert settings[2].seconds == pytest.approx(seconds.mean())
     # of triquadratic elements the finer mesh is nearer to the finest
     assert settings[1].worst["e_n"] > settings[3].worst["e_n"] > 0
+    dented = settings_in(ds.assign(indentation=e_n))  # which of all numbers the size of a wall's elements moves most
+    assert [s.worst["indentation"] for s in dented] == [s.worst["e_n"] for s in settings]
     ds = ds.isel(element=slice(0, 1))
     ds.elements.attrs |= {"long_name": "accuracy.wall_element_mm", "options": ()}
     text = ds.attrs["scene"].replace('"gripper.elements"', '"accuracy.wall_element_mm"')
