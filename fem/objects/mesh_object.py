@@ -14,7 +14,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import NamedTuple, Self
+from typing import Self
 
 import numpy as np
 
@@ -183,7 +183,8 @@ class MeshObject:
         return smooth_triangles(self.points, self.triangles, self.crease_angle)
 
 
-class MeshRegion(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class MeshRegion:
     """Signed distance to what a finger sees of a mesh, twice continuously differentiable inside a box of its frame.
 
     Outside the box the distance to the sheet itself is taken: slower and rougher, but of the right sign and growing.

@@ -34,8 +34,6 @@ from softjaw.study.quantities import MISSING, REALISATION, Axis
 from softjaw.study.scene import Scene
 from softjaw.study.units import UNITS, in_si, split_unit
 
-MOST_NAMED = 5  # poses that a message names
-
 
 class Candidate(NamedTuple):
     """One place to grasp: station along the object's axis [m], angle about it [rad].
@@ -106,7 +104,7 @@ def check_candidates(scene: Scene) -> None:
         remedy = "expected a line of approach that meets it; point_mm is in mm, in the frame of the object's own file"
         misses = [f"candidates.poses[{i}].point_mm: found {label}, where the pads miss the object; {remedy}"
                  for i, label in labels.items()]  # fmt: skip
-        raise StudyError(USAGE, "\n".join(first_of(misses, MOST_NAMED, " poses miss it")))
+        raise StudyError(USAGE, "\n".join(first_of(misses, 5, " poses miss it")))
 
 
 def turn_between(first: Candidate, second: Candidate, axis_symmetry: int) -> float | None:
