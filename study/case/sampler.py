@@ -63,14 +63,12 @@ def axes_of(approach: FloatArray, along: FloatArray) -> FloatArray:
     return pad_axes(approach, across(approach, along))
 
 
-def straightened(
-    surface: tuple[FloatArray, IntArray], point: FloatArray, axes: FloatArray, jaws: Jaws
-) -> JawsOnSurface:
+def straightened(surface: tuple[FloatArray, IntArray], grip: JawsOnSurface) -> JawsOnSurface:
     """Turn and shift a gripper until both pads meet the object squarely and in their middles, or a few rounds are over.
 
     Raises `NoContactError` where the pads pass the object.
     """
-    grip = JawsOnSurface(surface, point, axes, jaws)
+    jaws = grip.jaws
     for _ in range(TURNS):
         tilt, shift = grip.tilt, grip.shift
         approach = grip.axes @ tilt
@@ -172,14 +170,15 @@ def offers(
             aimed = JawsOnSurface(surface, place, axes_of(-normal, axis), jaws)
             if state := state_of(aimed):
                 yield SampledGrasp(aimed.point, aimed.axes[:, 2], aimed.axes[:, 0], aimed.opening, 0.0, state), None
-            start = straightened(surface, place, axes_of(-normal, axis), jaws)
+            start = straightened(surface, aimed)
             square = start.tilt[2] > math.cos(STRAIGHT)
             # one that is still turning leads elsewhere than one that has come to rest beside it
             if any(same_place(start, other) and (rests or not square) for other, rests in starts):
                 continue
             starts.append((start, square))
             for along in long_sides(start, axis):
-                grip = straightened(surface, start.point, axes_of(start.axes[:, 2], along), jaws)
+                turned = JawsOnSurface(surface, start.point, axes_of(start.axes[:, 2], along), jaws)
+                grip = straightened(surface, turned)
                 grasp = judged(grip, task)
                 good += not grasp.state
                 yield grasp, lids is not None and grip.over(lids)
