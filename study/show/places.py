@@ -84,12 +84,15 @@ def _third(bounds: np.ndarray, middle: np.ndarray, axes: list[int]) -> str:
 
     >>> _third(np.array([[0.0, 0, 0], [1, 1, 3]]), np.array([0.5, 0.4, 2.5]), [1, 2])
     'upper third'
+    >>> _third(np.array([[0.0, 0, 0], [1, 1, 3]]), np.array([1.5, 0.4, 2.5]), [0, 1])
+    'beyond the +x end'
     """
     share = (2 * middle - bounds.sum(axis=0)) / np.ptp(bounds, axis=0)
     axis = max(axes, key=lambda axis: abs(share[axis]))
     if abs(share[axis]) <= THIRD:
         return "middle"
-    return f"{('lower', 'upper')[int(share[axis] > 0)] if axis == 2 else towards(axis, share[axis])} third"
+    side = ("lower", "upper")[int(share[axis] > 0)] if axis == 2 else towards(axis, share[axis])
+    return f"{side} third" if abs(share[axis]) <= 1.0 else f"beyond the {side} end"
 
 
 def towards(axis: int, sign: float) -> str:
