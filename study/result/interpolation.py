@@ -258,7 +258,7 @@ def at_force(ds: xr.Dataset, force: float) -> xr.Dataset:
     forces = ds["normal_force"].values
     if not forces[0] <= force <= forces[-1] or len(forces) < 2:
         solved = ", ".join(f"{f:g}" for f in forces)
-        raise ValueError(f"{force:g} N was not solved, nor lies it between two forces that were: {solved} N")
+        raise ValueError(f"{force:g} N was not solved, nor does it lie between two forces that were: {solved} N")
     k = min(int(np.searchsorted(forces, force, side="right")) - 1, len(forces) - 2)
     share, power = ((force - forces[k]) / np.diff(forces)[k], np.log(force / forces[k]) / np.diff(np.log(forces))[k])
     low, high = (ds.isel(normal_force=[i]).assign_coords(normal_force=[force]) for i in (k, k + 1))
