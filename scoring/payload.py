@@ -28,7 +28,7 @@ the answer knows its error.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -59,6 +59,14 @@ class Payload(NamedTuple):
     upper: float
     direction: FloatArray
     borne: bool
+
+
+class Facets(ConvexHull):
+    """A hull that knows its facets alone; volume and extent are half of the price of a point that is added."""
+
+    def _update(self, qhull: Any) -> None:
+        qhull.triangulate()
+        self.simplices, _, self.equations, *_ = qhull.get_simplex_facet_array()
 
 
 def payload(
@@ -142,7 +150,7 @@ def _worst(grasp: _Grasp, gap: float, least: float) -> Payload:
     extent = np.linalg.svd(points[:8] - points[:8].mean(axis=0), compute_uv=False)
     lower, least = 0.0, max(least, ROUNDING_FORCE)
     if extent[-1] > ROUNDING_FORCE and upper > least:
-        hull, before = ConvexHull(points[:8], incremental=True), np.zeros(4)
+        hull, before = Facets(points[:8], incremental=True), np.zeros(4)
         for n in range(8, MOST_POINTS):
             nearest = hull.equations[:, 3].argmax()
             plane = hull.equations[nearest].copy()
@@ -156,7 +164,7 @@ def _worst(grasp: _Grasp, gap: float, least: float) -> Payload:
             try:
                 hull.add_points(points[n : n + 1])
             except QhullError:  # of points in the planes of its facets
-                hull = ConvexHull(points[: n + 1], incremental=True)
+                hull = Facets(points[: n + 1], incremental=True)
     force = min(lower, upper) if lower > ROUNDING_FORCE else 0.0
     return Payload(force, max(upper, 0.0), -u, upper >= -ROUNDING_FORCE)
 

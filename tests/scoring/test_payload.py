@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 from scipy.optimize import linprog
+from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from softjaw.scoring.contact import DiscBody, PolytopeBody, SoftContact, fibonacci_vertices
-from softjaw.scoring.payload import BOUND_GAP, NEAR, payload
+from softjaw.scoring.payload import BOUND_GAP, NEAR, Facets, payload
 from tests.scoring.grasps import contact_axes
 
 F, MU, E, D = 5.0, 0.8, 0.006, 0.06
@@ -196,3 +197,14 @@ def test_a_sum_of_discs_is_exact_where_its_samples_lie_inside(kind, direction, s
     assert exact.force <= exact.upper <= exact.force * (1 + 1.01 * BOUND_GAP)
     # 8000 motions leave 1e-3 at a limit that an arm makes of small remainders
     assert sampled.force * (1 - BOUND_GAP) <= exact.upper <= sampled.upper * 1.004
+
+
+def test_facets_are_those_of_a_hull():
+    points = np.random.default_rng(0).normal(size=(40, 3))
+    hull, facets = ConvexHull(points[:8], incremental=True), Facets(points[:8], incremental=True)
+    for n in range(8, 40):
+        hull.add_points(points[n : n + 1])
+        facets.add_points(points[n : n + 1])
+    assert (facets.equations == hull.equations).all()
+    assert (facets.simplices == hull.simplices).all()
+    assert not hasattr(facets, "volume")  # nobody asks for it, and it takes half of the time
