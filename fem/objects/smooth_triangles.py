@@ -154,7 +154,25 @@ def smooth_triangles(points: FloatArray, triangles: IntArray, crease_angle: floa
         tangent = _tangent(q - p, corner_normals[corner[:, 0]], corner_normals[corner[:, 1]])
         # where several surfaces end nobody knows how the edge continues
         inner[:, end] = p + np.where((paired | (joined.at_edge == 1))[:, None], tangent, q - p) / 3
+    folded = _folded(points, triangles, normal, ends, joined.edge_of, inner) & crease
+    inner[folded] = points[ends[folded]] + (points[ends[folded, ::-1]] - points[ends[folded]]) / 3
     return SmoothTriangles(points, triangles, ends, joined.edge_of, inner, crease, turn)
+
+
+def _folded(
+    points: FloatArray, triangles: IntArray, normal: FloatArray, ends: IntArray, edge_of: IntArray, inner: FloatArray
+) -> np.ndarray:
+    """Whether edges ``(e,)``, as they curve, leave a corner beyond the next side of a triangle, which then folds.
+
+    The rim of a hole in a flat face does so where a narrow triangle meets it at a grazing angle.
+    """
+    first, corners = (ends[edge_of, 0] == triangles)[..., None], points[triangles]
+    leaving = np.where(first, inner[edge_of, 0], inner[edge_of, 1]) - corners
+    arriving = np.roll(np.where(first, inner[edge_of, 1], inner[edge_of, 0]), 1, axis=1) - corners
+    over = np.einsum("mkd,md->mk", np.cross(leaving, arriving), normal) < 0.0
+    folded = np.zeros(len(ends), dtype=bool)
+    folded[edge_of[over]] = folded[np.roll(edge_of, 1, axis=1)[over]] = True
+    return folded
 
 
 def _measures(

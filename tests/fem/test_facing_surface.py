@@ -85,6 +85,17 @@ def test_edges_above_the_crease_angle_stay_and_neighbours_stay_joined():
     assert smooth_triangles(*octagon).bulge(np.arange(len(octagon[1]))).max() < 1e-15
 
 
+def test_narrow_triangle_beside_a_bore_does_not_fold():
+    phi, graze = 2 * np.pi * np.arange(24) / 24, np.pi / 24 - np.radians(3.0)  # the rim leaves its chord by 7.5 degrees
+    ring = 0.006 * np.stack([np.cos(phi), np.sin(phi), 0 * phi], axis=1)
+    apex = ring[1] + 0.02 * np.array([-np.sin(graze), np.cos(graze), 0.0])
+    wall = grid_triangles(2, 24, closed=True)[:, ::-1]
+    x, triangles = np.concatenate([ring - [0, 0, 0.01], ring, [apex]]), np.concatenate([wall, [[25, 24, 48]]])
+    points, small = smooth_triangles(x, triangles).refined(np.array([len(wall)]), 4)
+    a, b, c = points[small].transpose(1, 0, 2)
+    assert (np.cross(b - a, c - a)[:, 2] > 0).all()  # it looks up, as its face does
+
+
 def test_a_straight_wall_between_cones_stays_straight_and_a_round_one_of_many_facets_stays_round():
     """Long facets of a shank between flares of 22 degrees; a waist of facets of 4 degrees; coarse bands of a ball."""
     cones = [(0, 0), (0.03, 0), (0.03, 0.015), (0.018, 0.045), (0.018, 0.135), (0.03, 0.165), (0.03, 0.18), (0, 0.18)]
