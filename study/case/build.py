@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator
 from functools import lru_cache
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -204,15 +204,18 @@ def _swing(shape: Any) -> str:
     """What there is to say of a smooth outline that lies far off straight lines between its points; mostly nothing."""
     if shape.shape not in ("revolution", "sections"):
         return ""
-    outlines = [shape.profile_mm] if shape.shape == "revolution" else [
-        [(s.z_mm, s.a_mm + s.shift_mm[0]) for s in shape.sections],
-        [(s.z_mm, (s.b_mm or s.a_mm) + s.shift_mm[1]) for s in shape.sections],
-    ]  # fmt: skip
-    surface, off = outer_surface(shape), 0.0
-    places = np.linspace(*surface.wall, 500)
-    for axis, points in enumerate(map(np.array, outlines)):
-        curve = 1e3 * surface.jets(np.full(len(places), 0.5 * np.pi * axis), places)[:, 0, [2, axis]]
-        along, beside = np.diff(points, axis=0), curve[:, None] - points[:-1]
+    drawn: Any
+    if shape.shape == "revolution":
+        curve, wall, _ = cast(objects.Revolution, build_object(shape)).closed
+        drawn = [(curve.derivative(np.linspace(*wall, 500)), shape.profile_mm)]
+    else:
+        surface = outer_surface(shape)
+        X, Y = (surface.jets(angle, np.linspace(*surface.wall, 500))[:, 0] for angle in (0.0, 0.5 * np.pi))
+        sides = np.array([(s.z_mm, s.a_mm + s.shift_mm[0], (s.b_mm or s.a_mm) + s.shift_mm[1]) for s in shape.sections])
+        drawn = [(X[:, [2, 0]], sides[:, [0, 1]]), (Y[:, [2, 1]], sides[:, [0, 2]])]
+    off = 0.0
+    for places, points in drawn:
+        along, beside = np.diff(points, axis=0), 1e3 * places[:, None] - points[:-1]
         share = np.clip((beside * along).sum(axis=2) / (along**2).sum(axis=1), 0.0, 1.0)
         off = max(off, float(np.linalg.norm(beside - share[..., None] * along, axis=2).min(axis=1).max()))
     # share of the width: less is how a round outline with few points is meant; and what a rounded corner leaves [mm]
