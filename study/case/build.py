@@ -204,20 +204,15 @@ def _swing(shape: Any) -> str:
     """What there is to say of a smooth outline that lies far off straight lines between its points; mostly nothing."""
     if shape.shape not in ("revolution", "sections"):
         return ""
-    drawn: Any
     if shape.shape == "revolution":
         curve, wall, _ = cast(objects.Revolution, build_object(shape)).closed
-        drawn = [(curve.derivative(np.linspace(*wall, 500)), shape.profile_mm)]
+        points = np.array(shape.profile_mm)
     else:
-        surface = outer_surface(shape)
-        X, Y = (surface.jets(angle, np.linspace(*surface.wall, 500))[:, 0] for angle in (0.0, 0.5 * np.pi))
-        sides = np.array([(s.z_mm, s.a_mm + s.shift_mm[0], (s.b_mm or s.a_mm) + s.shift_mm[1]) for s in shape.sections])
-        drawn = [(X[:, [2, 0]], sides[:, [0, 1]]), (Y[:, [2, 1]], sides[:, [0, 2]])]
-    off = 0.0
-    for places, points in drawn:
-        along, beside = np.diff(points, axis=0), 1e3 * places[:, None] - points[:-1]
-        share = np.clip((beside * along).sum(axis=2) / (along**2).sum(axis=1), 0.0, 1.0)
-        off = max(off, float(np.linalg.norm(beside - share[..., None] * along, axis=2).min(axis=1).max()))
+        curve, wall = outer_surface(shape).curve, outer_surface(shape).wall
+        points = np.array([(s.z_mm, s.a_mm) for s in shape.sections])
+    along, beside = np.diff(points, axis=0), 1e3 * curve.derivative(np.linspace(*wall, 500))[:, None] - points[:-1]
+    share = np.clip((beside * along).sum(axis=2) / (along**2).sum(axis=1), 0.0, 1.0)
+    off = float(np.linalg.norm(beside - share[..., None] * along, axis=2).min(axis=1).max())
     # share of the width: less is how a round outline with few points is meant; and what a rounded corner leaves [mm]
     if off < max(0.03 * float(np.ptp([shape.spans_mm[axis] for axis in "xy"], axis=1).max()), 1.0):
         return ""

@@ -203,9 +203,9 @@ def certainty(ds: xr.Dataset, places: Sequence[int], score: str, k: int) -> str:
     more = f", but too little is known of {', '.join(map(str, hardly))}" * bool(hardly)
     if not alike:
         return f"place 1 is best beyond errors{more}"
-    if alike[-1] == len(alike) + 1 > 2:  # without a gap
-        return f"places 1 to {alike[-1]} are equal within errors{more}"
-    return f"places {', '.join(map(str, [1, *alike[:-1]]))} and {alike[-1]} are equal within errors{more}"
+    without_gap, last = alike[-1] == len(alike) + 1 > 2, alike.pop()
+    names = f"1 to {last}" if without_gap else f"{', '.join(map(str, [1, *alike]))} and {last}"
+    return f"places {names} are equal within errors{more}"
 
 
 def common(marks: np.ndarray) -> int:
