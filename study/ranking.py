@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from softjaw.fem.objects.gap import IntArray
 from softjaw.friction.patch import FloatArray
@@ -154,6 +155,15 @@ class Sure(NamedTuple):
         """All of it together, ``(n,)``."""
         return np.hypot(self.error, half_width(self.changes))
 
+    @property
+    def vague(self) -> NDArray[np.bool_]:
+        """Which values are hardly known, ``(n,)``: to no better than a fifth."""
+        return ~(self.half_width <= 0.2 * np.abs(self.value))
+
+    def guessed(self) -> Sure:
+        """The same, with the fifth for the errors that are not known."""
+        return self._replace(error=np.where(np.isnan(self.error), 0.2 * np.abs(self.value), self.error))
+
     def apart(self, i: int, j: int) -> bool | None:
         """Whether grasp ``i`` is better than ``j`` beyond the errors of their difference; None where not known.
 
@@ -213,10 +223,10 @@ def ranked(ds: xr.Dataset, k: int, by: str | None = None) -> IntArray:
     name = score_of(ds, by)
     score, flags = rank_values(ds, name, k), judged(ds)[..., k].ravel()
     order, errors = done[ranking(score[done], flags[done])], sure(ds, name, k)
-    vaguely = 0.2 * np.abs(score)  # from this error on a value is hardly known, and one without an error, too
+    half, vague = np.zeros(len(score)), np.zeros(len(order), bool)
     if errors is not None:
-        errors = errors._replace(error=np.where(np.isnan(errors.error), vaguely, errors.error))
-    half = np.zeros(len(score)) if errors is None else errors.half_width
+        vague, errors = errors.vague[order], errors.guessed()
+        half = errors.half_width
     surely, places, group, head, surest = score - half, _places(score), np.zeros(len(order), np.int64), 0, 0
     for n, i in enumerate(order):
         first, lost = order[head], flags[[order[head], i]] & LOST > 0
@@ -230,7 +240,7 @@ def ranked(ds: xr.Dataset, k: int, by: str | None = None) -> IntArray:
         elif surely[i] > surely[order[surest]]:
             surest = n
         group[n] = head
-    marks, vague = flags[order], (half >= vaguely)[order]
+    marks = flags[order]
     hopeless = marks & LOST > 0
     if all(name in ds for name in FORCE_RANGE):
         safe = (np.maximum(ds["force_low"].values, least_force(ds)) <= ds["force_high"].values).ravel()[order]

@@ -61,4 +61,8 @@ def add_blocks(blocks, rows, columns, start, column, values):
                 if columns[n, j] < 0:
                     continue
                 # columns ascend within a row, so bisection finds the slot
-                values[low + np.searchsorted(column[low:high], columns[n, j])] += blocks[n, r, j]
+                place = low + np.searchsorted(column[low:high], columns[n, j])
+                # without one it would be added elsewhere, or beyond the last
+                has_place = place < high and column[place] == columns[n, j]
+                assert has_place
+                values[place] += blocks[n, r, j]

@@ -62,8 +62,8 @@ class GraspNumbers(ABC):
         return self.value("opening")
 
 
-def surely_below(value: float, limit: float) -> bool:
-    """Whether a value is below a limit by more than `UNDECIDED`; no where that is undecided, or the value is NaN.
+def surely_below(value: Any, limit: float) -> Any:
+    """Whether a value, or each of several, is below a limit by more than `UNDECIDED`; no where undecided, or NaN.
 
     >>> surely_below(0.9, 1.0), surely_below(1.0 - 1e-12, 1.0), surely_below(1.1, 1.0)
     (True, False, False)

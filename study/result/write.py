@@ -10,6 +10,7 @@ from typing import Any
 
 import h5py
 import numpy as np
+from numpy.typing import NDArray
 
 from softjaw.study.case.result import CaseResult
 from softjaw.study.messages import CANNOT_WRITE, OTHER_FILE, StudyError
@@ -24,6 +25,11 @@ from softjaw.study.scene.sections import COARSE, FINEST
 
 MESH = "work/mesh"
 NOT_FINER = "on a finer mesh it was not solved: "
+
+
+def keeps_coarser(messages: Any) -> NDArray[np.bool_]:
+    """Which cases have the values of a coarser mesh, because they were not solved on a finer one, by their messages."""
+    return np.char.find(messages.astype(str), NOT_FINER) >= 0
 
 
 class ResultWriter:

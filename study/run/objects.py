@@ -35,7 +35,7 @@ from softjaw.study.run.load_path import sentence, settle
 from softjaw.study.run.object_folder import ObjectFolder, key_of
 from softjaw.study.run.plan import Plan
 from softjaw.study.run.schedule import Claims
-from softjaw.study.run.session import Session, Work, file_of, finish, keeps_coarser, locked, on_rank0, pack, rounds_in
+from softjaw.study.run.session import Session, Work, file_of, finish, has_coarser, locked, on_rank0, pack, rounds_in
 from softjaw.study.scene import Scene, SceneError, parse_scene
 from softjaw.study.scene.text import differences
 from softjaw.study.table import Row
@@ -289,7 +289,7 @@ def _rows_of(folder: ObjectFolder, out: Path, retry_failed: bool) -> tuple[list[
             text = f"{path}: object '{listed.name}' was solved from another scene or mesh ({change})"
             raise StudyError(messages.OTHER_FILE, f"{text}; choose another folder with -o, or move this one away")
         if before["key"] == key and (before["done"] < 1 or (out / row["file"]).exists()):
-            kept = retry_failed and before["done"] > 0 and keeps_coarser(out / row["file"])
+            kept = retry_failed and before["done"] > 0 and has_coarser(out / row["file"])
             lacks = {"state": index.MISSING} if kept or before["state"] in again else {}
             row = before | {"mesh": row["mesh"]} | lacks
         rows.append(row | {"key": key} | ({} if mass is None else {"mass": in_si("mass_g", mass)}))

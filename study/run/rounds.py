@@ -36,7 +36,7 @@ from softjaw.study.flags import LOST, Flag
 from softjaw.study.quantities import DONE, FAILED, LISTED, NO_GRASP
 from softjaw.study.ranking import distinct, judge, largest, rank_values, ranked, sure
 from softjaw.study.result.read import dataset, other_levels
-from softjaw.study.result.write import NOT_FINER
+from softjaw.study.result.write import keeps_coarser
 from softjaw.study.run.refine import Place, gained, next_stations, scores_of_poses, with_places
 from softjaw.study.scene import Scene
 from softjaw.study.scene.grasps import GraspPose
@@ -153,7 +153,7 @@ def next_cases(result: Any, scene: Scene) -> tuple[Case, ...]:
         return ()
     named, shape, target = result.layout.finer, ds.status.shape, scene.accuracy.target
     relative = ds[f"{scene.accuracy.target_of}_error"].values.reshape(-1, shape[-1])
-    often = _often(ds, named, k, relative <= (target or 0.0) * (1.0 - UNDECIDED))
+    often = _often(ds, named, k, surely_below(relative, target or 0.0))
     times, flags = often[:, k], ds["flags"].values[..., k].ravel()
     lost = [i for i in order if flags[i] & LOST and not flags[i] & Flag.OUT_OF_REACH][:LISTED]
     order = [i for i in order if not flags[i] & LOST and np.isfinite(known.value[i])]
@@ -187,7 +187,7 @@ def _often(ds: Any, named: Mapping[Case, int], k: int = 0, known: Any = False) -
     uncertain inputs are solved on the mesh that a case is named for, whatever its error.
     """
     shape, forces = ds.status.shape, ds.status.shape[-1]
-    left = (np.char.find(ds["message"].values.astype(str), NOT_FINER) >= 0).reshape(-1, forces)
+    left = keeps_coarser(ds["message"].values).reshape(-1, forces)
     often = np.array([[named[case_of(i, n, shape)] for n in range(forces)] for i in range(len(left))])
     return np.where(left | known & (often > 0) & (np.arange(forces) != k), FINEST, often)
 

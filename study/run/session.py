@@ -24,7 +24,7 @@ from softjaw.study.result.index import INDEX
 from softjaw.study.result.lock import Lock, OpenedFile, holder, in_use
 from softjaw.study.result.skeleton import create, rewrite
 from softjaw.study.result.store import Result, open_result, torn_rows
-from softjaw.study.result.write import MESH, NOT_FINER, Files, ResultWriter, codes_on, verify
+from softjaw.study.result.write import MESH, Files, ResultWriter, codes_on, keeps_coarser, verify
 from softjaw.study.run.limits import Stopper, early, limited_memory
 from softjaw.study.run.load_path import PathSolver, rows_again, settle
 from softjaw.study.run.plan import Plan
@@ -135,7 +135,7 @@ def _finished(path: Path, plan: Plan, retry_failed: bool, ranks: int) -> int | N
     """Exit code of a file that is packed and lacks nothing, which is left as it is; None of any other."""
     if not path.exists() or not verify(path, plan.layout, plan.header):
         return None
-    if retry_failed and keeps_coarser(path):
+    if retry_failed and has_coarser(path):
         return None
     with open_result(path, unchecked=True) as result:
         codes, wanted = result.codes.ravel(), plan.wanted
@@ -146,10 +146,10 @@ def _finished(path: Path, plan: Plan, retry_failed: bool, ranks: int) -> int | N
     return code_of(codes)
 
 
-def keeps_coarser(path: Path) -> bool:
-    """Whether a case of a file has the values of a coarser mesh, because it was not solved on a finer one."""
+def has_coarser(path: Path) -> bool:
+    """Whether `keeps_coarser` is true of a case of a file."""
     with open_result(path, unchecked=True) as result:
-        return any(NOT_FINER in message for message in result.messages.ravel())
+        return bool(keeps_coarser(result.messages).any())
 
 
 def _solve(plan: Plan, work: Work, path: Path, comm: Any, retry_failed: bool) -> int:

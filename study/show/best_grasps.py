@@ -197,9 +197,9 @@ def certainty(ds: xr.Dataset, places: Sequence[int], score: str, k: int) -> str:
         return ""
     if apart[0] is None:
         return "places 1 and 2 cannot be compared: one has no error yet"
-    known = errors.half_width <= 0.2 * np.abs(errors.value)  # as in `ranked`
-    close = [(n, known[i]) for n, (i, better) in enumerate(zip(others, apart, strict=True), start=2) if not better]
-    alike, hardly = ([n for n, sure_of in close if sure_of == how] for how in (True, False))
+    vague = errors.vague
+    close = [(n, vague[i]) for n, (i, better) in enumerate(zip(others, apart, strict=True), start=2) if not better]
+    alike, hardly = ([n for n, is_vague in close if is_vague == how] for how in (False, True))
     more = f", but too little is known of {', '.join(map(str, hardly))}" * bool(hardly)
     if not alike:
         return f"place 1 is best beyond errors{more}"
