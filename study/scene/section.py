@@ -173,6 +173,7 @@ def _expectation(entry: ErrorDetails, path: KeyPath) -> str:
     if kind.startswith("union_tag"):
         return f"one of {entry['ctx']['expected_tags']}" if kind == "union_tag_invalid" else "the object's shape"
     text = text.removeprefix("Input should be ").removeprefix("Tuple should have ").replace(" after validation", "")
+    text = text.replace("a valid integer", "a whole number").replace("a valid ", "a ")
     return f"{'a number ' * text.startswith(('greater', 'less'))}{text.replace('tuple', 'list')}"
 
 
