@@ -8,12 +8,12 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from softjaw.study.messages import Problem, closest, first_of, shown
+from softjaw.study.messages import Problem, closest, first_of, shortened, shown
 from softjaw.study.scene.section import SceneError
 
 LARGEST = 1_000_000  # bytes; a scene is a few kB
 REMEDY = "write each `key = value` once and on a line of its own, text in quotes, decimals with a point, lists in [ ]"
-MOST_NAMED, WIDTH = 5, 30
+MOST_NAMED, WIDTH = 5, 24
 
 
 def read_text(path: Path) -> str:
@@ -123,7 +123,8 @@ def differences(theirs: str, ours: str) -> str:
         return "its scene cannot be read"
     if not changed:
         return "the same keys, but another mesh file or another version"
-    named = [f"{key} is {value_text(first)} there and {value_text(second)} here" for key, first, second in changed]
+    texts = ((key, *value_texts(first, second)) for key, first, second in changed)
+    named = [f"{key} is {there} there and {here} here" for key, there, here in texts]
     return "; ".join(first_of(named, MOST_NAMED, " keys"))
 
 
@@ -147,9 +148,18 @@ def _values(text: str) -> dict[str, Any]:
     return {key: value for key, value in values.items() if key not in ("object.name", "gripper.preset")}
 
 
-def value_text(value: Any) -> str:
-    """A value of a scene in a few words."""
-    return "not set" if value is None else shown(value, WIDTH)
+def value_texts(first: Any, second: Any) -> tuple[str, str]:
+    """Two values of a scene in a few words; where those are alike, from shortly before the values differ.
+
+    >>> value_texts([[0.0, 0.5], [20.0, 0.3], [120.0, 0.3]], [[0.0, 0.5], [20.0, 0.3], [120.0, 0.4]])
+    ('...0.3]]', '...0.4]]')
+    """
+    a, b = ("not set" if value is None else shown(value, LARGEST) for value in (first, second))
+    if shortened(a, WIDTH) == shortened(b, WIDTH):
+        alike = next((i for i, pair in enumerate(zip(a, b, strict=False)) if len(set(pair)) > 1), 0)
+        start = max(a.rfind(" ", 0, alike) + 1, alike - WIDTH // 3)
+        a, b = (f"...{text[start:]}" for text in (a, b))
+    return shortened(a, WIDTH), shortened(b, WIDTH)
 
 
 def scene_table(text: str, section: str) -> dict[str, Any]:

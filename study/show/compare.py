@@ -14,7 +14,7 @@ from softjaw.study.quantities import NUMERIC_MAPS, map_row
 from softjaw.study.ranking import falling
 from softjaw.study.result.layout import DONE
 from softjaw.study.result.read import axes_of, stated_error, values_of
-from softjaw.study.scene.text import changes, value_text
+from softjaw.study.scene.text import changes, value_texts
 from softjaw.study.show.overview import listed
 from softjaw.study.table import PAPER, Column, Row, Table, as_text, with_unit, wrapped
 from softjaw.study.units import shown, shown_unit
@@ -68,7 +68,8 @@ def compare(first: xr.Dataset, second: xr.Dataset, quantity: str = "e_n", model:
 def compare_text(table: Table, top: int = 10, width: int = PAPER) -> str:
     """What differs, in lines of at most ``width`` characters; the ``top`` largest differences (0: all) case by case."""
     facts, quantity = table.facts, str(table.facts["quantity"])
-    settings = [{"key": row["key"], **{f: value_text(row[f]) for f in "ab"}} for row in facts["settings"]]
+    texts = ((row["key"], *value_texts(row["a"], row["b"])) for row in facts["settings"])
+    settings = [dict(zip(("key", "a", "b"), words, strict=True)) for words in texts]
     heads = [Column("key", label="setting", wrap=width // 2), Column("a"), Column("b")]
     lines = [f"{letter}: {file}" for letter, file in facts["files"].items()]
     lines.append(as_text(Table("", heads, settings), width) or "settings: no difference")

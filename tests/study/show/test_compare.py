@@ -82,6 +82,14 @@ def test_rounding_is_no_difference_and_errors_of_one_file_alone_are_unknown(pair
     assert found.facts["settings"] == []
 
 
+def test_long_values_that_begin_alike_are_shown_where_they_differ(pair):
+    def walled(wall):
+        return sj.open(pair[0]).assign_attrs(scene=f"object.wall_mm = [[0, 0.5], [20, 0.3], [120, {wall}], [160, 1.2]]")
+
+    (line,) = (line for line in compare_text(compare(walled(0.3), walled(0.4))).splitlines() if "wall_mm" in line)
+    assert line.split("  ")[1:] == ["...0.3], [160, 1.2]]", "...0.4], [160, 1.2]]"]
+
+
 def test_the_text_fits_a_terminal_largest_first_and_programs_get_every_common_case_in_si(pair):
     found = compared(*pair)
     lines = compare_text(found, top=3).splitlines()
