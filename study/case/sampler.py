@@ -7,8 +7,9 @@ wider than the opening, runs into the fingers or slips comes with that state.
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import cache, lru_cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -39,7 +40,8 @@ BETWEEN = 4e-3  # distance of the points of an object that a hand must not meet 
 EDGE_COST = 0.05  # of a payload, for which a place off the edges of the object is preferred
 
 
-class SampledGrasp(NamedTuple):
+@dataclass(frozen=True, eq=False)  # one is itself alone: arrays have no hash, and what a hand reaches is kept by it
+class SampledGrasp:
     """A grasp as the spring foundation sees it.
 
     ``point`` (3,) array: middle between both contacts [m]. ``approach, long_side`` (3,) arrays: finger 1's approach and
@@ -202,7 +204,7 @@ def improved(
             wanted = (1.0 + WORTHWHILE) * grasp.payload
             other = judged(grip, task, wanted)
             if not other.state and other.payload > wanted:
-                grasp = other._replace(point=grip.middle)
+                grasp = replace(other, point=grip.middle)
     return grasp
 
 
