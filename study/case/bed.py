@@ -7,7 +7,7 @@ need no closed mesh and no normals, and inner walls or thin parts behind do not 
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 import numpy as np
 from numba import njit
@@ -25,10 +25,17 @@ INNER = (slice(1, -1), slice(1, -1))  # of height fields that reach one cell bey
 ALONG, ACROSS = (np.gradient(np.eye(n), axis=0) for n in GRID)  # differences of neighbouring cells
 
 
-@lru_cache(maxsize=8)
-def cells(length: float, width: float) -> tuple[list[FloatArray], list[FloatArray]]:
-    """Places of cells along both sides of a face, one more even step at both ends, and x and y of its own [m]."""
-    wider = [side * ((np.arange(-1, n + 1) + 0.5) / n - 0.5) for side, n in zip((length, width), GRID, strict=True)]
+def cells(pad: FloatArray, low: FloatArray, high: FloatArray) -> tuple[list[FloatArray], list[FloatArray]]:
+    """Places of cells along both sides of a face, one more even step at both ends, and x and y of its own [m].
+
+    They divide what of the face an object between ``low (2,)`` and ``high (2,)`` can meet, so that a small object gets
+    as many as a large one, and the same ones wherever it lies under the pad.
+    """
+    low, high = np.maximum(low, -0.5 * pad), np.minimum(high, 0.5 * pad)
+    if (low >= high).any():
+        raise NoContactError("the pad misses the object")
+    middle, sides = 0.5 * (low + high), high - low
+    wider = [m + d * ((np.arange(-1, n + 1) + 0.5) / n - 0.5) for m, d, n in zip(middle, sides, GRID, strict=True)]
     return wider, list(np.meshgrid(*(part[1:-1] for part in wider), indexing="ij"))
 
 
@@ -112,13 +119,14 @@ class JawsOnSurface:
 
     def __init__(self, surface: tuple[FloatArray, IntArray], point: FloatArray, axes: FloatArray, jaws: Jaws) -> None:
         self.point, self.axes, self.jaws = point, axes, jaws
-        wider, (x, y) = cells(*jaws.pad[:2])
         self.local, self.triangles = np.ascontiguousarray((surface[0] - point) @ axes), surface[1]
+        beside = self.local[:, :2]
+        wider, (x, y) = cells(np.array(jaws.pad[:2]), beside.min(axis=0), beside.max(axis=0))
         low, high = height_fields(self.local, self.triangles, *wider)
         if not np.isfinite(low[INNER]).any():
             raise NoContactError("the pad misses the object")
         # finger 2 looks against the approach, with its short side reversed
-        self.sides = Side(low[INNER], x, y, jaws), Side(-high[:, ::-1][INNER], x, y, jaws)
+        self.sides = Side(low[INNER], x, y, jaws), Side(-high[:, ::-1][INNER], x, -y[:, ::-1], jaws)
         self._fields = low, -high[:, ::-1]
 
     @property

@@ -131,6 +131,13 @@ def test_a_bowl_is_held_from_outside_or_by_its_bottom_and_springs_on_a_face_hold
     assert at_origin(box(0.2, 1.001 * width, 0.05)).on_edges == pytest.approx(2 / GRID[1])
 
 
+def test_a_small_object_is_held_in_the_middle_of_the_pads_not_where_cells_of_their_faces_favour_it():
+    ball = surface(trimesh.creation.icosphere(3, 0.004))
+    good = [g for g in antipodal_grasps(ball, JAWS, TASK, 3, samples=10) if not g.state]
+    assert good
+    assert max(np.linalg.norm(g.point) for g in good) < 1e-4
+
+
 @pytest.mark.long
 def test_no_pad_is_put_over_a_hole_and_grasps_are_spread_over_the_places_of_an_object():
     body = box(0.2, 0.2, 0.05)
