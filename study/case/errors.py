@@ -32,7 +32,7 @@ WIDER = dict.fromkeys((q.name for q in TABLE if q.error == "absolute"), 10.0) | 
 OF_WIDTH = {"closing": 0.33, "contact_area": 1.4, "p_max": 5.0}  # the same, of what depends on the contact's width
 # Of the share of the load that edges of the object bear: where such an edge lies within an element tells no mesh.
 OF_EDGES = dict.fromkeys((q.name for q in TABLE), 0.12) | {
-    "payload": 0.02, "safety_factor": 0.02, "f_x_max": 0.04, "f_y_max": 0.04, "closing": 0.25, "contact_area": 0.2,
+    "payload": 0.02, "safety_factor": 0.02, "f_x_max": 0.04, "f_y_max": 0.04, "closing": 0.3, "contact_area": 0.2,
     "p_max": 3.0,
 }  # fmt: skip
 # Of the square of the overlap where one line of nodes bears, which tells little of the contact's width.
@@ -107,14 +107,17 @@ def mesh_errors(
     viewed = [_sums(view) | grasp_values(tuple(view), settings) for view in views]
     compared = [(_all(low, settings), _all(high, settings), share) for low, high, share in pairs]
     acts = any(contact.state.points.friction is not None for _, high, _ in pairs for contact in high.contacts)
+    walled = closes_less > 0.0 or any("wall" in q.needs and q.key in coarse_mesh for q in TABLE)
     errors = {}
     for q in (q for q in TABLE if q.error and q.key in coarse_mesh and q.name != "opening_loaded"):
         view_values = [view[q.key] for view in viewed if q.key in view]
         value, size = fine_mesh[q.key], _size(q, fine_mesh[q.key])
         # dents of walls converge with first order: as far as the coarser mesh's is away, they are off
         share = 1.0 if "wall" in q.needs else OF_FARTHEST
-        error = estimate(value, coarse_mesh[q.key], view_values, q.error, q.name in PAYLOADS, share)
-        error += unseen.share(q, fine, acts or left_out > 0.0) * size
+        part = _part(q, fine, walled)
+        error = part * estimate(value, coarse_mesh[q.key], view_values, q.error, q.name in PAYLOADS, share)
+        mine = unseen._replace(floor=part * unseen.floor, of_width=part * unseen.of_width)
+        error += mine.share(q, fine, acts or left_out > 0.0) * size
         if q.name in PAYLOADS:  # the larger, the more in doubt
             error = max(error, min(error * (1.0 + 1.6 * error), 1.0))
         if q.error == "relative" and not np.all(coarse_mesh[q.key]):
@@ -125,6 +128,18 @@ def mesh_errors(
     if "maps/closing_error" in errors:  # the opening is less by what both pads close
         errors["maps/opening_loaded_error"] = 2.0 * errors["maps/closing_error"] * float(fine_mesh["maps/closing"][0])
     return errors
+
+
+def _part(q: Quantity, contacts: Sequence[Any], walled: bool) -> float:
+    """How much is stated of what meshes and floors tell: less where the mesh resolves the contact, more on one line."""
+    coarse = any(contact.coarse for contact in contacts)
+    whole = ("contact_area", "quality", *PAYLOADS) if coarse else ("contact_area", "p_max")
+    if q.name in whole or (walled and q.name not in PAYLOADS):
+        return 1.0
+    forces = q.name in PAYLOADS or q.name.startswith("f_")
+    # one line of nodes tells little of the contact's width
+    least, most = 0.8 if forces else 0.7, 1.0 if forces or q.name == "closing" else 1.4
+    return float(np.interp(min(contact.lines for contact in contacts), (1.7, 1.9), (most, least)))
 
 
 def coarse_errors(

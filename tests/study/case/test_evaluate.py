@@ -36,6 +36,7 @@ def pair(tilt=0.0, strips=65):
     """A patch, and the same half a turn about x away, tilted about x [rad]."""
     patch = cylinder_grid(R, ANGLE, LENGTH, strips, 64)
     one = Contact(replace(patch, pressure=PRESSURE * patch.pressure), MU)
+    one.coarse, one.lines = False, 8.0
     turn = np.diag([1.0, -1.0, -1.0]) @ Rotation.from_euler("x", tilt).as_matrix()
     return one, one.at(Pose(turn, np.add(one.origin, [0, 0, DISTANCE]) - turn @ one.frame.origin))
 
@@ -105,7 +106,8 @@ def test_extents_scale_arms_contacts_that_lean_are_flagged_and_errors_are_differ
     errors = mesh_errors(fine, coarse, values, {}, SETTINGS)
     other, _ = evaluate(coarse, SETTINGS)
     for name in ("e_n", "f_y_max", "quality"):
-        expected = weights.OF_FARTHEST * abs(other[f"maps/{name}"][0] / values[f"maps/{name}"][0] - 1)
+        part = 0.8 if name == "f_y_max" else 0.7  # of contacts that the mesh resolves
+        expected = part * weights.OF_FARTHEST * abs(other[f"maps/{name}"][0] / values[f"maps/{name}"][0] - 1)
         assert errors[f"maps/{name}_error"] == pytest.approx(expected, rel=1e-9, abs=1e-12)
     alone = mesh_errors(fine, fine, values, {}, SETTINGS)
     gap = BOUND_GAP * (1 + 1.6 * BOUND_GAP)
@@ -113,7 +115,7 @@ def test_extents_scale_arms_contacts_that_lean_are_flagged_and_errors_are_differ
     floor = mesh_errors(fine, fine, values, {}, SETTINGS, unseen=Unseen(0.01, 0.02, 0.5))
     found = [floor[f"maps/{name}_error"] for name in ("e_n", "f_x_max", "p_max")]
     edges = [0.5 * weights.OF_EDGES[name] for name in ("e_n", "f_x_max", "p_max")]
-    shares = [0.01, 0.01 * weights.WIDER["f_x_max"], 0.02 * weights.OF_WIDTH["p_max"]]
+    shares = [0.007, 0.008 * weights.WIDER["f_x_max"], 0.02 * weights.OF_WIDTH["p_max"]]
     lost = max(1.0 - contact.limits["ccm"].F_N / contact.limits["ccm"].S for contact in fine)
     edges[1] += 0.5 * weights.OF_CORNERS["f_x_max"] * weights.OF_LOSS * lost
     assert found == pytest.approx(np.add(shares, edges))
@@ -127,7 +129,7 @@ def test_extents_scale_arms_contacts_that_lean_are_flagged_and_errors_are_differ
     held, less = (evaluate(contacts, task)[0]["maps/payload"][0] for contacts in (fine, coarse))
     error = mesh_errors(fine, coarse, {**values, "maps/payload": [held]}, {}, task)["maps/payload_error"]
     apart = abs(less / held - 1)
-    expected = weights.OF_FARTHEST * apart * (1 + apart) + BOUND_GAP
+    expected = 0.8 * weights.OF_FARTHEST * apart * (1 + apart) + BOUND_GAP
     assert error == pytest.approx(expected * (1 + 1.6 * expected), rel=1e-9)
     held = {**values, "maps/payload": [held]}
     sharp, edged = (coarse_errors(fine, held, [fine, coarse], task, r)["maps/payload_error"] for r in (False, True))
@@ -157,14 +159,14 @@ def test_every_quantity_with_an_error_gets_one():
     errors = mesh_errors(fine, coarse, values, other, task)
     assert set(errors) == {q.of_error.key for q in TABLE if q.error and "wall" not in q.needs}
     assert np.isfinite([*errors.values()]).all()
-    assert errors["maps/closing_error"] == pytest.approx(weights.OF_FARTHEST * 0.1, rel=1e-9)
-    assert errors["maps/opening_loaded_error"] == pytest.approx(weights.OF_FARTHEST * 0.1 * 2e-3, rel=1e-9)
+    assert errors["maps/closing_error"] == pytest.approx(0.7 * weights.OF_FARTHEST * 0.1, rel=1e-9)
+    assert errors["maps/opening_loaded_error"] == pytest.approx(0.7 * weights.OF_FARTHEST * 0.1 * 2e-3, rel=1e-9)
     # trilinear elements lock: of foam that is hardly compressed they close less than finer ones
     floors = []
     for pad.shape.element, pad.material.poisson_ratio in (("hex8", 0.25), ("hex8", 0.45), ("hex27", 0.45)):
         unseen = Unseen(0.0, 0.01, 0.0)
         floors.append(mesh_errors(fine, coarse, values, other, task, unseen=unseen)["maps/closing_error"])
-    expected = 0.01 * weights.OF_WIDTH["closing"] * np.array([0.8, 2.4, 1.0])
+    expected = 0.7 * 0.01 * weights.OF_WIDTH["closing"] * np.array([0.8, 2.4, 1.0])
     assert np.array(floors) - errors["maps/closing_error"] == pytest.approx(expected, rel=1e-9)
     peaks = [contacts[0].patch.pressure.max() for contacts in (fine, coarse)]
     assert errors["maps/p_max_error"] == pytest.approx(weights.OF_FARTHEST * abs(peaks[1] / peaks[0] - 1), rel=1e-9)
