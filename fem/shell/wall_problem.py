@@ -254,7 +254,7 @@ class WallProblem(ContactProblem):
     def _couplings(self, f: Finger, meetings: IntArray) -> list[tuple[IntArray, IntArray]]:
         """Rows and columns of the entries that contact and friction may have between facets and nodes ``(n, 9)``."""
         facet, now, before = meetings[:, 0], meetings[:, 1:5], meetings[:, 5:]
-        moved, on_wall = f.dofs[facet].reshape(len(facet), -1), self.wall_dofs(now)
+        moved, on_wall = f.dofs.reshape(len(f.dofs), -1)[facet], self.wall_dofs(now)
         on_pad = np.concatenate([moved, f.pressure_dofs[facet]], axis=1)
         along = np.where(before[:, :1] >= 0, self.wall_dofs(before), -1)
         pair = pairs(on_pad[:, :, None], on_wall[:, None, :])

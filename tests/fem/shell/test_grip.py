@@ -14,7 +14,7 @@ from softjaw.fem.errors import ConvergenceError
 from softjaw.fem.shell.grip import Grip
 from softjaw.fem.shell.wall_material import WallMaterial
 from softjaw.fem.shell.wall_mesh import MeshSize, body_mesh, interpolated
-from tests.fem.grips import check_tangent, e_n, gap_at, grip, pose, stirred, thin
+from tests.fem.grips import check_tangent, dense, e_n, gap_at, grip, pose, stirred, thin
 
 FORCES, MU = (0.5, 2.0), 0.4
 FORCE = Control(force=2.0)
@@ -46,6 +46,15 @@ def test_the_tangent_is_the_derivative_of_the_residual(allowed, level, control, 
     faced = problem.fingers[0].faced / problem.fingers[0].pad.face_area
     assert ((faced > 0.0) & (faced < 1.0)).any() == (place == RIM)
     check_tangent(problem, stirred(problem, np.random.default_rng(1)), 1e-9, 1e-8)
+
+
+def test_one_pad_may_meet_nodes_of_the_wall_while_the_other_meets_none():
+    problem = grip(thin(), elements=(4, 2, 2), allowed=(False, False)).problem
+    x, other = stirred(problem, np.random.default_rng(1)), problem.fingers[1]
+    x[other.unknowns] *= -1.0  # off the wall
+    x[other.pressures] = 0.0
+    K, wall = dense(problem, x), slice(0, problem.model.size)
+    assert [K[f.unknowns, wall].any() for f in problem.fingers] == [True, False]
 
 
 @pytest.mark.long
