@@ -20,6 +20,8 @@ from softjaw.study.scene.grasps import listed
 from softjaw.study.scene.sections import Accuracy, Gripper
 from softjaw.study.units import converted, in_si
 
+MAX_SLOPE = np.radians(60.0)  # of an approach against the planes across a thin-walled object's axis
+
 
 def geometry() -> Any:
     """The module that builds what needs compiled loops; most scenes are checked and planned without it."""

@@ -18,7 +18,7 @@ from softjaw.fem.shell.wall_mesh import MeshSize
 from softjaw.fem.shell.wall_problem import WallProblem
 from softjaw.friction.patch import ContactPatch, cross
 from softjaw.friction.wrench import FrictionLimits
-from softjaw.study.case.build import pad_shape
+from softjaw.study.case.build import MAX_SLOPE, pad_shape
 from softjaw.study.case.contact import Contact
 from softjaw.study.case.geometry import Finger
 from softjaw.study.case.model import contact_rules, image_signs, pad_of, press_of, require_planes
@@ -33,7 +33,6 @@ SHARP = np.radians(20.0)  # by which normals of neighbouring faces turn more tha
 BENT = np.radians(120.0)  # between the object's normals at neighbouring loaded faces, beyond which it is coarse too
 OVERLAPS = 0.1  # share of the closing displacement, beyond which the mesh is coarse for the contact
 MESH_HOLE = 0.01  # of a pad's face before a hole of the mesh, beyond which that is flagged
-MAX_SLOPE = np.radians(60.0)  # of an approach against the planes across a thin-walled object's axis
 UPRIGHT, HALF_TURN = (1.0, 1.0, 1.0), (-1.0, -1.0, 1.0)  # signs of the axes of a pad's frame
 
 

@@ -17,7 +17,7 @@ from softjaw.fem.objects.gap import IntArray
 from softjaw.fem.objects.mesh_object import MeshObject
 from softjaw.friction.patch import FloatArray, NoContactError
 from softjaw.study.case.bed import JawsOnSurface, Side, grips, spring_payload
-from softjaw.study.case.build import build_object, listed_accuracy, own_frame, surface_triangles
+from softjaw.study.case.build import MAX_SLOPE, build_object, has_wall, listed_accuracy, own_frame, surface_triangles
 from softjaw.study.case.contact import slips
 from softjaw.study.case.fit import Jaws, fit_of, jaws_of
 from softjaw.study.case.poses import across, in_file, pad_axes, pose_of
@@ -133,8 +133,8 @@ def antipodal_grasps(
     ``surface`` (k, 3) array, (m, 3) int array: points [m] and triangles. ``task``: what they have to hold. ``count``:
     grasps that can be solved. ``seed``: of the points where grasps are looked for; the same seed gives the same grasps
     on every machine. ``samples``: number of those points. ``lids`` (n, 3, 3) array, optional: corners of the triangles
-    that close holes [m]: no pad is put there if there are other places. ``reached``: whether the hand gets to a grasp;
-    others are given where it gets to none.
+    that close holes [m]: no pad is put there if there are other places. ``reached``: whether the hand gets to a grasp
+    that can be solved; others are given where there is none.
     """
     surface = np.ascontiguousarray(surface[0]), np.ascontiguousarray(surface[1])
     offered: dict[bool | None, list[SampledGrasp]] = {None: [], False: [], True: []}  # by what `offers` says of them
@@ -310,10 +310,12 @@ def same_grasp(grasp: SampledGrasp, other: SampledGrasp, length: float) -> bool:
 def with_sampled_grasps(scene: Scene) -> Scene:
     """The scene with the grasps that its sampler finds as explicit poses; `NoGraspError` where none fits the pads."""
     given, obj = scene.candidates, build_object(scene.object)
-    task, surface = task_of(scene), surface_triangles(scene.object)
+    task, surface, by_hand = task_of(scene), surface_triangles(scene.object), reached_by_hand(scene)
+    slope = math.sin(MAX_SLOPE) if has_wall(scene.object) else math.inf
     grasps = antipodal_grasps(
-        surface, jaws_of(scene), task, given.sampled or 1, lids=lids_of(obj), reached=reached_by_hand(scene)
-    )
+        surface, jaws_of(scene), task, given.sampled or 1, lids=lids_of(obj),
+        reached=lambda grasp: abs(grasp.approach[2]) <= slope and by_hand(grasp),
+    )  # fmt: skip
     placed = own_frame(scene.object)
     given_as = [(in_file(grasp.point, grasp.approach, grasp.long_side, placed), grasp.state) for grasp in grasps]
     poses = tuple(pose_of(numbers) for numbers, state in given_as if not state)

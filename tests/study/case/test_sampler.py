@@ -197,6 +197,12 @@ def test_grasps_that_the_hand_does_not_reach_are_left_out():
     assert [g.payload for g in grasps(lambda _: False)] == [g.payload for g in everywhere]
 
 
+def test_thin_walls_are_not_held_across_their_ends():
+    cup = 'shape = "revolution"\nprofile_mm = [[0, 28], [20, 29], [40, 30], [60, 31]]\nwall_mm=1\nwall_material = "PP"'
+    [pose] = with_sampled_grasps(parse_scene(text_of(cup, "sampled = 1\n"))).candidates.poses
+    assert abs(pose.approach[2]) < 0.1
+
+
 def test_a_hand_reaches_a_slab_as_far_as_its_fingers_do():
     slab = text_of('shape = "box"\nsize_mm = [40, 200, 200]\nedge_radius_mm = 2', forces="[5]")
     at = [SampledGrasp(np.array([0.0, 0.0, z]), np.eye(3)[0], np.eye(3)[2], 0.04, 1.0) for z in (0.0, 0.09)]
