@@ -135,7 +135,7 @@ def _part(q: Quantity, contacts: Sequence[Any], walled: bool) -> float:
     coarse = any(contact.coarse for contact in contacts)
     whole = ("contact_area", "quality", *PAYLOADS) if coarse else ("contact_area", "p_max")
     if q.name in whole or (walled and q.name not in PAYLOADS):
-        return 1.5 if walled and q.name.startswith("f_") else 1.0
+        return 2.0 if walled and q.name.startswith("f_") else 1.0
     forces = q.name in PAYLOADS or q.name.startswith("f_")
     # one line of nodes tells little of the contact's width
     least, most = 0.8 if forces else 0.7, 1.0 if forces or q.name == "closing" else 1.4
