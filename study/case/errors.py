@@ -89,7 +89,7 @@ ALL_SEEN = Unseen()
 
 
 def mesh_errors(
-    fine: Sequence[Contact], coarse: Sequence[Contact], values: Mapping[str, Any], other: Mapping[str, Any],
+    fine: Sequence[Any], coarse: Sequence[Contact], values: Mapping[str, Any], other: Mapping[str, Any],
     settings: EvaluationSettings, views: Sequence[Sequence[Contact]] = (),
     pairs: Sequence[tuple[Any, Any, float]] = (), unseen: Unseen = ALL_SEEN,
     left_out: float = 0.0, closes_less: float = 0.0,
@@ -107,6 +107,7 @@ def mesh_errors(
     viewed = [_sums(view) | grasp_values(tuple(view), settings) for view in views]
     compared = [(_all(low, settings), _all(high, settings), share) for low, high, share in pairs]
     acts = any(contact.state.points.friction is not None for _, high, _ in pairs for contact in high.contacts)
+    coarsely, lines = any(contact.coarse for contact in fine), min(contact.lines for contact in fine)
     walled = closes_less > 0.0 or any("wall" in q.needs and q.key in coarse_mesh for q in TABLE)
     errors = {}
     for q in (q for q in TABLE if q.error and q.key in coarse_mesh and q.name != "opening_loaded"):
@@ -114,7 +115,7 @@ def mesh_errors(
         value, size = fine_mesh[q.key], _size(q, fine_mesh[q.key])
         # dents of walls converge with first order: as far as the coarser mesh's is away, they are off
         share = 1.0 if "wall" in q.needs else OF_FARTHEST
-        part = _part(q, fine, walled)
+        part = _part(q, coarsely, lines, walled)
         error = part * estimate(value, coarse_mesh[q.key], view_values, q.error, q.name in PAYLOADS, share)
         mine = unseen._replace(floor=part * unseen.floor, of_width=part * unseen.of_width)
         error += mine.share(q, fine, acts or left_out > 0.0) * size
@@ -130,16 +131,15 @@ def mesh_errors(
     return errors
 
 
-def _part(q: Quantity, contacts: Sequence[Any], walled: bool) -> float:
+def _part(q: Quantity, coarse: bool, lines: float, walled: bool) -> float:
     """How much is stated of what meshes and floors tell: less where the mesh resolves the contact, more on one line."""
-    coarse = any(contact.coarse for contact in contacts)
     whole = ("contact_area", "quality", *PAYLOADS) if coarse else ("contact_area", "p_max")
     if q.name in whole or (walled and q.name not in PAYLOADS):
         return 2.0 if walled and q.name.startswith("f_") else 1.0
     forces = q.name in PAYLOADS or q.name.startswith("f_")
     # one line of nodes tells little of the contact's width
     least, most = 0.8 if forces else 0.7, 1.0 if forces or q.name == "closing" else 1.4
-    return float(np.interp(min(contact.lines for contact in contacts), (1.7, 1.9), (most, least)))
+    return float(np.interp(lines, (1.7, 1.9), (most, least)))
 
 
 def coarse_errors(
