@@ -53,24 +53,40 @@ class Unseen(NamedTuple):
     """Shares that no difference of two meshes shows: floors of sums over a contact and of widths; load on edges.
 
     ``overlap`` is how far the pad is in the object, over the closing displacement, where one line of nodes bears.
+    ``lines`` of nodes, at least, share the load; ``coarse``: whether the mesh is coarse for a contact.
     """
 
     floor: float = 0.0
     of_width: float = 0.0
     on_edges: float = 0.0
     overlap: float = 0.0
+    lines: float = np.inf
+    coarse: bool = False
 
     @classmethod
-    def of(cls, contacts: Sequence[Any], doubt: float = 1.0) -> Unseen:
-        """On these contacts; floors, at which meshes agree by luck, are ``doubt`` times what the elements tell."""
+    def of(cls, contacts: Sequence[Any], coarse: bool = False) -> Unseen:
+        """On these contacts; floors, at which meshes agree by luck, are higher on a ``coarse`` mesh."""
+        doubt, lines = DOUBTED if coarse else 1.0, [c.lines for c in contacts]
         floor = doubt * FLOOR / min(c.elements for c in contacts) ** POWER
         of_width = doubt * FLOOR / min(c.across for c in contacts) ** POWER
-        overlap = max(min(c.overlap, MOST_OVERLAP) * (c.lines <= ONE_LINE) for c in contacts)
-        return cls(floor, of_width, max(c.on_edges for c in contacts), overlap)
+        overlap = max(min(c.overlap, MOST_OVERLAP) * (n <= ONE_LINE) for c, n in zip(contacts, lines, strict=True))
+        return cls(floor, of_width, max(c.on_edges for c in contacts), overlap, min(lines), coarse)
 
-    def share(self, q: Quantity, contacts: Sequence[Any], acts: bool = False) -> float:
-        """Of a quantity's value; ``acts``: whether friction acts back, or should."""
+    def part(self, q: Quantity, walled: bool) -> float:
+        """How much is stated of what meshes and floors tell: less of a contact that is resolved, more on one line."""
+        payload, along = q.name in PAYLOADS, q.name.startswith("f_")
+        if walled and not payload:
+            return 2.0 if along else 1.0
+        if q.name in (("contact_area", "quality", *PAYLOADS) if self.coarse else ("contact_area", "p_max")):
+            return 1.0
+        least, most = 0.8 if payload or along else 0.7, 1.0 if payload or along or q.name == "closing" else 1.4
+        # one line of nodes tells little of the contact's width
+        return float(np.interp(self.lines, (1.7, 1.9), (most, least)))
+
+    def share(self, q: Quantity, contacts: Sequence[Any], acts: bool = False, part: float = 1.0) -> float:
+        """Of a quantity's value, ``part`` of the floors; ``acts``: whether friction acts back, or should."""
         floor = self.of_width * OF_WIDTH[q.name] if q.name in OF_WIDTH else self.floor * WIDER.get(q.name, 1.0)
+        floor *= part
         if q.name == "closing" and (pad := contacts[0].state.pad).shape.element == "hex8":
             # trilinear elements close less, the less the foam can be compressed
             floor *= 0.4 + 0.2 / (1.0 - 2.0 * pad.material.poisson_ratio)
@@ -89,7 +105,7 @@ ALL_SEEN = Unseen()
 
 
 def mesh_errors(
-    fine: Sequence[Any], coarse: Sequence[Contact], values: Mapping[str, Any], other: Mapping[str, Any],
+    fine: Sequence[Contact], coarse: Sequence[Contact], values: Mapping[str, Any], other: Mapping[str, Any],
     settings: EvaluationSettings, views: Sequence[Sequence[Contact]] = (),
     pairs: Sequence[tuple[Any, Any, float]] = (), unseen: Unseen = ALL_SEEN,
     left_out: float = 0.0, closes_less: float = 0.0,
@@ -107,7 +123,6 @@ def mesh_errors(
     viewed = [_sums(view) | grasp_values(tuple(view), settings) for view in views]
     compared = [(_all(low, settings), _all(high, settings), share) for low, high, share in pairs]
     acts = any(contact.state.points.friction is not None for _, high, _ in pairs for contact in high.contacts)
-    coarsely, lines = any(contact.coarse for contact in fine), min(contact.lines for contact in fine)
     walled = closes_less > 0.0 or any("wall" in q.needs and q.key in coarse_mesh for q in TABLE)
     errors = {}
     for q in (q for q in TABLE if q.error and q.key in coarse_mesh and q.name != "opening_loaded"):
@@ -115,10 +130,9 @@ def mesh_errors(
         value, size = fine_mesh[q.key], _size(q, fine_mesh[q.key])
         # dents of walls converge with first order: as far as the coarser mesh's is away, they are off
         share = 1.0 if "wall" in q.needs else OF_FARTHEST
-        part = _part(q, coarsely, lines, walled)
+        part = unseen.part(q, walled)
         error = part * estimate(value, coarse_mesh[q.key], view_values, q.error, q.name in PAYLOADS, share)
-        mine = unseen._replace(floor=part * unseen.floor, of_width=part * unseen.of_width)
-        error += mine.share(q, fine, acts or left_out > 0.0) * size
+        error += unseen.share(q, fine, acts or left_out > 0.0, part) * size
         if q.name in PAYLOADS:  # the larger, the more in doubt
             error = max(error, min(error * (1.0 + 1.6 * error), 1.0))
         if q.error == "relative" and not np.all(coarse_mesh[q.key]):
@@ -129,17 +143,6 @@ def mesh_errors(
     if "maps/closing_error" in errors:  # the opening is less by what both pads close
         errors["maps/opening_loaded_error"] = 2.0 * errors["maps/closing_error"] * float(fine_mesh["maps/closing"][0])
     return errors
-
-
-def _part(q: Quantity, coarse: bool, lines: float, walled: bool) -> float:
-    """How much is stated of what meshes and floors tell: less where the mesh resolves the contact, more on one line."""
-    whole = ("contact_area", "quality", *PAYLOADS) if coarse else ("contact_area", "p_max")
-    if q.name in whole or (walled and q.name not in PAYLOADS):
-        return 2.0 if walled and q.name.startswith("f_") else 1.0
-    forces = q.name in PAYLOADS or q.name.startswith("f_")
-    # one line of nodes tells little of the contact's width
-    least, most = 0.8 if forces else 0.7, 1.0 if forces or q.name == "closing" else 1.4
-    return float(np.interp(lines, (1.7, 1.9), (most, least)))
 
 
 def coarse_errors(

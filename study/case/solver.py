@@ -20,7 +20,7 @@ from softjaw.fem.objects.gap import Pose
 from softjaw.fem.petsc import Seconds
 from softjaw.study.case.build import build_object, forces_apart, has_wall, pad_elements
 from softjaw.study.case.contact import Contact
-from softjaw.study.case.errors import DOUBTED, Unseen, grasp_values, mesh_errors
+from softjaw.study.case.errors import Unseen, grasp_values, mesh_errors
 from softjaw.study.case.evaluate import EvaluationSettings, settings_of
 from softjaw.study.case.geometry import Finger, approach
 from softjaw.study.case.pressing import OnRigid, OnWall, PressedContact, pressing, refuse_along_axis
@@ -97,7 +97,7 @@ class Solved(NamedTuple):
             # they are rounded over a part of an element, and what that does falls with it
             sizes = [mesh.contacts[0].state.pad.shape.elements[0] for mesh in (self.meshes[-2], self.fine)]
             pairs.append((*self.edges, sizes[0] / sizes[1]))
-        unseen = Unseen.of(fine, DOUBTED if any(contact.coarse for contact in fine) else 1.0)
+        unseen = Unseen.of(fine, any(contact.coarse for contact in fine))
         shares = left_out, closes_less
         return mesh_errors(fine, coarse.contacts, values, other, settings, coarse.views, pairs, unseen, *shares)
 

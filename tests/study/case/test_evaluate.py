@@ -36,7 +36,6 @@ def pair(tilt=0.0, strips=65):
     """A patch, and the same half a turn about x away, tilted about x [rad]."""
     patch = cylinder_grid(R, ANGLE, LENGTH, strips, 64)
     one = Contact(replace(patch, pressure=PRESSURE * patch.pressure), MU)
-    one.coarse, one.lines = False, 8.0
     turn = np.diag([1.0, -1.0, -1.0]) @ Rotation.from_euler("x", tilt).as_matrix()
     return one, one.at(Pose(turn, np.add(one.origin, [0, 0, DISTANCE]) - turn @ one.frame.origin))
 
@@ -123,7 +122,7 @@ def test_extents_scale_arms_contacts_that_lean_are_flagged_and_errors_are_differ
     alone = coarse_errors(fine, values, [fine, coarse], SETTINGS, rounded=False)
     assert alone["maps/f_x_max_error"] == pytest.approx(weights.DOUBTED * Unseen.of(fine).floor, rel=1e-6)
     # the more elements bear, the less they agree by luck
-    few, many = Unseen.of(coarse), Unseen.of(fine, doubt=2.0)
+    few, many = Unseen.of(coarse), Unseen.of(fine, coarse=True)
     assert np.divide(many[:2], few[:2]) == pytest.approx([2 / 16**weights.POWER, 2 / 4**weights.POWER], rel=1e-9)
     task = replace(SETTINGS, task=Task((fine[0].origin + fine[1].origin) / 2))
     held, less = (evaluate(contacts, task)[0]["maps/payload"][0] for contacts in (fine, coarse))
