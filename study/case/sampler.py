@@ -313,7 +313,7 @@ def with_sampled_grasps(scene: Scene) -> Scene:
     task, surface, by_hand = task_of(scene), surface_triangles(scene.object), reached_by_hand(scene)
     slope = math.sin(MAX_SLOPE) if has_wall(scene.object) else math.inf
     grasps = antipodal_grasps(
-        surface, jaws_of(scene), task, given.sampled or 1, lids=lids_of(obj),
+        surface, jaws_of(scene), task, given.sampled or 1, samples=SAMPLES, lids=lids_of(obj),
         reached=lambda grasp: abs(grasp.approach[2]) <= slope and by_hand(grasp),
     )  # fmt: skip
     placed = own_frame(scene.object)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from softjaw.study.case import sampler
 from softjaw.study.case.bed import CRUSHED, GRID, JawsOnSurface, height_fields, spring_payload
 from softjaw.study.case.candidates import with_sampled_grasps
 from softjaw.study.case.fit import Jaws, fit_of
@@ -178,7 +179,8 @@ def test_a_scene_gets_the_grasps_as_poses_once_and_for_all():
     assert parse_scene(scene.effective_toml()).digest == scene.digest  # what a file keeps needs no sampler
 
 
-def test_a_scene_without_a_grasp_between_the_pads_is_refused():
+def test_a_scene_without_a_grasp_between_the_pads_is_refused(monkeypatch):
+    monkeypatch.setattr(sampler, "SAMPLES", 30)
     with refusal(USAGE) as refused:
         sampled_scene(opening=20)
     assert "max_opening_mm" in str(refused.value)
@@ -197,7 +199,8 @@ def test_grasps_that_the_hand_does_not_reach_are_left_out():
     assert [g.payload for g in grasps(lambda _: False)] == [g.payload for g in everywhere]
 
 
-def test_thin_walls_are_not_held_across_their_ends():
+def test_thin_walls_are_not_held_across_their_ends(monkeypatch):
+    monkeypatch.setattr(sampler, "SAMPLES", 30)
     cup = 'shape = "revolution"\nprofile_mm = [[0, 28], [20, 29], [40, 30], [60, 31]]\nwall_mm=1\nwall_material = "PP"'
     [pose] = with_sampled_grasps(parse_scene(text_of(cup, "sampled = 1\n"))).candidates.poses
     assert abs(pose.approach[2]) < 0.1
