@@ -14,6 +14,7 @@ from softjaw.friction.patch import FloatArray
 from softjaw.study.case.build import geometry
 from softjaw.study.case.candidates import axes
 from softjaw.study.case.result import UNDECIDED
+from softjaw.study.flags import Flag
 from softjaw.study.quantities import FORCE_RANGE, Quantity
 from softjaw.study.result.interpolation import BESIDE_CASES, law_claims, plain
 from softjaw.study.scene import Scene
@@ -21,7 +22,9 @@ from softjaw.study.scene import Scene
 LOW, HIGH = FORCE_RANGE
 LOW_ERROR, HIGH_ERROR = f"{LOW}_error", f"{HIGH}_error"
 # maps that they follow from, of the curved model
-SOURCES = ("safety_factor", "payload_error", "indentation", "indentation_error", "wall_stress", "wall_stress_error")
+SOURCES = (
+    "safety_factor", "payload_error", "indentation", "indentation_error", "wall_stress", "wall_stress_error", "flags",
+)  # fmt: skip
 
 # on which they depend besides
 LIMITS = {"task.safety", "object.allowed_dent_mm", "object.yield_strength_mpa", "object.wall_material"}
@@ -83,6 +86,7 @@ def force_ranges(scene: Scene, values: Mapping[str, FloatArray], ended: ArrayLik
     """
     forces, ranges = np.asarray(scene.load.normal_force), dict[str, FloatArray]()
     swept = {*scene.sweep, *scene.uncertainty.spread}
+    snapped = np.nan_to_num(values.get("flags", 0.0)).astype(np.int64) & Flag.SNAPPED > 0
     points = [scene.at(point) for point in scene.points] if swept & LIMITS else [scene]
 
     def at_points(limit: Callable[[Scene], float | None]) -> FloatArray:
@@ -92,7 +96,7 @@ def force_ranges(scene: Scene, values: Mapping[str, FloatArray], ended: ArrayLik
 
     if scene.object.mass is not None:
         safety, stated = at_points(lambda point: point.task.safety), values.get("payload_error", np.nan)
-        ranges[LOW], ranges[LOW_ERROR] = crossing(forces, values["safety_factor"], safety, stated)
+        ranges[LOW], ranges[LOW_ERROR] = crossing(forces, values["safety_factor"], safety, stated, snapped)
     if getattr(scene.object, "wall", None) is not None:
         limits = {
             "indentation": at_points(lambda point: getattr(point.object, "allowed_dent", None)),
@@ -102,7 +106,8 @@ def force_ranges(scene: Scene, values: Mapping[str, FloatArray], ended: ArrayLik
         solved = np.where(known.any(axis=-1) & ended, np.where(known, forces, 0.0).max(axis=-1), np.nan)
         shares = {name: values.get(f"{name}_error", np.nan) for name in limits}
         without_holes = {name: np.apply_along_axis(_without_holes, -1, values[name], forces) for name in limits}
-        bounds = [crossing(forces, without_holes[name], most, shares[name]) for name, most in limits.items()]
+        snapped = np.apply_along_axis(_without_holes, -1, np.where(known, snapped, np.nan), forces) > 0.0
+        bounds = [crossing(forces, without_holes[name], most, shares[name], snapped) for name, most in limits.items()]
         larger = {name: without_holes[name] * (1.0 + np.nan_to_num(share)) for name, share in shares.items()}
         # fmin, not minimum: a limit that is never passed is NaN and bounds nothing.
         high = ranges[HIGH] = np.fmin.reduce([solved, *(at for at, _ in bounds)])
@@ -123,7 +128,7 @@ def _without_holes(values: FloatArray, forces: FloatArray) -> FloatArray:
 
 
 def crossing(
-    forces: ArrayLike, values: ArrayLike, limit: ArrayLike, stated: ArrayLike = np.nan
+    forces: ArrayLike, values: ArrayLike, limit: ArrayLike, stated: ArrayLike = np.nan, snapped: ArrayLike = False
 ) -> tuple[FloatArray, FloatArray]:
     """Force at which values ``(..., k)`` first pass a ``limit (...)`` [N], NaN for never, and the error of that.
 
@@ -131,7 +136,8 @@ def crossing(
     value within `UNDECIDED` of the limit has passed it; what comes after a NaN is not used. The error is that of a
     look-up there, from what the values ``stated (..., k)`` as shares, and how far a straight line leads elsewhere, of
     which half below the first force; there also what another exponent makes of it, that of the next two forces or one
-    that differs by a tenth. NaN where no two forces tell a law.
+    that differs by a tenth. Between the last force before a wall has ``snapped (..., k)``, or 0, and the first after it
+    the error reaches to both. NaN where no two forces tell a law.
 
     >>> [v.round(3).tolist() for v in crossing([1.0, 2.0], [[0.5, 2.0], [0.5, 0.9]], 1.0, 0.1)]
     [[1.414, nan], [0.342, nan]]
@@ -169,5 +175,7 @@ def crossing(
         changes = np.fmax(changes, np.abs(slopes[..., 0] - first[..., 0]))
         error += np.where(k > 0, 0.0, np.log(x[0] / at) * changes)
         away = np.where(k > 0, 1.0, 0.5) * np.abs(np.clip(line, 0.0, x[k]) - at)
-        error = np.where(nothing, np.fmax(at - x[below], x[k] - at), at * error / exponent + away)
+        snaps = taken(np.diff(np.broadcast_to(snapped, y.shape), axis=-1, prepend=False), k) > 0.0
+        reach = np.fmax(at - np.where(k > 0, x[below], 0.0), x[k] - at)
+        error = np.where(nothing | snaps, reach, at * error / exponent + away)
     return at, np.where(np.isfinite(y[..., 1]) | (k > 0), error, np.nan)

@@ -19,6 +19,8 @@ from tests.study.fake_run import fake_plan, fake_result
 from tests.study.formula_results import ANGLES, FORCES, STATIONS, linear, make, written
 from tests.study.scenes import BALL, text_of
 
+TUBE = 'shape = "revolution"\nprofile_mm = [[0, 30], [40, 30], [60, 30], [100, 30]]\nwall_mm = 1\nwall_material = "PP"'
+
 
 @pytest.fixture(scope="module")
 def half(tmp_path_factory):
@@ -148,16 +150,35 @@ def test_below_and_between_solved_forces_a_crossing_is_where_the_law_of_the_cont
     assert np.isnan(crossing(x, x**power, wanted**power)[1])
 
 
+def test_a_wall_that_has_snapped_at_the_first_force_tells_nothing_of_smaller_ones():
+    """The bottle of jobs/snap-in.toml on its coarse mesh: it is dented by 2 mm at 2.8 N, by 0.8 mm at 1.9 N."""
+    dent, snapped = [0.599e-3, 1.202e-3, 2.896e-3, 4.919e-3], [False, False, True, True]
+    x = np.array([1.5, 2.5, 3.0, 4.0])
+    for first, limit, truth in ((2, 2e-3, 2.8), (2, 0.8e-3, 1.9), (1, 2e-3, 2.8)):  # solved from there on
+        at, error = crossing(x[first:], dent[first:], limit, 0.01, snapped[first:])
+        assert abs(at - truth) < error <= x[first]
+    scene = parse_scene(text_of(TUBE, stations="[50]", forces="[3, 4]"), "x.toml", ["object.allowed_dent_mm=0.8"])
+    known = {"indentation": dent[2:], "wall_stress": [0.0, 0.0], "indentation_error": [0.01, 0.01]}
+    known |= {"flags": [Flag.SNAPPED, Flag.SNAPPED]}
+    for lost in (None, 0):  # the first force without a result
+        one = {name: np.array(v, float)[None, None] for name, v in known.items()}
+        if lost is not None:
+            for v in one.values():
+                v[..., lost] = np.nan
+        ranges = force_ranges(scene, one)
+        high, error = (ranges[name].item() for name in ("force_high", "force_high_error"))
+        assert high - error <= 1e-9
+        assert high + error >= 3 * (1 - 1e-9)
+
+
 def test_bounds_of_the_force_are_those_of_their_point_of_a_sweep_and_errors_hold_what_lies_between():
     scene = parse_scene(text_of(BALL, forces="[1, 4]") + "[task]\n", "x.toml",
                         ["object.mass_g=100", "sweep.task.safety=[1, 2, 4]"])  # fmt: skip
     factor = np.broadcast_to([1.0, 4.0], (3, 2, 1, 2))
     ranges = force_ranges(scene, {"safety_factor": factor, "payload_error": np.full(factor.shape, 0.01)})
     assert ranges["force_low"] == pytest.approx(np.broadcast_to([[[1.0]], [[2.0]], [[4.0]]], (3, 2, 1)))
-    tube = 'shape = "revolution"\nprofile_mm = [[0, 30], [40, 30], [60, 30], [100, 30]]'
-    tube += '\nwall_mm = 1\nwall_material = "PP"'
     limits = ["object.allowed_dent_mm=1", "sweep.object.allowed_dent_mm=[0.5, 3, 9]"]
-    scene = parse_scene(text_of(tube, stations="[50]", forces="[1, 2, 4]"), "x.toml", limits)
+    scene = parse_scene(text_of(TUBE, stations="[50]", forces="[1, 2, 4]"), "x.toml", limits)
     dent = np.broadcast_to([1e-3, 2e-3, 4e-3], (3, 1, 1, 3))
     known = {"indentation": dent, "wall_stress": 0.0 * dent, "indentation_error": np.full(dent.shape, 0.01)}
     ranges = force_ranges(scene, known)
@@ -169,7 +190,7 @@ def test_bounds_of_the_force_are_those_of_their_point_of_a_sweep_and_errors_hold
         high = force_ranges(scene, holes)["force_high"].ravel()
         assert (high <= np.array(bears) * (1 + 1e-9)).all()
         assert (high > 0).all()
-    scene = parse_scene(text_of(tube, stations="[50]", forces="[4]"), "x.toml", limits[:1])
+    scene = parse_scene(text_of(TUBE, stations="[50]", forces="[4]"), "x.toml", limits[:1])
     ranges = force_ranges(scene, {name: values[0, ..., 2:] for name, values in known.items()})
     assert ranges["force_high"].ravel() == pytest.approx([1.0])
     assert np.isnan(ranges["force_high_error"]).all()  # one force tells no law
