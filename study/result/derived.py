@@ -134,10 +134,10 @@ def crossing(
 
     Between solved forces by power laws, as look-ups interpolate, below the first by the law of the first two. A solved
     value within `UNDECIDED` of the limit has passed it; what comes after a NaN is not used. The error is that of a
-    look-up there, from what the values ``stated (..., k)`` as shares, and how far a straight line leads elsewhere, of
-    which half below the first force; there also what another exponent makes of it, that of the next two forces or one
-    that differs by a tenth. Between the last force before a wall has ``snapped (..., k)``, or 0, and the first after it
-    the error reaches to both. NaN where no two forces tell a law.
+    look-up there, from what the values ``stated (..., k)`` as shares, and how far a straight line leads elsewhere;
+    below the first force half of that or how far one from 0 leads, whatever is more, and what another exponent makes of
+    it, that of the next two forces or one that differs by a tenth. Between the last force before a wall has ``snapped
+    (..., k)``, or 0, and the first after it the error reaches to both. NaN where no two forces tell a law.
 
     >>> [v.round(3).tolist() for v in crossing([1.0, 2.0], [[0.5, 2.0], [0.5, 0.9]], 1.0, 0.1)]
     [[1.414, nan], [0.342, nan]]
@@ -174,7 +174,8 @@ def crossing(
         changes = np.fmax(np.abs(np.diff(slopes[..., :2])).max(axis=-1, initial=0.0), 0.1)
         changes = np.fmax(changes, np.abs(slopes[..., 0] - first[..., 0]))
         error += np.where(k > 0, 0.0, np.log(x[0] / at) * changes)
-        away = np.where(k > 0, 1.0, 0.5) * np.abs(np.clip(line, 0.0, x[k]) - at)
+        away = np.abs(np.clip(line, 0.0, x[k]) - at)
+        away = np.where(k > 0, away, np.fmax(0.5 * away, np.abs(x[k] * limit / taken(y, k) - at)))
         snaps = taken(np.diff(np.broadcast_to(snapped, y.shape), axis=-1, prepend=False), k) > 0.0
         reach = np.fmax(at - np.where(k > 0, x[below], 0.0), x[k] - at)
         error = np.where(nothing | snaps, reach, at * error / exponent + away)

@@ -150,6 +150,16 @@ def test_below_and_between_solved_forces_a_crossing_is_where_the_law_of_the_cont
     assert np.isnan(crossing(x, x**power, wanted**power)[1])
 
 
+@pytest.mark.parametrize(
+    ("values", "limit", "truth"),
+    [([23.36, 37.82], 2.0, 7.67), ([23.36, 37.82], 0.5, 1.93), ([2348.0, 5197.0], 1000.0, 40.06)],
+)
+def test_a_crossing_far_below_forces_whose_law_bends_lies_within_its_error(values, limit, truth):
+    """Safety factor and stress [MPa] of a steel can of 0.25 mm, dented by 10 mm at 100 N, and solved from 2 N on."""
+    at, error = crossing([100.0, 200.0], values, limit, 0.01)
+    assert abs(at - truth) < error
+
+
 def test_a_wall_that_has_snapped_at_the_first_force_tells_nothing_of_smaller_ones():
     """The bottle of jobs/snap-in.toml on its coarse mesh: it is dented by 2 mm at 2.8 N, by 0.8 mm at 1.9 N."""
     dent, snapped = [0.599e-3, 1.202e-3, 2.896e-3, 4.919e-3], [False, False, True, True]
