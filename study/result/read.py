@@ -257,6 +257,8 @@ def values_of(ds: xr.Dataset, name: str, model: str = "ccm") -> np.ndarray:
 def stated_error(ds: xr.Dataset, name: str) -> np.ndarray | None:
     """Stated error of a map (CCM) over the cases, in its unit; None where the file has none."""
     q = BY_KEY.get(f"maps/{name}")
+    if name in FORCE_RANGE and f"{name}_error" in ds:
+        return values_of(ds, f"{name}_error")
     if q is None or not q.error or q.of_error.name not in ds:
         return None
     return np.asarray(q.error_in_unit(values_of(ds, q.of_error.name), values_of(ds, name)))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from softjaw.friction.patch import FloatArray
 from softjaw.study.case.result import TIE
 from softjaw.study.messages import OTHER_FILE, USAGE, StudyError, fault_of
-from softjaw.study.quantities import NUMERIC_MAPS, map_row
+from softjaw.study.quantities import FORCE_RANGE, MAIN, NUMERIC_MAPS
 from softjaw.study.ranking import falling
 from softjaw.study.result.layout import DONE
 from softjaw.study.result.read import axes_of, stated_error, values_of
@@ -37,12 +37,12 @@ def compare(first: xr.Dataset, second: xr.Dataset, quantity: str = "e_n", model:
     in_a, in_b = (ds.status.values == DONE for ds in pair)
     states = {"solved in both": in_a & in_b, "only in a": in_a & ~in_b, "only in b": ~in_a & in_b,
               "in neither": ~in_a & ~in_b}  # fmt: skip
-    names = [q.name for q in NUMERIC_MAPS if q.name in first and q.name in second]
+    names = [n for n in (*(q.name for q in NUMERIC_MAPS), *FORCE_RANGE) if n in first and n in second]
     if quantity not in names:
         raise StudyError(USAGE, f"--quantity: found '{quantity}', expected one of: {', '.join(names)}")
-    units = map_row(quantity).unit
+    units = first[quantity].units
     values = _values(pair, quantity, model)
-    *few, station, angle, _ = axes
+    *few, station, angle, force = axes
     poses = not axes[station]["units"]
     rows: list[Row] = []
     for index in np.ndindex(in_a.shape):
@@ -50,7 +50,7 @@ def compare(first: xr.Dataset, second: xr.Dataset, quantity: str = "e_n", model:
         place["label"] = str(pair[0].label.values[index[-3:-1]])
         rows.append(place | {name: array[index] for name, array in values.items()})
     hidden = [name for name in (*few, station, angle) if len(axes[name]["common"]) < 2]
-    hidden += [station, angle] * poses
+    hidden += [station, angle] * poses + [force] * (quantity in FORCE_RANGE)
     columns = [Column(name, axis["units"], digits=5, display=name not in hidden) for name, axis in axes.items()]
     columns += [Column("label", wrap=24)] * poses
     judged = any(value is not None for value in values["beyond_error"].ravel())
@@ -60,8 +60,8 @@ def compare(first: xr.Dataset, second: xr.Dataset, quantity: str = "e_n", model:
     facts = {"files": {"a": str(first.file), "b": str(second.file)}, "axes": axes,
              "settings": [{"key": key, "a": a, "b": b} for key, a, b in changed],
              "states": {words: int(cases.sum()) for words, cases in states.items()}, "quantity": quantity,
-             "summary": [_summary(name, _values(pair, name, model)) for name in names
-                         if map_row(name).rank or name == quantity]}  # fmt: skip
+             "summary": [_summary(name, _values(pair, name, model), first[name].units) for name in names
+                         if name in MAIN or name == quantity]}  # fmt: skip
     return Table("", columns, rows, _verdict(pair, quantity, model, values), facts, "cases")
 
 
@@ -84,7 +84,8 @@ def compare_text(table: Table, top: int = 10, width: int = PAPER) -> str:
         return "\n".join([*lines, "", "no case is solved in both"])
     listed = [known[i] for i in falling(np.abs([row["difference"] for row in known]))][: top or None]
     percent = [row | {"relative": 100 * row["relative"]} for row in listed]
-    title = f"{with_unit(quantity, shown_unit(map_row(quantity).unit))}: {len(listed)} of {len(known)} differences, "
+    units = next(column.unit for column in table.columns if column.name == "a")
+    title = f"{with_unit(quantity, shown_unit(units))}: {len(listed)} of {len(known)} differences, "
     heads = [c._replace(label="b-a\n[%]") if c.name == "relative" else c for c in table.columns]
     cases = replace(table, title=f"{title}the largest first", columns=heads, rows=percent)
     return "\n".join([*lines, "", as_text(summary, width), "", as_text(cases, width)])
@@ -153,6 +154,8 @@ def _left_out(name: str, axis: dict[str, Any]) -> list[str]:
 def _values(pair: Pair, name: str, model: str) -> dict[str, NDArray[Any]]:
     """Columns of a map over the common cases; NaN where a file has no result, None where an error is unknown."""
     a, b = (values_of(ds, name, model) for ds in pair)
+    if name in FORCE_RANGE:  # known once for all forces
+        b = np.where(np.arange(b.shape[-1]) > 0, np.nan, b)
     error = sum(np.full(a.shape, np.nan) if e is None else e for e in (_error(ds, name, model) for ds in pair))
     change, size = b - a, np.abs(a)
     beyond = (np.abs(change) > error + TIE * size).astype(object)
@@ -163,18 +166,18 @@ def _values(pair: Pair, name: str, model: str) -> dict[str, NDArray[Any]]:
 
 def _error(ds: xr.Dataset, name: str, model: str) -> FloatArray | None:
     """Error of a map in its unit; None where the file has none, as for models other than CCM."""
-    if map_row(name).by_model and model != "ccm":
+    if "model" in ds[name].dims and model != "ccm":
         return None
     parts = [values_of(ds, f"{name}_interval")] if f"{name}_interval" in ds else []
     stated = stated_error(ds, name)
     return None if stated is None else np.sqrt(sum(part**2 for part in [*parts, stated]))
 
 
-def _summary(name: str, values: dict[str, NDArray[Any]]) -> Row:
+def _summary(name: str, values: dict[str, NDArray[Any]], units: str = "") -> Row:
     """Means, mean and largest relative difference of a map, and how many differences exceed the errors."""
     a, b, change, relative = (values[k] for k in ("a", "b", "difference", "relative"))
     both, judged = np.isfinite(change), [value for value in values["beyond_error"].ravel() if value is not None]
-    row: Row = {"quantity": name, "units": map_row(name).unit, "compared": int(both.sum()), "judged": len(judged)}
+    row: Row = {"quantity": name, "units": units, "compared": int(both.sum()), "judged": len(judged)}
     row["beyond_error"] = sum(map(bool, judged))
     if both.any():
         row |= {"mean_a": float(a[both].mean()), "mean_b": float(b[both].mean())}

@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from softjaw.study.quantities import Axis
 from softjaw.study.result.store import open_result
 from softjaw.study.show.compare import compare, compare_text
 from softjaw.study.table import as_csv, as_json
-from tests.study.formula_results import SCENE, STATIONS, grid_axes, linear, make, without_result
+from tests.study.formula_results import SCENE, STATIONS, grid_axes, linear, make, window, without_result
 from tests.study.launching import refusal, softjaw
 
 SOFTER = SCENE + "[friction]\nmu = 0.5\n"
@@ -159,3 +160,17 @@ def test_poses_are_shown_by_label_sweeps_by_word_and_commands_give_the_usual_cod
     assert softjaw(0, "compare", a, tmp_path / "none.hdf")[0] == OTHER_FILE
     assert softjaw(0, "compare", a)[0] == softjaw(0, "export", a)[0] == USAGE
     assert softjaw(0, "export", tmp_path / "none.hdf", "--json")[0] == OTHER_FILE
+
+
+def test_what_walls_bear_is_compared_once_a_candidate_with_its_own_errors(tmp_path):
+    axes = grid_axes(STATIONS[:4])
+    (high,) = window(axes)
+    derived = {"derived": (high, replace(high, name="force_high_error")), "derived__force_high_error": 0.25}
+    one, other = (
+        make(tmp_path / f"{force}.hdf", axes=axes, derived__force_high=force, **derived) for force in (4.0, 5.0)
+    )
+    found = compared(one, other, quantity="force_high")
+    known = [row for row in found.rows if np.isfinite(row["difference"])]
+    assert len(known) == 4 * 6  # stations and angles, not forces
+    assert {(row["difference"], row["error"], row["beyond_error"]) for row in known} == {(1.0, 0.5, True)}
+    assert "normal_force  " not in compare_text(found).partition("force_high [N]: ")[2]
