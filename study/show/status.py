@@ -5,6 +5,7 @@ import re
 from argparse import Namespace
 from collections.abc import Sequence
 from datetime import UTC, datetime
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -117,7 +118,10 @@ def largest_stated_error(result: Any) -> str:
     """The largest stated error so far of what the scene's target is for."""
     row = map_row(aim(result)[0]).of_error
     errors = result.read(row.key) if row in result.layout.quantities else None
-    return "; ".join(largest_error(errors, result, result.axes, result.labels, meshes(result)))
+    given = result.status.copy()
+    given.reshape(-1, result.layout.inputs, math.prod(given.shape[-3:]))[:, 1:] = MISSING  # samples have no target
+    cases = SimpleNamespace(status=given, scene=result.scene)
+    return "; ".join(largest_error(errors, cases, result.axes, result.labels, meshes(result)))
 
 
 def aim(cases: Any) -> tuple[str, float]:

@@ -19,7 +19,7 @@ from softjaw.study.run.rounds import off_target
 from softjaw.study.scene import SceneError, parse_scene
 from softjaw.study.scene.sections import Uncertainty
 from softjaw.study.show.best_grasps import best
-from softjaw.study.show.status import unfinished
+from softjaw.study.show.status import largest_stated_error, unfinished
 from tests.study.formula_results import written
 from tests.study.scenes import BALL, NO_COUPLING, OVAL, QUICK, pose_of, scene_of
 
@@ -179,3 +179,16 @@ def test_a_target_takes_all_samples_of_a_case_to_the_same_mesh(tmp_path):
     ds = softjaw.open(written(tmp_path / "c.hdf", make_plan(together).layout, sample, scene=together.effective_toml()))
     assert np.isnan(ds.payload_interval.values).all()
     assert np.isnan(ds.payload_samples.values[0, 0, 0]).tolist() == [i == 3 for i in range(1, 9)]
+
+
+def test_a_target_and_the_errors_beside_it_are_those_of_the_inputs_that_are_given(tmp_path):
+    aimed = scene_of(BALL, 'uncertainty={ samples = 8, spread = { "friction.mu" = 0.08 } }', "accuracy.target=0.02")
+    plan = make_plan(aimed)
+
+    def sample(index):
+        error = 0.5 if index[0] else 0.01
+        return CaseResult({"maps/payload": [1.0] * 3, "maps/payload_error": error, "work/mesh": 2.0})
+
+    written(tmp_path / "a.hdf", plan.layout, sample, plan.header)
+    with open_result(tmp_path / "a.hdf") as result:
+        assert "payload errors up to 1 %; the largest at " in largest_stated_error(result)
