@@ -27,7 +27,6 @@ from softjaw.study.ranking import judge, largest, task_keys
 from softjaw.study.result import index
 from softjaw.study.result.lock import holder, in_use
 from softjaw.study.result.read import dataset, values_of
-from softjaw.study.result.skeleton import rewrite
 from softjaw.study.result.store import open_result, torn_rows
 from softjaw.study.result.write import Files, ResultWriter
 from softjaw.study.run.limits import AbandonedError, Stopper, early, limited_memory
@@ -35,7 +34,18 @@ from softjaw.study.run.load_path import sentence, settle
 from softjaw.study.run.object_folder import ObjectFolder, key_of
 from softjaw.study.run.plan import Plan
 from softjaw.study.run.schedule import Claims
-from softjaw.study.run.session import Session, Work, file_of, finish, has_coarser, locked, on_rank0, pack, rounds_in
+from softjaw.study.run.session import (
+    Session,
+    Work,
+    begin_round,
+    file_of,
+    finish,
+    has_coarser,
+    locked,
+    on_rank0,
+    pack,
+    rounds_in,
+)
 from softjaw.study.scene import Scene, SceneError, parse_scene
 from softjaw.study.scene.text import differences
 from softjaw.study.table import Row
@@ -237,7 +247,7 @@ class _ObjectsRun:
         if not added or not work.grown:
             return None
         plan, work = work.grown((*plan.layout.rounds, added))
-        rewrite(part.path, plan.layout, plan.header)
+        begin_round(part.path, plan)
         self._mine[part.number] = plan, work
         return part._replace(plan=plan, torn=())
 

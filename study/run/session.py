@@ -22,7 +22,7 @@ from softjaw.study.quantities import DONE, FAILED, MISSING
 from softjaw.study.result import provenance
 from softjaw.study.result.index import INDEX
 from softjaw.study.result.lock import Lock, OpenedFile, holder, in_use
-from softjaw.study.result.skeleton import create, rewrite
+from softjaw.study.result.skeleton import ROUND_COMPLETE, create, rewrite
 from softjaw.study.result.store import Result, open_result, torn_rows
 from softjaw.study.result.write import MESH, Files, ResultWriter, codes_on, keeps_coarser, verify
 from softjaw.study.run.limits import Stopper, early, limited_memory
@@ -94,7 +94,7 @@ def run_study(plan: Plan, work: Work, path: Path, comm: Any, *, retry_failed: bo
         while work.grown and code != STOPPED and (added := on_rank0(comm, _next_round, path, work)):
             plan, work = work.grown((*plan.layout.rounds, added))
             finished = None
-            on_rank0(comm, rewrite, path, plan.layout, plan.header)
+            on_rank0(comm, begin_round, path, plan)
             code = _solve(plan, work, path, comm, retry_failed=False)
         if finished is None and code != STOPPED:
             on_rank0(comm, pack, work, path, plan)
@@ -290,6 +290,14 @@ def finish(work: Work, path: Path, plan: Plan, session: int, name: str) -> None:
         # Once more: libraries that were loaded for the solves are known only now.
         versions = provenance.versions(MPI.Get_library_version())
         writer.update_session(stop=provenance.timestamp(), reason=reason, versions=versions, done=done, failed=failed)
+
+
+def begin_round(path: Path, plan: Plan) -> None:
+    """Give a file the rows of a further round of the same run; by one process."""
+    rewrite(path, plan.layout, plan.header)
+    with contextlib.closing(ResultWriter(path, plan.layout, MPI.COMM_SELF)) as writer:
+        writer.session = len(writer.result().sessions) - 1
+        writer.update_session(reason=ROUND_COMPLETE)
 
 
 def pack(work: Work, path: Path, plan: Plan) -> None:

@@ -15,7 +15,7 @@ from softjaw.study.flags import flag_sentences, flags_in
 from softjaw.study.quantities import DONE, FAILED, MISSING, NO_GRASP, PARTS, STATES, map_row, misses
 from softjaw.study.result.index import index_path
 from softjaw.study.result.lock import holder
-from softjaw.study.result.skeleton import UNFINISHED
+from softjaw.study.result.skeleton import ROUND_COMPLETE, UNFINISHED
 from softjaw.study.result.store import open_result, place_text
 from softjaw.study.run.progress import duration
 from softjaw.study.run.refine import about
@@ -240,8 +240,7 @@ def sessions(result: Any, running: bool, width: int = PAPER) -> list[str]:
     """One line for each time the study was started, and for each further round."""
     lines, number, turn, stored = [], 0, 1, result.sessions
     for i, s in enumerate(stored, start=1):
-        # what follows on a complete one is its next round
-        further = i > 1 and stored[i - 2]["reason"] == "complete"
+        further = i > 1 and stored[i - 2]["reason"] == ROUND_COMPLETE
         number, turn = (number, turn + 1) if further else (number + 1, 1)
         now = running and i == len(stored)
         reason = s["reason"] if s["stop"] else "running" if now else "no end was recorded (killed?)"

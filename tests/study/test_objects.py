@@ -22,6 +22,7 @@ from softjaw.study.run.objects import row_of
 from softjaw.study.run.plan import make_plan
 from softjaw.study.run.session import locked
 from softjaw.study.scene.text import quoted
+from softjaw.study.show.status import sessions
 from tests.study import fake_objects
 from tests.study.formula_results import written
 from tests.study.launching import contents, differing, here, launch, refusal
@@ -289,6 +290,9 @@ def test_what_has_failed_is_tried_again_once_and_not_in_every_round(scene, tmp_p
         counts = [int(line.split()[2]) for line in text.splitlines() if "to solve" in line]
         assert (code, counts[0]) == (SOME_FAILED, first)
         assert counts[1:] == [6, 12, 18] * (first == 42)
+    with open_result(tmp_path / "out/grows.hdf") as result:
+        lines = sessions(result, running=False)
+    assert ["round" in line.split(":")[0] for line in lines] == [False, True, True, True, False]
 
 
 def test_an_object_is_as_complete_as_the_samples_of_its_uncertain_inputs(tmp_path):

@@ -15,6 +15,7 @@ from softjaw.study.lookup import GraspMap
 from softjaw.study.quantities import DONE, FAILED, MODELS, quantities
 from softjaw.study.ranking import distinct, judge, judged, keys_at
 from softjaw.study.result import read
+from softjaw.study.result.skeleton import ROUND_COMPLETE
 from softjaw.study.result.store import open_result
 from softjaw.study.run.objects import row_of
 from softjaw.study.run.refine import scores_of_poses
@@ -337,12 +338,12 @@ def test_the_safe_forces_of_a_grasp(low, high, text):
     assert "safe_forces" not in row
 
 
-def test_what_follows_on_a_complete_session_is_its_next_round():
-    reasons = "stopped by SIGTERM", "complete", "complete", "stopped by SIGUSR1", "complete"
+def test_what_follows_on_a_complete_round_is_the_next_one_and_on_a_complete_run_a_session():
+    reasons = "stopped by SIGTERM", ROUND_COMPLETE, ROUND_COMPLETE, "stopped by SIGUSR1", "complete", "complete"
     each = {"start": "2026-01-01T00:00:00", "stop": "2026-01-01T00:01:00", "ranks": 1, "host": "a"}
     stored = [each | {"reason": reason} for reason in reasons]
     heads = [line.split(":")[0].split()[1:] for line in sessions(SimpleNamespace(sessions=stored), False)]
-    assert heads == [["1"], ["2"], ["2,", "round", "2"], ["2,", "round", "3"], ["3"]]
+    assert heads == [["1"], ["2"], ["2,", "round", "2"], ["2,", "round", "3"], ["3"], ["4"]]
 
 
 def test_the_safety_that_is_swept_is_that_of_its_point():
