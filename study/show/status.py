@@ -149,7 +149,7 @@ def largest_error(errors: Any, cases: Any, axes: Sequence[Any], labels: Any, mes
     worst = tuple(map(int, np.unravel_index(int(np.nanargmax(known)), status.shape)))
     name, target = aim(cases)
     # where next to nothing is held the error may be many times what is
-    most = f"up to {100 * known[worst]:.2g} %" if known[worst] < 1 else "above 100 %"
+    most = f"up to {100 * known[worst]:.3g} %" if known[worst] < 1 else "above 100 %"
     above = int(np.count_nonzero(misses(known, target)))
     parts = [f"{name} errors {most}" + f", {above} of {count} above {100 * target:g} %" * (above > 0)]
     if count < solved:
