@@ -14,6 +14,7 @@ from softjaw.study.flags import BORNE, LOST, OF_FILE, Flag, flag_words, flags_in
 from softjaw.study.quantities import BY_KEY, FORCE_RANGE, LEAST_FORCE, LISTED, MAIN, MISSING, MODELS, STATES, map_row
 from softjaw.study.ranking import (
     distinct,
+    hand_of,
     index_of,
     judge,
     keys_at,
@@ -228,16 +229,18 @@ def _notes(ds: xr.Dataset, accuracy: Sequence[str], marks: np.ndarray) -> list[s
     faults = [flag for flag in raised if not flag & FINER]
     off = float(ds.attrs.get("object_centroid_error", [0.0])[0])  # of a mesh that is not closed
     centre = f"known to {1e3 * off:.0f} mm, not in the errors: set task.centre_of_mass_mm"
+    preset = task_keys(ds, "gripper").get("preset") or ""
     parts = {"centre of mass": [centre] * (off > 1e-3),
              "accuracy": [*filter(None, accuracy), *(words[flag] for flag in raised if flag & FINER)],
              "look at": [f"{words[f]}{f': {f.sentence}' * (len(faults) == 1)}" for f in faults],
              "not ended": [f"{to_come} cases are not computed yet"] * bool(to_come),
              "left out": [*no_grasps(states), *[f"{apart} whose contact changes between"] * (apart > 0)]}  # fmt: skip
     if gone := [short_name(ds, c) for c, approach in ds.attrs["reach"].items() if approach == ()]:
-        hand = Path(task_keys(ds, "gripper")["preset"]).stem
         more = f" and {len(gone) - MOST_PLACES} more" * (len(gone) > MOST_PLACES)
-        last = f"out of the reach of {hand}, so last: {', '.join(gone[:MOST_PLACES])}{more}"
+        last = f"out of the reach of {Path(preset).stem}, so last: {', '.join(gone[:MOST_PLACES])}{more}"
         parts["left out"] = [last, *parts["left out"]]
+    elif preset and not hand_of(ds):
+        parts["left out"] = [f"the reach and the forces of the hand, as {preset} cannot be read", *parts["left out"]]
     lines = []
     for head, (first, *clauses) in ((head, clauses) for head, clauses in parts.items() if clauses):
         line = f"{head}: {first}"

@@ -303,6 +303,8 @@ def test_a_grasp_that_the_hand_of_the_scene_does_not_reach_comes_last(tmp_path, 
         alone = best(ds.isel(station=[0]), lines=True).facts["answer"]
         assert Flag.OUT_OF_REACH.sentence in alone["limit"]
     assert any("p00" in note for note in table.notes) == (order[0] == 1.0)
+    moved = ds.assign_attrs(scene=ds.attrs["scene"].replace("franka_hand", "moved.toml"))
+    assert any("moved.toml cannot be read" in line for line in best(moved).notes) == (not reached)
 
 
 def test_the_answer_says_what_is_held_and_which_force_holds_a_mass():
