@@ -160,7 +160,8 @@ def next_cases(result: Any, scene: Scene) -> tuple[Case, ...]:
     places = distinct(ds, order, rank_values(ds, "payload", k), k)
     error = np.nan_to_num(known.error, nan=np.inf)
     # thin parts may have no state on a mesh this coarse; what a bed of springs ranks first comes first
-    failed = [] if named else np.flatnonzero(ds.status.values[..., k].ravel() == FAILED)[:LISTED].tolist()
+    without = ds.status.values.reshape(-1, shape[-1]) == FAILED
+    failed = [] if named else np.flatnonzero(without[:, k])[:LISTED].tolist()
     chosen = failed + [place.best for place in places[:LISTED] if not times[place.best]]
     chosen = chosen or [i for i in rivals(places, known.value, error, lost) if not times[i]][:LISTED]
     if not chosen:
@@ -177,7 +178,9 @@ def next_cases(result: Any, scene: Scene) -> tuple[Case, ...]:
     if not chosen and places and "safety_factor" not in ds:  # the first lines say what the best holds at these forces
         chosen = [places[0].best]
         levels = tuple(i for i in other_levels(shape[-1], k) if not named[case_of(chosen[0], i, shape)])
-    return tuple(sorted({case_of(i, n, shape) for i in chosen for n in levels if n == k or often[i, n] < FINEST}))
+    cases = {(i, n) for i in chosen for n in levels if n == k or often[i, n] < FINEST}
+    cases |= {(i, n) for i in chosen for n in np.flatnonzero(without[i] & (often[i] == 0)).tolist()}
+    return tuple(sorted(case_of(i, n, shape) for i, n in cases))
 
 
 def _often(ds: Any, named: Mapping[Case, int], k: int = 0, known: Any = False) -> NDArray[np.int64]:

@@ -128,6 +128,23 @@ def test_with_a_mass_finer_meshes_go_to_the_force_below_too(tmp_path, changes, l
     assert (0, 3, last) in named  # the scene's mesh may have a state where the coarse one has none
 
 
+@pytest.mark.parametrize(("rounds", "again"), [((), True), ((((0, 2, 1), (0, 2, 0)),), False)])
+def test_a_grasp_that_gets_a_finer_mesh_gets_it_where_the_coarse_one_has_no_state(tmp_path, rounds, again):
+    made = sampled()
+    plan = make_plan(made, rounds=rounds)
+
+    def case(index):
+        if index in ((2, 0, 0), (3, 0, 0), (3, 0, 1)):
+            return "no state"
+        values = {"maps/payload": [0.01] * 3, "maps/payload_error": 0.02, "maps/flags": 0.0, "work/mesh": 0}
+        return CaseResult(values)
+
+    with open_result(written(tmp_path / "a.hdf", plan.layout, case, plan.header)) as result:
+        named = next_cases(result, made)
+    assert ((0, 2, 0) in named) == ((0, 3, 0) in named) == again
+    assert {n for *_, n in named} == ({0, 1} if again else {1})
+
+
 def test_what_one_mesh_says_of_a_grasp_that_may_be_the_best_is_asked_of_the_next(tmp_path):
     made = sampled("load.normal_force_n=[5]")
     plan = make_plan(made, rounds=(tuple((0, n, 0) for n in range(4)),))  # all on the scene's mesh
