@@ -339,7 +339,7 @@ def shown_level(ds: Any, flags: np.ndarray) -> tuple[int, str]:
     """Number of the force level at which grasps are ranked, and in words why it is that one.
 
     Where the object's mass is known the lowest at which a grasp holds it and does no harm; else the highest that most
-    of the solved candidates reached, or that some wall bears.
+    of the solved candidates reached, that some wall bears, or at which any can be used.
 
     ``flags``: as `judged` gives them.
     """
@@ -354,6 +354,8 @@ def shown_level(ds: Any, flags: np.ndarray) -> tuple[int, str]:
     shared = np.flatnonzero(2 * solved.sum(axis=0) > solved.any(axis=1).sum())
     last = np.flatnonzero(solved.any(axis=0))[-1] if solved.any() else len(forces) - 1
     k = int(shared[-1]) if len(shared) else int(last)
+    if usable.any() and not usable[:, k].any():  # as where the pads meet beside a small object
+        return int(np.flatnonzero(usable.any(axis=0))[-1]), "the highest at which a grasp can be used"
     return k, LARGEST if k == last else "the largest that most candidates were solved at"
 
 

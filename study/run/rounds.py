@@ -179,7 +179,7 @@ def next_cases(result: Any, scene: Scene) -> tuple[Case, ...]:
         chosen = [places[0].best]
         levels = tuple(i for i in other_levels(shape[-1], k) if not named[case_of(chosen[0], i, shape)])
     cases = {(i, n) for i in chosen for n in levels if n == k or often[i, n] < FINEST}
-    cases |= {(i, n) for i in chosen for n in np.flatnonzero(without[i] & (often[i] == 0)).tolist()}
+    cases |= {(i, n) for i in chosen for n in np.flatnonzero(without[i, :k] & (often[i, :k] == 0)).tolist()}
     return tuple(sorted(case_of(i, n, shape) for i, n in cases))
 
 

@@ -134,6 +134,8 @@ def test_cases_outside_their_window_are_judged_by_the_force():
     assert shown_level(ds, flags)[0] == 2
     assert shown_level(ds, flags | Flag.TOO_WEAK)[0] == 2
     assert shown_level(ds, np.full((1, 4), Flag.TOO_STRONG))[0] == 3
+    collide = np.array([[0, 0, Flag.COLLISION, Flag.COLLISION]])  # beside an object that is small
+    assert shown_level(ds, collide) == (1, "the highest at which a grasp can be used")
     assert ranking(np.array([4.0, 1, 2, 5]), flags[0]).tolist() == [2, 1, 3, 0]
 
 
