@@ -25,6 +25,7 @@ PRESETS = tuple(sorted(path.stem for path in FOLDER.glob("*.toml")))
 EXPECTED = f"one of {', '.join(PRESETS)}, or a file of the same form"
 APPROACHES = {"x": (0, 1.0), "minus-x": (0, -1.0), "y": (1, 1.0), "minus-y": (1, -1.0)}  # axis of finger 1's pad, sign
 Approach = Annotated[str, Field(pattern="^(minus-)?[xy]$")]
+Size = Annotated[float, Field(gt=0)]
 Pair = Annotated[tuple[float, float], Field(strict=False)]
 Triple = Annotated[tuple[float, float, float], Field(strict=False)]
 
@@ -66,7 +67,7 @@ class Hand(BaseModel):
     finger and its thickness from the face outwards. ``approaches`` are those that the mounted pads allow.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
     frame: str = "gripper"
     closing: Literal["x", "y"] = "y"
     stroke_mm: float = Field(math.inf, gt=0)
@@ -77,7 +78,7 @@ class Hand(BaseModel):
     largest_angle: float = math.inf
     approaches: Annotated[tuple[Approach, ...], Field(strict=False, min_length=1)] = tuple(APPROACHES)
     palm_mm: Annotated[tuple[Triple, Triple], Field(strict=False)] | None = None
-    finger_mm: Pair | None = None
+    finger_mm: Annotated[tuple[Size, Size], Field(strict=False)] | None = None
 
     def values(self, gap: float) -> dict[str, float]:
         """Joint values [m or rad] at a gap [m], within the stroke.
@@ -117,6 +118,8 @@ def gripper_file(name: str) -> tuple[dict[str, Any], Hand]:
         hand = Hand.model_validate(tables.get("hand", {}))
         if other := [k for k, keys in tables.items() if k not in ("gripper", "hand") or not isinstance(keys, dict)]:
             raise ValueError(f"found {', '.join(other)}, expected tables [gripper] and [hand] alone")
+        if "preset" in tables.get("gripper", {}):
+            raise ValueError("found gripper.preset, expected the gripper's own numbers")
         if not 0 <= hand.force_n[0] <= hand.force_n[1]:
             raise ValueError(f"hand.force_n: found {list(hand.force_n)}, expected the least and the largest force")
     except OSError as error:
