@@ -40,7 +40,7 @@ def save_picture(view: View, index: Index, path: Path, quantity: str, motion: st
         plotter.set_background("white", all_renderers=True)
         plotter.subplot(0, 2)
         lines = [view.ds.attrs["title"], *view.summary(index, quantity), "", *view.legend(index, motion)]
-        _say(plotter, "\n".join(fill(line, 46) for line in lines))
+        _say(plotter, "\n".join(fill(line, 60) for line in lines))
         plotter.subplot(1, 2)
         _limit(plotter, view, index)
         look(plotter, (0.8, -1.0, 0.55), (0, 0, 1), 0.95)
