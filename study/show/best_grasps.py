@@ -41,7 +41,7 @@ from softjaw.study.show.status import (
     time_split,
     unfinished,
 )
-from softjaw.study.table import PAPER, Column, Row, Table, as_text, number, terminal_width, with_error, wrapped
+from softjaw.study.table import Column, Row, Table, as_text, number, terminal_width, with_error, wrapped
 from softjaw.study.units import in_si, shown, shown_text, shown_unit
 
 if TYPE_CHECKING:
@@ -191,7 +191,8 @@ def certainty(ds: xr.Dataset, places: Sequence[int], score: str, k: int) -> str:
     errors = sure(ds, score, k)
     if errors is None:
         return ""
-    usable = ~(ds["flags"].values[..., k].ravel() & LOST > 0) & np.isfinite(errors.value)
+    marks = ds["flags"].values[..., k].ravel() & LOST
+    usable = (marks & ~(marks[places[0]] & Flag.TOO_WEAK) == 0) & np.isfinite(errors.value)
     first, *others = [i for i in places if usable[i]] or [0]
     apart = [errors.apart(first, i) for i in others]
     if not apart:
@@ -218,10 +219,7 @@ def common(marks: np.ndarray) -> int:
 
 
 def _notes(ds: xr.Dataset, accuracy: Sequence[str], marks: np.ndarray) -> list[str]:
-    """At most five lines by what to do about them: how exact, which flags to look at, what is to come or left out.
-
-    Each has its first clause, and of the others what a line of a terminal has room for.
-    """
+    """At most five notes by what to do about them: how exact, which flags to look at, what is to come or left out."""
     states = ds.status.values[..., ds.attrs["level"]]
     apart = np.count_nonzero(states == MISSING) * ("between" in ds.attrs)
     to_come = np.count_nonzero(ds.status.values == MISSING) * ("between" not in ds.attrs)
@@ -243,13 +241,7 @@ def _notes(ds: xr.Dataset, accuracy: Sequence[str], marks: np.ndarray) -> list[s
         parts["left out"] = [last, *parts["left out"]]
     elif preset and not hand_of(ds):
         parts["left out"] = [f"the reach and the forces of the hand, as {preset} cannot be read", *parts["left out"]]
-    lines = []
-    for head, (first, *clauses) in ((head, clauses) for head, clauses in parts.items() if clauses):
-        line = f"{head}: {first}"
-        for clause in clauses:
-            line += f"; {clause}" * (len(line) + len(clause) + 2 <= PAPER)
-        lines.append(line)
-    return lines
+    return [f"{head}: {'; '.join(clauses)}" for head, clauses in parts.items() if clauses]
 
 
 # --- the answer ------------------------------------------------------------------------------------------------------

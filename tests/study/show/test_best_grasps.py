@@ -210,6 +210,21 @@ def test_a_grasp_without_an_error_neither_leads_its_equals_nor_parts_them():
     assert "places 1 and 2 are equal within errors, but too little is known of 3" in " ".join(table.notes)
 
 
+def test_places_are_compared_where_none_holds_the_mass_and_what_is_said_of_errors_and_of_common_flags_is_whole():
+    ds = rising(5.0)  # kg
+    ds.payload.values[:] = 0.9
+    errors = np.repeat([0.02, 0.03], 2).reshape(ds.status.shape)
+    ds["payload_error"] = (ds.status.dims, errors, {"units": ""})
+    assert "places 1 and 2 are equal within errors" in " ".join(best(ds).notes)
+    ds = study([[1.0], [0.8], [0.3], [0.2]], flags=[0.0, *[float(Flag.COARSE)] * 3])
+    ds = ds.assign_attrs(scene='\n[accuracy]\ntarget = 0.01\ntarget_of = "payload"\n')
+    errors = np.repeat([0.02, 0.03, 0.04, 0.06], 2).reshape(ds.status.shape)
+    ds["payload_error"] = (ds.status.dims, errors, {"units": ""})
+    [line] = [note for note in best(ds).notes if note.startswith("accuracy: place 1 is best beyond errors")]
+    assert "payload errors up to 6 %, 4 of 4 above 1 %; the largest at" in line
+    assert "coarse (3 of 4)" in line  # the rows do not repeat it
+
+
 def test_the_force_is_the_largest_that_most_share_or_the_lowest_that_holds_a_mass_and_payload_in_grams():
     assert best(rising()).facts["force"] == 5.0
     some = rising()
