@@ -172,7 +172,7 @@ def next_cases(result: Any, scene: Scene) -> tuple[Case, ...]:
         near |= {i for i in order if known.value[i] + error[i] > most and (times[i] == 1 or reach[i])}
         chosen = [i for i in near if 0 < times[i] < FINEST and not (target and surely_below(relative[i], target))]
         # what one mesh says of pads that meet beside a thin part, or of a contact that slips, the next one may not
-        chosen += [i for i in lost if known.value[i] + error[i] > most and times[i] == 1]
+        chosen += [i for i in lost if times[i] == 1 and (known.value[i] + error[i] > most or error[i] > known.value[i])]
     # The least force that holds a mass lies between this force and the one below.
     levels: tuple[int, ...] = (k - 1, k) if k and "safety_factor" in ds else (k,)
     if not chosen and places and "safety_factor" not in ds:  # the first lines say what the best holds at these forces
