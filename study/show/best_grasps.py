@@ -203,8 +203,8 @@ def certainty(ds: xr.Dataset, places: Sequence[int], score: str, k: int) -> str:
     close = [(n, vague[i]) for n, (i, better) in enumerate(zip(others, apart, strict=True), start=2) if not better]
     alike, hardly = ([n for n, is_vague in close if is_vague == how] for how in (False, True))
     more = f", but too little is known of {', '.join(map(str, hardly))}" * bool(hardly)
-    if hardly and not alike and vague[first]:
-        return f"too little is known of places 1, {', '.join(map(str, hardly))} to tell them apart"
+    if len(hardly) == len(others):
+        return f"too little is known of {', '.join(map(str, hardly))} to compare them with place 1"
     if not alike:
         return f"place 1 is best beyond errors{more}"
     without_gap, last = alike[-1] == len(alike) + 1 > 2, alike.pop()
