@@ -11,6 +11,7 @@ import numpy as np
 from softjaw.friction.patch import NEGLIGIBLE
 from softjaw.study.case.result import TIE
 from softjaw.study.flags import BORNE, LOST, OF_FILE, Flag, flag_words, flags_in
+from softjaw.study.messages import first_of
 from softjaw.study.quantities import BY_KEY, FORCE_RANGE, LEAST_FORCE, LISTED, MAIN, MISSING, MODELS, STATES, map_row
 from softjaw.study.ranking import (
     distinct,
@@ -221,7 +222,7 @@ def common(marks: np.ndarray) -> int:
 def _notes(ds: xr.Dataset, accuracy: Sequence[str], marks: np.ndarray) -> list[str]:
     """At most five notes by what to do about them: how exact, which flags to look at, what is to come or left out."""
     states = ds.status.values[..., ds.attrs["level"]]
-    apart = np.count_nonzero(states == MISSING) * ("between" in ds.attrs)
+    apart = [short_name(ds, int(c)) for c in np.flatnonzero(states == MISSING) if "between" in ds.attrs]
     to_come = np.count_nonzero(ds.status.values == MISSING) * ("between" not in ds.attrs)
     count = {flag: int(np.count_nonzero(marks & flag)) for flag in Flag if flag != Flag.OUT_OF_REACH}
     raised = sorted(filter(count.get, count), key=lambda flag: (-count[flag], flag))
@@ -234,14 +235,16 @@ def _notes(ds: xr.Dataset, accuracy: Sequence[str], marks: np.ndarray) -> list[s
              "accuracy": [*filter(None, accuracy), *(words[flag] for flag in raised if flag & FINER)],
              "look at": [f"{words[f]}{f': {f.sentence}' * (len(faults) == 1)}" for f in faults],
              "not ended": [f"{to_come} cases are not computed yet"] * bool(to_come),
-             "left out": [*no_grasps(states), *[f"{apart} whose contact changes between"] * (apart > 0)]}  # fmt: skip
+             "left out": [*no_grasps(states), *[f"{_some(apart)}, as its contact changes"] * bool(apart)]}  # fmt: skip
     if gone := [short_name(ds, c) for c, approach in ds.attrs["reach"].items() if approach == ()]:
-        more = f" and {len(gone) - MOST_PLACES} more" * (len(gone) > MOST_PLACES)
-        last = f"out of the reach of {Path(preset).stem}, so last: {', '.join(gone[:MOST_PLACES])}{more}"
-        parts["left out"] = [last, *parts["left out"]]
+        parts["left out"] = [f"out of the reach of {Path(preset).stem}, so last: {_some(gone)}", *parts["left out"]]
     elif preset and not hand_of(ds):
         parts["left out"] = [f"the reach and the forces of the hand, as {preset} cannot be read", *parts["left out"]]
     return [f"{head}: {'; '.join(clauses)}" for head, clauses in parts.items() if clauses]
+
+
+def _some(names: Sequence[str]) -> str:
+    return ", ".join(first_of(names, MOST_PLACES, ""))
 
 
 # --- the answer ------------------------------------------------------------------------------------------------------

@@ -21,6 +21,7 @@ from softjaw.study.run.objects import row_of
 from softjaw.study.run.refine import scores_of_poses
 from softjaw.study.scene import parse_scene
 from softjaw.study.show.best_grasps import best, safe_range
+from softjaw.study.show.places import short_name
 from softjaw.study.show.status import grouped, sessions
 from softjaw.study.table import MOST_NOTES, PAPER, as_csv, as_json
 from tests.study import formula_results
@@ -125,6 +126,8 @@ def test_a_force_between_two_solved_ones_needs_both_and_carries_their_flags():
     assert table.rows[0]["flags"] == Flag.HOLE | Flag.COARSE
     ds.flags.values[1, 0, 1] = Flag.SNAPPED
     assert not best(ds, force=2.0).rows
+    ds.status.values[0, 0, 1] = DONE
+    assert f"left out: {short_name(ds, 1)}, as" in " ".join(best(ds, force=2.0).notes)
 
 
 def test_a_centre_of_mass_that_is_hardly_known_is_said_first():
