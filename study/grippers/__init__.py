@@ -28,6 +28,7 @@ Approach = Annotated[str, Field(pattern="^(minus-)?[xy]$")]
 Size = Annotated[float, Field(gt=0)]
 Pair = Annotated[tuple[float, float], Field(strict=False)]
 Triple = Annotated[tuple[float, float, float], Field(strict=False)]
+IN_FILES = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)  # a table within another does not inherit it
 
 
 class Linkage(BaseModel):
@@ -37,7 +38,7 @@ class Linkage(BaseModel):
     crank from the pivot, the pad's face from the end of the crank.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = IN_FILES
     pivot: Pair
     crank: Pair
     pad: Pair
@@ -67,7 +68,7 @@ class Hand(BaseModel):
     finger and its thickness from the face outwards. ``approaches`` are those that the mounted pads allow.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = IN_FILES
     frame: str = "gripper"
     closing: Literal["x", "y"] = "y"
     stroke_mm: float = Field(math.inf, gt=0)

@@ -88,6 +88,7 @@ def test_joints_are_half_the_gap_within_the_stroke_or_the_angle_of_a_linkage():
     "[hand]\nfingers = 3", "[hand]\nstroke_mm = -1", "[hand]\nclosing = 'z'", "hand =", "[Hand]\nstroke_mm = 40",
     "gripper = 3", "[hand]\nforce_n = [35, 1]", "[hand]\nforce_n = [1, nan]",
     "[hand]\ndepth_mm = inf", "[hand]\nfinger_mm = [-5, 5]", "[hand.joints]\nleft = nan", "[gripper]\npreset = 'wsg50'",
+    "[hand.linkage_mm]\npivot = [nan, 0]\ncrank = [0, 20]\npad = [0, 5]",
 ])  # fmt: skip
 def test_a_file_with_wrong_keys_is_refused(tmp_path, text):
     (tmp_path / "mine.toml").write_text(text)
