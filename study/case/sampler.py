@@ -123,16 +123,16 @@ def antipodal_grasps(
     jaws: Jaws,
     task: Task,
     count: int,
+    samples: int,
     seed: int = 0,
-    samples: int = SAMPLES,
     lids: FloatArray | None = None,
     reached: Callable[[SampledGrasp], bool] = lambda _: True,
 ) -> list[SampledGrasp]:
     """At most ``count`` distinct grasps of a surface, the best first; then those that are not worth a solve.
 
     ``surface`` (k, 3) array, (m, 3) int array: points [m] and triangles. ``task``: what they have to hold. ``count``:
-    grasps that can be solved. ``seed``: of the points where grasps are looked for; the same seed gives the same grasps
-    on every machine. ``samples``: number of those points. ``lids`` (n, 3, 3) array, optional: corners of the triangles
+    grasps that can be solved. ``samples``: number of points where grasps are looked for. ``seed``: of these points; the
+    same seed gives the same grasps on every machine. ``lids`` (n, 3, 3) array, optional: corners of the triangles
     that close holes [m]: no pad is put there if there are other places. ``reached``: whether the hand gets to a grasp
     that can be solved; others are given where there is none.
     """
@@ -313,7 +313,7 @@ def with_sampled_grasps(scene: Scene) -> Scene:
     task, surface, by_hand = task_of(scene), surface_triangles(scene.object), reached_by_hand(scene)
     slope = math.sin(MAX_SLOPE) if has_wall(scene.object) else math.inf
     grasps = antipodal_grasps(
-        surface, jaws_of(scene), task, given.sampled or 1, samples=SAMPLES, lids=lids_of(obj),
+        surface, jaws_of(scene), task, given.sampled or 1, SAMPLES, lids=lids_of(obj),
         reached=lambda grasp: abs(grasp.approach[2]) <= slope and by_hand(grasp),
     )  # fmt: skip
     placed = own_frame(scene.object)

@@ -52,7 +52,7 @@ TEXTS = {
     "report": "best grasps, failures with their reasons, how to read the file",
 }
 CUT = " ..."  # at the end of a text that was too long
-ROUND_COMPLETE = "round complete"  # why a session ended that the next one goes on with
+ROUND_COMPLETE = "round complete"  # why a session ended that the next one continues
 UNFINISHED = "Not all cases of this study are solved yet; this text is written at its end."
 
 

@@ -203,9 +203,10 @@ def certainty(ds: xr.Dataset, places: Sequence[int], score: str, k: int) -> str:
     vague = errors.vague
     close = [(n, vague[i]) for n, (i, better) in enumerate(zip(others, apart, strict=True), start=2) if not better]
     alike, hardly = ([n for n, is_vague in close if is_vague == how] for how in (False, True))
-    more = f", but too little is known of {', '.join(map(str, hardly))}" * bool(hardly)
+    unknown = f"too little is known of {', '.join(map(str, hardly))}"
     if len(hardly) == len(others):
-        return f"too little is known of {', '.join(map(str, hardly))} to compare them with place 1"
+        return f"{unknown} to compare them with place 1"
+    more = f", but {unknown}" * bool(hardly)
     if not alike:
         return f"place 1 is best beyond errors{more}"
     without_gap, last = alike[-1] == len(alike) + 1 > 2, alike.pop()
@@ -222,8 +223,9 @@ def common(marks: np.ndarray) -> int:
 def _notes(ds: xr.Dataset, accuracy: Sequence[str], marks: np.ndarray) -> list[str]:
     """At most five notes by what to do about them: how exact, which flags to look at, what is to come or left out."""
     states = ds.status.values[..., ds.attrs["level"]]
-    apart = [short_name(ds, int(c)) for c in np.flatnonzero(states == MISSING) if "between" in ds.attrs]
-    to_come = np.count_nonzero(ds.status.values == MISSING) * ("between" not in ds.attrs)
+    between = "between" in ds.attrs
+    apart = [short_name(ds, int(c)) for c in np.flatnonzero(between & (states == MISSING))]
+    to_come = np.count_nonzero(ds.status.values == MISSING) * (not between)
     count = {flag: int(np.count_nonzero(marks & flag)) for flag in Flag if flag != Flag.OUT_OF_REACH}
     raised = sorted(filter(count.get, count), key=lambda flag: (-count[flag], flag))
     words = {flag: f"{flag.word} ({count[flag]} of {len(marks)})" for flag in raised}
