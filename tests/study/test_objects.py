@@ -13,7 +13,6 @@ import trimesh
 from mpi4py import MPI
 
 import softjaw
-from softjaw.study.case import sampler
 from softjaw.study.case.result import CaseResult
 from softjaw.study.messages import DONE, IN_USE, OTHER_FILE, SOME_FAILED, STOPPED, USAGE, StudyError
 from softjaw.study.result.index import NO_GRASP, blank_row, code_of, open_index, write_index
@@ -129,7 +128,6 @@ def test_the_command_line_names_meshes_from_where_it_is(scene, objects, count, m
     shutil.copy(scene.parent / "meshes/a.stl", scene.parent / "odd [1]")
     (scene.parent / "some.csv").write_text("mesh\nmeshes/a.stl\nmeshes/longest.stl\n")
     monkeypatch.chdir(scene.parent)
-    monkeypatch.setattr(sampler, "SAMPLES", 30)
     code, text, _ = command(0, "check", "sub/scene.toml", "--objects", objects)
     assert code == DONE
     assert f"{count}: a" in text
